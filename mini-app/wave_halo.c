@@ -26,7 +26,7 @@ void wave_halo_free(wave_halo *halo)
     *halo = (wave_halo){0};
 }
 
-static void pack(const wave_halo *halo, const void *values, int64_t cell_stride, int64_t component_stride)
+static void pack_values(const wave_halo *halo, const void *values, int64_t cell_stride, int64_t component_stride)
 {
     for (int32_t i = 0; i < halo->mesh->send_count; ++i) {
         for (int k = 0; k < COMPONENTS; ++k) {
@@ -41,7 +41,7 @@ static void pack(const wave_halo *halo, const void *values, int64_t cell_stride,
     }
 }
 
-static void unpack(const wave_halo *halo, void *values, int64_t cell_stride, int64_t component_stride)
+static void unpack_values(const wave_halo *halo, void *values, int64_t cell_stride, int64_t component_stride)
 {
     int32_t own = halo->mesh->own_cells, count = halo->mesh->cells - own;
     for (int32_t i = 0; i < count; ++i) {
@@ -69,12 +69,12 @@ void wave_halo_exchange(wave_halo *halo, void *values, int64_t cell_stride, int6
                   COMPONENTS * (link->receive_end - link->receive_begin), type, link->rank, WAVE_TAG_HALO, halo->comm,
                   &halo->requests[count++]);
     }
-    pack(halo, values, cell_stride, component_stride);
+    pack_values(halo, values, cell_stride, component_stride);
     for (int l = 0; l < mesh->link_count; ++l) {
         const wave_link *link = &mesh->links[l];
         MPI_Isend(halo->send + (size_t)link->send_begin * tuple, COMPONENTS * (link->send_end - link->send_begin), type,
                   link->rank, WAVE_TAG_HALO, halo->comm, &halo->requests[count++]);
     }
     MPI_Waitall(count, halo->requests, MPI_STATUSES_IGNORE);
-    unpack(halo, values, cell_stride, component_stride);
+    unpack_values(halo, values, cell_stride, component_stride);
 }

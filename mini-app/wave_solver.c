@@ -87,7 +87,7 @@ static void fill_grid(wave_solver *s)
     }
 }
 
-static void measure(const wave_mesh *mesh, int32_t cell, wave_cell_geometry *out)
+static void measure_cells(const wave_mesh *mesh, int32_t cell, wave_cell_geometry *out)
 {
     int32_t vertex[8];
     int64_t id[8];
@@ -101,7 +101,7 @@ static void measure(const wave_mesh *mesh, int32_t cell, wave_cell_geometry *out
 }
 
 /* Stores the faces and volume of an own cell; returns the largest stable time step for it. */
-static double measure_own(wave_solver *s, int32_t cell, const wave_cell_geometry *g)
+static double measure_own_cells(wave_solver *s, int32_t cell, const wave_cell_geometry *g)
 {
     int bytes = s->setup.real_bytes, count = wave_cell_shape_of(wave_mesh_type(s->mesh, cell))->face_count;
     int64_t first = 4 * wave_mesh_first_face(s->mesh, cell);
@@ -140,12 +140,12 @@ static bool fill_cells(wave_solver *s, double (*centroid)[3])
 {
     wave_cell_geometry g;
     for (int32_t c = 0; c < s->mesh->cells; ++c) {
-        measure(s->mesh, c, &g);
+        measure_cells(s->mesh, c, &g);
         s->layers[c] = wave_medium_layer(&s->setup.medium, g.centroid[2]);
         put_real(s->speed, s->setup.real_bytes, c, s->setup.medium.speed[s->layers[c]]);
         for (int a = 0; a < 3; ++a) centroid[c][a] = g.centroid[a];
         if (c >= s->mesh->own_cells) continue;
-        s->time_step = fmin(s->time_step, measure_own(s, c, &g));
+        s->time_step = fmin(s->time_step, measure_own_cells(s, c, &g));
         if (!add_source_cell(s, c, g.centroid)) return false;
     }
     return true;
@@ -222,7 +222,7 @@ void wave_solver_get(const wave_solver *s, int32_t cell, double state[4])
 void wave_solver_centroid(const wave_solver *s, int32_t cell, double xyz[3])
 {
     wave_cell_geometry g;
-    measure(s->mesh, cell, &g);
+    measure_cells(s->mesh, cell, &g);
     for (int a = 0; a < 3; ++a) xyz[a] = g.centroid[a];
 }
 

@@ -41,7 +41,7 @@ constexpr double interior_threshold = 0.35; // fraction of the field's range bel
 
 using grid_list = std::vector<vtkUnstructuredGrid *>;
 
-grid_list grids_in(vtkDataObject *data)
+grid_list list_grids(vtkDataObject *data)
 {
     grid_list grids;
     const auto add = [&](vtkDataObject *leaf) {
@@ -85,7 +85,7 @@ std::string first_field_of(const grid_list &grids)
 }
 
 /* Returns a tuple's value, or its magnitude if there are several components. */
-double value_of(vtkDataArray *array, vtkIdType i)
+double find_tuple_value(vtkDataArray *array, vtkIdType i)
 {
     const int components = array->GetNumberOfComponents();
     if (components == 1) return array->GetComponent(i, 0);
@@ -94,7 +94,7 @@ double value_of(vtkDataArray *array, vtkIdType i)
     return std::sqrt(square);
 }
 
-vtkDataArray *array_of(vtkDataSet *data, const std::string &field, bool &is_at_points)
+vtkDataArray *find_array(vtkDataSet *data, const std::string &field, bool &is_at_points)
 {
     vtkDataArray *array = data->GetPointData()->GetArray(field.c_str());
     is_at_points = array != nullptr;
@@ -102,7 +102,7 @@ vtkDataArray *array_of(vtkDataSet *data, const std::string &field, bool &is_at_p
 }
 
 /* Returns the highest dimension of the grid's cells. */
-int dimension_of(vtkUnstructuredGrid *grid)
+int find_dimension(vtkUnstructuredGrid *grid)
 {
     vtkNew<vtkCellTypes> types;
     grid->GetCellTypes(types);
@@ -147,15 +147,15 @@ void add_visible_faces(vtkUnstructuredGrid *grid, const std::string &field, cons
     filter->Update();
     vtkPolyData *faces = filter->GetOutput();
     bool is_at_points = false;
-    vtkDataArray *values = array_of(faces, field, is_at_points);
+    vtkDataArray *values = find_array(faces, field, is_at_points);
     for (vtkIdType f = 0; values && f < faces->GetNumberOfCells(); f++) {
         vtkIdType count = 0;
         const vtkIdType *points = nullptr;
         faces->GetCellPoints(f, count, points);
         const double area = count < 3 ? 0 : projected_area(faces, count, points, to_viewer);
-        double value = is_at_points ? 0 : value_of(values, f);
+        double value = is_at_points ? 0 : find_tuple_value(values, f);
         for (vtkIdType k = 0; is_at_points && k < count; k++)
-            value += value_of(values, points[k]) / static_cast<double>(count);
+            value += find_tuple_value(values, points[k]) / static_cast<double>(count);
         if (area > 0 && std::isfinite(value)) visible.push_back({value, area});
     }
 }
@@ -167,9 +167,9 @@ double visible_range_fraction(const grid_list &grids, const std::string &field, 
     std::vector<visible_value> visible;
     for (vtkUnstructuredGrid *grid : grids) {
         bool is_at_points = false;
-        vtkDataArray *values = array_of(grid, field, is_at_points);
+        vtkDataArray *values = find_array(grid, field, is_at_points);
         for (vtkIdType i = 0; values && i < values->GetNumberOfTuples(); i++) {
-            const double value = value_of(values, i);
+            const double value = find_tuple_value(values, i);
             if (!std::isfinite(value)) continue;
             low = std::min(low, value);
             high = std::max(high, value);
@@ -230,14 +230,14 @@ default_look choose_look(const options &o)
     const size_t steps = file->times().size();
     const size_t step = steps ? std::min(static_cast<size_t>(o.first_step), steps - 1) : 0;
     const auto data = grids_of(file->read(step, 0, 1), o.files.front());
-    const grid_list grids = grids_in(data);
+    const grid_list grids = list_grids(data);
     default_look look;
     look.field = o.field.empty() ? first_field_of(grids) : o.field;
     vtkBoundingBox bounds;
     int dimension = 0;
     for (vtkUnstructuredGrid *grid : grids) {
         bounds.AddBounds(grid->GetBounds());
-        dimension = std::max(dimension, dimension_of(grid));
+        dimension = std::max(dimension, find_dimension(grid));
     }
     for (int axis = 0; dimension == 2 && axis < 3; axis++)
         if (bounds.GetLength(axis) <= 1e-6 * bounds.GetMaxLength()) look.flat_axis = axis;

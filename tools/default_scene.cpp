@@ -33,7 +33,7 @@ std::string quoted(const std::string &text)
     return out + '"';
 }
 
-std::string list_of(const std::array<double, 3> &v)
+std::string format_list(const std::array<double, 3> &v)
 {
     std::ostringstream text;
     text.precision(17);
@@ -43,21 +43,21 @@ std::string list_of(const std::array<double, 3> &v)
 
 /* Returns the camera. If the extent of all steps is known, it determines the position, so that the camera does not move
  * between steps. A flat mesh is viewed from the front unless the options specify a direction. */
-std::string camera_of(const options &o, const default_look &look, const data_extent *e)
+std::string format_camera(const options &o, const default_look &look, const data_extent *e)
 {
     std::string automatic = "fit: box", up;
     if (look.flat_axis < 0 || !o.direction.empty()) {
-        automatic += ", direction: " + list_of(eye_direction(o));
-        up = ", up: " + list_of(up_direction(o));
+        automatic += ", direction: " + format_list(eye_direction(o));
+        up = ", up: " + format_list(up_direction(o));
     }
     if (e && e->has_bounds())
-        automatic += ", bounds: [" + list_of({e->low[0], e->low[1], e->low[2]}) + ", " +
-                     list_of({e->high[0], e->high[1], e->high[2]}) + "]";
+        automatic += ", bounds: [" + format_list({e->low[0], e->low[1], e->low[2]}) + ", " +
+                     format_list({e->high[0], e->high[1], e->high[2]}) + "]";
     return "{automatic: {" + automatic + "}" + up + "}";
 }
 
 /* Returns a hash of the text as eight hexadecimal digits (FNV-1a). */
-std::string digits_of(const std::string &text)
+std::string hash_digits(const std::string &text)
 {
     uint32_t hash = 0x811c9dc5U;
     for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x01000193U;
@@ -90,7 +90,7 @@ std::string picture_name(const std::filesystem::path &file)
     std::string apart;
     if (folder != here) apart = folder.string();
     if (stem.size() > 60 || is_shared_name(file, stem)) apart += '/' + file.filename().string();
-    return apart.empty() ? stem : stem.substr(0, 51) + '_' + digits_of(apart);
+    return apart.empty() ? stem : stem.substr(0, 51) + '_' + hash_digits(apart);
 }
 
 } // namespace
@@ -106,7 +106,7 @@ std::string default_scene(const options &o, const default_look &look, const data
     const std::string plane = "planes: [{normal: [" + std::to_string(look.cut[0]) + ", " + std::to_string(look.cut[1]) +
                               ", " + std::to_string(look.cut[2]) + "]}]";
     scene << "images:\n  - name: " << quoted(picture_name(file)) << "\n    size: [" << o.width << ", " << o.height
-          << "]\n    camera: " << camera_of(o, look, extent) << "\n";
+          << "]\n    camera: " << format_camera(o, look, extent) << "\n";
     if (look.is_cut()) scene << "    clip: {" << plane << "}\n";
     scene << "    layers:\n      - surface: {" << (look.field.empty() ? "" : "colour_by: {" + colour.str() + "}");
     scene << "}\n";

@@ -264,7 +264,7 @@ std::string working_folder()
 }
 
 /* Returns the extent of all steps of the source, on every rank. Collective. */
-data_extent extent_of(const rank_info &w, step_source &source, const std::string &field)
+data_extent find_extent(const rank_info &w, step_source &source, const std::string &field)
 {
     data_extent extent;
     run_on_all_ranks(w, [&] {
@@ -290,7 +290,7 @@ std::string text_of_default(const rank_info &w, const options &o, step_source &s
     MPI_Bcast(look.field.data(), length, MPI_CHAR, 0, w.comm);
     if (source.count() == 1) return default_scene(o, look, nullptr);
     if (w.is_root()) std::printf("reading %zu steps ahead, for one range of colours and one camera\n", source.count());
-    const data_extent extent = extent_of(w, source, look.field);
+    const data_extent extent = find_extent(w, source, look.field);
     return default_scene(o, look, &extent);
 }
 

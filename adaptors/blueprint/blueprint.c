@@ -251,7 +251,7 @@ static insitu_status mpi_failure(insitu_blueprint *adaptor)
 }
 
 /* Computes the largest cycle and time over all ranks, and finds the lowest rank with an error, or -1. */
-static insitu_status reduce(insitu_blueprint *adaptor, int *failed_rank)
+static insitu_status reduce_state(insitu_blueprint *adaptor, int *failed_rank)
 {
     int rank, ranks;
     if (MPI_Comm_rank(adaptor->comm, &rank) || MPI_Comm_size(adaptor->comm, &ranks)) return mpi_failure(adaptor);
@@ -297,7 +297,7 @@ insitu_status insitu_blueprint_step(insitu_blueprint *adaptor, const int64_t *cy
     adaptor->report.left_out = adaptor->log.left_out ? adaptor->log.left_out : "";
     adaptor->report.copied_why = adaptor->log.copied_why ? adaptor->log.copied_why : "";
     adaptor->report.bytes_copied = adaptor->log.bytes_copied;
-    insitu_status status = reduce(adaptor, &failed_rank);
+    insitu_status status = reduce_state(adaptor, &failed_rank);
     if (status) return status;
     if (failed_rank >= 0) return share_error(adaptor, failed_rank);
     adaptor->last_cycle = cycle ? *cycle : adaptor->cycle;

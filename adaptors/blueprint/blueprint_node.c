@@ -15,7 +15,7 @@ static void write_path(const node *n, char *out)
     snprintf(out + length, NODE_PATH - length, "%s%s", length && *n->name ? "/" : "", n->name);
 }
 
-static void path_of(const node *parent, const char *path, char *out)
+static void make_path(const node *parent, const char *path, char *out)
 {
     *out = 0;
     write_path(parent, out);
@@ -33,7 +33,7 @@ bool node_set_error(const node *parent, const char *path, insitu_status status, 
     va_start(list, format);
     vsnprintf(what, sizeof what, format, list);
     va_end(list);
-    path_of(parent, path, where);
+    make_path(parent, path, where);
     log->status = status;
     snprintf(log->message, sizeof log->message, "%.500s: %.500s", where, what);
     return false;
@@ -56,14 +56,14 @@ void node_report_left_out(const node *parent, const char *path, const char *form
     va_start(list, format);
     vsnprintf(what, sizeof what, format, list);
     va_end(list);
-    path_of(parent, path, where);
+    make_path(parent, path, where);
     add_line(&parent->log->left_out, where, what);
 }
 
 void node_report_copy(const node *parent, const char *path, int64_t bytes, const char *why)
 {
     char where[NODE_PATH], what[NODE_PATH];
-    path_of(parent, path, where);
+    make_path(parent, path, where);
     snprintf(what, sizeof what, "%s (%lld bytes)", why, (long long)bytes);
     add_line(&parent->log->copied_why, where, what);
     parent->log->bytes_copied += bytes;
@@ -124,7 +124,7 @@ bool node_string(const node *parent, const char *path, const char **out)
 /* ---- arrays ----------------------------------------------------------------------------------------------------- */
 
 /* Converts a Conduit type id (3 to 12) to an insitu_type. Returns 0 for other ids, which are not numeric. */
-static int type_of(int64_t id)
+static int find_type(int64_t id)
 {
     static const unsigned char types[] = {0,
                                           0,
@@ -144,7 +144,7 @@ static int type_of(int64_t id)
 
 bool node_read_array(const node *of, node_array *out)
 {
-    const int type = type_of(of->conduit->id(of->at));
+    const int type = find_type(of->conduit->id(of->at));
     if (!type) return node_set_error(of, "", INSITU_ERROR_MESH, "is no array of numbers");
     *out = (node_array){.count = of->conduit->number_of_elements(of->at)};
     out->array.type = (insitu_type)type;

@@ -106,7 +106,7 @@ static bool find_parameters(const node *root)
 }
 
 /* Makes an error in the node of any rank an error on all ranks. */
-static insitu_status agree(MPI_Comm comm, const node_log *log)
+static insitu_status agree_on_error(MPI_Comm comm, const node_log *log)
 {
     int worst = (int)log->status;
     MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_INT, MPI_MAX, comm);
@@ -134,7 +134,7 @@ insitu_status catalyst_adaptor_initialize(const insitu_conduit *conduit, const v
     state = (struct catalyst_state){.conduit = conduit};
     if (find_communicator(&root, &comm) && find_parameters(&root)) find_scene(&root, &scene, &is_text);
     MPI_Comm_rank(comm, &state.rank);
-    insitu_status status = agree(comm, &log);
+    insitu_status status = agree_on_error(comm, &log);
     if (!status) status = open_session(comm, scene, is_text);
     node_log_free(&log);
     return status;

@@ -5,7 +5,7 @@
 #include "insitu/conduit.h"
 
 /* Converts errors of libinsitu to numbers above those that Catalyst uses itself. */
-static enum catalyst_status status_of(insitu_status status)
+static enum catalyst_status convert_status(insitu_status status)
 {
     return status ? (enum catalyst_status)(100 + (int)status) : catalyst_status_ok;
 }
@@ -29,18 +29,18 @@ static const catalyst_writer writer = {set_string, set_integer, set_real};
 
 enum catalyst_status catalyst_initialize_insitu(const conduit_node *params)
 {
-    return status_of(catalyst_adaptor_initialize(&insitu_conduit_functions, params));
+    return convert_status(catalyst_adaptor_initialize(&insitu_conduit_functions, params));
 }
 
 enum catalyst_status catalyst_execute_insitu(const conduit_node *params)
 {
-    return status_of(catalyst_adaptor_execute(params));
+    return convert_status(catalyst_adaptor_execute(params));
 }
 
 enum catalyst_status catalyst_finalize_insitu(const conduit_node *params)
 {
     (void)params;
-    return status_of(catalyst_adaptor_finalize());
+    return convert_status(catalyst_adaptor_finalize());
 }
 
 enum catalyst_status catalyst_about_insitu(conduit_node *params)

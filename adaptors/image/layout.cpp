@@ -71,7 +71,7 @@ bool is_at_side(insitu_anchor at)
     return at == INSITU_LEFT || at == INSITU_RIGHT;
 }
 
-area bounds_at(const layout_state &s, insitu_anchor at, double width, double height)
+area find_anchored_bounds(const layout_state &s, insitu_anchor at, double width, double height)
 {
     const double middle_x = std::floor(0.5 * (s.image.width - width)),
                  middle_y = std::floor(0.5 * (s.image.height - height));
@@ -84,7 +84,7 @@ area bounds_at(const layout_state &s, insitu_anchor at, double width, double hei
  * times, so that blocks with the same anchor are stacked. */
 bool find_free_bounds(const layout_state &s, insitu_anchor at, double width, double height, area &bounds)
 {
-    const area anchored = bounds_at(s, at, width, height);
+    const area anchored = find_anchored_bounds(s, at, width, height);
     std::vector<double> xs{anchored.x0}, ys{anchored.y0};
     for (const block &b : s.out.blocks) {
         xs.insert(xs.end(), {b.bounds.x1, b.bounds.x0 - width});
@@ -118,7 +118,7 @@ std::size_t bytes_that_fit(const layout_state &s, const std::string &word, int s
 }
 
 /* Wraps text at blanks. A word that is wider than the available width is split. */
-std::vector<std::string> wrap(const layout_state &s, const std::string &text, int size, double available_width)
+std::vector<std::string> wrap_text(const layout_state &s, const std::string &text, int size, double available_width)
 {
     std::vector<std::string> lines;
     if (s.measure(text, size) <= available_width) return {text};
@@ -147,7 +147,7 @@ std::vector<std::string> wrap(const layout_state &s, const std::string &text, in
     return lines;
 }
 
-double width_of(const layout_state &s, const std::vector<std::string> &lines, int size)
+double measure_lines(const layout_state &s, const std::vector<std::string> &lines, int size)
 {
     int width = 0;
     for (const std::string &line : lines) width = std::max(width, s.measure(line, size));
@@ -183,12 +183,12 @@ bool place_words(layout_state &s, int index)
         for (const double share : shares) {
             const double pads = 2 * pixels(padding, size), available_width = share * (s.x1 - s.x0) - pads;
             if (!(available_width > size)) continue;
-            const std::vector<std::string> lines = wrap(s, words.text, size, available_width);
+            const std::vector<std::string> lines = wrap_text(s, words.text, size, available_width);
             const bool is_last = size == sizes.back();
             if (!is_last && (lines.size() > MOST_LINES || !is_wrapped_at_blanks(words.text, lines))) continue;
             block b{block_kind::words, index, size, {}, {}, {}, {}};
             const double height = std::ceil(static_cast<double>(lines.size()) * line_height * size) + pads;
-            if (!find_free_bounds(s, words.at, width_of(s, lines, size) + pads, height, b.bounds)) continue;
+            if (!find_free_bounds(s, words.at, measure_lines(s, lines, size) + pads, height, b.bounds)) continue;
             align_lines(s, lines, words.at, b);
             s.out.blocks.push_back(b);
             return true;
@@ -219,10 +219,10 @@ bar_group make_group(const layout_state &s, const std::vector<int> &bars, insitu
         for (int k = 0; k < bar.tick_count; k++) numbers = std::max(numbers, s.measure(bar.ticks[k].text, size));
         const double body = (thickness + 0.5) * size + numbers;
         const double most = std::min(std::max(body, label_width * size), s.x1 - s.x0 - 2 * pixels(padding, size));
-        g.labels.push_back(wrap(s, bar.label, size, most));
+        g.labels.push_back(wrap_text(s, bar.label, size, most));
         g.is_readable = g.is_readable && g.labels.back().size() <= MOST_LABEL_LINES &&
                         is_wrapped_at_blanks(bar.label, g.labels.back());
-        g.width = std::max({g.width, body, width_of(s, g.labels.back(), size)});
+        g.width = std::max({g.width, body, measure_lines(s, g.labels.back(), size)});
         lines = std::max(lines, g.labels.back().size());
     }
     g.width = std::ceil(g.width) + 2 * pixels(padding, size);

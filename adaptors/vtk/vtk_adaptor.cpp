@@ -307,7 +307,8 @@ void set_converted_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_
     auto *at = vtkUniformGridAMRDataIterator::SafeDownCast(it);
     vtkSmartPointer<vtkUnsignedCharArray> flags;
     if (amr && at)
-        flags = refined_flags(amr, at->GetCurrentLevel(), at->GetCurrentIndex(), data, "mesh '" + name + "'", out.log);
+        flags =
+            make_refined_flags(amr, at->GetCurrentLevel(), at->GetCurrentIndex(), data, "mesh '" + name + "'", out.log);
     set_converted(adaptor, parts, name, data, flags, out);
 }
 

@@ -81,7 +81,7 @@ int64_t ratio_to_next(vtkOverlappingAMR *amr, unsigned level)
 }
 
 /* Returns a copy of data's ghost flags, or zeros if there are none. */
-vtkSmartPointer<vtkUnsignedCharArray> copied_flags(vtkDataSet *data)
+vtkSmartPointer<vtkUnsignedCharArray> copy_flags(vtkDataSet *data)
 {
     const auto own = vtkSmartPointer<vtkUnsignedCharArray>::Take(
         insitu_vtk_ghost_flags(data->GetCellData(), data->GetNumberOfCells()));
@@ -105,8 +105,8 @@ void flag_refined(const box &in, const box &part, vtkUnsignedCharArray *flags)
 
 } // namespace
 
-vtkSmartPointer<vtkUnsignedCharArray> refined_flags(vtkOverlappingAMR *amr, unsigned level, unsigned number,
-                                                    vtkDataSet *data, const std::string &what, conversion_log &log)
+vtkSmartPointer<vtkUnsignedCharArray> make_refined_flags(vtkOverlappingAMR *amr, unsigned level, unsigned number,
+                                                         vtkDataSet *data, const std::string &what, conversion_log &log)
 {
     vtkSmartPointer<vtkUnsignedCharArray> flags;
     if (!amr->GetAMRInfo() || level + 1 >= amr->GetNumberOfLevels()) return flags;
@@ -121,7 +121,7 @@ vtkSmartPointer<vtkUnsignedCharArray> refined_flags(vtkOverlappingAMR *amr, unsi
     for (unsigned i = 0; i < finer; i++) {
         const box part = intersection(own, cells_of(amr->GetAMRBox(level + 1, i), ratio));
         if (part.is_empty()) continue;
-        if (!flags) flags = copied_flags(data);
+        if (!flags) flags = copy_flags(data);
         flag_refined(own, part, flags);
     }
     return flags;

@@ -32,7 +32,7 @@ template <typename T> constexpr insitu_type element_type()
         return sizeof(T) == 4 ? INSITU_FLOAT32 : INSITU_FLOAT64;
 }
 
-array_view shape_of(vtkDataArray *array, insitu_type type)
+array_view describe_array(vtkDataArray *array, insitu_type type)
 {
     array_view view;
     view.type = type;
@@ -47,7 +47,7 @@ template <typename T> bool borrow_aos(vtkDataArray *array, array_view &view)
 {
     auto *typed = vtkAOSDataArrayTemplate<T>::FastDownCast(array);
     if (!typed) return false;
-    view = shape_of(array, element_type<T>());
+    view = describe_array(array, element_type<T>());
     view.data = typed->GetPointer(0);
     return true;
 }
@@ -71,7 +71,7 @@ template <typename T> bool borrow_soa(vtkDataArray *array, array_view &view)
     if (!typed || array->GetNumberOfTuples() == 0) return false;
     const int64_t stride = block_stride(typed);
     if (stride == 0) return false;
-    view = shape_of(array, element_type<T>());
+    view = describe_array(array, element_type<T>());
     view.data = typed->GetComponentArrayPointer(0);
     view.tuple_stride_bytes = sizeof(T);
     view.component_stride_bytes = stride;
@@ -88,7 +88,7 @@ template <typename From, typename To> bool convert(vtkDataArray *array, held_arr
 {
     auto *typed = vtkAOSDataArrayTemplate<From>::FastDownCast(array);
     if (!typed) return false;
-    view = shape_of(array, element_type<To>());
+    view = describe_array(array, element_type<To>());
     const int64_t count = view.tuple_count * view.component_count;
     auto *to = reinterpret_cast<To *>(held.allocate(static_cast<size_t>(count) * sizeof(To)));
     const From *from = typed->GetPointer(0);
@@ -100,7 +100,7 @@ template <typename From, typename To> bool convert(vtkDataArray *array, held_arr
 /* Copies an array of any class, through VTK's access by double. */
 template <typename To> array_view convert_any(vtkDataArray *array, held_arrays &held)
 {
-    array_view view = shape_of(array, element_type<To>());
+    array_view view = describe_array(array, element_type<To>());
     const size_t count = static_cast<size_t>(view.tuple_count) * static_cast<size_t>(view.component_count);
     auto *to = reinterpret_cast<To *>(held.allocate(count * sizeof(To)));
     view.data = to;
@@ -120,7 +120,7 @@ array_view copy_array(vtkDataArray *array, held_arrays &held)
     return convert_any<double>(array, held);
 }
 
-int64_t bytes_of(const array_view &view)
+int64_t count_bytes(const array_view &view)
 {
     return view.tuple_count * view.component_count * type_size(view.type);
 }
@@ -144,7 +144,7 @@ const char *type_name(insitu_type type)
     }
 }
 
-std::string why_copied(vtkDataArray *array, const array_view &copy)
+std::string find_copy_reason(vtkDataArray *array, const array_view &copy)
 {
     if (is_known_type(array)) return "components not laid out evenly";
     return std::string(array->GetDataTypeAsString()) + " values to " + type_name(copy.type);
@@ -223,11 +223,11 @@ array_view view_array(vtkDataArray *array, const std::string &what, held_arrays 
     if (borrow<float>(array, view) || borrow<double>(array, view) || borrow<int>(array, view) ||
         borrow<long>(array, view) || borrow<long long>(array, view)) {
         held.objects.emplace_back(array);
-        log.bytes_borrowed += bytes_of(view);
+        log.bytes_borrowed += count_bytes(view);
         return view;
     }
     view = copy_array(array, held);
-    log.copied(what, why_copied(array, view), bytes_of(view));
+    log.copied(what, find_copy_reason(array, view), count_bytes(view));
     return view;
 }
 
@@ -242,10 +242,10 @@ void view_points(vtkDataArray *points, const std::string &what, held_arrays &hel
     array_view view;
     if (borrow_aos<float>(points, view) || borrow_aos<double>(points, view)) {
         held.objects.emplace_back(points);
-        log.bytes_borrowed += bytes_of(view);
+        log.bytes_borrowed += count_bytes(view);
     } else {
         view = convert_any<double>(points, held);
-        log.copied(what, std::string(points->GetDataTypeAsString()) + " coordinates to float64", bytes_of(view));
+        log.copied(what, std::string(points->GetDataTypeAsString()) + " coordinates to float64", count_bytes(view));
     }
     for (int c = 0; c < 3; c++) coordinates[c] = view.component(c);
 }

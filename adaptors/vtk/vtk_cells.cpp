@@ -256,7 +256,7 @@ void fill_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces, uint
 }
 
 /* Names the conversions that the cells need, for example "voxels reordered, faces of polyhedra shared". */
-std::string why_converted(const std::array<int64_t, 256> &by_type)
+std::string find_conversion_reason(const std::array<int64_t, 256> &by_type)
 {
     const char *const reasons[] = {"some cells not drawn",
                                    "points and lines left out",
@@ -374,7 +374,7 @@ bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, 
         view.cells.count = raw.count;
         borrow_cells(grid, raw, by_type, connectivity_count, view);
     } else {
-        convert_cells(grid, raw, why_converted(by_type), view);
+        convert_cells(grid, raw, find_conversion_reason(by_type), view);
     }
     return true;
 }

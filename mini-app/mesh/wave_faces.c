@@ -59,7 +59,7 @@ static face_entry *find_entry(const face_table *table, const int64_t key[4], uin
 }
 
 /* Checks whether all vertices of the face lie on the same wall of the box. */
-static bool on_a_wall(const wave_mesh *mesh, int32_t cell, int face)
+static bool is_on_wall(const wave_mesh *mesh, int32_t cell, int face)
 {
     const wave_lattice *lattice = &mesh->partition.lattice;
     int32_t v[8];
@@ -108,7 +108,7 @@ static void count_unmatched(wave_mesh *mesh)
         int faces = wave_cell_shape_of(wave_mesh_type(mesh, c))->face_count;
         for (int f = 0; f < faces; ++f) {
             /* A face must have a neighbour if and only if it is not on a wall. */
-            mesh->unmatched += (mesh->neighbours[first + f] < 0) != on_a_wall(mesh, c, f);
+            mesh->unmatched += (mesh->neighbours[first + f] < 0) != is_on_wall(mesh, c, f);
         }
     }
 }

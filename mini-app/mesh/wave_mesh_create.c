@@ -81,7 +81,7 @@ static bool find_own_cubes(mesh_builder *m)
 
 /* Computes the owners of a cube and of the 26 cubes around it, -1 outside the lattice. Returns true if any of them is
  * another rank. */
-static bool owners_around(const wave_mesh *mesh, int64_t cube, int owner[3][3][3])
+static bool list_owners_around(const wave_mesh *mesh, int64_t cube, int owner[3][3][3])
 {
     const wave_lattice *lattice = &mesh->partition.lattice;
     int ijk[3];
@@ -211,7 +211,7 @@ static bool make_own_cells(mesh_builder *m)
     for (int64_t i = 0; i < m->own.count; ++i) {
         int64_t cube = m->own.items[i].value;
         int count = wave_lattice_cells(&m->mesh->partition.lattice, cube, cells);
-        bool foreign = owners_around(m->mesh, cube, owner);
+        bool foreign = list_owners_around(m->mesh, cube, owner);
         if (foreign && !add_foreign_cubes(m, cube, owner)) return false;
         for (int c = 0; c < count; ++c) {
             if (foreign && !add_sends(m, cube, m->mesh->cells, &cells[c], owner)) return false;
@@ -319,7 +319,7 @@ static bool make_around(wave_mesh *mesh)
     return true;
 }
 
-static void drop_what_a_uniform_mesh_needs_not(wave_mesh *mesh)
+static void drop_uniform_arrays(wave_mesh *mesh)
 {
     mesh->uniform_type = wave_lattice_uniform_type(&mesh->partition.lattice);
     if (!mesh->uniform_type) return;
@@ -340,7 +340,7 @@ bool wave_mesh_create(const wave_partition *partition, int rank, int index_bytes
     free(m.own.items);
     free(m.foreign.items);
     free(m.sends.items);
-    if (ok) drop_what_a_uniform_mesh_needs_not(mesh);
+    if (ok) drop_uniform_arrays(mesh);
     ok = ok && make_around(mesh) && wave_faces_find_neighbours(mesh);
     if (!ok) wave_mesh_free(mesh);
     return ok;

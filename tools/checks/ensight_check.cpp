@@ -208,7 +208,7 @@ struct values_section {
     bool has_undefined = false, is_partial = false;
 };
 
-values_section section_of(const std::string &line)
+values_section parse_section(const std::string &line)
 {
     std::istringstream in(line);
     values_section s;
@@ -252,7 +252,7 @@ std::string check_values(ensight_stream &in, const geometry &parts, int componen
             continue;
         }
         if (!part) in.fail("\"" + line + "\" is not understood");
-        const values_section section = section_of(line);
+        const values_section section = parse_section(line);
         const auto element = part->elements.find(section.word);
         const bool is_block = section.word == "block",
                    is_points = is_per_node && (is_block || section.word == "coordinates");
@@ -284,7 +284,7 @@ void check_variable(const std::string &path, encoding how, const std::vector<geo
 }
 
 /* Splits "1 1 name file" into words, without the leading numbers of time and file sets. */
-std::vector<std::string> words_of(const std::string &text)
+std::vector<std::string> split_words(const std::string &text)
 {
     std::vector<std::string> words;
     std::istringstream in(text);
@@ -301,7 +301,7 @@ int components_of(const std::string &key)
     return starts_with(key, "tensor asym") ? 9 : 0;
 }
 
-std::vector<case_file> files_of(const std::string &case_path)
+std::vector<case_file> list_files(const std::string &case_path)
 {
     std::vector<case_file> files;
     std::ifstream in(case_path);
@@ -316,7 +316,7 @@ std::vector<case_file> files_of(const std::string &case_path)
                                      ": names in quotes are not read, found " + line.substr(line.find('"', colon)) +
                                      ", expected names without blanks");
         const std::string key = line.substr(start, colon - start);
-        const std::vector<std::string> words = words_of(line.substr(colon + 1));
+        const std::vector<std::string> words = split_words(line.substr(colon + 1));
         if (key == "type") is_gold = words.size() == 2 && words[0] == "ensight" && words[1] == "gold";
         if (key == "measured") throw std::runtime_error(case_path + ": measured particles are not read");
         if (key == "model" && !words.empty()) files.push_back({words[0]});
@@ -358,7 +358,7 @@ std::map<std::string, std::string> matching_files(const std::string &folder, con
 void check_ensight(const std::string &case_path)
 {
     const std::string folder = case_path.substr(0, case_path.find_last_of('/') + 1);
-    const std::vector<case_file> files = files_of(case_path);
+    const std::vector<case_file> files = list_files(case_path);
     std::map<std::string, std::vector<geometry>>
         geometries; // geometries of the steps, by the digits in the file's name
     encoding how = encoding::text;

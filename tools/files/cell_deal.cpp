@@ -27,7 +27,7 @@ struct leaf {
 };
 
 /* Returns a hash of the number (the finalizer of splitmix64). */
-uint64_t mix(uint64_t x)
+uint64_t hash_number(uint64_t x)
 {
     x += 0x9e3779b97f4a7c15u;
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -47,7 +47,7 @@ class owner
     {
         const auto ranks = static_cast<uint64_t>(ranks_);
         switch (how_) {
-        case partition::random: return static_cast<int>(mix(static_cast<uint64_t>(number)) % ranks);
+        case partition::random: return static_cast<int>(hash_number(static_cast<uint64_t>(number)) % ranks);
         case partition::checkerboard: return static_cast<int>(square(grid, cell) % ranks);
         default: return static_cast<int>(number * ranks_ / cells_);
         }
@@ -77,7 +77,7 @@ class owner
     const vtkBoundingBox &bounds_;
 };
 
-std::vector<leaf> leaves_of(vtkDataObject *data)
+std::vector<leaf> list_leaves(vtkDataObject *data)
 {
     std::vector<leaf> leaves;
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
@@ -102,7 +102,8 @@ int64_t number_cells(std::vector<leaf> &leaves, vtkBoundingBox &bounds)
     return count;
 }
 
-vtkSmartPointer<vtkDataObject> part_of(vtkUnstructuredGrid *grid, int64_t first_cell, const owner &owners, int rank)
+vtkSmartPointer<vtkDataObject> extract_part(vtkUnstructuredGrid *grid, int64_t first_cell, const owner &owners,
+                                            int rank)
 {
     std::vector<vtkIdType> mine;
     for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++)
@@ -130,12 +131,13 @@ bool parse_partition(const std::string &text, partition &out)
 vtkSmartPointer<vtkDataObject> distribute_cells(vtkDataObject *data, partition how, int rank, int ranks)
 {
     if (!data || ranks == 1) return data;
-    std::vector<leaf> leaves = leaves_of(data);
+    std::vector<leaf> leaves = list_leaves(data);
     vtkBoundingBox bounds;
     const int64_t cells = number_cells(leaves, bounds);
     const owner owners(how, ranks, std::max<int64_t>(cells, 1), bounds);
     auto part = [&](const leaf &l) -> vtkSmartPointer<vtkDataObject> {
-        if (auto *grid = vtkUnstructuredGrid::SafeDownCast(l.data)) return part_of(grid, l.first_cell, owners, rank);
+        if (auto *grid = vtkUnstructuredGrid::SafeDownCast(l.data))
+            return extract_part(grid, l.first_cell, owners, rank);
         return rank == 0 ? l.data : nullptr;
     };
     if (!vtkCompositeDataSet::SafeDownCast(data)) return part(leaves[0]);

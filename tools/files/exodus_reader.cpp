@@ -59,7 +59,7 @@ std::string upper(std::string text)
 
 /* Returns the shape of a block's elements from the first three letters of their type, as VTK does. A triangular shell
  * is called SHELL3, SHELL6 or TRISHELL. */
-shape shape_of(const element_block &b)
+shape find_shape(const element_block &b)
 {
     static const std::map<std::string, shape> shapes = {
         {"TRI", {VTK_TRIANGLE, 3}},   {"QUA", {VTK_QUAD, 4}},       {"SHE", {VTK_QUAD, 4}},
@@ -80,7 +80,7 @@ bool has_vtk_type(const element_block &b)
     static const std::map<int, std::vector<int64_t>> node_counts = {
         {VTK_TRIANGLE, {3, 6}}, {VTK_QUAD, {4, 8}},           {VTK_TETRA, {4, 10, 15}},
         {VTK_PYRAMID, {5, 13}}, {VTK_WEDGE, {6, 15, 18, 21}}, {VTK_HEXAHEDRON, {8, 20, 27}}};
-    const auto found = node_counts.find(shape_of(b).cell_type);
+    const auto found = node_counts.find(find_shape(b).cell_type);
     return found == node_counts.end() || std::count(found->second.begin(), found->second.end(), b.nodes) > 0;
 }
 
@@ -94,7 +94,7 @@ std::string describe(int64_t id, const element_block &b)
  * is unknown. The message is more specific than VTK's. */
 void check_elements(const std::string &path, int64_t id, const element_block &b)
 {
-    const int64_t corners = shape_of(b).corners;
+    const int64_t corners = find_shape(b).corners;
     if (b.elements == 0 || b.nodes == 0 || (corners > 0 && b.nodes >= corners)) return;
     throw std::runtime_error(
         path + ": cannot be read: " + describe(id, b) +
@@ -157,7 +157,7 @@ class exodus_file
 /* Replaces the grid's cells by linear cells with the same corners. Returns an error message, or "". */
 std::string set_cells(vtkUnstructuredGrid *grid, const element_block &b, const std::vector<int64_t> &nodes)
 {
-    const shape s = shape_of(b);
+    const shape s = find_shape(b);
     const vtkIdType points = grid->GetNumberOfPoints();
     if (nodes.empty()) return "have a connectivity that cannot be read";
     vtkNew<vtkIdTypeArray> offsets, corners;
@@ -209,7 +209,7 @@ class reader : public vtkExodusIIReader
     std::map<int64_t, element_block> blocks_;
 
     /* Returns the block from which a grid was made; null if it is unknown or the grid has no cells. */
-    const element_block *block_of(vtkUnstructuredGrid *grid, int64_t &id) const
+    const element_block *find_block(vtkUnstructuredGrid *grid, int64_t &id) const
     {
         vtkDataArray *ids = grid ? grid->GetCellData()->GetArray(GetObjectIdArrayName()) : nullptr;
         if (!ids || ids->GetNumberOfTuples() == 0 || grid->GetNumberOfCells() == 0) return nullptr;
@@ -232,7 +232,7 @@ class reader : public vtkExodusIIReader
             auto *grid = vtkUnstructuredGrid::SafeDownCast(all->GetBlock(i));
             if (!grid) continue;
             int64_t id = 0;
-            const element_block *b = block_of(grid, id);
+            const element_block *b = find_block(grid, id);
             if (b && has_other_cells(grid, *b)) {
                 const std::string wrong = replace_cells(grid, id, *b);
                 if (!wrong.empty()) return describe(id, *b) + " " + wrong;
@@ -249,7 +249,7 @@ class reader : public vtkExodusIIReader
 
     std::string replace_cells(vtkUnstructuredGrid *grid, int64_t id, const element_block &b)
     {
-        if (GetSqueezePoints() || shape_of(b).cell_type == VTK_EMPTY_CELL) return "are of no type that is read";
+        if (GetSqueezePoints() || find_shape(b).cell_type == VTK_EMPTY_CELL) return "are of no type that is read";
         const exodus_file file(GetFileName());
         return set_cells(grid, b, file.is_open() ? file.connectivity(id, b) : std::vector<int64_t>{});
     }

@@ -25,7 +25,7 @@ namespace
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> folders_in(const fs::path &folder)
+std::vector<std::string> list_folders(const fs::path &folder)
 {
     std::vector<std::string> names;
     std::error_code code;
@@ -40,10 +40,10 @@ bool are_digits(const std::string &text)
 }
 
 /* Returns the folders of steps by their times. */
-std::map<double, std::string> steps_in(const fs::path &folder)
+std::map<double, std::string> list_steps(const fs::path &folder)
 {
     std::map<double, std::string> steps;
-    for (const std::string &name : folders_in(folder)) {
+    for (const std::string &name : list_folders(folder)) {
         char *end = nullptr;
         const double time = std::strtod(name.c_str(), &end);
         if (std::isdigit(static_cast<unsigned char>(name[0])) && !*end) steps[time] = name;
@@ -57,21 +57,21 @@ bool has_mesh(const fs::path &folder)
     std::error_code code;
     const fs::path constant = folder / "constant";
     if (fs::is_directory(constant / "polyMesh", code)) return true;
-    const auto regions = folders_in(constant);
+    const auto regions = list_folders(constant);
     return std::any_of(regions.begin(), regions.end(),
                        [&](const std::string &name) { return fs::is_directory(constant / name / "polyMesh", code); });
 }
 
-std::string folder_of(size_t processor)
+std::string name_processor_folder(size_t processor)
 {
     return "processor" + std::to_string(processor);
 }
 
 /* Returns the numbers of the processors that have a folder, in ascending order. */
-std::vector<int> processors_in(const fs::path &folder)
+std::vector<int> list_processors(const fs::path &folder)
 {
     std::vector<int> numbers;
-    for (const std::string &name : folders_in(folder))
+    for (const std::string &name : list_folders(folder))
         if (name.compare(0, 9, "processor") == 0 && are_digits(name.substr(9)) && name.size() < 18)
             numbers.push_back(std::atoi(name.c_str() + 9));
     std::sort(numbers.begin(), numbers.end());
@@ -81,7 +81,7 @@ std::vector<int> processors_in(const fs::path &folder)
 void check_processors(const std::string &path, const fs::path &folder, const std::vector<int> &numbers)
 {
     for (size_t i = 0; i < numbers.size(); i++) {
-        const std::string name = folder_of(i);
+        const std::string name = name_processor_folder(i);
         if (numbers[i] != static_cast<int>(i))
             throw std::runtime_error(std::string(path)
                                          .append(": ")
@@ -98,7 +98,7 @@ void check_processors(const std::string &path, const fs::path &folder, const std
 /* Throws if there are no folders of single processors, but one folder for several in OpenFOAM's collated format. */
 void check_collated(const std::string &path, const fs::path &folder)
 {
-    for (const std::string &name : folders_in(folder))
+    for (const std::string &name : list_folders(folder))
         if (name.compare(0, 10, "processors") == 0 && std::isdigit(static_cast<unsigned char>(name[10])))
             throw std::runtime_error(std::string(path).append(": ").append(name).append(
                 "/ is of OpenFOAM's collated format, which is not read: run reconstructPar first"));
@@ -109,13 +109,13 @@ std::unique_ptr<parts_file> open_processors(const fs::path &path, size_t count)
 {
     const fs::path folder = path.parent_path();
     std::vector<std::string> parts, warnings;
-    std::map<double, std::string> common = steps_in(folder / folder_of(0));
+    std::map<double, std::string> common = list_steps(folder / name_processor_folder(0));
     for (size_t p = 0; p < count; p++) {
-        parts.push_back((folder / folder_of(p) / path.filename()).string());
-        const auto steps = steps_in(folder / folder_of(p));
+        parts.push_back((folder / name_processor_folder(p) / path.filename()).string());
+        const auto steps = list_steps(folder / name_processor_folder(p));
         for (auto at = common.begin(); at != common.end();) {
             const bool is_there = steps.count(at->first) > 0;
-            if (!is_there) warnings.push_back(folder_of(p) + "/ has no step " + at->second + ": left out");
+            if (!is_there) warnings.push_back(name_processor_folder(p) + "/ has no step " + at->second + ": left out");
             at = is_there ? std::next(at) : common.erase(at);
         }
     }
@@ -132,13 +132,13 @@ std::unique_ptr<parts_file> open_processors(const fs::path &path, size_t count)
 std::unique_ptr<data_file> open_decomposed_foam(const std::string &path)
 {
     const fs::path folder = fs::absolute(path).parent_path();
-    const std::vector<int> numbers = processors_in(folder);
+    const std::vector<int> numbers = list_processors(folder);
     const bool is_whole = has_mesh(folder);
     if (numbers.empty()) {
         if (!is_whole) check_collated(path, folder);
         return nullptr;
     }
-    const auto own = steps_in(folder), of_first = steps_in(folder / "processor0");
+    const auto own = list_steps(folder), of_first = list_steps(folder / "processor0");
     const auto last = [](const std::map<double, std::string> &steps) {
         return steps.empty() ? -1 : steps.rbegin()->first;
     };

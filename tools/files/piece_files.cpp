@@ -41,7 +41,7 @@ namespace
     throw std::runtime_error(path + ": " + why);
 }
 
-std::string beside(const std::string &path, const std::string &name)
+std::string make_sibling_path(const std::string &path, const std::string &name)
 {
     return name[0] == '/' ? name : path.substr(0, path.find_last_of('/') + 1) + name;
 }
@@ -63,7 +63,7 @@ vtkSmartPointer<vtkXMLDataElement> read_list(const std::string &path, const char
 }
 
 /* Returns the child elements with this name. */
-std::vector<vtkSmartPointer<vtkXMLDataElement>> elements_of(vtkXMLDataElement *parent, const char *name)
+std::vector<vtkSmartPointer<vtkXMLDataElement>> list_elements(vtkXMLDataElement *parent, const char *name)
 {
     std::vector<vtkSmartPointer<vtkXMLDataElement>> found;
     for (int i = 0; i < parent->GetNumberOfNestedElements(); i++)
@@ -77,7 +77,7 @@ std::string file_named_by(vtkXMLDataElement *element, const char *attribute, con
 {
     const char *name = element->GetAttribute(attribute);
     if (!name || !name[0]) refuse(path, "a " + std::string(element->GetName()) + " names no file");
-    std::string file = beside(path, name);
+    std::string file = make_sibling_path(path, name);
     const std::string why_not = why_not_data(file);
     if (!why_not.empty()) refuse(path, why_not);
     return file;
@@ -134,7 +134,7 @@ class pvtu_file : public data_file
     {
         const auto list = read_list(path, "PUnstructuredGrid");
         fields_ = declared_fields(list);
-        for (const auto &piece : elements_of(list, "Piece")) pieces_.push_back(file_named_by(piece, "Source", path));
+        for (const auto &piece : list_elements(list, "Piece")) pieces_.push_back(file_named_by(piece, "Source", path));
     }
 
     const std::vector<double> &times() const override { return times_; }
@@ -278,7 +278,7 @@ std::unique_ptr<data_file> open_pvd(const std::string &path)
 {
     std::vector<series_step> steps;
     bool has_times = true;
-    for (const auto &element : elements_of(read_list(path, "Collection"), "DataSet")) {
+    for (const auto &element : list_elements(read_list(path, "Collection"), "DataSet")) {
         const char *text = element->GetAttribute("timestep");
         has_times = has_times && text;
         const double time = text ? parse_time(text, path) : 0;
@@ -303,7 +303,7 @@ std::unique_ptr<data_file> open_series(const std::string &path)
         if (!entry.isObject() || !entry["name"].isString() || entry["name"].asString().empty())
             refuse(path, "an entry of \"files\" has no \"name\"");
         if (!entry["time"].isNumeric()) refuse(path, entry["name"].asString() + ": \"time\" is no number");
-        const std::string file = beside(path, entry["name"].asString()), why_not = why_not_data(file);
+        const std::string file = make_sibling_path(path, entry["name"].asString()), why_not = why_not_data(file);
         if (!why_not.empty()) refuse(path, why_not);
         steps.push_back({entry["time"].asDouble(), {file}});
     }
