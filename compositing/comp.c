@@ -72,7 +72,7 @@ static void choose_owners(composition *c)
     comp_route_fold(&c->route, claims, c->grid.blocks);
     comp_claims_balance(claims, c->grid.blocks, c->loads, c->route.owners);
     for (uint32_t b = 0; b < c->grid.blocks; b++)
-        c->owners.places[b] = claims[b].vote ? comp_vote_rank(claims[b].vote) : -1;
+        c->owners.places[b] = claims[b].priority ? comp_priority_rank(claims[b].priority) : -1;
 }
 
 /* Claims each block in proportion to the number of this rank's fragments there. */
@@ -82,7 +82,8 @@ static void claim_blocks(composition *c)
     const uint32_t ranges = c->strips.starts[c->grid.strips];
     for (uint32_t r = 0; r < ranges; r++)
         claims[comp_grid_block(&c->grid, c->strips.ranges[r].strip)].fragments += c->strips.ranges[r].count;
-    for (uint32_t b = 0; b < c->grid.blocks; b++) claims[b].vote = comp_vote(b, c->transport.rank, claims[b].fragments);
+    for (uint32_t b = 0; b < c->grid.blocks; b++)
+        claims[b].priority = comp_claim_priority(b, c->transport.rank, claims[b].fragments);
 }
 
 /* Allocates the memory for the three phases. */
@@ -109,7 +110,7 @@ static insitu_status merge_owned(composition *c, const comp_messages *held, comp
 {
     const double start = MPI_Wtime();
     const int place = comp_route_place(&c->route, c->transport.rank);
-    comp_owned owned = {.own = &c->strips, .owners = &c->owners, .place = place};
+    comp_owned owned = {.traced_strips = &c->strips, .owners = &c->owners, .place = place};
     c->merged.out = place == 0 ? c->out : NULL;
     if (!status && place < c->route.owners) {
         const int parent = place ? comp_route_rank(&c->route, comp_gather_parent(&c->route, place)) : 0;

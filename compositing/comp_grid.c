@@ -15,8 +15,8 @@
 static void count_blocks(comp_grid *g)
 {
     const uint32_t down = ((g->height - 1) >> g->row_shift) + 1;
-    g->strips = g->across * down;
-    g->blocks_across = ((g->across - 1) >> g->shift_x) + 1;
+    g->strips = g->strips_per_row * down;
+    g->blocks_across = ((g->strips_per_row - 1) >> g->shift_x) + 1;
     g->blocks = g->blocks_across * (((down - 1) >> g->shift_y) + 1);
 }
 
@@ -48,7 +48,7 @@ comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks)
     comp_grid g = {.width = width, .height = height, .row_shift = 5, .threads = 1};
     const int counted = ranks < COMP_COUNTED_RANKS_MAX ? ranks : COMP_COUNTED_RANKS_MAX;
     const uint32_t wanted = counted > 1 ? COMP_BLOCKS_PER_RANK * (uint32_t)counted : 0;
-    g.across = (width - 1) / COMP_LANES + 1;
+    g.strips_per_row = (width - 1) / COMP_LANES + 1;
     g.inverse = width > 1 ? UINT64_MAX / width + 1 : 0;
     for (count_blocks(&g); g.blocks > COMP_TARGET_BLOCKS; count_blocks(&g)) merge_blocks(&g);
     for (; g.blocks < wanted && (g.shift_x || g.row_shift); count_blocks(&g)) divide_blocks(&g);
@@ -62,7 +62,7 @@ static uint32_t hash_word(uint32_t x)
     return x ^ (x >> 16);
 }
 
-int32_t comp_vote(uint32_t block, int rank, int64_t fragments)
+int32_t comp_claim_priority(uint32_t block, int rank, int64_t fragments)
 {
     if (fragments <= 0) return 0;
     const uint32_t drawn = hash_word(hash_word(block + 1) + (uint32_t)rank);
@@ -78,8 +78,8 @@ static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *
     uint64_t owners = 0, all = 0;
     for (int r = 0; r < ranks; r++) loads[r] = 0;
     for (uint32_t b = 0; b < blocks; b++) {
-        if (!claims[b].vote) continue;
-        uint64_t *const load = &loads[comp_vote_rank(claims[b].vote)];
+        if (!claims[b].priority) continue;
+        uint64_t *const load = &loads[comp_priority_rank(claims[b].priority)];
         owners += *load == 0;
         *load += claims[b].fragments;
         all += claims[b].fragments;
@@ -107,9 +107,9 @@ static int find_taker(taker_search *t, uint64_t fragments)
             t->next = 0;
             t->allowed_excess += t->allowed_excess < 8;
         }
-        const int32_t vote = t->claims[t->next].vote;
-        if (!vote) continue;
-        const int rank = comp_vote_rank(vote);
+        const int32_t priority = t->claims[t->next].priority;
+        if (!priority) continue;
+        const int rank = comp_priority_rank(priority);
         const uint64_t load = t->loads[rank];
         if (load < t->share && 8 * load + (8 - t->allowed_excess) * fragments <= 8 * t->share) return rank;
     }
@@ -119,13 +119,13 @@ void comp_claims_balance(comp_claim *claims, uint32_t blocks, uint64_t *loads, i
 {
     taker_search t = {claims, blocks, 0, 4, loads, find_share(claims, blocks, loads, ranks)};
     for (uint32_t b = 0; b < blocks; b++) {
-        if (!claims[b].vote) continue;
+        if (!claims[b].priority) continue;
         const uint64_t fragments = claims[b].fragments;
-        uint64_t *const load = &loads[comp_vote_rank(claims[b].vote)];
+        uint64_t *const load = &loads[comp_priority_rank(claims[b].priority)];
         if (2 * *load < 2 * t.share + fragments || *load == fragments) continue;
         const int taker = find_taker(&t, fragments);
         *load -= fragments;
         loads[taker] += fragments;
-        claims[b].vote = comp_vote_with_rank(claims[b].vote, taker);
+        claims[b].priority = comp_priority_with_rank(claims[b].priority, taker);
     }
 }

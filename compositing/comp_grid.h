@@ -17,9 +17,9 @@ enum {
 
 typedef struct comp_grid {
     uint32_t width, height;
-    uint32_t row_shift;        /* a strip has 2^row_shift rows of pixels */
-    uint32_t across, strips;   /* number of strips per row of strips, and in total */
-    uint32_t shift_x, shift_y; /* a block has 2^shift_x × 2^shift_y strips */
+    uint32_t row_shift;              /* a strip has 2^row_shift rows of pixels */
+    uint32_t strips_per_row, strips; /* number of strips per row of strips, and in total */
+    uint32_t shift_x, shift_y;       /* a block has 2^shift_x × 2^shift_y strips */
     uint32_t blocks_across, blocks;
     uint64_t
         inverse; /* 2^64 / width, rounded up; 0 for width 1. The high 64 bits of inverse * pixel are pixel / width */
@@ -47,7 +47,7 @@ static inline uint32_t comp_grid_block_pixels(const comp_grid *grid)
 static inline uint32_t comp_grid_block(const comp_grid *grid, uint32_t strip)
 {
     if (grid->blocks == grid->strips) return strip;
-    const uint32_t y = strip / grid->across, x = strip - y * grid->across;
+    const uint32_t y = strip / grid->strips_per_row, x = strip - y * grid->strips_per_row;
     return (y >> grid->shift_y) * grid->blocks_across + (x >> grid->shift_x);
 }
 
@@ -59,7 +59,7 @@ static inline uint32_t comp_grid_y(const comp_grid *grid, uint32_t pixel)
 static inline uint32_t comp_grid_strip(const comp_grid *grid, uint32_t pixel)
 {
     const uint32_t y = comp_grid_y(grid, pixel), x = pixel - y * grid->width;
-    return (y >> grid->row_shift) * grid->across + x / COMP_LANES;
+    return (y >> grid->row_shift) * grid->strips_per_row + x / COMP_LANES;
 }
 
 /* Returns the pixel's index in its strip, row by row. */
@@ -76,7 +76,7 @@ typedef struct comp_area {
 
 static inline comp_area comp_grid_area(const comp_grid *grid, uint32_t strip)
 {
-    const uint32_t x = strip % grid->across * COMP_LANES, y = strip / grid->across << grid->row_shift;
+    const uint32_t x = strip % grid->strips_per_row * COMP_LANES, y = strip / grid->strips_per_row << grid->row_shift;
     const uint32_t right = grid->width - x, below = grid->height - y, rows = 1u << grid->row_shift;
     return (comp_area){x, y, right < COMP_LANES ? right : COMP_LANES, below < rows ? below : rows};
 }
@@ -84,31 +84,31 @@ static inline comp_area comp_grid_area(const comp_grid *grid, uint32_t strip)
 /* Returns the pixel of the picture that has this index in the strip. */
 static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, uint32_t at)
 {
-    const uint32_t x = strip % grid->across * COMP_LANES, y = strip / grid->across << grid->row_shift;
+    const uint32_t x = strip % grid->strips_per_row * COMP_LANES, y = strip / grid->strips_per_row << grid->row_shift;
     return (y + at / COMP_LANES) * grid->width + x + at % COMP_LANES;
 }
 
 /* ---- who owns a block ------------------------------------------------------------------------------------------- */
 
-/* A rank's claim to a block. The combined claim of all ranks has the largest vote and the sum of the fragments. */
+/* A rank's claim to a block. The combined claim of all ranks has the largest priority and the sum of the fragments. */
 typedef struct comp_claim {
-    int32_t vote;       /* the rank with the largest vote is the owner; 0: the block has no fragments */
+    int32_t priority;   /* the rank with the largest priority is the owner; 0: the block has no fragments */
     uint32_t fragments; /* number of fragments in the block; UINT32_MAX if there are more */
 } comp_claim;
 
-/* Returns a rank's vote to own a block in which it has this number of fragments. */
-int32_t comp_vote(uint32_t block, int rank, int64_t fragments);
+/* Returns a rank's priority to own a block in which it has this number of fragments. */
+int32_t comp_claim_priority(uint32_t block, int rank, int64_t fragments);
 
-/* Returns the rank that cast the vote. */
-static inline int comp_vote_rank(int32_t vote)
+/* Returns the rank that is encoded in the priority. */
+static inline int comp_priority_rank(int32_t priority)
 {
-    return vote & 0xfffff;
+    return priority & 0xfffff;
 }
 
-/* Returns the same vote with another rank. */
-static inline int32_t comp_vote_with_rank(int32_t vote, int rank)
+/* Returns the same priority with another rank. */
+static inline int32_t comp_priority_with_rank(int32_t priority, int rank)
 {
-    return (int32_t)(((uint32_t)vote & ~0xfffffu) | ((uint32_t)rank & 0xfffff));
+    return (int32_t)(((uint32_t)priority & ~0xfffffu) | ((uint32_t)rank & 0xfffff));
 }
 
 /* Combines the claim with the sum. */
@@ -116,7 +116,7 @@ static inline void comp_claim_add(const comp_claim *claim, comp_claim *sum)
 {
     const uint32_t fragments = sum->fragments + claim->fragments;
     sum->fragments = fragments < claim->fragments ? UINT32_MAX : fragments;
-    sum->vote = sum->vote > claim->vote ? sum->vote : claim->vote;
+    sum->priority = sum->priority > claim->priority ? sum->priority : claim->priority;
 }
 
 /* Balances the number of fragments per rank: moves blocks from ranks with more than their share to other owners, until

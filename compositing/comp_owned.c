@@ -14,7 +14,7 @@
 
 /* The work space of a thread; its lists are kept from strip to strip. */
 typedef struct merge_scratch {
-    comp_sheet all, other, pixels;
+    comp_sheet joined, other, pixels;
     fragment_list remaining,
         listed;                /* fragments that do not fit in the sheet; their .pixel is the index in the strip */
     uint16_t mixed[COMP_ROWS]; /* bit mask per row: pixels that have fragments in the list `remaining` */
@@ -59,9 +59,9 @@ static bool add_remaining(merge_scratch *m, const fragment *item, uint32_t at)
 /* Joins a fragment in a pixel that already has another. */
 static bool join_second(merge_scratch *m, const fragment *item, uint32_t at)
 {
-    const fragment other = comp_sheet_get(&m->all, at, item->pixel);
+    const fragment other = comp_sheet_get(&m->joined, at, item->pixel);
     if (!comp_is_opaque(item) || !comp_is_opaque(&other)) return add_remaining(m, item, at);
-    if (fragment_compare(item, &other) < 0) comp_sheet_put(&m->all, at, item);
+    if (fragment_compare(item, &other) < 0) comp_sheet_put(&m->joined, at, item);
     return true;
 }
 
@@ -74,8 +74,8 @@ static bool join_own(const comp_strips *own, uint32_t strip, merge_scratch *m)
         for (const fragment *end = item + own->ranges[r].count; item < end; item++) {
             const uint32_t at = comp_grid_at(&grid, item->pixel);
             __builtin_prefetch(item + AHEAD);
-            if (!comp_sheet_has(&m->all, at))
-                comp_sheet_put(&m->all, at, item);
+            if (!comp_sheet_has(&m->joined, at))
+                comp_sheet_put(&m->joined, at, item);
             else if (!join_second(m, item, at))
                 return false;
         }
@@ -86,7 +86,7 @@ static bool join_own(const comp_strips *own, uint32_t strip, merge_scratch *m)
 static bool join_other(merge_scratch *m)
 {
     uint16_t left[COMP_ROWS];
-    comp_sheet_join(&m->all, &m->other, left);
+    comp_sheet_join(&m->joined, &m->other, left);
     for (uint32_t r = 0; r < COMP_ROWS; r++)
         for (unsigned bits = left[r]; bits; bits &= bits - 1) {
             const uint32_t at = r * COMP_LANES + (uint32_t)__builtin_ctz(bits);
@@ -100,13 +100,13 @@ static bool join_all(const comp_owned *owned, uint32_t strip, merge_scratch *m)
 {
     const comp_received *const come = &owned->arrivals;
     const uint32_t first = come->starts[strip];
-    const bool has_own = owned->own->starts[strip] < owned->own->starts[strip + 1];
+    const bool has_own = owned->traced_strips->starts[strip] < owned->traced_strips->starts[strip + 1];
     m->remaining.count = 0;
     memset(m->mixed, 0, sizeof m->mixed);
-    comp_sheet_begin(&m->all, strip);
-    if (!join_own(owned->own, strip, m)) return false;
+    comp_sheet_begin(&m->joined, strip);
+    if (!join_own(owned->traced_strips, strip, m)) return false;
     for (uint32_t i = first; i < come->starts[strip + 1]; i++) {
-        comp_sheet_read(come->sheets[i], COMP_WORDS, i > first || has_own ? &m->other : &m->all);
+        comp_sheet_read(come->sheets[i], COMP_WORDS, i > first || has_own ? &m->other : &m->joined);
         if ((i > first || has_own) && !join_other(m)) return false;
     }
     return true;
@@ -135,7 +135,7 @@ static bool list_pixels(merge_scratch *m)
     }
     if (!reserve_fragments(&m->listed, sum)) return false;
     for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1))
-        m->listed.items[--m->ends[k]] = comp_sheet_get(&m->all, k, k);
+        m->listed.items[--m->ends[k]] = comp_sheet_get(&m->joined, k, k);
     for (int64_t i = 0; i < m->remaining.count; i++)
         m->listed.items[--m->ends[m->remaining.items[i].pixel]] = m->remaining.items[i];
     return true;
@@ -145,7 +145,7 @@ static bool list_pixels(merge_scratch *m)
 static void mark_all_mixed(merge_scratch *m)
 {
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
-        if (comp_sheet_has(&m->all, k)) mark_mixed(m, k);
+        if (comp_sheet_has(&m->joined, k)) mark_mixed(m, k);
 }
 
 static void put_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel)
@@ -160,7 +160,7 @@ static void blend_listed(const comp_grid *grid, const comp_merge_output *merged,
 {
     for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1)) {
         const comp_pixel pixel = comp_pixels_blend(merged, m->listed.items + m->ends[k], m->counts[k],
-                                                   comp_grid_pixel(grid, m->all.strip, k));
+                                                   comp_grid_pixel(grid, m->joined.strip, k));
         put_pixel(&m->pixels, k, &pixel);
     }
 }
@@ -182,12 +182,12 @@ static bool write_pixels(const comp_owned *owned, merge_scratch *m)
 static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merge_output *merged, merge_scratch *m)
 {
     if (!join_all(owned, strip, m)) return false;
-    comp_sheet_finish(&m->all, merged->background, &m->pixels);
+    comp_sheet_finish(&m->joined, merged->background, &m->pixels);
     if (merged->deep) mark_all_mixed(m);
     if (!list_pixels(m)) return false;
-    blend_listed(owned->own->grid, merged, m);
+    blend_listed(owned->traced_strips->grid, merged, m);
     if (!merged->out) return write_pixels(owned, m);
-    comp_sheet_store(&m->pixels, owned->own->grid, merged->background, merged->out);
+    comp_sheet_store(&m->pixels, owned->traced_strips->grid, merged->background, merged->out);
     return true;
 }
 
@@ -202,12 +202,12 @@ static bool merge_strips(const comp_owned *owned, const comp_merge_output *merge
 {
     bool is_ok = m != NULL;
 #pragma omp for schedule(dynamic, 16) nowait
-    for (uint32_t s = 0; s < owned->own->grid->strips; s++) {
-        const int32_t place = owned->owners->places[comp_grid_block(owned->own->grid, s)];
+    for (uint32_t s = 0; s < owned->traced_strips->grid->strips; s++) {
+        const int32_t place = owned->owners->places[comp_grid_block(owned->traced_strips->grid, s)];
         if (is_ok && place == owned->place)
             is_ok = merge_strip(owned, s, merged, m);
         else if (is_ok && place < 0 && merged->out)
-            clear_strip(owned->own->grid, s, merged, m);
+            clear_strip(owned->traced_strips->grid, s, merged, m);
     }
     return is_ok;
 }
@@ -217,7 +217,7 @@ insitu_status comp_owned_merge(const comp_owned *owned, const comp_merge_output 
 {
     bool is_ok = true;
     *finished = (comp_messages){NULL, NULL};
-#pragma omp parallel num_threads(owned->own->grid->threads) reduction(&& : is_ok)
+#pragma omp parallel num_threads(owned->traced_strips->grid->threads) reduction(&& : is_ok)
     {
         region_enter();
         merge_scratch *const m = base_alloc(sizeof *m);

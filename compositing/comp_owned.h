@@ -9,8 +9,8 @@
 
 /* The input of one rank's merge: all fragments in the strips that it owns. */
 typedef struct comp_owned {
-    const comp_strips *own; /* fragments that this rank traced */
-    comp_received arrivals; /* fragments received from other ranks for these strips */
+    const comp_strips *traced_strips; /* fragments that this rank traced */
+    comp_received arrivals;           /* fragments received from other ranks for these strips */
     const comp_owners *owners;
     int place;
 } comp_owned;

@@ -80,9 +80,10 @@ int comp_route_stride(const comp_route *route, int round)
 void comp_route_fold(const comp_route *route, comp_claim *claims, uint32_t blocks)
 {
     for (uint32_t b = 0; b < blocks; b++) {
-        if (!claims[b].vote) continue;
-        const int place = comp_route_place(route, comp_vote_rank(claims[b].vote));
-        claims[b].vote = comp_vote_with_rank(claims[b].vote, place < route->owners ? place : place - route->owners);
+        if (!claims[b].priority) continue;
+        const int place = comp_route_place(route, comp_priority_rank(claims[b].priority));
+        claims[b].priority =
+            comp_priority_with_rank(claims[b].priority, place < route->owners ? place : place - route->owners);
     }
 }
 

@@ -308,16 +308,16 @@ static int winner_of(uint32_t block, const int64_t *fragments, int ranks)
 {
     int32_t greatest = 0;
     for (int r = 0; r < ranks; r++) {
-        const int32_t vote = comp_vote(block, r, fragments[r]);
-        assert_true(fragments[r] ? comp_vote_rank(vote) == r && vote > 0 : vote == 0);
-        if (vote > greatest) greatest = vote;
+        const int32_t priority = comp_claim_priority(block, r, fragments[r]);
+        assert_true(fragments[r] ? comp_priority_rank(priority) == r && priority > 0 : priority == 0);
+        if (priority > greatest) greatest = priority;
     }
-    return comp_vote_rank(greatest);
+    return comp_priority_rank(greatest);
 }
 
 /* A rank owns a block with a chance as the fourth power of its fragments. Of n draws with chance p a rank wins pn,
  * within five standard deviations sqrt(n p (1 - p)) in all but one of a million cases, and of 1/16 of what is drawn, by
- * which votes are rounded. */
+ * which priorities are rounded. */
 static void owners_are_drawn_by_what_they_have(void **context)
 {
     (void)context;
@@ -380,7 +380,7 @@ static void cover(const comp_grid *grid, uint32_t y, double from, double to)
     }
 }
 
-/* Claims with a fragment in each covered pixel, and no votes. Returns how many pixels are covered. */
+/* Claims with a fragment in each covered pixel, and no priorities. Returns how many pixels are covered. */
 static int64_t claim_shape(const comp_grid *grid, span_function *span_of)
 {
     int64_t covered = 0;
@@ -399,9 +399,9 @@ static int64_t claim_shape(const comp_grid *grid, span_function *span_of)
     return covered;
 }
 
-/* Levels the claims, whose votes are cast. No fragment is lost, ranks that won nothing own nothing, and nobody has more
- * than the mean of the others and those of the fullest block. Returns what the busiest rank owns over the mean of all
- * ranks. */
+/* Levels the claims, whose priorities are cast. No fragment is lost, ranks that won nothing own nothing, and nobody has
+ * more than the mean of the others and those of the fullest block. Returns what the busiest rank owns over the mean of
+ * all ranks. */
 static double check_levels(uint32_t blocks, int ranks)
 {
     static uint64_t won[MOST_RANKS], owned[MOST_RANKS], loads[MOST_RANKS];
@@ -410,14 +410,14 @@ static double check_levels(uint32_t blocks, int ranks)
     memset(won, 0, sizeof won);
     memset(owned, 0, sizeof owned);
     for (uint32_t b = 0; b < blocks; b++) {
-        if (!claims[b].vote) continue;
-        won[comp_vote_rank(claims[b].vote)] += claims[b].fragments;
+        if (!claims[b].priority) continue;
+        won[comp_priority_rank(claims[b].priority)] += claims[b].fragments;
         all += claims[b].fragments;
         fullest = claims[b].fragments > fullest ? claims[b].fragments : fullest;
     }
     comp_claims_balance(claims, blocks, loads, ranks);
     for (uint32_t b = 0; b < blocks; b++)
-        if (claims[b].vote) owned[comp_vote_rank(claims[b].vote)] += claims[b].fragments;
+        if (claims[b].priority) owned[comp_priority_rank(claims[b].priority)] += claims[b].fragments;
     for (int r = 0; r < ranks; r++) {
         assert_true(owned[r] == loads[r] && !owned[r] == !won[r]);
         owners += owned[r] > 0;
@@ -451,7 +451,8 @@ static void owners_share_what_all_have(void **context)
                 for (size_t k = 0; k < sizeof shapes / sizeof *shapes; k++) {
                     const int64_t covered = claim_shape(&grid, shapes[k]);
                     for (uint32_t b = 0; b < grid.blocks; b++)
-                        claims[b].vote = comp_vote(b, (int)(next_random() % (uint32_t)ranks[n]), claims[b].fragments);
+                        claims[b].priority =
+                            comp_claim_priority(b, (int)(next_random() % (uint32_t)ranks[n]), claims[b].fragments);
                     const double skew = check_levels(grid.blocks, ranks[n]);
                     if (skew <= 1.1 || covered < ENOUGH * (int64_t)ranks[n]) continue;
                     fprintf(stderr, "%u x %u, %d ranks, shape %d: %g\n", width, height, ranks[n], (int)k, skew);
@@ -482,23 +483,23 @@ static void owners_share_what_they_have(void **context)
             const comp_claim seen = claims[b];
             claims[b] = (comp_claim){0, 0};
             for (int r = 0; r < ranks[n]; r++)
-                comp_claim_add(&(comp_claim){comp_vote(b, r, have[r]), (uint32_t)have[r]}, &claims[b]);
-            assert_true(!claims[b].vote == !seen.fragments &&
+                comp_claim_add(&(comp_claim){comp_claim_priority(b, r, have[r]), (uint32_t)have[r]}, &claims[b]);
+            assert_true(!claims[b].priority == !seen.fragments &&
                         (!seen.fragments || claims[b].fragments % seen.fragments == 0));
         }
         assert_true(check_levels(grid.blocks, ranks[n]) <= 1.1);
     }
 }
 
-/* Gives all ranks' votes by lot to places of the route, and sees that they share the blocks to a tenth. */
+/* Gives all ranks' priorities by lot to places of the route, and sees that they share the blocks to a tenth. */
 static void check_folded(const comp_route *route)
 {
     const comp_grid grid = comp_grid_of(1920, 1080, route->ranks);
     claim_shape(&grid, span_of_disc);
     for (uint32_t b = 0; b < grid.blocks; b++)
-        claims[b].vote = comp_vote(b, (int)(next_random() % (uint32_t)route->ranks), claims[b].fragments);
+        claims[b].priority = comp_claim_priority(b, (int)(next_random() % (uint32_t)route->ranks), claims[b].fragments);
     comp_route_fold(route, claims, grid.blocks);
-    for (uint32_t b = 0; b < grid.blocks; b++) assert_true(comp_vote_rank(claims[b].vote) < route->owners);
+    for (uint32_t b = 0; b < grid.blocks; b++) assert_true(comp_priority_rank(claims[b].priority) < route->owners);
     assert_true(check_levels(grid.blocks, route->owners) <= 1.1);
 }
 
@@ -560,7 +561,8 @@ static void unfair_lots_are_levelled(void **context)
                 for (uint32_t blocks = 1; blocks <= COMP_BLOCKS_PER_RANK * MOST_RANKS; blocks *= 11) {
                     for (uint32_t b = 0; b < blocks; b++) {
                         claims[b].fragments = unfair_fragments(fragments, b, blocks);
-                        claims[b].vote = comp_vote(b, unfair_winner(winners, b, blocks, ranks[n]), claims[b].fragments);
+                        claims[b].priority =
+                            comp_claim_priority(b, unfair_winner(winners, b, blocks, ranks[n]), claims[b].fragments);
                     }
                     check_levels(blocks, ranks[n]);
                 }
@@ -575,7 +577,7 @@ static void claims_add_up(void **context)
         comp_claim sum = three[first];
         comp_claim_add(&three[(first + 1) % 3], &sum);
         comp_claim_add(&three[(first + 2) % 3], &sum);
-        assert_true(sum.vote == 9 && sum.fragments == UINT32_MAX);
+        assert_true(sum.priority == 9 && sum.fragments == UINT32_MAX);
     }
 }
 

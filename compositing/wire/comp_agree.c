@@ -74,6 +74,7 @@ insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *maxim
     const insitu_status status =
         comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, items, count + 2, MPI_2INT, claims->add, comm), error);
     if (status != INSITU_OK) return status;
-    *maximum = items[count + 1].vote;
-    return report_status(own, (insitu_status)(items[count].vote >> SHIFT), MASK - (items[count].vote & MASK), error);
+    *maximum = items[count + 1].priority;
+    return report_status(own, (insitu_status)(items[count].priority >> SHIFT), MASK - (items[count].priority & MASK),
+                         error);
 }

@@ -43,18 +43,18 @@ static bool sort_strips(const comp_owners *owners, owner_strips *c)
 typedef struct packing {
     comp_writer *writer;
     uint32_t owner;
-    int64_t left; /* estimated number of fragments for the owner that are not written yet */
+    int64_t remaining; /* estimated number of fragments for the owner that are not written yet */
 } packing;
 
 static bool pack_sheet(void *state, const comp_sheet *sheet, int count)
 {
     packing *p = state;
     const size_t bound = comp_sheet_max_bytes(count, COMP_WORDS);
-    const size_t left = (size_t)(p->left > 0 ? p->left : 0);
+    const size_t left = (size_t)(p->remaining > 0 ? p->remaining : 0);
     unsigned char *at = comp_writer_reserve(p->writer, p->owner, bound, left * EXPECTED_BYTES + bound);
     if (!at) return false;
     comp_writer_commit(p->writer, comp_sheet_write(sheet, COMP_WORDS, at), (uint32_t)count);
-    p->left -= count;
+    p->remaining -= count;
     return true;
 }
 
@@ -67,7 +67,7 @@ static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int sha
     const uint32_t end = begin + (uint32_t)((uint64_t)count * ((uint32_t)share + 1) / (uint32_t)shares);
     packing p = {writer, owner, 0};
     bool is_ok = true;
-    for (uint32_t i = first; i < end; i++) p.left += comp_strips_count(c->strips, c->order[i]);
+    for (uint32_t i = first; i < end; i++) p.remaining += comp_strips_count(c->strips, c->order[i]);
     for (uint32_t i = first; i < end && is_ok; i++)
         is_ok = comp_strips_sheets(c->strips, c->order[i], layers, pack_sheet, &p);
     return is_ok;
