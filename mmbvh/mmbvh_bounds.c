@@ -222,7 +222,8 @@ item_grid item_grid_make(const double lower[3], const double upper[3])
         if (extent > far * 0x1p-22) grid.is_finest = false;
     }
     grid.step = longest / ITEM_TOP;
-    for (int axis = 0; axis < 3; axis++) grid.inverse[axis] = has_extent[axis] && grid.step > 0 ? 1 / grid.step : 0;
+    for (int axis = 0; axis < 3; axis++)
+        grid.inverse_step[axis] = has_extent[axis] && grid.step > 0 ? 1 / grid.step : 0;
     return grid;
 }
 
@@ -245,7 +246,7 @@ static float_mapping float_mapping_make(const bounds_source *source, const item_
     float_mapping m = {.factor = {0}};
     for (int axis = 0; axis < 3; axis++) {
         m.origin[axis] = (float)(source->origin[axis] + grid->origin[axis] / source->scale);
-        m.factor[axis] = (float)(source->scale * grid->inverse[axis]);
+        m.factor[axis] = (float)(source->scale * grid->inverse_step[axis]);
     }
     return m;
 }

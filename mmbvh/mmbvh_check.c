@@ -13,8 +13,8 @@ typedef struct check_state {
     const mmbvh *tree;
     const grid *g;
     const grid_field *field;
-    unsigned char *seen; /* bit set of the cells visited so far */
-    int64_t seen_count;  /* number of cells of the grid, or of meshes in a parent tree */
+    unsigned char *visited; /* bit set of the cells visited so far */
+    int64_t visited_count;  /* number of cells of the grid, or of meshes in a parent tree */
     int64_t next_pair;
     int64_t next_entry;
     int64_t unusable;
@@ -101,8 +101,8 @@ static insitu_status check_cell_range(check_state *w, int64_t index, int64_t cel
 
 static insitu_status check_cell(check_state *w, int64_t index, int64_t cell)
 {
-    if (cell >= w->seen_count) return VIOLATION(w, "leaf %" PRId64 ": there is no cell %" PRId64, index, cell);
-    unsigned char *byte = &w->seen[cell / 8];
+    if (cell >= w->visited_count) return VIOLATION(w, "leaf %" PRId64 ": there is no cell %" PRId64, index, cell);
+    unsigned char *byte = &w->visited[cell / 8];
     const unsigned bit = 1u << (cell % 8);
     if (*byte & bit) return VIOLATION(w, "leaf %" PRId64 ": cell %" PRId64 " is in the tree twice", index, cell);
     *byte = (unsigned char)(*byte | bit);
@@ -213,8 +213,8 @@ static insitu_status check_complete(const check_state *w)
         return VIOLATION(w, "%" PRId64 " of %" PRId64 " cell entries are in leaves", w->next_entry,
                          w->tree->cell_count);
     }
-    for (int64_t cell = 0; cell < w->seen_count; cell++) {
-        const bool seen = w->seen[cell / 8] >> (cell % 8) & 1;
+    for (int64_t cell = 0; cell < w->visited_count; cell++) {
+        const bool seen = w->visited[cell / 8] >> (cell % 8) & 1;
         if (!seen && !(w->g && !grid_is_drawn(w->g, cell))) return VIOLATION(w, "cell %" PRId64 " is in no leaf", cell);
     }
     if (w->field && w->unusable != w->tree->unusable_cells) {
@@ -239,12 +239,12 @@ insitu_status mmbvh_check(const mmbvh *tree, const grid *g, const grid_field *fi
 {
     if (!tree) return base_fail(error, INSITU_ERROR_ARGUMENT, "no tree to check");
     check_state w = {.tree = tree, .g = g, .field = g ? field : NULL, .next_pair = 1, .error = error};
-    w.seen_count = g ? g->cell_count : tree->cell_count;
-    w.seen = base_calloc((size_t)w.seen_count / 8 + 1, 1);
-    if (!w.seen) return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: checking a tree");
+    w.visited_count = g ? g->cell_count : tree->cell_count;
+    w.visited = base_calloc((size_t)w.visited_count / 8 + 1, 1);
+    if (!w.visited) return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: checking a tree");
     insitu_status status = tree->node_count > 0 ? check_nodes(&w) : INSITU_OK;
     if (!status) status = check_complete(&w);
-    base_free(w.seen);
+    base_free(w.visited);
     if (!status && out) *out = make_statistics(&w);
     return status;
 }

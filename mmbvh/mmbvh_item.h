@@ -22,9 +22,9 @@ typedef lanes item;
  * steps. */
 typedef struct item_grid {
     double origin[3];
-    double step;       /* length of a step; 0 if no axis has a finite extent */
-    double inverse[3]; /* 1 / step for each axis, or 0 on an axis without a finite extent */
-    bool is_finest;    /* true if a finer grid would not separate more cells */
+    double step;            /* length of a step; 0 if no axis has a finite extent */
+    double inverse_step[3]; /* 1 / step for each axis, or 0 on an axis without a finite extent */
+    bool is_finest;         /* true if a finer grid would not separate more cells */
 } item_grid;
 
 /* The bounds of a set of items and of their centroids. */
@@ -109,8 +109,8 @@ static inline item item_make(const item_grid *grid, const double lower[3], const
 {
     item made;
     for (int axis = 0; axis < 3; axis++) {
-        const double low = (lower[axis] - grid->origin[axis]) * grid->inverse[axis] + 0.5;
-        const double high = (upper[axis] - grid->origin[axis]) * grid->inverse[axis] + 0.5;
+        const double low = (lower[axis] - grid->origin[axis]) * grid->inverse_step[axis] + 0.5;
+        const double high = (upper[axis] - grid->origin[axis]) * grid->inverse_step[axis] + 0.5;
         made[axis] = (int16_t)(ITEM_TOP - (int)(low > 0 ? low < ITEM_TOP ? low : ITEM_TOP : 0));
         made[4 + axis] = (int16_t)(high > 0 ? high < ITEM_TOP ? high : ITEM_TOP : 0);
     }

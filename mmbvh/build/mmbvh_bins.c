@@ -24,8 +24,8 @@ void bins_clear(bins *b, int count)
 {
     const lanes none = {INT16_MIN, INT16_MIN, INT16_MIN, 0, INT16_MIN, INT16_MIN, INT16_MIN, 0};
     for (int bin = 0; bin < count; bin++) {
-        for (int axis = 0; axis < 3; axis++) b->of[bin].boxes[axis] = none;
-        *(ivec4 *)b->of[bin].counts = (ivec4){0};
+        for (int axis = 0; axis < 3; axis++) b->bin_array[bin].boxes[axis] = none;
+        *(ivec4 *)b->bin_array[bin].counts = (ivec4){0};
     }
 }
 
@@ -33,8 +33,8 @@ void bins_merge(bins *b, const bins *other, int count)
 {
     for (int bin = 0; bin < count; bin++) {
         for (int axis = 0; axis < 3; axis++) {
-            b->of[bin].boxes[axis] = lanes_max(b->of[bin].boxes[axis], other->of[bin].boxes[axis]);
-            b->of[bin].counts[axis] += other->of[bin].counts[axis];
+            b->bin_array[bin].boxes[axis] = lanes_max(b->bin_array[bin].boxes[axis], other->bin_array[bin].boxes[axis]);
+            b->bin_array[bin].counts[axis] += other->bin_array[bin].counts[axis];
         }
     }
 }
@@ -56,7 +56,7 @@ static inline void add_item(bins *b, const uint16_t offsets[3], item i)
 {
     const lanes counted = i & (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
     for (int axis = 0; axis < 3; axis++) {
-        lanes *box = (lanes *)(void *)((char *)b->of + offsets[axis]) + axis;
+        lanes *box = (lanes *)(void *)((char *)b->bin_array + offsets[axis]) + axis;
         *box = lanes_max(*box, counted) + (lanes){0, 0, 0, 1};
     }
 }
@@ -65,7 +65,7 @@ static inline void add_item(bins *b, const uint16_t offsets[3], item i)
 static void add_lane_counts(bins *b, int count)
 {
     for (int i = 0; i < count; i++) {
-        bin *of = &b->of[i];
+        bin *of = &b->bin_array[i];
         const ivec4 x = (ivec4)of->boxes[0], y = (ivec4)of->boxes[1], z = (ivec4)of->boxes[2];
         const ivec4 xy = __builtin_shufflevector(x, y, 1, 1, 5, 5);
         *(ivec4 *)of->counts += __builtin_shufflevector(xy, z, 0, 2, 5, 5) >> 16;
@@ -120,8 +120,8 @@ static inline vec4 side_cost(const lanes boxes[3], ivec4 counts)
 
 static inline void extend_side(lanes boxes[3], ivec4 *counts, const bins *b, int bin)
 {
-    for (int axis = 0; axis < 3; axis++) boxes[axis] = lanes_max(boxes[axis], b->of[bin].boxes[axis]);
-    *counts += *(const ivec4 *)b->of[bin].counts;
+    for (int axis = 0; axis < 3; axis++) boxes[axis] = lanes_max(boxes[axis], b->bin_array[bin].boxes[axis]);
+    *counts += *(const ivec4 *)b->bin_array[bin].counts;
 }
 
 /* Returns the cheapest of the three axes' splits, without unpredictable branches. */

@@ -40,7 +40,7 @@ typedef struct bin {
 } bin;
 
 typedef struct bins {
-    _Alignas(64) bin of[BINS_MAX];
+    _Alignas(64) bin bin_array[BINS_MAX];
 } bins;
 
 void bins_clear(bins *b, int count);

@@ -33,13 +33,13 @@ typedef struct node_split {
     int64_t count;
     int64_t chunk_size;
     int chunk_count;
-    int64_t left[CHUNKS_MAX]; /* number of left items in each chunk */
+    int64_t left_counts[CHUNKS_MAX]; /* number of left items in each chunk */
     int64_t left_count;
     branch_node node;
     bin_mapping mapping;
     int64_t stride; /* one item in this many is binned (bins_stride()) */
     bin_split split;
-    bins total;
+    bins all_bins;
     item_set sides[2];
 } node_split;
 
@@ -87,7 +87,7 @@ static void bin_chunk(node_split *s, const branch_builder *builder, int chunk, i
     bins_clear(&own, s->mapping.count);
     bins_fill(&own, &s->mapping, s->items + begin, end - begin, s->stride);
 #pragma omp critical(mmbvh_merge)
-    bins_merge(&s->total, &own, s->mapping.count);
+    bins_merge(&s->all_bins, &own, s->mapping.count);
 }
 
 static void partition_chunk(node_split *s, const branch_builder *builder, int chunk, int64_t begin, int64_t end)
@@ -96,7 +96,7 @@ static void partition_chunk(node_split *s, const branch_builder *builder, int ch
     item *items = s->items + begin;
     const int64_t count = end - begin, left = bins_partition(&s->mapping, s->split, items, count);
     const item_set sides[2] = {item_set_of(items, left), item_set_of(items + left, count - left)};
-    s->left[chunk] = left;
+    s->left_counts[chunk] = left;
 #pragma omp critical(mmbvh_merge)
     for (int side = 0; side < 2; side++) item_set_merge(&s->sides[side], &sides[side]);
 }
@@ -114,7 +114,7 @@ static bool misplaced_advance(misplaced_items *w)
     while (w->next >= w->end) {
         if (++w->chunk >= w->s->chunk_count) return false;
         const int64_t begin = w->chunk * w->s->chunk_size, border = w->s->left_count;
-        const int64_t middle = begin + w->s->left[w->chunk], end = chunk_end(w->s, w->chunk);
+        const int64_t middle = begin + w->s->left_counts[w->chunk], end = chunk_end(w->s, w->chunk);
         w->next = w->is_left ? (begin > border ? begin : border) : middle;
         w->end = w->is_left ? middle : (end < border ? end : border);
     }
@@ -149,7 +149,7 @@ static void partition_items(node_split *s, const branch_builder *builder)
 {
     for_chunks(s, builder, partition_chunk);
     s->left_count = 0;
-    for (int chunk = 0; chunk < s->chunk_count; chunk++) s->left_count += s->left[chunk];
+    for (int chunk = 0; chunk < s->chunk_count; chunk++) s->left_count += s->left_counts[chunk];
     exchange_misplaced(s);
 }
 
@@ -164,9 +164,9 @@ static void choose_splits(node_split *s, const branch_builder *builder)
 {
     s->mapping = bin_mapping_make(s->node.set.centroids, s->count);
     for (s->stride = bins_stride(s->count);; s->stride = 1) {
-        bins_clear(&s->total, s->mapping.count);
+        bins_clear(&s->all_bins, s->mapping.count);
         for_chunks(s, builder, bin_chunk);
-        s->split = bins_choose(&s->total, &s->mapping);
+        s->split = bins_choose(&s->all_bins, &s->mapping);
         if (s->split.axis >= 0 || s->stride == 1) return;
     }
 }

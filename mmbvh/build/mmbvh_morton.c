@@ -58,7 +58,7 @@ void morton_coder_init(morton_coder *coder, const double lower[3], const double 
         const double side = upper[axis] - lower[axis], steps = (double)(1 << counts[axis]);
         coder->origin[axis] = lower[axis];
         coder->factor[axis] = side > 0 && side < INFINITY ? steps / side : 0;
-        coder->most[axis] = steps - 1;
+        coder->last_step[axis] = steps - 1;
         left[axis] = counts[axis];
     }
     for (int bit = 0; bit < coder->code_bits; bit++) {
@@ -90,14 +90,14 @@ static inline uint64_t morton_code(const bounds_source *source, const morton_cod
     for (int axis = 0; axis < 3; axis++) {
         const double x = (centre[axis] - source->origin[axis]) * source->scale;
         const double place = (x - coder->origin[axis]) * coder->factor[axis];
-        steps[axis] = (int32_t)(place > 0 ? place < coder->most[axis] ? place : coder->most[axis] : 0);
+        steps[axis] = (int32_t)(place > 0 ? place < coder->last_step[axis] ? place : coder->last_step[axis] : 0);
     }
     return code_of_steps(coder, steps);
 }
 
 /* Maps the midpoint of a box of floats, in the source's coordinates, to steps of the code. */
 typedef struct sum_mapping {
-    vec4 origin, factor, most;
+    vec4 origin, factor, last_step;
 } sum_mapping;
 
 static sum_mapping sum_mapping_make(const bounds_source *source, const morton_coder *coder)
@@ -106,7 +106,7 @@ static sum_mapping sum_mapping_make(const bounds_source *source, const morton_co
     for (int axis = 0; axis < 3; axis++) {
         m.origin[axis] = (float)(source->origin[axis] + coder->origin[axis] / source->scale);
         m.factor[axis] = (float)(source->scale * coder->factor[axis]);
-        m.most[axis] = (float)coder->most[axis];
+        m.last_step[axis] = (float)coder->last_step[axis];
     }
     return m;
 }
@@ -117,7 +117,7 @@ static inline uint64_t code_of_float_box(const sum_mapping *m, const morton_code
 {
     const vec4 place = ((float_box->lower + float_box->upper) * 0.5f - m->origin) * m->factor;
     _Alignas(16) int32_t steps[4];
-    *(ivec4 *)(void *)steps = vec4_truncate(vec4_min(vec4_max(place, (vec4){0}), m->most));
+    *(ivec4 *)(void *)steps = vec4_truncate(vec4_min(vec4_max(place, (vec4){0}), m->last_step));
     return code_of_steps(coder, steps);
 }
 
@@ -178,7 +178,7 @@ void morton_make_keys(const bounds_source *source, const morton_coder *coder, ui
 /* Keys are sorted by their highest digit first. Neighbouring cells mostly have neighbouring indices, so consecutive
  * keys go to few output streams; the keys of one digit then fit in a core's cache, where they are sorted completely. */
 typedef struct digit_counts {
-    int64_t of[SORT_CHUNKS_MAX][DIGITS];
+    int64_t chunk_digits[SORT_CHUNKS_MAX][DIGITS];
 } digit_counts;
 
 typedef struct sorting {
@@ -199,8 +199,8 @@ static void count_digits(const sorting *s, const uint64_t *keys, int64_t count, 
         region_enter();
 #pragma omp for schedule(dynamic) nowait
         for (int chunk = 0; chunk < s->chunks; chunk++) {
-            int64_t *of = s->counts->of[chunk];
-            memset(of, 0, sizeof s->counts->of[chunk]);
+            int64_t *of = s->counts->chunk_digits[chunk];
+            memset(of, 0, sizeof s->counts->chunk_digits[chunk]);
             const int64_t end = count * (chunk + 1) / s->chunks;
             for (int64_t i = count * chunk / s->chunks; i < end; i++) of[extract_digit(keys[i], shift)]++;
         }
@@ -215,8 +215,8 @@ static void sum_digits(const sorting *s, int64_t starts[DIGITS + 1])
     for (int digit = 0; digit < DIGITS; digit++) {
         starts[digit] = sum;
         for (int chunk = 0; chunk < s->chunks; chunk++) {
-            const int64_t count = s->counts->of[chunk][digit];
-            s->counts->of[chunk][digit] = sum;
+            const int64_t count = s->counts->chunk_digits[chunk][digit];
+            s->counts->chunk_digits[chunk][digit] = sum;
             sum += count;
         }
     }
@@ -230,7 +230,7 @@ static void move_digits(const sorting *s, const uint64_t *from, uint64_t *to, in
         region_enter();
 #pragma omp for schedule(dynamic) nowait
         for (int chunk = 0; chunk < s->chunks; chunk++) {
-            int64_t *places = s->counts->of[chunk];
+            int64_t *places = s->counts->chunk_digits[chunk];
             const int64_t end = count * (chunk + 1) / s->chunks;
             for (int64_t i = count * chunk / s->chunks; i < end; i++)
                 to[places[extract_digit(from[i], shift)]++] = from[i];
@@ -312,7 +312,7 @@ bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int
     sorting s = {.threads = threads};
     s.chunks = SORT_CHUNKS * threads < SORT_CHUNKS_MAX ? SORT_CHUNKS * threads : SORT_CHUNKS_MAX;
     s.large = count / SORT_LARGE > SORT_LARGE_MIN ? count / SORT_LARGE : SORT_LARGE_MIN;
-    s.counts = base_alloc((size_t)s.chunks * sizeof s.counts->of[0]);
+    s.counts = base_alloc((size_t)s.chunks * sizeof s.counts->chunk_digits[0]);
     if (!s.counts) return false;
     sort_parallel(&s, keys, other, count, coder->index_bits + coder->code_bits, false);
     base_free(s.counts);

@@ -12,8 +12,8 @@ enum { MORTON_PART_BITS = 7, MORTON_PARTS = 3, MORTON_AXIS_BITS = MORTON_PART_BI
  * low ones, so that no two keys are equal. */
 typedef struct morton_coder {
     double origin[3];
-    double factor[3]; /* number of code steps per unit length on each axis */
-    double most[3];   /* index of the last code step on each axis */
+    double factor[3];    /* number of code steps per unit length on each axis */
+    double last_step[3]; /* index of the last code step on each axis */
     int index_bits;
     int code_bits;
     uint64_t parts[3][MORTON_PARTS][1 << MORTON_PART_BITS]; /* lookup tables that spread an axis's bits over the code */
