@@ -75,13 +75,13 @@ INLINE cell_view view_cell(const wave_grid *grid, const wave_cell_shape *shape, 
 
 static void average_to_vertices(const wave_grid *grid)
 {
-    const real *weights = grid->around_weights, *state = grid->state.values;
+    const real *weights = grid->vertex_cell_weights, *state = grid->state.values;
     real *out = grid->vertex_state.values;
     int64_t stride = grid->state.stride, is_soa = grid->state.component_stride;
     for (int32_t v = 0; v < grid->own_vertices; ++v) {
         real sum[4] = {0, 0, 0, 0};
-        for (int64_t i = grid->around_offsets[v]; i < grid->around_offsets[v + 1]; ++i) {
-            const real *q = state + grid->around[i] * stride;
+        for (int64_t i = grid->vertex_cell_offsets[v]; i < grid->vertex_cell_offsets[v + 1]; ++i) {
+            const real *q = state + grid->vertex_cells[i] * stride;
             for (int k = 0; k < 4; ++k) sum[k] += weights[i] * q[k * is_soa];
         }
         for (int a = 0; a < 3 && grid->reflecting; ++a) {

@@ -24,16 +24,16 @@ typedef struct wave_grid {
     const void *connectivity, *offsets; /* arrays of type index */
     const int64_t *face_offsets;
     const int32_t *neighbours;
-    const int64_t *around_offsets;
-    const int32_t *around;
+    const int64_t *vertex_cell_offsets;
+    const int32_t *vertex_cells;
     const uint8_t *walls;
-    const uint8_t *layers;      /* layer of the medium for each cell */
-    const void *around_weights; /* real; for each entry of around: weight of the cell in the value at the vertex */
-    const void *faces;          /* real; outward unit normal and area of each own face */
-    const void *inverse_volume; /* real; 1 / volume of each own cell */
-    wave_values state;          /* pressure and velocity of each cell */
-    wave_values vertex_state;   /* for each vertex: pressure, velocity; values is NULL in the first-order scheme */
-    wave_values coordinates;    /* x, y, z of each vertex, displaced if vertices move */
+    const uint8_t *layers;           /* layer of the medium for each cell */
+    const void *vertex_cell_weights; /* real; for each entry of around: weight of the cell in the value at the vertex */
+    const void *faces;               /* real; outward unit normal and area of each own face */
+    const void *inverse_volume;      /* real; 1 / volume of each own cell */
+    wave_values state;               /* pressure and velocity of each cell */
+    wave_values vertex_state;        /* for each vertex: pressure, velocity; values is NULL in the first-order scheme */
+    wave_values coordinates;         /* x, y, z of each vertex, displaced if vertices move */
     void
         *jump; /* real, interleaved; for each cell: 4 components of its state minus its mean over the cell's vertices */
     double modulus[WAVE_LAYERS_MAX], density[WAVE_LAYERS_MAX], impedance[WAVE_LAYERS_MAX];

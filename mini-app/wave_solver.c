@@ -50,8 +50,8 @@ static bool allocate(wave_solver *s)
     s->grid.jump = calloc(4 * (size_t)mesh->cells + 1, real);
     bool ok = s->faces && s->inverse_volume && s->layers && s->speed && s->volume && s->grid.jump;
     if (vertices) {
-        s->around_weights = malloc(((size_t)mesh->around_offsets[mesh->own_vertices] + 1) * real);
-        ok = ok && s->around_weights && make_values(&s->setup, mesh->vertices, 4, &s->grid.vertex_state);
+        s->vertex_cell_weights = malloc(((size_t)mesh->vertex_cell_offsets[mesh->own_vertices] + 1) * real);
+        ok = ok && s->vertex_cell_weights && make_values(&s->setup, mesh->vertices, 4, &s->grid.vertex_state);
     }
     return ok && make_values(&s->setup, mesh->cells, 4, &s->grid.state) &&
            make_values(&s->setup, mesh->vertices, 3, &s->grid.coordinates) &&
@@ -70,11 +70,11 @@ static void fill_grid(wave_solver *s)
     g->offsets = mesh->offsets;
     g->face_offsets = mesh->face_offsets;
     g->neighbours = mesh->neighbours;
-    g->around_offsets = mesh->around_offsets;
-    g->around = mesh->around;
+    g->vertex_cell_offsets = mesh->vertex_cell_offsets;
+    g->vertex_cells = mesh->vertex_cells;
     g->walls = mesh->walls;
     g->layers = s->layers;
-    g->around_weights = s->around_weights;
+    g->vertex_cell_weights = s->vertex_cell_weights;
     g->faces = s->faces;
     g->inverse_volume = s->inverse_volume;
     g->second_order = s->setup.order == 2;
@@ -161,13 +161,13 @@ static bool fill_vertices(wave_solver *s, const double (*centroid)[3])
             int64_t at = v * s->grid.coordinates.stride + a * s->grid.coordinates.component_stride;
             put_real(s->grid.coordinates.values, bytes, at, xyz[a]);
         }
-        if (v >= s->mesh->own_vertices || !s->around_weights) continue;
-        int64_t begin = s->mesh->around_offsets[v];
-        int count = (int)(s->mesh->around_offsets[v + 1] - begin);
+        if (v >= s->mesh->own_vertices || !s->vertex_cell_weights) continue;
+        int64_t begin = s->mesh->vertex_cell_offsets[v];
+        int count = (int)(s->mesh->vertex_cell_offsets[v + 1] - begin);
         double weight[WAVE_AROUND_MAX];
         if (count > WAVE_AROUND_MAX) return false;
-        wave_weights_fit(xyz, s->mesh->walls[v], count, s->mesh->around + begin, centroid, weight);
-        for (int i = 0; i < count; ++i) put_real(s->around_weights, bytes, begin + i, weight[i]);
+        wave_weights_fit(xyz, s->mesh->walls[v], count, s->mesh->vertex_cells + begin, centroid, weight);
+        for (int i = 0; i < count; ++i) put_real(s->vertex_cell_weights, bytes, begin + i, weight[i]);
     }
     return true;
 }
@@ -187,7 +187,7 @@ bool wave_solver_create(const wave_setup *setup, const wave_mesh *mesh, MPI_Comm
 
 void wave_solver_free(wave_solver *s)
 {
-    free(s->around_weights);
+    free(s->vertex_cell_weights);
     free(s->faces);
     free(s->inverse_volume);
     free(s->layers);

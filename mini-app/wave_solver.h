@@ -24,7 +24,7 @@ typedef struct wave_solver {
     MPI_Comm comm; /* communicator, borrowed from the caller */
     wave_grid grid;
     wave_halo halo;
-    void *around_weights, *faces, *inverse_volume; /* arrays to which grid points, owned by the solver */
+    void *vertex_cell_weights, *faces, *inverse_volume; /* arrays to which grid points, owned by the solver */
     uint8_t *layers;
     void *speed;               /* real; speed of sound in each cell */
     double *volume;            /* volume of each own cell */

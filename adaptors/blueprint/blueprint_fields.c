@@ -7,7 +7,7 @@
 
 /* A field of the topology. */
 typedef struct blueprint_field {
-    node at, values;
+    node field_node, values_node;
     bool is_element;
     int64_t first;      /* index in the array of the tuple of the first vertex or cell */
     int64_t strides[3]; /* distance in tuples between neighbours along each axis of a lattice */
@@ -56,12 +56,12 @@ static bool find_field(const node *field, blueprint_field *out, bool reports_lef
         return false;
     }
     if (!node_string(field, "association", &association)) return false;
-    out->at = *field;
+    out->field_node = *field;
     out->is_element = strcmp(association, "element") == 0;
     if (!out->is_element && strcmp(association, "vertex") != 0)
         return node_set_error(field, "association", INSITU_ERROR_FIELD, "is \"%s\", expected vertex or element",
                               association);
-    return node_require(&out->at, "values", &out->values);
+    return node_require(&out->field_node, "values", &out->values_node);
 }
 
 /* Iterates over the fields of a topology. next_field() returns false behind the last field, or if a field is
@@ -72,7 +72,7 @@ typedef struct field_walk {
     bool reports_left_out; /* true if fields that are left out are reported */
     node fields, field;
     int64_t next;
-    blueprint_field found;
+    blueprint_field field_found;
 } field_walk;
 
 static bool next_field(field_walk *w)
@@ -80,8 +80,9 @@ static bool next_field(field_walk *w)
     if (w->next == 0 && !node_find(w->domain, "fields", &w->fields)) return false;
     while (w->next < node_child_count(&w->fields)) {
         node_child(&w->fields, w->next++, &w->field);
-        w->found = (blueprint_field){.first = 0};
-        if (belongs_to(&w->field, w->topology) && find_field(&w->field, &w->found, w->reports_left_out)) return true;
+        w->field_found = (blueprint_field){.first = 0};
+        if (belongs_to(&w->field, w->topology) && find_field(&w->field, &w->field_found, w->reports_left_out))
+            return true;
         if (w->domain->log->status) return false;
     }
     return false;
@@ -119,16 +120,17 @@ static bool read_strides(const blueprint_mesh *mesh, blueprint_field *field)
     field->strides[1] = counts[0];
     field->strides[2] = counts[0] * counts[1];
     if (!mesh->mesh.lattice) return true;
-    node_integers(&field->at, "offsets", offsets, &count);
-    if (node_integers(&field->at, "strides", field->strides, &count))
+    node_integers(&field->field_node, "offsets", offsets, &count);
+    if (node_integers(&field->field_node, "strides", field->strides, &count))
         for (int axis = count; axis < 3; axis++) field->strides[axis] = field->strides[axis - 1] * counts[axis - 1];
     for (int axis = 0; axis < 3; axis++) {
         if (field->strides[axis] < 1 || offsets[axis] < 0)
-            return node_set_error(&field->at, field->strides[axis] < 1 ? "strides" : "offsets", INSITU_ERROR_FIELD,
-                                  "has %lld", (long long)(field->strides[axis] < 1 ? field->strides : offsets)[axis]);
+            return node_set_error(&field->field_node, field->strides[axis] < 1 ? "strides" : "offsets",
+                                  INSITU_ERROR_FIELD, "has %lld",
+                                  (long long)(field->strides[axis] < 1 ? field->strides : offsets)[axis]);
         field->first += offsets[axis] * field->strides[axis];
     }
-    return !field->at.log->status;
+    return !field->field_node.log->status;
 }
 
 /* Checks whether the strides are equal along all axes with more than one element. */
@@ -195,17 +197,18 @@ static bool set_ghost_flags(const blueprint_field *field, blueprint_mesh *mesh)
 {
     node_array array;
     insitu_array flags;
-    if (!node_read_array(&field->values, &array)) return false;
+    if (!node_read_array(&field->values_node, &array)) return false;
     if (!node_is_integers(&array))
-        return node_set_error(&field->values, "", INSITU_ERROR_FIELD, "are no whole numbers, as flags of ghosts are");
-    if (!read_component(&field->values, mesh, field, &flags)) return false;
+        return node_set_error(&field->values_node, "", INSITU_ERROR_FIELD,
+                              "are no whole numbers, as flags of ghosts are");
+    if (!read_component(&field->values_node, mesh, field, &flags)) return false;
     int64_t any = 0;
     for (int64_t i = 0; i < mesh->mesh.cell_count && flags.data; i++) any |= node_element(&flags, i);
     mesh->mesh.ghosts = any ? flags : (insitu_array){0};
-    if (strcmp(field->at.name, "ascent_ghosts") == 0 || !(any & ~(int64_t)VTK_HIDDEN_BITS)) return true;
-    unsigned char *own = make_flags(&field->at, mesh, &flags, VTK_HIDDEN_BITS);
+    if (strcmp(field->field_node.name, "ascent_ghosts") == 0 || !(any & ~(int64_t)VTK_HIDDEN_BITS)) return true;
+    unsigned char *own = make_flags(&field->field_node, mesh, &flags, VTK_HIDDEN_BITS);
     if (!own) return false;
-    node_report_copy(&field->at, "values", mesh->mesh.cell_count, "the flags that hide a cell");
+    node_report_copy(&field->field_node, "values", mesh->mesh.cell_count, "the flags that hide a cell");
     mesh->mesh.ghosts = (insitu_array){own, INSITU_UINT8, 0};
     return true;
 }
@@ -282,10 +285,11 @@ static bool read_nestsets(const node *domain, const char *topology, blueprint_me
 bool blueprint_read_ghosts(const node *domain, const char *topology, blueprint_mesh *mesh)
 {
     for (field_walk w = {.domain = domain, .topology = topology}; next_field(&w);) {
-        if (!w.found.is_element) continue;
-        if (!read_strides(mesh, &w.found)) return false;
-        set_cell_strides(mesh, &w.found);
-        if (has_mesh_strides(mesh, &w.found) && is_ghosts(domain, w.field.name) && !set_ghost_flags(&w.found, mesh))
+        if (!w.field_found.is_element) continue;
+        if (!read_strides(mesh, &w.field_found)) return false;
+        set_cell_strides(mesh, &w.field_found);
+        if (has_mesh_strides(mesh, &w.field_found) && is_ghosts(domain, w.field.name) &&
+            !set_ghost_flags(&w.field_found, mesh))
             return false;
         if (domain->log->status) return false;
     }
@@ -297,15 +301,15 @@ bool blueprint_read_ghosts(const node *domain, const char *topology, blueprint_m
 /* Describes the field's components in an array, which the caller must free. NULL after an error. */
 static insitu_array *read_values(const blueprint_field *field, const blueprint_mesh *mesh, int *count)
 {
-    const int64_t children = node_child_count(&field->values);
+    const int64_t children = node_child_count(&field->values_node);
     *count = children ? (int)children : 1;
     insitu_array *out = calloc((size_t)*count, sizeof *out);
     bool is_read = out != NULL;
-    if (!out) node_set_error(&field->values, "", INSITU_ERROR_MEMORY, "no memory for %d components", *count);
-    if (out && !children) is_read = read_component(&field->values, mesh, field, out);
+    if (!out) node_set_error(&field->values_node, "", INSITU_ERROR_MEMORY, "no memory for %d components", *count);
+    if (out && !children) is_read = read_component(&field->values_node, mesh, field, out);
     for (int i = 0; i < children && is_read; i++) {
         node component;
-        node_child(&field->values, i, &component);
+        node_child(&field->values_node, i, &component);
         is_read = read_component(&component, mesh, field, &out[i]);
     }
     if (is_read) return out;
@@ -321,7 +325,7 @@ static bool set_field(const blueprint_field *field, const blueprint_mesh *mesh, 
     insitu_array *values = read_values(field, mesh, &components);
     if (!values) return false;
     insitu_field_defaults(&given);
-    given.name = field->at.name;
+    given.name = field->field_node.name;
     given.centring = field->is_element ? INSITU_CELL : INSITU_VERTEX;
     given.count = field->is_element ? mesh->mesh.cell_count : mesh->mesh.vertex_count;
     given.component_count = components;
@@ -331,7 +335,7 @@ static bool set_field(const blueprint_field *field, const blueprint_mesh *mesh, 
         given.components = values;
     const insitu_status status = insitu_set_field(session, name, &given);
     free(values);
-    return !status || node_set_error(&field->at, "", status, "%s", insitu_error(session));
+    return !status || node_set_error(&field->field_node, "", status, "%s", insitu_error(session));
 }
 
 bool blueprint_set_fields(const node *domain, const char *topology, const blueprint_mesh *mesh, insitu_session *session,
@@ -339,16 +343,16 @@ bool blueprint_set_fields(const node *domain, const char *topology, const bluepr
 {
     for (field_walk w = {.domain = domain, .topology = topology, .reports_left_out = true}; next_field(&w);) {
         if (is_ghosts(domain, w.field.name)) {
-            if (!w.found.is_element) node_report_left_out(&w.field, "values", "ghosts at vertices are not read");
+            if (!w.field_found.is_element) node_report_left_out(&w.field, "values", "ghosts at vertices are not read");
             continue;
         }
-        if (!read_strides(mesh, &w.found)) return false;
-        if (!has_mesh_strides(mesh, &w.found)) {
+        if (!read_strides(mesh, &w.field_found)) return false;
+        if (!has_mesh_strides(mesh, &w.field_found)) {
             node_report_left_out(&w.field, "strides", "has other strides than the %s of the topology",
-                                 w.found.is_element ? "other element fields" : "vertices");
+                                 w.field_found.is_element ? "other element fields" : "vertices");
             continue;
         }
-        if (!set_field(&w.found, mesh, session, name)) return false;
+        if (!set_field(&w.field_found, mesh, session, name)) return false;
         ++*count;
     }
     return !domain->log->status;

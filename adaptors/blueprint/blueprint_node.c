@@ -80,13 +80,14 @@ void node_log_free(node_log *log)
 
 bool node_has(const node *parent, const char *path)
 {
-    return parent->conduit->has_path(parent->at, path);
+    return parent->conduit->has_path(parent->conduit_node, path);
 }
 
 bool node_find(const node *parent, const char *path, node *out)
 {
     if (!node_has(parent, path)) return false;
-    *out = (node){parent->conduit, parent->log, parent->conduit->fetch_existing(parent->at, path), parent, {0}};
+    *out =
+        (node){parent->conduit, parent->log, parent->conduit->fetch_existing(parent->conduit_node, path), parent, {0}};
     snprintf(out->name, sizeof out->name, "%s", path);
     return true;
 }
@@ -98,13 +99,13 @@ bool node_require(const node *parent, const char *path, node *out)
 
 int64_t node_child_count(const node *parent)
 {
-    return parent->conduit->number_of_children(parent->at);
+    return parent->conduit->number_of_children(parent->conduit_node);
 }
 
 void node_child(const node *parent, int64_t number, node *out)
 {
-    *out = (node){parent->conduit, parent->log, parent->conduit->child(parent->at, number), parent, {0}};
-    char *name = parent->conduit->name(out->at);
+    *out = (node){parent->conduit, parent->log, parent->conduit->child(parent->conduit_node, number), parent, {0}};
+    char *name = parent->conduit->name(out->conduit_node);
     if (name && *name)
         snprintf(out->name, sizeof out->name, "%s", name);
     else
@@ -116,8 +117,9 @@ bool node_string(const node *parent, const char *path, const char **out)
 {
     node found;
     if (!node_require(parent, path, &found)) return false;
-    if (!found.conduit->is_string(found.at)) return node_set_error(&found, "", INSITU_ERROR_MESH, "is no string");
-    *out = found.conduit->as_char8_str(found.at);
+    if (!found.conduit->is_string(found.conduit_node))
+        return node_set_error(&found, "", INSITU_ERROR_MESH, "is no string");
+    *out = found.conduit->as_char8_str(found.conduit_node);
     return *out || node_set_error(&found, "", INSITU_ERROR_MESH, "is no string");
 }
 
@@ -144,14 +146,14 @@ static int find_type(int64_t id)
 
 bool node_read_array(const node *of, node_array *out)
 {
-    const int type = find_type(of->conduit->id(of->at));
+    const int type = find_type(of->conduit->id(of->conduit_node));
     if (!type) return node_set_error(of, "", INSITU_ERROR_MESH, "is no array of numbers");
-    *out = (node_array){.count = of->conduit->number_of_elements(of->at)};
+    *out = (node_array){.count = of->conduit->number_of_elements(of->conduit_node)};
     out->array.type = (insitu_type)type;
     if (out->count < 0) return node_set_error(of, "", INSITU_ERROR_MESH, "has %lld elements", (long long)out->count);
     if (out->count == 0) return true;
-    out->array.data = of->conduit->element_ptr(of->at, 0);
-    out->array.stride_bytes = of->conduit->stride(of->at);
+    out->array.data = of->conduit->element_ptr(of->conduit_node, 0);
+    out->array.stride_bytes = of->conduit->stride(of->conduit_node);
     if (!out->array.data)
         return node_set_error(of, "", INSITU_ERROR_MESH, "has %lld elements and no address", (long long)out->count);
     if (out->array.stride_bytes == 0 && out->count > 1)

@@ -22,7 +22,7 @@ typedef struct node_log {
 typedef struct node {
     const insitu_conduit *conduit;
     node_log *log;
-    const void *at;
+    const void *conduit_node;
     const struct node *parent; /* parent node; NULL for the root, whose name the caller chose */
     char name[NODE_NAME];
 } node;

@@ -69,8 +69,8 @@ static const char *find_script(const node *root)
     for (int64_t i = 0; i < node_child_count(&scripts); i++) {
         node_child(&scripts, i, &script);
         if (!node_find(&script, "filename", &file)) file = script;
-        if (!file.conduit->is_string(file.at)) continue;
-        const char *path = file.conduit->as_char8_str(file.at);
+        if (!file.conduit->is_string(file.conduit_node)) continue;
+        const char *path = file.conduit->as_char8_str(file.conduit_node);
         if (path && is_yaml(path)) return path;
     }
     return NULL;
@@ -154,11 +154,11 @@ static bool set_channel(const node *channel)
     if (!is_multimesh && strcmp(type, "mesh") != 0 && strcmp(type, "amrmesh") != 0)
         return node_set_error(channel, "type", INSITU_ERROR_MESH, "is \"%s\", expected mesh, multimesh or amrmesh",
                               type);
-    if (!is_multimesh) return !insitu_blueprint_set(state.adaptor, channel->name, data.at);
+    if (!is_multimesh) return !insitu_blueprint_set(state.adaptor, channel->name, data.conduit_node);
     for (int64_t i = 0; i < node_child_count(&data); i++) {
         node_child(&data, i, &mesh);
         snprintf(name, sizeof name, "%s/%s", channel->name, mesh.name);
-        if (insitu_blueprint_set(state.adaptor, name, mesh.at)) return false;
+        if (insitu_blueprint_set(state.adaptor, name, mesh.conduit_node)) return false;
     }
     return true;
 }

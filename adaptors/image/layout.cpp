@@ -202,7 +202,7 @@ bool place_words(layout_state &s, int index)
  * highest label. */
 struct bar_group {
     std::vector<int> bars;
-    insitu_anchor at;
+    insitu_anchor anchor;
     int size;
     double width, head;
     std::vector<std::vector<std::string>> labels;
@@ -291,7 +291,7 @@ bool fill_column(const layout_state &s, const bar_group &g, std::size_t first, s
                  std::vector<block> &out)
 {
     const double pitch = g.width + pixels(column_gap, g.size);
-    const double x0 = g.at == INSITU_LEFT ? s.x0 + column * pitch : s.x1 - column * pitch - g.width;
+    const double x0 = g.anchor == INSITU_LEFT ? s.x0 + column * pitch : s.x1 - column * pitch - g.width;
     double top = 0, bottom = 0;
     free_height(s, x0, x0 + g.width, top, bottom);
     const double share = count == 1 ? 0.62 : count == 2 ? 0.8 : 1;
@@ -320,7 +320,7 @@ bool place_group(layout_state &s, const bar_group &g)
         bool is_placed = true;
         const std::size_t used = (count + rows - 1) / rows;
         for (std::size_t i = 0; i < used && is_placed; i++) { /* the first column is the leftmost one */
-            const std::size_t column = g.at == INSITU_LEFT ? i : used - 1 - i;
+            const std::size_t column = g.anchor == INSITU_LEFT ? i : used - 1 - i;
             is_placed = fill_column(s, g, i * rows, std::min(rows, count - i * rows), static_cast<int>(column), bars);
         }
         if (!is_placed) continue;

@@ -189,7 +189,7 @@ struct new_size {
 /* The cells with faces, in their order. has[i] is true if VTK's cell i is one of them and all its faces are valid. */
 struct cells_with_faces {
     face_list faces;
-    std::vector<bool> has;
+    std::vector<bool> has_faces;
 };
 
 template <typename Id>
@@ -198,9 +198,9 @@ void read_faces(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, cells_with_
     for (int64_t i = 0; i < raw.count; i++) {
         const cell_conversion &r = cell_conversions()[raw.types[i]];
         if (r.kind != conversion_kind::faces || raw.size(i) < r.needed_points) continue;
-        if (with_faces.has.empty()) with_faces.has.resize(static_cast<size_t>(raw.count));
+        if (with_faces.has_faces.empty()) with_faces.has_faces.resize(static_cast<size_t>(raw.count));
         const std::vector<int64_t> points(raw.connectivity + raw.offsets[i], raw.connectivity + raw.offsets[i + 1]);
-        with_faces.has[static_cast<size_t>(i)] = with_faces.faces.add_cell(grid, i, raw.types[i], points.data());
+        with_faces.has_faces[static_cast<size_t>(i)] = with_faces.faces.add_cell(grid, i, raw.types[i], points.data());
     }
 }
 
@@ -211,7 +211,7 @@ new_size count_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces,
     size_t number = 0;
     for (int64_t i = 0; i < raw.count; i++) {
         const cell_conversion &r = raw.conversion_of(i);
-        const bool is_faced = !with_faces.has.empty() && with_faces.has[static_cast<size_t>(i)];
+        const bool is_faced = !with_faces.has_faces.empty() && with_faces.has_faces[static_cast<size_t>(i)];
         const bool is_drawn = is_faced || (r.linear_cell_count > 0 && raw.size(i) >= r.needed_points);
         if (r.kind == conversion_kind::flat)
             counts.flat++;
@@ -234,7 +234,7 @@ void fill_new(const raw_cells<Id> &raw, const cells_with_faces &with_faces, uint
     size_t number = 0;
     for (int64_t i = 0; i < raw.count; i++) {
         const cell_conversion &r = raw.conversion_of(i);
-        const bool is_faced = !with_faces.has.empty() && with_faces.has[static_cast<size_t>(i)];
+        const bool is_faced = !with_faces.has_faces.empty() && with_faces.has_faces[static_cast<size_t>(i)];
         if (!is_faced && (r.linear_cell_count == 0 || raw.size(i) < r.needed_points)) continue;
         *types++ = is_faced ? static_cast<uint8_t>(INSITU_POLYHEDRON) : r.replacement.type;
         *offsets++ = at;
@@ -298,8 +298,8 @@ void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const st
     mesh.offsets = {offsets, INSITU_INT64, 0};
     mesh.connectivity = {connectivity, sizeof(Id) == 4 ? INSITU_INT32 : INSITU_INT64, 0};
     mesh.connectivity_count = size.vertices;
-    const int64_t face_bytes = with_faces.has.empty() ? 0 : with_faces.faces.copy_to_mesh(held, mesh);
-    view.log.copied(view.what + " cells", why,
+    const int64_t face_bytes = with_faces.has_faces.empty() ? 0 : with_faces.faces.copy_to_mesh(held, mesh);
+    view.log.copied(view.grid_name + " cells", why,
                     size.cells + (size.cells + 1) * 8 + size.vertices * static_cast<int64_t>(sizeof(Id)) + face_bytes);
 }
 
@@ -362,8 +362,8 @@ bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, 
     for (int64_t i = 0; i < raw.count; i++) {
         by_type[raw.types[i]]++;
         if (raw.offsets[i] < 0 || raw.offsets[i] > raw.offsets[i + 1] || raw.offsets[i + 1] > connectivity_count) {
-            error = view.what + ": cell " + std::to_string(i) + ": offsets " + std::to_string(raw.offsets[i]) + ", " +
-                    std::to_string(raw.offsets[i + 1]) + " are not within the connectivity's " +
+            error = view.grid_name + ": cell " + std::to_string(i) + ": offsets " + std::to_string(raw.offsets[i]) +
+                    ", " + std::to_string(raw.offsets[i + 1]) + " are not within the connectivity's " +
                     std::to_string(connectivity_count) + " entries";
             return false;
         }
@@ -387,7 +387,7 @@ bool view_cells(vtkUnstructuredGrid *grid, const cells_view &view, std::string &
     vtkUnsignedCharArray *types = grid->GetCellTypesArray();
     if (!array || array->GetNumberOfCells() == 0) return true;
     if (!types || types->GetNumberOfValues() != array->GetNumberOfCells()) {
-        error = view.what + ": " + std::to_string(array->GetNumberOfCells()) + " cells but " +
+        error = view.grid_name + ": " + std::to_string(array->GetNumberOfCells()) + " cells but " +
                 std::to_string(types ? types->GetNumberOfValues() : 0) + " cell types";
         return false;
     }

@@ -31,7 +31,7 @@ struct cell_list {
 
 //  The outputs of view_cells(), and the name of the grid for messages.
 struct cells_view {
-    const std::string &what; // name of the grid in messages
+    const std::string &grid_name; // name of the grid in messages
     held_arrays &held;
     conversion_log &log;
     insitu_mesh &mesh;

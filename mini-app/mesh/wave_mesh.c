@@ -12,8 +12,8 @@ void wave_mesh_free(wave_mesh *mesh)
     free(mesh->offsets);
     free(mesh->face_offsets);
     free(mesh->neighbours);
-    free(mesh->around_offsets);
-    free(mesh->around);
+    free(mesh->vertex_cell_offsets);
+    free(mesh->vertex_cells);
     free(mesh->links);
     free(mesh->sends);
     *mesh = (wave_mesh){0};

@@ -35,8 +35,8 @@ typedef struct wave_mesh {
     int32_t *neighbours; /* for each face of each own cell: the neighbour across it, or -1 at a wall */
     int64_t face_count;  /* number of faces of own cells; a face between two of them counts twice */
     int64_t unmatched;   /* faces of own cells without a neighbour, or with two: 0 for a conforming mesh */
-    int64_t *around_offsets; /* first entry in around of each own vertex, and the total */
-    int32_t *around;         /* cells around each vertex of an own cell, in ascending order of cell id */
+    int64_t *vertex_cell_offsets; /* first entry in around of each own vertex, and the total */
+    int32_t *vertex_cells;        /* cells around each vertex of an own cell, in ascending order of cell id */
     int link_count;
     wave_link *links; /* links to other ranks, in ascending order of rank */
     int32_t *sends;   /* own cells to send to other ranks, link by link */

@@ -293,13 +293,13 @@ static void sort_by_id(const wave_mesh *mesh, int32_t *cells, int64_t count)
 static bool make_around(wave_mesh *mesh)
 {
     int32_t v[8];
-    mesh->around_offsets = calloc((size_t)mesh->own_vertices + 2, sizeof *mesh->around_offsets);
-    mesh->around = malloc(((size_t)mesh->connectivity_count + 1) * sizeof *mesh->around);
-    if (!mesh->around_offsets || !mesh->around) return false;
-    int64_t *begin = mesh->around_offsets + 1;
+    mesh->vertex_cell_offsets = calloc((size_t)mesh->own_vertices + 2, sizeof *mesh->vertex_cell_offsets);
+    mesh->vertex_cells = malloc(((size_t)mesh->connectivity_count + 1) * sizeof *mesh->vertex_cells);
+    if (!mesh->vertex_cell_offsets || !mesh->vertex_cells) return false;
+    int64_t *begin = mesh->vertex_cell_offsets + 1;
     for (int64_t i = 0; i < mesh->connectivity_count; ++i) {
         int64_t vertex = wave_mesh_index(mesh, mesh->connectivity, i);
-        if (vertex < mesh->own_vertices) mesh->around_offsets[vertex + 1]++;
+        if (vertex < mesh->own_vertices) mesh->vertex_cell_offsets[vertex + 1]++;
     }
     int64_t total = 0;
     for (int32_t i = 0; i < mesh->own_vertices; ++i) {
@@ -310,11 +310,12 @@ static bool make_around(wave_mesh *mesh)
     for (int32_t c = 0; c < mesh->cells; ++c) {
         int count = wave_mesh_cell(mesh, c, v)->vertex_count;
         for (int i = 0; i < count; ++i) {
-            if (v[i] < mesh->own_vertices) mesh->around[begin[v[i]]++] = c;
+            if (v[i] < mesh->own_vertices) mesh->vertex_cells[begin[v[i]]++] = c;
         }
     }
     for (int32_t i = 0; i < mesh->own_vertices; ++i) {
-        sort_by_id(mesh, mesh->around + mesh->around_offsets[i], mesh->around_offsets[i + 1] - mesh->around_offsets[i]);
+        sort_by_id(mesh, mesh->vertex_cells + mesh->vertex_cell_offsets[i],
+                   mesh->vertex_cell_offsets[i + 1] - mesh->vertex_cell_offsets[i]);
     }
     return true;
 }
