@@ -122,7 +122,7 @@ static void print_mapping(FILE *to, const scene_mapping *mapping, const char *pa
         char *keys = strstr(words, " with the keys");
         if (keys) *keys = '\0';
         fprintf(to, "| `%s` | %s | %s | %s |\n", mapping->fields[i].key, words,
-                key->by_default ? key->by_default : "**required**", key->help);
+                key->default_text ? key->default_text : "**required**", key->help);
     }
     for (int i = 0; mapping->fields[i].key; i++) {
         for (int form = 0; form < mapping->keys[i].form_count; form++) {

@@ -32,7 +32,8 @@ static void block_create(block_rank *b, int rank)
         }
         count++;
     }
-    b->homes = (session_homes){.is_known = true, .rank = rank, .near_count = count, .near = b->near, .boxes = b->boxes};
+    b->homes = (session_homes){
+        .is_computed = true, .rank = rank, .near_count = count, .near_ranks = b->near, .boxes = b->boxes};
 }
 
 static uint64_t hash_of(const double point[3])
@@ -53,7 +54,7 @@ static int count_homes(const block_rank *own, block_rank *neighbours, int neighb
     for (int v = 0; v < 9 * 9 * 9; v++) {
         const double point[1][3] = {{low[0] + v % 9 / 8.0, low[1] + v / 9 % 9 / 8.0, low[2] + v / 81 / 8.0}};
         if (!session_homes_share(&own->homes, point[0])) continue;
-        const int home = session_home(&own->homes, point, 1, hash_of(point[0]), 0);
+        const int home = session_find_home(&own->homes, point, 1, hash_of(point[0]), 0);
         (*shared)++;
         homes += !is_home[home];
         is_home[home] = true;
@@ -63,7 +64,7 @@ static int count_homes(const block_rank *own, block_rank *neighbours, int neighb
                 if (neighbours[n].near[k] == neighbours[n].homes.rank) box = &neighbours[n].boxes[k];
             bool has_it = true;
             for (int a = 0; a < 3; a++) has_it = has_it && box->lower[a] <= point[0][a] && point[0][a] <= box->upper[a];
-            if (has_it) assert_int_equal(session_home(&neighbours[n].homes, point, 1, hash_of(point[0]), 0), home);
+            if (has_it) assert_int_equal(session_find_home(&neighbours[n].homes, point, 1, hash_of(point[0]), 0), home);
         }
     }
     return homes;
@@ -93,8 +94,12 @@ static void homes_by_id_are_the_shares_owners(void **state)
     (void)state;
     int64_t firsts[MOST_SHARES];
     int owners[MOST_SHARES];
-    session_homes homes = {
-        .is_known = true, .by_id = true, .rank = 3, .share_count = MOST_SHARES, .firsts = firsts, .owners = owners};
+    session_homes homes = {.is_computed = true,
+                           .by_id = true,
+                           .rank = 3,
+                           .share_count = MOST_SHARES,
+                           .first_ids = firsts,
+                           .owners = owners};
     for (int i = 0; i < MOST_SHARES; i++) {
         firsts[i] = 100 * i + 40;
         owners[i] = (i * 37) % MOST_SHARES;
@@ -103,7 +108,7 @@ static void homes_by_id_are_the_shares_owners(void **state)
     for (int64_t id = -50; id < 100 * MOST_SHARES + 200; id++) {
         int expected = 0;
         while (expected + 1 < MOST_SHARES && firsts[expected + 1] <= id) expected++;
-        assert_int_equal(session_home(&homes, nowhere, 1, 0, id), owners[expected]);
+        assert_int_equal(session_find_home(&homes, nowhere, 1, 0, id), owners[expected]);
     }
 }
 

@@ -50,7 +50,7 @@ template <typename Use> void for_nodes(const session_nodes &of, Use use)
 
 void expect_place(int type, const session_nodes &of, const double *theirs, int i, int j, int k)
 {
-    const int place = session_node_place(&of, INSITU_ORDER_VTK, i, j, k), p = of.order;
+    const int place = session_node_index(&of, INSITU_ORDER_VTK, i, j, k), p = of.order;
     double at[3] = {static_cast<double>(i) / p, static_cast<double>(j) / p, static_cast<double>(k) / p};
     if (of.type == GRID_PYRAMID) {
         /* VTK's reference pyramid has its apex over the middle; its nodes on edges are halfway. */
@@ -92,7 +92,7 @@ void lagrange_nodes_are_vtks(void **)
             std::vector<int> seen(static_cast<size_t>(count));
             for_nodes(of, [&](int i, int j, int k) {
                 expect_place(type, of, theirs, i, j, k);
-                seen[static_cast<size_t>(session_node_place(&of, INSITU_ORDER_VTK, i, j, k))]++;
+                seen[static_cast<size_t>(session_node_index(&of, INSITU_ORDER_VTK, i, j, k))]++;
             });
             for (const int times : seen) assert_int_equal(times, 1);
         }
@@ -118,11 +118,11 @@ void old_hexes_have_two_edges_swapped(void **)
         assert_true(session_nodes_of(INSITU_LAGRANGE_HEX, session_node_count(INSITU_LAGRANGE_HEX, p), &of));
         const int r = p - 1, first = 8 + 10 * r;
         for_nodes(of, [&](int i, int j, int k) {
-            const int now = session_node_place(&of, INSITU_ORDER_VTK, i, j, k);
+            const int now = session_node_index(&of, INSITU_ORDER_VTK, i, j, k);
             int old = now;
             if (now >= first && now < first + r) old += r;
             if (now >= first + r && now < first + 2 * r) old -= r;
-            assert_int_equal(session_node_place(&of, INSITU_ORDER_VTK_BEFORE_9_1, i, j, k), old);
+            assert_int_equal(session_node_index(&of, INSITU_ORDER_VTK_BEFORE_9_1, i, j, k), old);
         });
     }
 }
@@ -139,7 +139,7 @@ void places_are_permutations(void **)
                 if (session_order_refused(&of, order)) continue;
                 std::vector<int> seen(static_cast<size_t>(of.count));
                 for_nodes(of, [&](int i, int j, int k) {
-                    const int place = session_node_place(&of, order, i, j, k);
+                    const int place = session_node_index(&of, order, i, j, k);
                     assert_in_range(place, 0, of.count - 1);
                     seen[static_cast<size_t>(place)]++;
                 });

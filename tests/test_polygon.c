@@ -126,7 +126,7 @@ typedef struct cut {
 
 static void cut_polygon(const polygon *p, cut *out)
 {
-    void *room = malloc(polygon_room(p->count));
+    void *room = malloc(polygon_work_bytes(p->count));
     assert_non_null(room);
     polygon_cut((const double(*)[3])p->corners, p->count, room, out->triangles);
     out->count = p->count - 2;

@@ -227,7 +227,7 @@ static void scene_image_keys_are_read(void **state)
     assert_int_equal(image->line, 4);
     assert_int_equal(image->width, 640);
     assert_int_equal(image->height, 480);
-    assert_int_equal(image->every, 10);
+    assert_int_equal(image->cycle_interval, 10);
     check_colour(image->background, 0.5 * linear(0.5), 0.5 * linear(0.25), 0.5);
     assert_true(image->background[3] == 0.5F);
     assert_true(image->step == 0 && image->step_cells == 0.25);
@@ -265,7 +265,7 @@ static void scene_view_keys_are_read(void **state)
     assert_true(camera->angle == 35.5);
     assert_true(s.images[0].antialias == 1 && s.images[1].antialias == 4 && s.images[1].frames == 4);
     assert_true(s.images[1].camera.is_automatic && s.images[1].camera.fits_box);
-    assert_true(s.images[0].every_time == 0 && s.images[1].every_time == 0.25);
+    assert_true(s.images[0].time_interval == 0 && s.images[1].time_interval == 0.25);
     assert_true(s.images[1].camera.is_orthographic && s.images[1].camera.height == 2.5);
     check_vector(s.images[1].camera.direction, 0, 0.6, 0.8);
     assert_true(s.images[1].camera.zoom == 1.5 && s.images[1].camera.has_bounds);
@@ -367,7 +367,8 @@ static void scene_volume_keys_are_read(void **state)
     assert_true(scene_field_is_on(&volume->field, "air") && scene_field_is_on(&volume->field, "sea/12/3"));
     assert_false(scene_field_is_on(&volume->field, "se") || scene_field_is_on(&volume->field, "sea2"));
     assert_int_equal(volume->opacity_count, 4);
-    for (int i = 0; i < 4; i++) assert_true(volume->opacity[i].at == at[i] && volume->opacity[i].opacity == opacity[i]);
+    for (int i = 0; i < 4; i++)
+        assert_true(volume->opacity[i].position == at[i] && volume->opacity[i].opacity == opacity[i]);
     scene_free(&s);
 }
 
@@ -381,7 +382,7 @@ static void scene_image_defaults_hold(void **state)
     assert_int_equal(s.threads, 0);
     assert_int_equal(s.tree, SCENE_TREE_AUTO);
     assert_int_equal(s.writing, SCENE_WRITE_BEHIND);
-    assert_true(image->width == 1280 && image->height == 720 && image->every == 1);
+    assert_true(image->width == 1280 && image->height == 720 && image->cycle_interval == 1);
     check_colour(image->background, linear(0.08), linear(0.09), linear(0.11));
     assert_true(image->background[3] == 1);
     assert_true(image->step == 0 && image->step_cells == 0.5);
@@ -479,13 +480,13 @@ static void statistics_and_conditions_are_read(void **state)
     const scene_statistics *first = s.statistics;
     assert_string_equal(first->field.name, "p");
     assert_string_equal(first->path, "out/p.csv");
-    assert_true(first->field.component == 0 && first->field.mesh_count == 1 && first->every == 3);
+    assert_true(first->field.component == 0 && first->field.mesh_count == 1 && first->cycle_interval == 3);
     assert_true(first->bin_count == 8 && first->low == -1 && first->high == 1);
-    assert_true(first[1].bin_count == 32 && first[1].low > first[1].high && first[1].every == 1);
+    assert_true(first[1].bin_count == 32 && first[1].low > first[1].high && first[1].cycle_interval == 1);
     assert_true(first[2].bin_count == 0);
     const scene_condition *when = &s.images[1].when;
     assert_true(s.images[1].once && !s.images[0].once && !s.images[0].when.is_given);
-    assert_true(when->is_given && when->of == SCENE_MEAN && when->above == 1 && when->below == 2.5);
+    assert_true(when->is_given && when->statistic == SCENE_MEAN && when->above == 1 && when->below == 2.5);
     assert_true(when->field.component == 2 && when->field.mesh_count == 2);
     scene_free(&s);
 }
@@ -519,7 +520,7 @@ static void surfaces_have_their_colours(void **state)
     assert_int_equal(s.images[0].surface_count, 3);
     const scene_surface *surface = s.images[0].surfaces;
     check_colour(surface[0].colour, linear(1), linear(0.5), linear(0));
-    assert_true(surface[0].opacity == 0.5F && !surface[0].has_colour_by && !surface[0].on.name);
+    assert_true(surface[0].opacity == 0.5F && !surface[0].has_colour_by && !surface[0].meshes_field.name);
     const scene_threshold *threshold = &surface[1].threshold;
     assert_false(surface[0].threshold.is_given);
     assert_true(threshold->is_given && threshold->low == 1 && threshold->high == 2.5);
@@ -529,10 +530,10 @@ static void surfaces_have_their_colours(void **state)
     assert_true(surface[0].edge_width == 2 && surface[1].edge_width >= 1);
     check_colour(surface[0].edge_colour, linear(0), linear(0.5), linear(1));
     check_colour(surface[1].edge_colour, linear(0.1), linear(0.1), linear(0.1));
-    assert_true(surface[0].on.mesh_count == 2 && scene_field_is_on(&surface[0].on, "sea/3"));
-    assert_false(scene_field_is_on(&surface[0].on, "seaside"));
+    assert_true(surface[0].meshes_field.mesh_count == 2 && scene_field_is_on(&surface[0].meshes_field, "sea/3"));
+    assert_false(scene_field_is_on(&surface[0].meshes_field, "seaside"));
     assert_true(surface[1].opacity == 1 && surface[1].has_colour_by && surface[1].colour_by.at_vertices);
-    assert_true(scene_field_is_on(&surface[1].on, "any"));
+    assert_true(scene_field_is_on(&surface[1].meshes_field, "any"));
     assert_string_equal(surface[1].colour_by.name, "q");
     check_built_in(&surface[1].colour_map, "grey");
     check_colour(surface[1].colour, linear(0.8), linear(0.8), linear(0.8));
@@ -560,9 +561,9 @@ static void planes_come_in_numbers(void **state)
         const scene_plane *plane = &slice[0].planes[i];
         check_vector(plane->normal, i < 3, 0, i < 3 ? 0 : -1);
         assert_true(plane->has_point == (i < 3) && fabs(plane->offset - (i < 3 ? offsets[i] : 0)) <= 0);
-        assert_true(fabs(plane->share - (i < 3 ? 0 : shares[i - 3])) <= 0); /* quarters are exact */
+        assert_true(fabs(plane->extent_fraction - (i < 3 ? 0 : shares[i - 3])) <= 0); /* quarters are exact */
     }
-    assert_true(slice[1].plane_count == 1 && slice[1].planes[0].share == 0);
+    assert_true(slice[1].plane_count == 1 && slice[1].planes[0].extent_fraction == 0);
     scene_free(&s);
 }
 
@@ -641,8 +642,8 @@ static void scene_layer_defaults_hold(void **state)
     check_built_in(&volume->colour_map, "viridis");
     assert_false(volume->colour_map.range.is_fixed);
     assert_true(volume->unit_distance == 0 && volume->opacity_count == 2);
-    assert_true(volume->opacity[0].at == 0 && volume->opacity[0].opacity == 0);
-    assert_true(volume->opacity[1].at == 1 && volume->opacity[1].opacity == 0.9F);
+    assert_true(volume->opacity[0].position == 0 && volume->opacity[0].opacity == 0);
+    assert_true(volume->opacity[1].position == 1 && volume->opacity[1].opacity == 0.9F);
     scene_free(&s);
 }
 
@@ -1279,7 +1280,8 @@ static void check_mapping(const scene_mapping *mapping)
         char in_file[64];
         snprintf(in_file, sizeof in_file, "%s:", field->key);
         if (!key->help || strlen(key->help) < 10) fail_msg("%s.%s has no help", mapping->title, field->key);
-        if (is_optional == !key->by_default) fail_msg("%s.%s: default and optional differ", mapping->title, field->key);
+        if (is_optional == !key->default_text)
+            fail_msg("%s.%s: default and optional differ", mapping->title, field->key);
         if (is_of_mappings(&field->value) == !key->child) fail_msg("%s.%s: child", mapping->title, field->key);
         if (!strstr(every_key, in_file)) fail_msg("%s.%s is not in the test's file", mapping->title, field->key);
         if (key->child) {
@@ -1303,7 +1305,7 @@ static void scene_decorations_are_read(void **state)
     assert_string_equal(d->title, "{name} at {time:.2f} s");
     assert_int_equal(d->words_count, 2);
     assert_string_equal(d->words[0].text, "cycle {cycle}");
-    assert_true(d->words[0].at == SCENE_BOTTOM_RIGHT && d->words[1].at == SCENE_TOP_LEFT);
+    assert_true(d->words[0].anchor == SCENE_BOTTOM_RIGHT && d->words[1].anchor == SCENE_TOP_LEFT);
     assert_true(d->bars_at == SCENE_LEFT && d->tick_count == 4 && d->label_count == 2 && d->size == 0.04);
     assert_string_equal(d->labels[0], "p in Pa");
     assert_true(d->unit_count == 2 && strcmp(d->units[1], "K") == 0);

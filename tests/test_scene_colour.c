@@ -129,7 +129,7 @@ static void every_map_is_found_by_its_name(void **state)
         assert_memory_equal(map->colours, colour_map_table(name, &count), 768 * sizeof(float));
         assert_true(map->count == 256 && !map->is_banded && map->scale == SCENE_LINEAR && !map->range.is_fixed);
         assert_true(!map->has_below && !map->has_above && !map->has_nan);
-        check_colour(map->outside[2], 0.6, 0.6, 0.6);
+        check_colour(map->outside_colours[2], 0.6, 0.6, 0.6);
     }
 }
 
@@ -180,13 +180,13 @@ static void scales_and_outside_are_read(void **state)
     (void)state;
     const scene_colour_map *map = map_of(", scale: log, range: [1e-3, 1e3], below: [1, 0, 0], nan: [0, 1, 0]");
     assert_true(map->scale == SCENE_LOG && map->has_below && !map->has_above && map->has_nan);
-    check_colour(map->outside[0], 1, 0, 0);
-    assert_memory_equal(map->outside[1], entry(map, 255), 3 * sizeof(float));
-    check_colour(map->outside[2], 0, 1, 0);
+    check_colour(map->outside_colours[0], 1, 0, 0);
+    assert_memory_equal(map->outside_colours[1], entry(map, 255), 3 * sizeof(float));
+    check_colour(map->outside_colours[2], 0, 1, 0);
     map = map_of(", scale: symlog, threshold: 1e-2, above: [0, 0, 1], reversed: true");
     assert_true(map->scale == SCENE_SYMLOG && map->threshold == 1e-2 && !map->has_below && map->has_above);
-    assert_memory_equal(map->outside[0], entry(map, 0), 3 * sizeof(float));
-    check_colour(map->outside[1], 0, 0, 1);
+    assert_memory_equal(map->outside_colours[0], entry(map, 0), 3 * sizeof(float));
+    check_colour(map->outside_colours[1], 0, 0, 1);
 }
 
 static void ranges_say_where_they_come_from(void **state)

@@ -168,7 +168,7 @@ static void sweeps_go_through_planes(void **state)
         assert_true(image->has_plane && image->variant.plane == plane && image->variant.isovalue == i / 5);
         assert_true(slice->plane_count == 1 && image->isosurfaces[0].values[0] == 3 + i / 5);
         assert_true(slice->planes[0].offset == (plane < 3 ? offsets[plane] : 0));
-        assert_true(slice->planes[0].share == (plane < 3 ? 0 : shares[plane - 3]));
+        assert_true(slice->planes[0].extent_fraction == (plane < 3 ? 0 : shares[plane - 3]));
         assert_true(scene_is_first_variant(image) == (i == 0));
         const scene_moment moment = scene_moment_of(image, 5, 0);
         char expected[64], *path = scene_expand(image->outputs[0].path, &moment);
@@ -214,11 +214,11 @@ static void grids_number_their_cells(void **state)
                &s);
     assert_int_equal(s.image_count, 5);
     assert_int_equal(s.montage_count, 2);
-    assert_true(s.montages[0].columns == 3 && s.montages[0].rows == 2 && s.montages[0].cell_count == 5);
-    assert_true(s.montages[0].width == 8 && s.montages[0].height == 6 && s.montages[1].cell_count == 1);
+    assert_true(s.montages[0].columns == 3 && s.montages[0].rows == 2 && s.montages[0].panel_count == 5);
+    assert_true(s.montages[0].width == 8 && s.montages[0].height == 6 && s.montages[1].panel_count == 1);
     for (int i = 0; i < 5; i++) {
         const scene_output *output = &s.images[i].outputs[0];
-        assert_true(output->montage == 0 && output->first_cell + s.images[i].variant.view == i);
+        assert_true(output->montage == 0 && output->first_panel + s.images[i].variant.view == i);
     }
     assert_true(s.images[0].outputs[1].montage == -1 && s.images[4].outputs[1].montage == 1);
     scene_free(&s);

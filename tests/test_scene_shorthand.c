@@ -48,7 +48,7 @@ static void print_layers(char *to, const scene_image *image)
         if (layer->has_colour_by) print_flag(to, layer->colour_by.name, true);
     }
     for (int i = 0; i < image->slice_count; i++) {
-        print_numbers(to, "outside", image->slices[i].colour_map.outside[0], 9);
+        print_numbers(to, "outside", image->slices[i].colour_map.outside_colours[0], 9);
         for (int n = 0; n < image->slices[i].plane_count; n++)
             print_vector(to, "normal", image->slices[i].planes[n].normal);
     }

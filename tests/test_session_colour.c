@@ -284,7 +284,7 @@ static void volumes_have_bands_and_colours_outside(void **state)
                                 .threshold = 0.5,
                                 .has_below = i / 2 % 2,
                                 .has_above = true,
-                                .outside = {{0.3F, 0.3F, 0.3F}, {0.6F, 0.6F, 0.6F}}};
+                                .outside_colours = {{0.3F, 0.3F, 0.3F}, {0.6F, 0.6F, 0.6F}}};
         assert_true(session_make_transfer(1, &map, 1, 10, &volume, &made));
         const render_transfer *t = &made.transfer;
         assert_true(made.low == 1 && made.high == 10 && t->opacity_values[0] == 1);
@@ -298,8 +298,9 @@ static void volumes_have_bands_and_colours_outside(void **state)
         for (int entry = 0; entry < 4 && !map.is_banded; entry++)
             assert_colour(t, render_unscaled(t->scale, 0.5, from + entry / 3.0 * width), colours[entry]);
         const double gap = width / (map.is_banded ? 63 : 3) * 1.001;
-        assert_colour(t, render_unscaled(t->scale, 0.5, from + width + gap), map.outside[1]);
-        assert_colour(t, render_unscaled(t->scale, 0.5, from - gap), map.has_below ? map.outside[0] : colours[0]);
+        assert_colour(t, render_unscaled(t->scale, 0.5, from + width + gap), map.outside_colours[1]);
+        assert_colour(t, render_unscaled(t->scale, 0.5, from - gap),
+                      map.has_below ? map.outside_colours[0] : colours[0]);
         session_transfer_free(&made);
     }
 }

@@ -3,30 +3,30 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool c_numbers_begin(c_numbers *numbers)
+bool c_locale_enter(c_locale *numbers)
 {
-    numbers->own = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
-    if (numbers->own) numbers->before = uselocale(numbers->own);
-    return numbers->own != (locale_t)0;
+    numbers->number_locale = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
+    if (numbers->number_locale) numbers->previous_locale = uselocale(numbers->number_locale);
+    return numbers->number_locale != (locale_t)0;
 }
 
-void c_numbers_end(c_numbers *numbers)
+void c_locale_leave(c_locale *numbers)
 {
-    uselocale(numbers->before);
-    freelocale(numbers->own);
+    uselocale(numbers->previous_locale);
+    freelocale(numbers->number_locale);
 }
 
 /* Calls write() with a stream into memory, with numbers in the C locale. The caller must free *text with free(). */
 static bool print(text_writer *write, const void *what, char **text, size_t *size)
 {
-    c_numbers numbers;
+    c_locale numbers;
     *text = NULL;
-    if (!c_numbers_begin(&numbers)) return false;
+    if (!c_locale_enter(&numbers)) return false;
     FILE *stream = open_memstream(text, size);
     if (stream) write(stream, what);
     const bool is_written = stream && !ferror(stream);
     const bool is_closed = stream && fclose(stream) == 0;
-    c_numbers_end(&numbers);
+    c_locale_leave(&numbers);
     if (is_written && is_closed) return true;
     free(*text);
     *text = NULL;

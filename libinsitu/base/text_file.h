@@ -11,11 +11,11 @@
 
 /* Between begin and end, the calling thread writes and reads numbers in the C locale. begin returns false if memory
  * runs out; then end must not be called. */
-typedef struct c_numbers {
-    locale_t own, before;
-} c_numbers;
-bool c_numbers_begin(c_numbers *numbers);
-void c_numbers_end(c_numbers *numbers);
+typedef struct c_locale {
+    locale_t number_locale, previous_locale;
+} c_locale;
+bool c_locale_enter(c_locale *numbers);
+void c_locale_leave(c_locale *numbers);
 
 typedef void text_writer(FILE *file, const void *what);
 

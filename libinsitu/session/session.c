@@ -30,7 +30,7 @@ const char *insitu_error(const insitu_session *session)
 const insitu_report *insitu_last_report(const insitu_session *session)
 {
     if (!session) return NULL;
-    return is_in_fill(session, "insitu_last_report") ? &no_report : &session->report.numbers;
+    return is_in_fill(session, "insitu_last_report") ? &no_report : &session->report.public_report;
 }
 
 const char *insitu_status_name(insitu_status status)
@@ -64,7 +64,7 @@ static void free_session(insitu_session *session)
     session_catalogue_free(&session->catalogue);
     session_trees_free(&session->trees);
     session_scene_file_free(&session->scene_file);
-    session_drop_kept(&session->kept);
+    session_drop_kept(&session->kept_pictures);
     session_run_ranges_free(&session->run_ranges);
     session_cinema_free(&session->cinema);
     session_montages_free(&session->montages);
@@ -85,7 +85,7 @@ static insitu_status create_session(const session_team *team, const session_scen
         session->team = *team;
         session->team.claims = comp_claims_create(team->ranks);
     }
-    if (!session) session_no_memory(error, (int64_t)sizeof *session, "the session");
+    if (!session) session_fail_for_memory(error, (int64_t)sizeof *session, "the session");
     if (session && !session->team.claims)
         base_fail(error, INSITU_ERROR_MEMORY, "%s: no memory for the owners of blocks of %d ranks", source->call,
                   team->ranks);
@@ -189,7 +189,7 @@ insitu_status insitu_parameter(insitu_session *session, const char *name, double
 {
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_parameter")) return INSITU_ERROR_ARGUMENT;
-    session_read_parameter(&session->scene_file, &session->asked, name, value, &error);
+    session_read_parameter(&session->scene_file, &session->asked_parameters, name, value, &error);
     return store_error(session, &error);
 }
 
@@ -197,18 +197,18 @@ insitu_status insitu_keep_pictures(insitu_session *session, int keep)
 {
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_keep_pictures")) return INSITU_ERROR_ARGUMENT;
-    session_drop_kept(&session->kept);
+    session_drop_kept(&session->kept_pictures);
     int is_on = keep != 0;
-    if (session_mpi(&error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast") == INSITU_OK)
-        session->kept.is_on = is_on;
+    if (session_check_mpi(&error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast") == INSITU_OK)
+        session->kept_pictures.is_on = is_on;
     return store_error(session, &error);
 }
 
 const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count)
 {
-    const int kept = session && !is_in_fill(session, "insitu_last_pictures") ? session->kept.count : 0;
+    const int kept = session && !is_in_fill(session, "insitu_last_pictures") ? session->kept_pictures.count : 0;
     if (count) *count = kept;
-    return kept ? session->kept.items : NULL;
+    return kept ? session->kept_pictures.items : NULL;
 }
 
 insitu_status insitu_destroy(insitu_session **session)
@@ -222,7 +222,7 @@ insitu_status insitu_destroy(insitu_session **session)
     }
     session_writer_drain(&s->writer);
     session_writer_collect(&s->writer, &s->report);
-    if (s->writer.failures) thread_error = session_writer_failure(&s->writer);
+    if (s->writer.failure_count) thread_error = session_writer_failure(&s->writer);
     if (is_mpi_running()) {
         session_share_error(s->team.comm, 0, &thread_error);
         session_team_free(&s->team);

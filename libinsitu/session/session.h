@@ -27,13 +27,13 @@ struct insitu_session {
     session_team team;
     session_threads threads;
     session_scene_file scene_file;
-    session_asked asked;
+    session_asked asked_parameters;
     session_meshes meshes;
     session_catalogue catalogue;
     session_space space;
     session_trees trees;
     session_writer writer; /* writes pictures; used on rank 0 only */
-    session_kept_pictures kept;
+    session_kept_pictures kept_pictures;
     session_run_ranges run_ranges;
     session_cinema cinema;     /* databases of pictures; used on rank 0 only */
     session_montages montages; /* pictures put side by side in one file; used on rank 0 only */

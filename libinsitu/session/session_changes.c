@@ -28,7 +28,7 @@ enum change_word {
     WRITES_AT_ONCE,
     ISA_LOW, /* lowest instruction set, and the lowest rank that has it, in one word */
     ISA_HIGH,
-    TELLING,   /* lowest rank with warnings for all ranks (session_telling_word()) */
+    TELLING,   /* lowest rank with warnings for all ranks (session_reporting_word()) */
     ROOT_TIME, /* the bits of rank 0's time */
     CHANGE_WORDS
 };
@@ -74,12 +74,12 @@ static void pack_changes(const insitu_session *session, int64_t cycle, double ti
     words[NAMES_LOW] = ~names;
     words[SCENE_CHANGED] = session_is_scene_edited(file, team->rank);
     words[THREADS_LACKING] = session_lacks_threads(&session->threads, file->scene.threads, team->cores);
-    words[UNWRITTEN] = session->writer.failures;
+    words[UNWRITTEN] = session->writer.failure_count;
     words[FILLED] = has_filled_field(meshes);
     words[WRITES_AT_ONCE] = team->rank == 0 && !session_writer_is_behind(&session->writer, &file->scene);
     words[ISA_LOW] = -(render_isa_level() * more_ranks + team->rank);
     words[ISA_HIGH] = render_isa_level();
-    words[TELLING] = session_telling_word(&session->report, team);
+    words[TELLING] = session_reporting_word(&session->report, team);
     words[ROOT_TIME] = team->rank == 0 ? bits_from_double(time) : INT64_MIN;
 }
 
@@ -88,17 +88,17 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
 {
     int64_t mine[CHANGE_WORDS], all[CHANGE_WORDS];
     pack_changes(session, cycle, time, mine);
-    const insitu_status status = session_mpi(
+    const insitu_status status = session_check_mpi(
         error, MPI_Allreduce(mine, all, CHANGE_WORDS, MPI_INT64_T, MPI_MAX, session->team.comm), "MPI_Allreduce");
     if (status) return status;
     *out = (session_changes){.cycle = all[CYCLE_HIGH],
                              .lowest_cycle = ~all[CYCLE_LOW],
                              .time = double_from_bits(all[ROOT_TIME]),
                              .failed_rank = all[FAILED] ? session->team.ranks - (int)all[FAILED] : -1,
-                             .of_scene = all[SCENE_CHANGED],
-                             .of_cells = all[CELLS_CHANGED],
-                             .of_levels = all[LEVELS_CHANGED],
-                             .of_names = all[NAMES_CHANGED],
+                             .is_scene_changed = all[SCENE_CHANGED],
+                             .are_cells_changed = all[CELLS_CHANGED],
+                             .are_levels_changed = all[LEVELS_CHANGED],
+                             .are_names_changed = all[NAMES_CHANGED],
                              .are_names_shared = all[NAMES_HIGH] == ~all[NAMES_LOW],
                              .are_threads_lacking = all[THREADS_LACKING],
                              .are_unwritten = all[UNWRITTEN],
@@ -107,7 +107,7 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
                              .isa_level = (int)(-all[ISA_LOW] / more_ranks),
                              .isa_rank = (int)(-all[ISA_LOW] % more_ranks),
                              .isa_best = (int)all[ISA_HIGH],
-                             .telling_rank = session_telling_rank((int)all[TELLING], &session->team)};
+                             .telling_rank = session_reporting_rank((int)all[TELLING], &session->team)};
     return INSITU_OK;
 }
 

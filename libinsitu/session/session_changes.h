@@ -10,9 +10,9 @@ typedef struct session_changes {
     int64_t cycle, lowest_cycle;
     double time;     /* rank 0's time */
     int failed_rank; /* lowest rank with an error of a set call; -1: there is none */
-    bool of_scene, of_cells, of_names;
-    bool of_levels;        /* set if blocks with levels of refinement have changed on some rank */
-    bool are_names_shared; /* set if all ranks have the same tables of names */
+    bool is_scene_changed, are_cells_changed, are_names_changed;
+    bool are_levels_changed; /* set if blocks with levels of refinement have changed on some rank */
+    bool are_names_shared;   /* set if all ranks have the same tables of names */
     bool are_threads_lacking;
     bool are_unwritten; /* set if pictures of earlier steps could not be written */
     bool is_filled;     /* set if some field has a fill function, which may call MPI */

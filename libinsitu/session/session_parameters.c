@@ -45,8 +45,8 @@ void session_warn_of_parameters(const scene *scene, const session_asked *asked, 
 {
     for (int i = 0; i < scene->parameter_count; i++) {
         const char *name = scene->parameters[i].name;
-        session_warn_own(report, &(session_warning){WARNING_PARAMETER, name, NULL, 0}, !is_asked(asked, name),
-                         "parameter \"%s\" of the scene changes nothing: the code has not asked for it on rank 0",
-                         name);
+        session_warn_locally(report, &(session_warning){WARNING_PARAMETER, name, NULL, 0}, !is_asked(asked, name),
+                             "parameter \"%s\" of the scene changes nothing: the code has not asked for it on rank 0",
+                             name);
     }
 }

@@ -48,29 +48,29 @@ static insitu_status read_attachment(const char *path, char **text, int64_t *siz
 /* Sends rank 0's bytes to all ranks; *data is allocated on the others. Collective. */
 static insitu_status broadcast_bytes(const session_team *team, char **data, int64_t *size, base_error *error)
 {
-    insitu_status status = session_mpi(error, MPI_Bcast(size, 1, MPI_INT64_T, 0, team->comm), "MPI_Bcast");
+    insitu_status status = session_check_mpi(error, MPI_Bcast(size, 1, MPI_INT64_T, 0, team->comm), "MPI_Bcast");
     if (status) return status;
     if (team->rank != 0) {
         *data = base_alloc((size_t)*size + 1);
-        if (!*data) session_no_memory(error, *size, "scene text");
+        if (!*data) session_fail_for_memory(error, *size, "scene text");
     }
     status = session_agree(team->comm, error);
     if (status) return status;
-    return session_mpi(error, MPI_Bcast(*data, (int)*size, MPI_CHAR, 0, team->comm), "MPI_Bcast");
+    return session_check_mpi(error, MPI_Bcast(*data, (int)*size, MPI_CHAR, 0, team->comm), "MPI_Bcast");
 }
 
 /* Sends the files that rank 0's scene names to all ranks. Collective. */
 static insitu_status broadcast_attachments(const session_team *team, scene_attachments *files, base_error *error)
 {
     int count = files->count;
-    insitu_status status = session_mpi(error, MPI_Bcast(&count, 1, MPI_INT, 0, team->comm), "MPI_Bcast");
+    insitu_status status = session_check_mpi(error, MPI_Bcast(&count, 1, MPI_INT, 0, team->comm), "MPI_Bcast");
     if (status || count == 0) return status;
     if (team->rank != 0) {
         files->items = base_calloc((size_t)count, sizeof *files->items);
         if (files->items)
             files->count = count;
         else
-            session_no_memory(error, count * (int64_t)sizeof *files->items, "files of the scene");
+            session_fail_for_memory(error, count * (int64_t)sizeof *files->items, "files of the scene");
     }
     status = session_agree(team->comm, error);
     for (int i = 0; i < count && !status; i++) {
@@ -91,11 +91,11 @@ static insitu_status parse_on_all_ranks(const char *path, const session_team *te
     scene_attachments files = {.read = read_attachment};
     if (team->rank == 0) scene_parse(text->data, (size_t)text->size, path, &files, &parsed, error);
     files.read = NULL;
-    insitu_status status = session_agree_as_is(team->comm, error);
+    insitu_status status = session_agree_without_rank(team->comm, error);
     if (!status) status = broadcast_bytes(team, &text->data, &text->size, error);
     if (!status) status = broadcast_attachments(team, &files, error);
     if (!status && team->rank != 0) scene_parse(text->data, (size_t)text->size, path, &files, &parsed, error);
-    if (!status) status = session_agree_as_is(team->comm, error);
+    if (!status) status = session_agree_without_rank(team->comm, error);
     scene_attachments_free(&files);
     if (status == INSITU_OK)
         *out = parsed;
@@ -116,7 +116,7 @@ static insitu_status copy_text(const char *given, scene_file_text *text, base_er
 {
     text->size = (int64_t)strnlen(given, MAX_SCENE_BYTES);
     text->data = base_alloc((size_t)text->size + 1);
-    if (!text->data) return session_no_memory(error, text->size, "scene text");
+    if (!text->data) return session_fail_for_memory(error, text->size, "scene text");
     memcpy(text->data, given, (size_t)text->size);
     return INSITU_OK;
 }
@@ -133,7 +133,7 @@ static insitu_status read_scene(session_scene_file *file, const session_team *te
         else
             read_file(file->path, &text, error);
     }
-    insitu_status status = session_agree_as_is(team->comm, error);
+    insitu_status status = session_agree_without_rank(team->comm, error);
     if (status == INSITU_OK) status = parse_on_all_ranks(file->path, team, &text, out, error);
     if (team->rank == 0 && text.has_stamp && status != INSITU_ERROR_MEMORY) {
         file->stamp = text.stamp;
@@ -152,7 +152,7 @@ static insitu_status broadcast_path(session_scene_file *file, const session_team
         if (!path)
             base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no scene is given", source->call);
         else if (!(file->path = base_strdup(path)))
-            session_no_memory(error, (int64_t)strlen(path), "the scene file's name");
+            session_fail_for_memory(error, (int64_t)strlen(path), "the scene file's name");
         else
             size = (int64_t)strlen(path) + 1;
     }

@@ -50,7 +50,7 @@ static void reload_scene(insitu_session *s)
     session_montages_free(&s->montages);
     session_overwrites_free(&s->overwrites);
     s->events = (session_events){0};
-    s->catalogue.are_joined = s->catalogue.are_parts_known = false;
+    s->catalogue.are_joined = s->catalogue.are_hashes_known = false;
     session_forget_warnings(&s->report);
     session_text_add(&s->report.warnings, "the scene file was edited: its images are drawn from this step on");
     s->catalogue.are_derived = false;
@@ -74,8 +74,8 @@ static void use_common_kernels(const session_changes *changes, session_report *r
 static void warn_of_environment(const session_team *team, session_report *report)
 {
     const char *isa = render_isa_warning();
-    session_warn_own(report, &(session_warning){WARNING_ISA, NULL, NULL, 0}, *isa != '\0', "rank %d: %s", team->rank,
-                     isa);
+    session_warn_locally(report, &(session_warning){WARNING_ISA, NULL, NULL, 0}, *isa != '\0', "rank %d: %s",
+                         team->rank, isa);
 }
 
 static session_derive_basis derive_basis(insitu_session *s)
@@ -106,7 +106,7 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
     const session_moment *moment = basis->moment;
     const session_event_time now = {moment->cycle, moment->time};
     const bool images = session_count_due(basis->scene, moment) > 0;
-    s->events.held = 0;
+    s->events.held_conditions = 0;
     if (session_has_events(basis->scene, moment->cycle, images)) {
         base_error own = {.status = INSITU_OK};
         const session_sound_events sound = session_check_event_fields(basis, images, error);
@@ -140,14 +140,14 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
 {
     const session_team *team = &s->team;
     base_error reason = {.status = INSITU_OK};
-    if (changes->of_levels && session_update_covers(&s->meshes, team, error)) return error->status;
-    if (changes->of_cells) session_check_meshes(&s->meshes, team, &reason);
+    if (changes->are_levels_changed && session_update_covers(&s->meshes, team, error)) return error->status;
+    if (changes->are_cells_changed) session_check_meshes(&s->meshes, team, &reason);
     if (!refused->status) *refused = reason;
-    const bool of_names = changes->of_names || refused->status || s->catalogue.has_faults;
-    if (changes->of_cells) session_forget_homes(&s->catalogue);
+    const bool of_names = changes->are_names_changed || refused->status || s->catalogue.has_faults;
+    if (changes->are_cells_changed) session_forget_homes(&s->catalogue);
     insitu_status status = list_meshes(s, of_names, changes->are_names_shared && !refused->status, error);
-    if (changes->of_cells && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
-    if ((changes->of_cells || of_names) && !status)
+    if (changes->are_cells_changed && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
+    if ((changes->are_cells_changed || of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
     return status;
 }
@@ -161,7 +161,7 @@ static insitu_status make_plan(insitu_session *s, const session_plan_basis *basi
     if (status == INSITU_ERROR_FIELD || status == INSITU_ERROR_ARGUMENT) {
         if (!refused->status) *refused = *error;
         *error = (base_error){0};
-        session_take_back(&s->meshes);
+        session_restore_excluded(&s->meshes);
         status = list_meshes(s, true, false, error);
         if (!status) status = session_make_plan(basis, &s->meshes, &s->team, &s->report, plan, error);
     }
@@ -177,8 +177,8 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     const double start = MPI_Wtime();
     const session_team *team = &s->team;
     const session_extent *extent = &s->space.extent;
-    session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent,
-                                changes->is_filled,   s->kept.is_on};
+    session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path,    moment, 0, &s->catalogue, extent,
+                                changes->is_filled,   s->kept_pictures.is_on};
     base_error of_events = {.status = INSITU_OK};
     const session_drawing drawing = {
         .team = team,
@@ -189,7 +189,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
         .space = &s->space,
         .run_ranges = &s->run_ranges,
         .report = &s->report,
-        .kept = &s->kept,
+        .kept = &s->kept_pictures,
         .scene = basis.scene,
         .cinema = &s->cinema,
         .montages = &s->montages,
@@ -213,15 +213,16 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
     if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);
     if (!status && plan.surface_count) status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, error);
-    s->report.numbers.prepare_ms = milliseconds_since(start);
+    s->report.public_report.prepare_ms = milliseconds_since(start);
     if (!status) { /* errors of all these phases are passed to all ranks by the next reduction */
         if (!error->status)
-            session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
+            session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.public_report,
+                                 error);
         status = session_check_layers(&plan, &s->catalogue, &s->meshes, team, &s->report, error);
     }
-    if (!status) status = session_draw_images(&drawing, &plan, &s->events.drawn, error);
+    if (!status) status = session_draw_images(&drawing, &plan, &s->events.drawn_images, error);
     session_plan_free(&plan);
-    session_take_back(&s->meshes);
+    session_restore_excluded(&s->meshes);
     if (!status) *error = of_events;
     return error->status;
 }
@@ -230,12 +231,12 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
 static insitu_status run_phases(insitu_session *s, const session_changes *changes, const session_guard *guard,
                                 base_error *error)
 {
-    s->report.numbers.time = changes->time;
-    if (changes->of_scene) {
+    s->report.public_report.time = changes->time;
+    if (changes->is_scene_changed) {
         reload_scene(s);
         s->news.is_new = true;
     }
-    if (s->team.rank == 0) s->report.numbers.write_ms += session_writer_begin(&s->writer, &s->scene_file.scene);
+    if (s->team.rank == 0) s->report.public_report.write_ms += session_writer_begin(&s->writer, &s->scene_file.scene);
     session_begin_cinema(&s->cinema, changes->cycle);
     base_error refused = {.status = INSITU_OK};
     insitu_status status = session_check_input(changes, &s->meshes, &s->team, &refused, error);
@@ -250,7 +251,7 @@ static insitu_status run_phases(insitu_session *s, const session_changes *change
     }
     use_common_kernels(changes, &s->report);
     status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
-                                   changes->are_threads_lacking || changes->of_scene, guard, &s->report, error);
+                                   changes->are_threads_lacking || changes->is_scene_changed, guard, &s->report, error);
     if (status) return status;
     return draw_due_images(s, changes, &moment, &refused, error);
 }
@@ -273,19 +274,19 @@ static void queue_news(insitu_session *s)
     const session_scene_file *file = &s->scene_file;
     const session_news_scene source = {&file->scene, file->path, file->has_stamp ? &file->stamp : NULL, file->warning};
     if (s->team.rank != 0 || file->scene.database_count == 0) return;
-    session_note_news(&s->news, &s->report, &s->error);
+    session_record_news(&s->news, &s->report, &s->error);
     if (!s->news.is_new) return;
     session_files *files = base_calloc(1, sizeof *files);
-    char *text = files ? session_make_news(&s->news, &source, &s->report.numbers) : NULL;
+    char *text = files ? session_make_news(&s->news, &source, &s->report.public_report) : NULL;
     if (!text) {
         base_free(files);
         return;
     }
     base_error error = {.status = INSITU_OK};
     *files = (session_files){.scene = &file->scene, .news = text};
-    files->moment.cycle = s->report.numbers.cycle;
-    session_writer_give(&s->writer, files, &error);
-    session_writer_note(&s->writer, s->report.numbers.cycle, &error);
+    files->moment.cycle = s->report.public_report.cycle;
+    session_writer_queue(&s->writer, files, &error);
+    session_writer_record_error(&s->writer, s->report.public_report.cycle, &error);
 }
 
 insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
@@ -295,13 +296,13 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_guard_begin(&guard);
     const double start = MPI_Wtime();
     session->error = (base_error){0};
-    session_drop_kept(&session->kept);
+    session_drop_kept(&session->kept_pictures);
     session_report_begin(&session->report, cycle, time);
     session_changes changes;
     session_writer_collect(&session->writer, &session->report);
     warn_of_environment(&session->team, &session->report);
     if (session->has_stepped && session->team.rank == 0)
-        session_warn_of_parameters(&session->scene_file.scene, &session->asked, &session->report);
+        session_warn_of_parameters(&session->scene_file.scene, &session->asked_parameters, &session->report);
     insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
     if (!status && changes.telling_rank >= 0)
         status = session_share_lines(&session->report, changes.telling_rank, &session->team, &session->error);
@@ -314,7 +315,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_summarize(&session->meshes, &session->trees.parent, &session->writer, session->scene_file.warning,
                       &session->report);
     session_forget_filled(&session->meshes);
-    session->report.numbers.total_ms = milliseconds_since(start);
+    session->report.public_report.total_ms = milliseconds_since(start);
     session_guard_end(&guard);
     return status;
 }

@@ -80,7 +80,7 @@ __attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *rea
 static void report_copied(const copied_reasons *reasons, const char *mesh, session_report *out)
 {
     for (int i = 0; i < reasons->count; i++) {
-        out->numbers.bytes_copied += reasons->bytes[i];
+        out->public_report.bytes_copied += reasons->bytes[i];
         session_text_add(&out->copied_why, "mesh \"%s\": %s: %lld bytes", mesh, reasons->words[i],
                          (long long)reasons->bytes[i]);
     }
@@ -110,9 +110,9 @@ static void report_field(session_report *out, copied_reasons *copied, const sess
                : field->corner_row            ? "in rows of corners"
                                               : "at the corners of a torn mesh");
     if (is_field_in_use(mesh, index))
-        out->numbers.bytes_borrowed += value_bytes(field) +
-                                       array_bytes(&field->index, session_field_places(&mesh->given, field)) +
-                                       patch_bytes(field);
+        out->public_report.bytes_borrowed +=
+            value_bytes(field) + array_bytes(&field->index, session_count_field_positions(&mesh->given, field)) +
+            patch_bytes(field);
 }
 
 static void report_scalar(session_report *out, copied_reasons *copied, const session_mesh *mesh,
@@ -120,7 +120,7 @@ static void report_scalar(session_report *out, copied_reasons *copied, const ses
 {
     const char *name = session_scalar_name(mesh, scalar);
     const int64_t vertices = session_vertex_count(mesh);
-    if (scalar->pairs) out->numbers.bytes_trees += mesh->tree.node_count * 2 * (int64_t)sizeof(float);
+    if (scalar->node_ranges) out->public_report.bytes_trees += mesh->tree.node_count * 2 * (int64_t)sizeof(float);
     if (scalar->vertex_values) {
         const insitu_centring centring = mesh->fields[scalar->field].given.centring;
         add_copied(copied, vertices * (int64_t)sizeof(double), "field \"%s\" recentred from %s to vertices", name,
@@ -130,7 +130,7 @@ static void report_scalar(session_report *out, copied_reasons *copied, const ses
     }
     if (scalar->gradients)
         add_copied(copied,
-                   vertices * (int64_t)sizeof *scalar->gradient_entries +
+                   vertices * (int64_t)sizeof *scalar->gradient_indices +
                        scalar->gradient_count * (int64_t)sizeof *scalar->gradients,
                    "gradients of field \"%s\" at vertices", name);
     if (scalar->distances) add_copied(copied, vertices * (int64_t)sizeof(float), "distances of vertices from a slice");
@@ -143,7 +143,7 @@ static void report_outer(session_report *out, copied_reasons *copied, const sess
         const session_outer *outer = mesh->outers[i];
         if (!outer->mesh) continue;
         bytes += outer->bytes;
-        out->numbers.bytes_trees += outer->mesh->has_tree ? mmbvh_bytes(&outer->mesh->tree) : 0;
+        out->public_report.bytes_trees += outer->mesh->has_tree ? mmbvh_bytes(&outer->mesh->tree) : 0;
     }
     add_copied(copied, bytes, "its outer faces");
 }
@@ -151,7 +151,7 @@ static void report_outer(session_report *out, copied_reasons *copied, const sess
 static void report_topology(session_report *out, copied_reasons *copied, const session_mesh *mesh)
 {
     const session_topology *t = &mesh->topology;
-    out->numbers.cells_recognised += t->recognised_count;
+    out->public_report.cells_recognised += t->recognised_count;
     if (t->recognised_count)
         add_copied(copied, t->cell_bytes,
                    "%lld of %lld polyhedra are drawn as the tets, hexes, wedges or pyramids that their faces make",
@@ -171,7 +171,7 @@ static void report_topology(session_report *out, copied_reasons *copied, const s
 
 static void report_part(session_report *out, copied_reasons *copied, const session_mesh *mesh)
 {
-    insitu_report *report = &out->numbers;
+    insitu_report *report = &out->public_report;
     int64_t unusable = 0;
     if (!mesh->is_given) return;
     report->cells += session_cell_count(mesh);
@@ -188,7 +188,8 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *scalar = &mesh->scalars[i];
         report_scalar(out, copied, mesh, scalar);
-        if (scalar->is_used && scalar->wants_ranges && scalar->unusable > unusable) unusable = scalar->unusable;
+        if (scalar->is_used && scalar->needs_ranges && scalar->unusable_count > unusable)
+            unusable = scalar->unusable_count;
     }
     report->cells_unusable += unusable;
     report_outer(out, copied, mesh);
@@ -197,7 +198,7 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
 static bool is_shown(const session_mesh *mesh)
 {
     bool is_any = mesh->is_needed;
-    for (int i = 0; i < mesh->outer_count; i++) is_any = is_any || mesh->outers[i]->is_wanted;
+    for (int i = 0; i < mesh->outer_count; i++) is_any = is_any || mesh->outers[i]->is_needed;
     return is_any;
 }
 
@@ -214,7 +215,7 @@ static void report_left_out(session_report *out, const session_parts *parts)
         drawn += part->drawn_count;
         if (part->is_partial) partial += part->drawn_count - part->tree.cell_count;
     }
-    if (!given || !out->numbers.images) return;
+    if (!given || !out->public_report.images) return;
     for (int i = 0; i < first->field_count; i++)
         if (!is_field_in_use(first, i))
             session_text_add(&out->left_out, "mesh \"%s\": field \"%s\" is in no picture", first->name,
@@ -237,7 +238,7 @@ static void report_parts(session_report *out, const session_parts *parts)
 void session_summarize(const session_meshes *meshes, const mmbvh *parent, session_writer *writer,
                        const char *scene_warning, session_report *out)
 {
-    insitu_report *report = &out->numbers;
+    insitu_report *report = &out->public_report;
     if (scene_warning) session_text_add(&out->warnings, "the scene file's last edit was not taken: %s", scene_warning);
     for (int i = 0; i < meshes->count;) {
         const session_parts parts = session_parts_at(meshes, i);

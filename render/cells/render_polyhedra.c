@@ -205,7 +205,7 @@ static void read_faces(work *w, int64_t cell)
         w->rank[w->vertices[i].as_met] = i;
         memcpy(w->positions[i], w->vertices[i].position, sizeof w->positions[i]);
     }
-    for (int i = 0; i < c->entry_count; i++) c->entry[i] = w->rank[c->entry[i]];
+    for (int i = 0; i < c->entry_count; i++) c->entry_vertices[i] = w->rank[c->entry_vertices[i]];
 }
 
 /* ---- storing the result ---- */
@@ -258,11 +258,11 @@ static void keep_quads(const work *w, polyhedron *c, int *quad_of)
 {
     int count = 0;
     for (int face = 0; face < w->faces.face_count; face++) {
-        const int first = w->faces.first[face];
+        const int first = w->faces.first_entries[face];
         const bool is_quad = closed_face_is_patch(&w->faces, face, (const double(*)[3])w->positions) &&
-                             !collapses(w, &w->faces.entry[first]);
+                             !collapses(w, &w->faces.entry_vertices[first]);
         quad_of[face] = is_quad ? count : -1;
-        if (quad_of[face] >= 0) memcpy(c->quads[count++], &w->faces.entry[first], 4 * sizeof(int));
+        if (quad_of[face] >= 0) memcpy(c->quads[count++], &w->faces.entry_vertices[first], 4 * sizeof(int));
     }
 }
 

@@ -27,13 +27,13 @@ size_t closed_faces_lay_out(closed_faces *c, char *room)
 {
     base_carving at = {room, 0};
     const size_t faces = (size_t)c->face_count, entries = (size_t)c->entry_count, table = (size_t)c->table_size;
-    c->first = base_carve(&at, (faces + 1) * sizeof(int));
-    c->entry = base_carve(&at, entries * sizeof(int));
+    c->first_entries = base_carve(&at, (faces + 1) * sizeof(int));
+    c->entry_vertices = base_carve(&at, entries * sizeof(int));
     c->face_of = base_carve(&at, entries * sizeof(int));
     c->edge_of = base_carve(&at, entries * sizeof(int));
     c->vertices = base_carve(&at, entries * sizeof *c->vertices);
     c->piece = base_carve(&at, faces * sizeof(int));
-    c->turn = base_carve(&at, faces * sizeof(int));
+    c->orientation = base_carve(&at, faces * sizeof(int));
     c->stack = base_carve(&at, faces * sizeof(int));
     c->piece_volume = base_carve(&at, faces * sizeof(double));
     c->seen = base_carve(&at, table * sizeof *c->seen);
@@ -42,7 +42,7 @@ size_t closed_faces_lay_out(closed_faces *c, char *room)
     c->triangles = base_carve(&at, entries * sizeof *c->triangles);
     c->corners = base_carve(&at, entries * sizeof *c->corners);
     c->cuts = base_carve(&at, entries * sizeof *c->cuts);
-    c->polygon = base_carve(&at, polygon_room((int)entries));
+    c->polygon = base_carve(&at, polygon_work_bytes((int)entries));
     return at.used;
 }
 
@@ -77,17 +77,17 @@ void closed_faces_read(closed_faces *c, const grid *g, int64_t cell)
     for (int face = 0; face < c->face_count; face++) {
         int64_t from, to;
         grid_face_vertices(g, grid_array_index(&g->connectivity, first + face), &from, &to);
-        c->first[face] = entry;
+        c->first_entries[face] = entry;
         int64_t before = grid_array_index(&g->face_connectivity, to - 1);
         for (int64_t i = from; i < to; i++) {
             const int64_t vertex = grid_array_index(&g->face_connectivity, i);
             if (vertex == before) continue;
             c->face_of[entry] = face;
-            c->entry[entry++] = find_vertex_number(c, vertex);
+            c->entry_vertices[entry++] = find_vertex_number(c, vertex);
             before = vertex;
         }
     }
-    c->first[c->face_count] = c->entry_count = entry;
+    c->first_entries[c->face_count] = c->entry_count = entry;
 }
 
 /* ---- consistent orientation -------------------------------------------------------------------------------------- */
@@ -95,7 +95,7 @@ void closed_faces_read(closed_faces *c, const grid *g, int64_t cell)
 static int find_side_end(const closed_faces *c, int side)
 {
     const int face = c->face_of[side];
-    return c->entry[side + 1 < c->first[face + 1] ? side + 1 : c->first[face]];
+    return c->entry_vertices[side + 1 < c->first_entries[face + 1] ? side + 1 : c->first_entries[face]];
 }
 
 int closed_edges_find(closed_faces *c, int a, int b)
@@ -118,16 +118,16 @@ static void orient_piece(closed_faces *c, int first)
 {
     int height = 0;
     c->stack[height++] = first;
-    c->turn[first] = 1;
+    c->orientation[first] = 1;
     c->piece[first] = c->piece_count;
     while (height) {
         const int face = c->stack[--height];
-        for (int side = c->first[face]; side < c->first[face + 1]; side++) {
+        for (int side = c->first_entries[face]; side < c->first_entries[face + 1]; side++) {
             const closed_edge *edge = &c->edges[c->edge_of[side]];
             const int other = edge->side[0] == side ? edge->side[1] : edge->side[0];
-            if (other < 0 || edge->low == edge->high || c->turn[c->face_of[other]]) continue;
-            const bool alike = c->entry[side] == c->entry[other];
-            c->turn[c->face_of[other]] = alike ? -c->turn[face] : c->turn[face];
+            if (other < 0 || edge->low == edge->high || c->orientation[c->face_of[other]]) continue;
+            const bool alike = c->entry_vertices[side] == c->entry_vertices[other];
+            c->orientation[c->face_of[other]] = alike ? -c->orientation[face] : c->orientation[face];
             c->piece[c->face_of[other]] = c->piece_count;
             c->stack[height++] = c->face_of[other];
         }
@@ -140,7 +140,7 @@ void closed_faces_turn(closed_faces *c)
     closed_edges_empty(c);
     c->piece_count = 0;
     for (int side = 0; side < c->entry_count; side++) {
-        const int at = closed_edges_find(c, c->entry[side], find_side_end(c, side));
+        const int at = closed_edges_find(c, c->entry_vertices[side], find_side_end(c, side));
         closed_edge *edge = &c->edges[at];
         c->edge_of[side] = at;
         if (edge->side[0] < 0)
@@ -148,9 +148,9 @@ void closed_faces_turn(closed_faces *c)
         else if (edge->side[1] < 0)
             edge->side[1] = side;
     }
-    memset(c->turn, 0, (size_t)c->face_count * sizeof(int));
+    memset(c->orientation, 0, (size_t)c->face_count * sizeof(int));
     for (int face = 0; face < c->face_count; face++)
-        if (!c->turn[face]) orient_piece(c, face);
+        if (!c->orientation[face]) orient_piece(c, face);
 }
 
 static void swap_pair(closed_triangle *t, int i, int j)
@@ -159,13 +159,13 @@ static void swap_pair(closed_triangle *t, int i, int j)
     const int v = t->vertex[i];
     t->vertex[i] = t->vertex[j];
     t->vertex[j] = v;
-    t->turn = -t->turn;
+    t->orientation = -t->orientation;
 }
 
 static void add_triangle(closed_faces *c, int face, const int corners[3])
 {
-    closed_triangle t = {.face = face, .turn = c->turn[face]};
-    for (int k = 0; k < 3; k++) t.vertex[k] = c->entry[c->first[face] + corners[k]];
+    closed_triangle t = {.face = face, .orientation = c->orientation[face]};
+    for (int k = 0; k < 3; k++) t.vertex[k] = c->entry_vertices[c->first_entries[face] + corners[k]];
     swap_pair(&t, 0, 1);
     swap_pair(&t, 1, 2);
     swap_pair(&t, 0, 1);
@@ -176,9 +176,10 @@ void closed_faces_cut(closed_faces *c, const double (*positions)[3])
 {
     c->triangle_count = 0;
     for (int face = 0; face < c->face_count; face++) {
-        const int first = c->first[face], count = c->first[face + 1] - first;
+        const int first = c->first_entries[face], count = c->first_entries[face + 1] - first;
         if (count < 3) continue;
-        for (int i = 0; i < count; i++) memcpy(c->corners[i], positions[c->entry[first + i]], sizeof c->corners[i]);
+        for (int i = 0; i < count; i++)
+            memcpy(c->corners[i], positions[c->entry_vertices[first + i]], sizeof c->corners[i]);
         polygon_cut((const double(*)[3])c->corners, count, c->polygon, c->cuts);
         for (int i = 0; i + 2 < count; i++) add_triangle(c, face, c->cuts[i]);
     }
@@ -187,9 +188,9 @@ void closed_faces_cut(closed_faces *c, const double (*positions)[3])
 bool closed_face_is_patch(const closed_faces *c, int face, const double (*positions)[3])
 {
     double corners[4][3];
-    const int first = c->first[face];
-    if (c->first[face + 1] - first != 4) return false;
-    for (int i = 0; i < 4; i++) memcpy(corners[i], positions[c->entry[first + i]], sizeof corners[i]);
+    const int first = c->first_entries[face];
+    if (c->first_entries[face + 1] - first != 4) return false;
+    for (int i = 0; i < 4; i++) memcpy(corners[i], positions[c->entry_vertices[first + i]], sizeof corners[i]);
     return !polygon_is_concave_quad((const double(*)[3])corners);
 }
 
@@ -249,7 +250,7 @@ void closed_faces_turn_outward(closed_faces *c, const double (*positions)[3], co
     for (int i = 0; i < c->piece_count; i++) c->piece_volume[i] = 0;
     for (int i = 0; i < c->triangle_count; i++) {
         closed_triangle *t = &c->triangles[i];
-        t->volume = t->turn * tet_volume(positions, t->vertex, centre);
+        t->volume = t->orientation * tet_volume(positions, t->vertex, centre);
         c->piece_volume[c->piece[t->face]] += t->volume;
     }
     for (int piece = 0; piece < c->piece_count; piece++) {
@@ -257,7 +258,7 @@ void closed_faces_turn_outward(closed_faces *c, const double (*positions)[3], co
         /* replaces the volume by the sign with which the piece is oriented */
         c->piece_volume[piece] = (c->piece_volume[piece] < 0) != is_turned ? -1 : 1;
     }
-    for (int face = 0; face < c->face_count; face++) c->turn[face] *= (int)c->piece_volume[c->piece[face]];
+    for (int face = 0; face < c->face_count; face++) c->orientation[face] *= (int)c->piece_volume[c->piece[face]];
     for (int i = 0; i < c->triangle_count; i++)
         c->triangles[i].volume *= c->piece_volume[c->piece[c->triangles[i].face]];
 }

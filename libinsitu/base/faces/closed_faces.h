@@ -15,8 +15,8 @@
 typedef struct closed_triangle {
     int vertex[3]; /* numbers of the vertices, in increasing order */
     int face;
-    int turn;      /* 1 if the three vertices run in the direction of the face's vertices, else -1 */
-    double volume; /* six times the volume of the tet with the centre; positive if the triangle is seen from inside */
+    int orientation; /* 1 if the three vertices run in the direction of the face's vertices, else -1 */
+    double volume;   /* six times the volume of the tet with the centre; positive if the triangle is seen from inside */
 } closed_triangle;
 
 /* An edge of the faces, with the sides that run along it. */
@@ -29,13 +29,13 @@ typedef struct closed_edge {
  * entry of the face. */
 typedef struct closed_faces {
     int face_count, entry_count, vertex_count, triangle_count, piece_count, table_size;
-    int *first;        /* first entry of each face; face_count + 1 elements */
-    int *entry;        /* vertex number of each entry */
-    int *face_of;      /* face of each entry */
-    int64_t *vertices; /* index in the grid of each numbered vertex */
+    int *first_entries;  /* first entry of each face; face_count + 1 elements */
+    int *entry_vertices; /* vertex number of each entry */
+    int *face_of;        /* face of each entry */
+    int64_t *vertices;   /* index in the grid of each numbered vertex */
     /* 1 or -1 per face: whether it is reversed; after closed_faces_turn_outward(), 1 if the face's vertices run around
      * the outward normal */
-    int *turn;
+    int *orientation;
     int *piece; /* number of the connected piece to which each face belongs */
     closed_triangle *triangles;
     closed_edge *edges; /* hash table of edges with 2 * table_size entries */

@@ -19,15 +19,15 @@ typedef struct polygon_work {
     int count;
     int step; /* 1 if that order runs in the direction of the caller's list, else -1 */
     int *order;
-    double (*places)[3]; /* positions relative to the smallest corner, scaled to a width of about 1 */
-    double (*flat)[2];   /* projection of the corners along the normal, in which the order runs counterclockwise */
-    int *next, *before;  /* doubly linked list of the corners that have not been cut off */
+    double (*places)[3];  /* positions relative to the smallest corner, scaled to a width of about 1 */
+    double (*flat)[2];    /* projection of the corners along the normal, in which the order runs counterclockwise */
+    int *next, *previous; /* doubly linked list of the corners that have not been cut off */
     char *is_ear;
     int (*triangles)[3];
     int triangle_count;
 } polygon_work;
 
-size_t polygon_room(int count)
+size_t polygon_work_bytes(int count)
 {
     return (size_t)count * (5 * sizeof(double) + 3 * sizeof(int) + 1) + 8;
 }
@@ -40,8 +40,8 @@ static polygon_work divide_work(int count, char *room, int (*triangles)[3])
     w.flat = (double(*)[2])(void *)(room + 3 * n * sizeof(double));
     w.order = (int *)(void *)(room + 5 * n * sizeof(double));
     w.next = w.order + n;
-    w.before = w.next + n;
-    w.is_ear = (char *)(w.before + n);
+    w.previous = w.next + n;
+    w.is_ear = (char *)(w.previous + n);
     return w;
 }
 
@@ -185,7 +185,7 @@ static bool are_coincident(const polygon_work *w, int a, int b)
  * tip there. */
 static bool enters_corner(const polygon_work *w, int a, int tip, int c, int again)
 {
-    const int ends[2] = {w->before[again], w->next[again]};
+    const int ends[2] = {w->previous[again], w->next[again]};
     for (int i = 0; i < 2; i++)
         if (triangle_area(w, a, tip, ends[i]) > line_slack && triangle_area(w, tip, c, ends[i]) > line_slack)
             return true;
@@ -202,7 +202,7 @@ static bool is_blocked(const polygon_work *w, int a, int tip, int c, int by)
 
 static bool is_ear(const polygon_work *w, int tip)
 {
-    const int a = w->before[tip], c = w->next[tip];
+    const int a = w->previous[tip], c = w->next[tip];
     if (!(triangle_area(w, a, tip, c) > line_slack)) return false;
     for (int by = w->next[c]; by != a; by = w->next[by])
         if (is_blocked(w, a, tip, c, by)) return false;
@@ -236,7 +236,7 @@ static int find_straight(const polygon_work *w, int first)
     int i = first;
     do {
         i = w->next[i];
-        if (fabs(triangle_area(w, w->before[i], i, w->next[i])) <= line_slack) return i;
+        if (fabs(triangle_area(w, w->previous[i], i, w->next[i])) <= line_slack) return i;
     } while (i != first);
     return -1;
 }
@@ -250,10 +250,10 @@ static void cut_ears(polygon_work *w)
         if (ear < 0) ear = find_ear_anew(w, first);
         if (ear < 0) ear = find_straight(w, first);
         if (ear < 0) break;
-        const int a = w->before[ear], c = w->next[ear];
+        const int a = w->previous[ear], c = w->next[ear];
         add_triangle(w, a, ear, c);
         w->next[a] = c;
-        w->before[c] = a;
+        w->previous[c] = a;
         if (ear == first) first = c;
         w->is_ear[a] = (char)is_ear(w, a);
         w->is_ear[c] = (char)is_ear(w, c);
@@ -268,7 +268,7 @@ void polygon_cut(const double (*corners)[3], int count, void *room, int (*triang
     find_order(&w, corners);
     for (int i = 0; i < count; i++) {
         w.next[i] = (i + 1) % count;
-        w.before[i] = (i + count - 1) % count;
+        w.previous[i] = (i + count - 1) % count;
     }
     const bool may_be_concave = count > 3 && scale_positions(&w, corners) && (count > 4 || is_concave_quad(&w));
     if (!may_be_concave || is_fan(&w, normal)) {

@@ -16,7 +16,7 @@
 #include <stddef.h>
 
 /* Returns the number of bytes, aligned to 8, of work space for a polygon of `count` corners. */
-size_t polygon_room(int count);
+size_t polygon_work_bytes(int count);
 
 /* Cuts a polygon of count corners, at least 3, into count - 2 triangles of corner numbers, each of which runs in the
  * direction of the polygon. Triangles of coincident or collinear corners may have no area. */

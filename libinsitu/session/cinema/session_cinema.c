@@ -185,25 +185,25 @@ static bool make_tables(session_cinema *cinema, const scene *scene)
     return true;
 }
 
-insitu_status session_note_picture(session_cinema *cinema, const scene *scene, const scene_image *image,
-                                   const scene_output *output, const scene_moment *moment, base_error *error)
+insitu_status session_record_picture(session_cinema *cinema, const scene *scene, const scene_image *image,
+                                     const scene_output *output, const scene_moment *moment, base_error *error)
 {
     const scene_database *database = &scene->databases[output->database];
-    c_numbers numbers;
+    c_locale numbers;
     if (!make_tables(cinema, scene)) return fail_memory(database, "data.csv", "written", error);
     session_table *t = &cinema->tables[output->database];
     insitu_status status = t->is_begun ? INSITU_OK : begin_table(t, cinema->first_cycle, error);
     if (status) return status;
     if (!t->is_open && moment->cycle <= t->last_cycle) drop_lines_from_cycle(t, moment->cycle);
     char *file = scene_expand(output->path + output->folder_bytes, moment);
-    if (!file || !c_numbers_begin(&numbers)) {
+    if (!file || !c_locale_enter(&numbers)) {
         base_free(file);
         return fail_memory(database, "data.csv", "written", error);
     }
     const size_t before = t->size;
     table_line line = {t, true};
     add_picture(&line, image, moment, file);
-    c_numbers_end(&numbers);
+    c_locale_leave(&numbers);
     base_free(file);
     if (!line.is_well) {
         t->size = before;

@@ -23,16 +23,16 @@ static void store_line(session_news *news, int64_t cycle, const char *line, size
     news->lines[at][size] = '\0';
 }
 
-void session_note_news(session_news *news, const session_report *report, const base_error *error)
+void session_record_news(session_news *news, const session_report *report, const base_error *error)
 {
     const char *at = report->warnings.size ? report->warnings.data : "";
     while (*at) {
         const size_t size = strcspn(at, "\n");
-        store_line(news, report->numbers.cycle, at, size);
+        store_line(news, report->public_report.cycle, at, size);
         at += size + (at[size] == '\n');
     }
-    if (!error->status && !report->numbers.images) return;
-    news->is_new = news->is_new || report->numbers.images || strcmp(error->message, news->error.message) != 0;
+    if (!error->status && !report->public_report.images) return;
+    news->is_new = news->is_new || report->public_report.images || strcmp(error->message, news->error.message) != 0;
     news->error = *error;
 }
 
@@ -123,15 +123,15 @@ static void add_warnings(news_text *out, const session_news *news)
 char *session_make_news(session_news *news, const session_news_scene *source, const insitu_report *report)
 {
     news_text out = {.is_whole = true};
-    c_numbers numbers;
-    if (!c_numbers_begin(&numbers)) return NULL;
+    c_locale numbers;
+    if (!c_locale_enter(&numbers)) return NULL;
     add_formatted(&out, "{\"cycle\": %lld, \"time\": ", (long long)report->cycle);
     add_number(&out, report->time);
     add_formatted(&out, ", \"error\": ");
     add_quoted(&out, news->error.status ? news->error.message : NULL);
     add_scene(&out, source);
     add_warnings(&out, news);
-    c_numbers_end(&numbers);
+    c_locale_leave(&numbers);
     if (out.is_whole) news->is_new = false;
     if (out.is_whole) return out.text.data;
     base_free(out.text.data);

@@ -39,7 +39,7 @@ typedef struct session_news_scene {
 
 /* Stores a step's error and its warnings. It must be called before the error of a refused scene file is added to them.
  * Local. */
-void session_note_news(session_news *news, const session_report *report, const base_error *error);
+void session_record_news(session_news *news, const session_report *report, const base_error *error);
 
 /* Returns the text of report.json, allocated by base_alloc(). Returns NULL if memory runs out; is_new then remains set.
  * Local. */

@@ -43,7 +43,7 @@ static const scene_image *find_image_of_output(const scene *scene, int output)
 static int find_last_writer(const session_overwrites *all, uint64_t file, int output, long long cycle)
 {
     for (int i = 0; i < all->count; i++)
-        if (all->last[i].file == file && (i != output || all->last[i].cycle != cycle)) return i;
+        if (all->last_files[i].file == file && (i != output || all->last_files[i].cycle != cycle)) return i;
     return -1;
 }
 
@@ -62,21 +62,21 @@ static void warn_of_overwrite(const session_overwrites *all, const scene *scene,
     const scene_image *earlier = find_image_of_output(scene, before);
     session_warn(report, &(session_warning){WARNING_REPLACED, image->name, NULL, 0}, true,
                  "image \"%s\": %.400s, written at cycle %lld by image \"%s\", is overwritten at cycle %lld; %s",
-                 image->name, path, all->last[before].cycle, earlier->name, cycle,
+                 image->name, path, all->last_files[before].cycle, earlier->name, cycle,
                  overwrite_advice(image, earlier, before == output));
 }
 
 static bool reserve_entries(session_overwrites *all, const scene *scene)
 {
-    if (all->last) return true;
+    if (all->last_files) return true;
     const int count = count_outputs_before(scene, scene->image_count);
-    all->last = base_calloc((size_t)count, sizeof *all->last);
-    all->count = all->last ? count : 0;
-    return all->last != NULL;
+    all->last_files = base_calloc((size_t)count, sizeof *all->last_files);
+    all->count = all->last_files ? count : 0;
+    return all->last_files != NULL;
 }
 
-void session_note_written(session_overwrites *all, const scene *scene, int image, long long cycle, double time,
-                          session_report *report)
+void session_record_written(session_overwrites *all, const scene *scene, int image, long long cycle, double time,
+                            session_report *report)
 {
     const scene_image *drawn = &scene->images[image];
     const scene_moment moment = scene_moment_of(drawn, cycle, time);
@@ -84,20 +84,20 @@ void session_note_written(session_overwrites *all, const scene *scene, int image
     const int first = count_outputs_before(scene, image);
     for (int i = 0; i < drawn->output_count; i++) {
         const scene_output *output = &drawn->outputs[i];
-        if (output->montage >= 0 && output->first_cell + drawn->variant.view > 0)
+        if (output->montage >= 0 && output->first_panel + drawn->variant.view > 0)
             continue; /* only the first cell of a montage counts, because all its cells are in the same file */
         char *path = scene_expand(drawn->outputs[i].path, &moment);
         if (!path) continue;
         const uint64_t file = hash_path(path);
         const int before = find_last_writer(all, file, first + i, cycle);
         if (before >= 0) warn_of_overwrite(all, scene, drawn, first + i, before, path, cycle, report);
-        all->last[first + i] = (session_written){file, cycle};
+        all->last_files[first + i] = (session_written){file, cycle};
         base_free(path);
     }
 }
 
 void session_overwrites_free(session_overwrites *overwrites)
 {
-    base_free(overwrites->last);
+    base_free(overwrites->last_files);
     *overwrites = (session_overwrites){0};
 }

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-insitu_status session_mpi(base_error *error, int code, const char *what)
+insitu_status session_check_mpi(base_error *error, int code, const char *what)
 {
     if (code == MPI_SUCCESS) return INSITU_OK;
     char reason[MPI_MAX_ERROR_STRING] = "";
@@ -14,7 +14,7 @@ insitu_status session_mpi(base_error *error, int code, const char *what)
     return base_fail(error, INSITU_ERROR_MPI, "%s: %s", what, reason);
 }
 
-insitu_status session_no_memory(base_error *error, int64_t bytes, const char *what)
+insitu_status session_fail_for_memory(base_error *error, int64_t bytes, const char *what)
 {
     return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of %s", (long long)bytes, what);
 }
@@ -23,7 +23,7 @@ insitu_status session_share_error(MPI_Comm comm, int root, base_error *error)
 {
     base_error shared = *error;
     const int code = MPI_Bcast(&shared, (int)sizeof shared, MPI_BYTE, root, comm);
-    if (code != MPI_SUCCESS) return session_mpi(error, code, "MPI_Bcast");
+    if (code != MPI_SUCCESS) return session_check_mpi(error, code, "MPI_Bcast");
     *error = shared;
     return error->status;
 }
@@ -44,7 +44,7 @@ static insitu_status agree_on_error(MPI_Comm comm, base_error *error, int with_r
     MPI_Comm_size(comm, &ranks);
     const int mine = error->status == INSITU_OK ? ranks : rank;
     const int code = MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm);
-    if (code != MPI_SUCCESS) return session_mpi(error, code, "MPI_Allreduce");
+    if (code != MPI_SUCCESS) return session_check_mpi(error, code, "MPI_Allreduce");
     if (first == ranks) return INSITU_OK;
     if (rank == first && with_rank) prefix_rank(rank, error);
     return session_share_error(comm, first, error);
@@ -55,7 +55,7 @@ insitu_status session_agree(MPI_Comm comm, base_error *error)
     return agree_on_error(comm, error, 1);
 }
 
-insitu_status session_agree_as_is(MPI_Comm comm, base_error *error)
+insitu_status session_agree_without_rank(MPI_Comm comm, base_error *error)
 {
     return agree_on_error(comm, error, 0);
 }

@@ -16,16 +16,16 @@ insitu_status session_agree(MPI_Comm comm, base_error *error);
 
 /* Ends a phase in the same way as session_agree(), but does not put "rank N: " in front of the message. It is used for
  * errors that are not specific to a rank. Collective. */
-insitu_status session_agree_as_is(MPI_Comm comm, base_error *error);
+insitu_status session_agree_without_rank(MPI_Comm comm, base_error *error);
 
 /* Copies the error of the rank `root` to every rank. Collective. */
 insitu_status session_share_error(MPI_Comm comm, int root, base_error *error);
 
 /* Converts the return code of an MPI call to a status. If the call failed, *error contains `what` and MPI's reason.
  * Local. */
-insitu_status session_mpi(base_error *error, int code, const char *what);
+insitu_status session_check_mpi(base_error *error, int code, const char *what);
 
 /* Stores an error that memory ran out for `bytes` bytes of `what`, and returns its status. Local. */
-insitu_status session_no_memory(base_error *error, int64_t bytes, const char *what);
+insitu_status session_fail_for_memory(base_error *error, int64_t bytes, const char *what);
 
 #endif

@@ -6,7 +6,7 @@
 
 uint64_t session_key_hash(const session_key *key)
 {
-    return session_mix(key->words[0] ^ session_mix(key->words[1] ^ session_mix(key->words[2])));
+    return session_mix_bits(key->words[0] ^ session_mix_bits(key->words[1] ^ session_mix_bits(key->words[2])));
 }
 
 bool session_keys_create(session_key_table *table, int64_t most)

@@ -12,7 +12,7 @@ typedef struct session_key {
 } session_key;
 
 /* Mixes the bits of a word, so that each of them affects all bits of the result. */
-static inline uint64_t session_mix(uint64_t x)
+static inline uint64_t session_mix_bits(uint64_t x)
 {
     x += 0x9e3779b97f4a7c15u;
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;

@@ -6,28 +6,28 @@
 
 enum { MOST_BYTES = 2048 }; /* maximum length of a line */
 
-int session_telling_word(const session_report *report, const session_team *team)
+int session_reporting_word(const session_report *report, const session_team *team)
 {
-    return report->own.size ? team->ranks - team->rank : 0;
+    return report->own_warnings.size ? team->ranks - team->rank : 0;
 }
 
-int session_telling_rank(int word, const session_team *team)
+int session_reporting_rank(int word, const session_team *team)
 {
     return word ? team->ranks - word : -1;
 }
 
 insitu_status session_share_lines(session_report *report, int root, const session_team *team, base_error *error)
 {
-    const char *lines = team->rank == root && report->own.size ? report->own.data : "";
+    const char *lines = team->rank == root && report->own_warnings.size ? report->own_warnings.data : "";
     char line[MOST_BYTES];
-    report->own.size = 0;
+    report->own_warnings.size = 0;
     for (;;) {
         int size = (int)strcspn(lines, "\n");
-        insitu_status status = session_mpi(error, MPI_Bcast(&size, 1, MPI_INT, root, team->comm), "MPI_Bcast");
+        insitu_status status = session_check_mpi(error, MPI_Bcast(&size, 1, MPI_INT, root, team->comm), "MPI_Bcast");
         if (status || !size) return status;
         const int taken = size < MOST_BYTES ? size : MOST_BYTES - 1;
         if (team->rank == root) memcpy(line, lines, (size_t)taken);
-        status = session_mpi(error, MPI_Bcast(line, taken, MPI_CHAR, root, team->comm), "MPI_Bcast");
+        status = session_check_mpi(error, MPI_Bcast(line, taken, MPI_CHAR, root, team->comm), "MPI_Bcast");
         if (status) return status;
         line[taken] = '\0';
         session_text_add(&report->warnings, "%s", line);

@@ -6,11 +6,11 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Returns this rank's input of an MPI reduction by maximum. session_telling_rank() computes a rank from its result.
+/* Returns this rank's input of an MPI reduction by maximum. session_reporting_rank() computes a rank from its result.
  * Local. */
-int session_telling_word(const session_report *report, const session_team *team);
+int session_reporting_word(const session_report *report, const session_team *team);
 /* Returns the lowest rank that has warnings; -1 if no rank has any. Local. */
-int session_telling_rank(int word, const session_team *team);
+int session_reporting_rank(int word, const session_team *team);
 
 /* Adds the warnings of the rank `root`, possibly none, to the reports of all ranks. Warnings of other ranks, which are
  * mostly the same, are dropped. Collective. */

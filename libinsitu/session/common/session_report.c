@@ -65,12 +65,12 @@ static const char *text_of(const session_text *text)
 
 void session_report_create(session_report *report)
 {
-    *report = (session_report){.numbers = {.schedule = "", .copied_why = "", .left_out = "", .warnings = ""}};
+    *report = (session_report){.public_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = ""}};
 }
 
 void session_report_begin(session_report *report, int64_t cycle, double time)
 {
-    report->numbers = (insitu_report){.cycle = cycle, .time = time, .schedule = ""};
+    report->public_report = (insitu_report){.cycle = cycle, .time = time, .schedule = ""};
     clear_text(&report->copied_why);
     clear_text(&report->left_out);
     clear_text(&report->warnings);
@@ -79,10 +79,10 @@ void session_report_begin(session_report *report, int64_t cycle, double time)
 
 void session_report_end(session_report *report)
 {
-    report->numbers.bytes_peak = base_memory_peak();
-    report->numbers.copied_why = text_of(&report->copied_why);
-    report->numbers.left_out = text_of(&report->left_out);
-    report->numbers.warnings = text_of(&report->warnings);
+    report->public_report.bytes_peak = base_memory_peak();
+    report->public_report.copied_why = text_of(&report->copied_why);
+    report->public_report.left_out = text_of(&report->left_out);
+    report->public_report.warnings = text_of(&report->warnings);
 }
 
 void session_report_free(session_report *report)
@@ -90,8 +90,8 @@ void session_report_free(session_report *report)
     free_text(&report->copied_why);
     free_text(&report->left_out);
     free_text(&report->warnings);
-    free_text(&report->own);
-    base_free(report->told);
+    free_text(&report->own_warnings);
+    base_free(report->reported);
 }
 
 /* ---- warnings ------------------------------------------------------------------------------------------------ */
@@ -106,21 +106,21 @@ static uint64_t warning_key(const session_warning *w)
     return key;
 }
 
-/* Returns the index of a warning that has been reported; told_count if it has not been reported. */
+/* Returns the index of a warning that has been reported; reported_count if it has not been reported. */
 static int find_reported(const session_report *report, uint64_t key)
 {
     int at = 0;
-    while (at < report->told_count && report->told[at] != key) at++;
+    while (at < report->reported_count && report->reported[at] != key) at++;
     return at;
 }
 
 /* Stores that a warning has been reported. If memory runs out, the warning will be reported again. */
 static void add_reported(session_report *report, uint64_t key)
 {
-    uint64_t *told = base_realloc(report->told, (size_t)(report->told_count + 1) * sizeof *told);
+    uint64_t *told = base_realloc(report->reported, (size_t)(report->reported_count + 1) * sizeof *told);
     if (!told) return;
-    report->told = told;
-    told[report->told_count++] = key;
+    report->reported = told;
+    told[report->reported_count++] = key;
 }
 
 static void add_warning(session_report *report, session_text *text, const session_warning *warning, bool holds,
@@ -128,7 +128,7 @@ static void add_warning(session_report *report, session_text *text, const sessio
 {
     const uint64_t key = warning_key(warning);
     const int at = find_reported(report, key);
-    if (holds && at == report->told_count) {
+    if (holds && at == report->reported_count) {
         char line[1024];
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wformat-nonliteral"
@@ -136,8 +136,8 @@ static void add_warning(session_report *report, session_text *text, const sessio
 #pragma GCC diagnostic pop
         session_text_add(text, "%s", line);
         add_reported(report, key);
-    } else if (!holds && at < report->told_count) {
-        report->told[at] = report->told[--report->told_count];
+    } else if (!holds && at < report->reported_count) {
+        report->reported[at] = report->reported[--report->reported_count];
     }
 }
 
@@ -149,21 +149,21 @@ void session_warn(session_report *report, const session_warning *warning, bool h
     va_end(arguments);
 }
 
-void session_warn_own(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
+void session_warn_locally(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
-    add_warning(report, &report->own, warning, holds, format, arguments);
+    add_warning(report, &report->own_warnings, warning, holds, format, arguments);
     va_end(arguments);
 }
 
 bool session_is_warned(const session_report *report, const session_warning *warning)
 {
-    return find_reported(report, warning_key(warning)) < report->told_count;
+    return find_reported(report, warning_key(warning)) < report->reported_count;
 }
 
 void session_forget_warnings(session_report *report)
 {
-    report->told_count = 0;
+    report->reported_count = 0;
     report->unusable_key = 0;
 }

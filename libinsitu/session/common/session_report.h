@@ -20,11 +20,12 @@ typedef struct session_text {
 } session_text;
 
 typedef struct session_report {
-    insitu_report numbers; /* its texts are set only at the end of a step */
+    insitu_report public_report; /* its texts are set only at the end of a step */
     session_text copied_why, left_out, warnings;
-    session_text own; /* this rank's own warnings, until session_share_lines() sends those of one rank to all */
-    int told_count;
-    uint64_t *told; /* hashes of warnings that have been reported and whose condition still holds */
+    session_text
+        own_warnings; /* this rank's own warnings, until session_share_lines() sends those of one rank to all */
+    int reported_count;
+    uint64_t *reported; /* hashes of warnings that have been reported and whose condition still holds */
     /* result of session_unusable_key() when its warnings were last reported; 0: there were none */
     uint64_t unusable_key;
 } session_report;
@@ -82,9 +83,9 @@ typedef struct session_warning {
 } session_warning;
 
 /* Adds the warning if its condition holds and it has not been reported yet. session_warn() is for conditions that are
- * the same on every rank. session_warn_own() is for conditions of one rank, whose warnings are sent to all ranks by
+ * the same on every rank. session_warn_locally() is for conditions of one rank, whose warnings are sent to all ranks by
  * session_share_lines(). Local. */
-void session_warn_own(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
+void session_warn_locally(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 void session_warn(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
     __attribute__((format(printf, 4, 5)));

@@ -5,9 +5,9 @@
 
 static insitu_status duplicate_comm(MPI_Comm comm, MPI_Comm *out, base_error *error)
 {
-    const insitu_status status = session_mpi(error, MPI_Comm_dup(comm, out), "MPI_Comm_dup");
+    const insitu_status status = session_check_mpi(error, MPI_Comm_dup(comm, out), "MPI_Comm_dup");
     if (status) return status;
-    return session_mpi(error, MPI_Comm_set_errhandler(*out, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+    return session_check_mpi(error, MPI_Comm_set_errhandler(*out, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
 }
 
 insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *error)

@@ -92,7 +92,7 @@ typedef struct trial {
     pthread_mutex_t gate; /* locked until the threads may end */
     pthread_t *threads;
     int count;
-    void *room;
+    void *thread_storage;
 } trial;
 
 static void *wait_at_gate(void *gate)
@@ -138,10 +138,10 @@ static void start_trial_threads(trial *t, int wanted)
 {
     pthread_attr_t attributes;
     sigset_t all, old;
-    *t = (trial){.threads = base_calloc((size_t)wanted, sizeof *t->threads), .room = base_alloc(SPARE_BYTES)};
+    *t = (trial){.threads = base_calloc((size_t)wanted, sizeof *t->threads), .thread_storage = base_alloc(SPARE_BYTES)};
     pthread_mutex_init(&t->gate, NULL);
     pthread_mutex_lock(&t->gate);
-    if (!t->threads || !t->room || pthread_attr_init(&attributes) != 0) return;
+    if (!t->threads || !t->thread_storage || pthread_attr_init(&attributes) != 0) return;
     const size_t stack = stack_of_environment();
     /* a size that is refused here is not used by OpenMP either */
     if (stack) pthread_attr_setstacksize(&attributes, stack);
@@ -160,7 +160,7 @@ static void join_trial_threads(trial *t)
     for (int i = 0; i < t->count; i++) pthread_join(t->threads[i], NULL);
     pthread_mutex_destroy(&t->gate);
     base_free(t->threads);
-    base_free(t->room);
+    base_free(t->thread_storage);
 }
 
 /* Tries to start threads before a rank's first parallel region, if any rank needs more than it has. All ranks try at
@@ -183,11 +183,12 @@ static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm 
 static int choose_threads(const session_threads *threads, int asked, int wanted, session_report *report)
 {
     const bool are_enough = threads->count >= wanted;
-    session_warn_own(report, &(session_warning){WARNING_THREADS, NULL, NULL, 0}, asked > wanted,
-                     "the scene asks for %d threads, at most %d are used: %s", asked, wanted, cap_of_team().reason);
-    session_warn_own(report, &(session_warning){WARNING_THREADS, NULL, NULL, 1}, !are_enough,
-                     "%d of %d threads are used: no more can be started, by the limits of memory, processes or threads",
-                     threads->count, wanted);
+    session_warn_locally(report, &(session_warning){WARNING_THREADS, NULL, NULL, 0}, asked > wanted,
+                         "the scene asks for %d threads, at most %d are used: %s", asked, wanted, cap_of_team().reason);
+    session_warn_locally(
+        report, &(session_warning){WARNING_THREADS, NULL, NULL, 1}, !are_enough,
+        "%d of %d threads are used: no more can be started, by the limits of memory, processes or threads",
+        threads->count, wanted);
     return are_enough ? wanted : threads->count;
 }
 
@@ -195,7 +196,7 @@ static int choose_threads(const session_threads *threads, int asked, int wanted,
 
 /* A thread's stack: its size, and the number of bytes left below the current frame. Both are INT64_MAX if unknown. */
 typedef struct thread_stack {
-    int64_t left, size;
+    int64_t free_bytes, total_bytes;
 } thread_stack;
 
 static thread_stack find_own_stack(void)
@@ -221,8 +222,8 @@ static thread_stack least_worker_stack(int threads)
         region_enter();
         if (omp_get_thread_num() > 0) {
             const thread_stack own = find_own_stack();
-            left = own.left;
-            size = own.size;
+            left = own.free_bytes;
+            size = own.total_bytes;
             if (has_key) pthread_setspecific(key, &key);
         }
         region_leave();
@@ -235,7 +236,7 @@ static thread_stack least_worker_stack(int threads)
 static long long needed_stack_kilobytes(const thread_stack *stack, int64_t needed)
 {
     enum { OF_SYSTEMS = 16 };
-    return ((needed + stack->size - stack->left) >> 10) + OF_SYSTEMS;
+    return ((needed + stack->total_bytes - stack->free_bytes) >> 10) + OF_SYSTEMS;
 }
 
 /* Stores an error if a stack is too small. Must be called before any other parallel region. Collective. */
@@ -246,18 +247,18 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
     session_guard_lend(guard);
     const thread_stack least = least_worker_stack(team->threads);
     session_guard_return();
-    if (own.left < SESSION_CALLER_STACK)
+    if (own.free_bytes < SESSION_CALLER_STACK)
         base_fail(error, INSITU_ERROR_ARGUMENT,
                   "the thread that calls insitu_step() has %lld kB of its stack left, a step needs %d kB: expected a "
                   "stack of %lld kB (ulimit -s %lld)",
-                  (long long)own.left >> 10, SESSION_CALLER_STACK >> 10,
+                  (long long)own.free_bytes >> 10, SESSION_CALLER_STACK >> 10,
                   needed_stack_kilobytes(&own, SESSION_CALLER_STACK),
                   needed_stack_kilobytes(&own, SESSION_CALLER_STACK));
-    else if (least.left < SESSION_WORKER_STACK)
+    else if (least.free_bytes < SESSION_WORKER_STACK)
         base_fail(error, INSITU_ERROR_ARGUMENT,
                   "OpenMP's threads have %lld kB of stack left, a step needs %d kB: expected stacks of %lld kB "
                   "(OMP_STACKSIZE=%lldk)",
-                  (long long)least.left >> 10, SESSION_WORKER_STACK >> 10,
+                  (long long)least.free_bytes >> 10, SESSION_WORKER_STACK >> 10,
                   needed_stack_kilobytes(&least, SESSION_WORKER_STACK),
                   needed_stack_kilobytes(&least, SESSION_WORKER_STACK));
     const insitu_status status = session_agree(team->comm, error);

@@ -14,7 +14,7 @@
 
 /* A point in the camera's coordinate system, relative to the eye: x to the right, y up, z forward. */
 typedef struct seen_point {
-    double at[3];
+    double position[3];
 } seen_point;
 
 static seen_point transform_to_camera(const render_camera *c, const double p[3])
@@ -22,28 +22,28 @@ static seen_point transform_to_camera(const render_camera *c, const double p[3])
     const double *const axes[3] = {c->right, c->up, c->forward};
     seen_point out;
     for (int i = 0; i < 3; i++) {
-        out.at[i] = 0;
-        for (int a = 0; a < 3; a++) out.at[i] += axes[i][a] * (p[a] - c->eye[a]);
+        out.position[i] = 0;
+        for (int a = 0; a < 3; a++) out.position[i] += axes[i][a] * (p[a] - c->eye[a]);
     }
     return out;
 }
 
 static void project_to_pixel(const render_camera *c, const seen_point *p, double pixel[2])
 {
-    const double depth = c->is_orthographic ? 1 : p->at[2], scale = 0.5 * c->height / (c->half_height * depth);
-    pixel[0] = 0.5 * c->width + p->at[0] * scale;
-    pixel[1] = 0.5 * c->height - p->at[1] * scale;
+    const double depth = c->is_orthographic ? 1 : p->position[2], scale = 0.5 * c->height / (c->half_height * depth);
+    pixel[0] = 0.5 * c->width + p->position[0] * scale;
+    pixel[1] = 0.5 * c->height - p->position[1] * scale;
 }
 
 /* Clips the edge at the plane with depth `near`. Returns false if all of the edge is nearer. */
 static bool clip_at_near_plane(seen_point *a, seen_point *b, double near)
 {
-    if (a->at[2] < near && b->at[2] < near) return false;
-    if (a->at[2] >= near && b->at[2] >= near) return true;
-    const double share = (near - a->at[2]) / (b->at[2] - a->at[2]);
-    seen_point *hidden = a->at[2] < near ? a : b;
+    if (a->position[2] < near && b->position[2] < near) return false;
+    if (a->position[2] >= near && b->position[2] >= near) return true;
+    const double share = (near - a->position[2]) / (b->position[2] - a->position[2]);
+    seen_point *hidden = a->position[2] < near ? a : b;
     seen_point cut;
-    for (int i = 0; i < 3; i++) cut.at[i] = a->at[i] + share * (b->at[i] - a->at[i]);
+    for (int i = 0; i < 3; i++) cut.position[i] = a->position[i] + share * (b->position[i] - a->position[i]);
     *hidden = cut;
     return true;
 }
@@ -86,10 +86,10 @@ int session_box_strokes(const double lower[3], const double upper[3], const rend
 typedef struct ruled_edge {
     double from[3], to[3]; /* the ends in scene coordinates */
     double pixels[2][2];   /* the ends in pixels */
-    double away[2];        /* unit vector in the picture, perpendicular to the edge and pointing out of the box */
-    /* is_there: the edge is in front of the eye; is_outer: it lies between a face that is seen from outside and one
+    double outward[2];     /* unit vector in the picture, perpendicular to the edge and pointing out of the box */
+    /* is_in_front: the edge is in front of the eye; is_outer: it lies between a face that is seen from outside and one
      * that is not */
-    bool is_there, is_outer;
+    bool is_in_front, is_outer;
 } ruled_edge;
 
 static ruled_edge find_edge(const double lower[3], const double upper[3], const render_camera *c, int axis, int corner)
@@ -97,7 +97,7 @@ static ruled_edge find_edge(const double lower[3], const double upper[3], const 
     const int b = (axis + 1) % 3, d = (axis + 2) % 3;
     const bool high_b = corner & 1, high_d = corner & 2;
     double middle[3], centre[2];
-    ruled_edge e = {.is_there = true};
+    ruled_edge e = {.is_in_front = true};
     e.from[axis] = lower[axis];
     e.to[axis] = upper[axis];
     e.from[b] = e.to[b] = high_b ? upper[b] : lower[b];
@@ -105,24 +105,24 @@ static ruled_edge find_edge(const double lower[3], const double upper[3], const 
     for (int a = 0; a < 3; a++) middle[a] = 0.5 * lower[a] + 0.5 * upper[a];
     const seen_point ends[3] = {transform_to_camera(c, e.from), transform_to_camera(c, e.to),
                                 transform_to_camera(c, middle)};
-    for (int i = 0; i < 3; i++) e.is_there = e.is_there && (c->is_orthographic || ends[i].at[2] > 0);
-    if (!e.is_there) return e;
+    for (int i = 0; i < 3; i++) e.is_in_front = e.is_in_front && (c->is_orthographic || ends[i].position[2] > 0);
+    if (!e.is_in_front) return e;
     project_to_pixel(c, &ends[0], e.pixels[0]);
     project_to_pixel(c, &ends[1], e.pixels[1]);
     project_to_pixel(c, &ends[2], centre);
     const double x = e.pixels[1][0] - e.pixels[0][0], y = e.pixels[1][1] - e.pixels[0][1], length = hypot(x, y);
-    e.is_there = length > 1;
-    if (!e.is_there) return e;
+    e.is_in_front = length > 1;
+    if (!e.is_in_front) return e;
     const double side = (centre[0] - e.pixels[0][0]) * y - (centre[1] - e.pixels[0][1]) * x < 0 ? 1 : -1;
-    e.away[0] = side * y / length;
-    e.away[1] = -side * x / length;
+    e.outward[0] = side * y / length;
+    e.outward[1] = -side * x / length;
     e.is_outer = is_seen_outside(lower, upper, c, b, high_b) != is_seen_outside(lower, upper, c, d, high_d);
     return e;
 }
 
 static bool is_lower(const ruled_edge *a, const ruled_edge *b)
 {
-    if (!a->is_there || !b->is_there) return a->is_there;
+    if (!a->is_in_front || !b->is_in_front) return a->is_in_front;
     if (a->is_outer != b->is_outer) return a->is_outer;
     return a->pixels[0][1] + a->pixels[1][1] > b->pixels[0][1] + b->pixels[1][1];
 }
@@ -141,7 +141,7 @@ static void place_axis_name(const ruled_edge *e, const insitu_stroke *ticks, int
 {
     double middle[2], least = INFINITY;
     for (int a = 0; a < 2; a++) at[a] = middle[a] = 0.5 * (e->pixels[0][a] + e->pixels[1][a]);
-    if (fabs(e->away[0]) <= fabs(e->away[1])) return;
+    if (fabs(e->outward[0]) <= fabs(e->outward[1])) return;
     for (int i = 0; i + 1 < count; i++) {
         const double between[2] = {0.5 * (ticks[i].from[0] + ticks[i + 1].from[0]),
                                    0.5 * (ticks[i].from[1] + ticks[i + 1].from[1])};
@@ -171,30 +171,30 @@ static void draw_ruler(const ruled_edge *e, int axis, const render_camera *c, do
         const seen_point seen = transform_to_camera(c, place);
         project_to_pixel(c, &seen, at);
         strokes[out->stroke_count++] = (insitu_stroke){
-            {at[0], at[1]}, {at[0] + 0.35 * size * e->away[0], at[1] + 0.35 * size * e->away[1]}, false};
-        labels[out->label_count++] = make_label(at, e->away, 0.55, ticks[i].text);
+            {at[0], at[1]}, {at[0] + 0.35 * size * e->outward[0], at[1] + 0.35 * size * e->outward[1]}, false};
+        labels[out->label_count++] = make_label(at, e->outward, 0.55, ticks[i].text);
     }
     place_axis_name(e, first, count, name_at);
-    labels[out->label_count++] = make_label(name_at, e->away, 2.4, names[axis]);
+    labels[out->label_count++] = make_label(name_at, e->outward, 2.4, names[axis]);
 }
 
 void session_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
                         insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels)
 {
     for (int axis = 0; axis < 3; axis++) {
-        ruled_edge best = {.is_there = false};
+        ruled_edge best = {.is_in_front = false};
         for (int corner = 0; corner < 4; corner++) {
             const ruled_edge e = find_edge(lower, upper, camera, axis, corner);
             if (is_lower(&e, &best)) best = e;
         }
-        if (best.is_there) draw_ruler(&best, axis, camera, size, out, strokes, labels);
+        if (best.is_in_front) draw_ruler(&best, axis, camera, size, out, strokes, labels);
     }
 }
 
 insitu_scale_bar session_make_scale_bar(const render_camera *camera, const double point[3], const char *unit)
 {
     insitu_scale_bar out = {.length = 0};
-    const double depth = camera->is_orthographic ? 1 : transform_to_camera(camera, point).at[2];
+    const double depth = camera->is_orthographic ? 1 : transform_to_camera(camera, point).position[2];
     const double pixel = 2 * camera->half_height * depth / camera->height;
     if (!(pixel > 0)) return out;
     const double room = 0.2 * camera->width * pixel, power = pow(10, floor(log10(room)));
@@ -224,7 +224,7 @@ static void choose_text_colour(const scene_image *image, float colour[3])
 static bool add_text(session_decorations *d, const char *text, const scene_moment *moment, insitu_anchor at, float size)
 {
     char *expanded = scene_expand(text, moment);
-    if (expanded) d->words[d->all.words_count++] = (insitu_words){expanded, at, size};
+    if (expanded) d->words[d->decorations.words_count++] = (insitu_words){expanded, at, size};
     return expanded != NULL;
 }
 
@@ -232,7 +232,7 @@ static bool add_scene_texts(session_decorations *d, const scene_decorations *sce
 {
     bool well = !scene->title || add_text(d, scene->title, moment, INSITU_TOP, 1.4F);
     for (int i = 0; i < scene->words_count && well; i++)
-        well = add_text(d, scene->words[i].text, moment, (insitu_anchor)scene->words[i].at, 1);
+        well = add_text(d, scene->words[i].text, moment, (insitu_anchor)scene->words[i].anchor, 1);
     return well;
 }
 
@@ -305,7 +305,7 @@ static void add_bar(session_decorations *d, const bar_basis *basis, const scene_
                     const scene_colour_map *map, const session_transfer *transfer)
 {
     const scene_decorations *scene = basis->scene;
-    const int i = d->all.bar_count, most = scene->tick_count;
+    const int i = d->decorations.bar_count, most = scene->tick_count;
     if (i == SESSION_MAX_BARS) return;
     const session_scale scale = {transfer->transfer.scale, transfer->transfer.threshold, transfer->low, transfer->high,
                                  scene->numbers};
@@ -319,12 +319,12 @@ static void add_bar(session_decorations *d, const bar_basis *basis, const scene_
                                      .colours = map->colours,
                                      .colour_count = map->count,
                                      .is_banded = map->is_banded,
-                                     .below = map->has_below ? map->outside[0] : NULL,
-                                     .above = map->has_above ? map->outside[1] : NULL,
+                                     .below = map->has_below ? map->outside_colours[0] : NULL,
+                                     .above = map->has_above ? map->outside_colours[1] : NULL,
                                      .at = (insitu_anchor)scene->bars_at,
                                      .tick_count = tick_count,
                                      .ticks = d->ticks[i]};
-    if (!is_repeated_bar(d, i)) d->all.bar_count++;
+    if (!is_repeated_bar(d, i)) d->decorations.bar_count++;
 }
 
 static void fill_bars(session_decorations *d, const scene_image *image, const session_decoration_basis *given)
@@ -350,9 +350,9 @@ static void fill_bars(session_decorations *d, const scene_image *image, const se
 static void fill_axes(session_decorations *d, const render_camera *c)
 {
     for (int a = 0; a < 3; a++) {
-        d->all.axes[a][0] = c->right[a];
-        d->all.axes[a][1] = c->up[a];
-        d->all.axes[a][2] = -c->forward[a];
+        d->decorations.axes[a][0] = c->right[a];
+        d->decorations.axes[a][1] = c->up[a];
+        d->decorations.axes[a][2] = -c->forward[a];
     }
 }
 
@@ -363,17 +363,17 @@ static void fill_length_decorations(session_decorations *d, const scene_decorati
     double middle[3];
     for (int a = 0; a < 3; a++) middle[a] = 0.5 * extent->lower[a] + 0.5 * extent->upper[a];
     if (scene->has_rulers)
-        session_box_rulers(extent->lower, extent->upper, camera, scene->size * camera->height, &d->all, d->strokes,
-                           d->ruler_labels);
-    if (scene->has_scale_bar) d->all.scale_bar = session_make_scale_bar(camera, middle, scene->scale_unit);
-    d->all.scale_bar.at = (insitu_anchor)scene->scale_at;
+        session_box_rulers(extent->lower, extent->upper, camera, scene->size * camera->height, &d->decorations,
+                           d->strokes, d->ruler_labels);
+    if (scene->has_scale_bar) d->decorations.scale_bar = session_make_scale_bar(camera, middle, scene->scale_unit);
+    d->decorations.scale_bar.at = (insitu_anchor)scene->scale_at;
 }
 
 static void fill_outline(session_decorations *d, const session_outline *outline, const render_camera *camera)
 {
     for (int i = 0; i < outline->count; i++)
-        d->all.stroke_count += session_box_strokes(outline->boxes[i].lower, outline->boxes[i].upper, camera,
-                                                   d->strokes + d->all.stroke_count);
+        d->decorations.stroke_count += session_box_strokes(outline->boxes[i].lower, outline->boxes[i].upper, camera,
+                                                           d->strokes + d->decorations.stroke_count);
 }
 
 session_decorations *session_make_decorations(const scene_image *image, const session_decoration_basis *basis)
@@ -383,16 +383,16 @@ session_decorations *session_make_decorations(const scene_image *image, const se
     session_decorations *d = base_calloc(1, sizeof *d);
     if (!d) return NULL;
     d->strokes = base_alloc(strokes * sizeof *d->strokes);
-    d->all = (insitu_decorations){.size = scene->size,
-                                  .words = d->words,
-                                  .bars = d->bars,
-                                  .strokes = d->strokes,
-                                  .labels = d->ruler_labels,
-                                  .has_axes = scene->has_axes};
-    memcpy(d->all.background, image->background, sizeof d->all.background);
-    d->background = d->all;
+    d->decorations = (insitu_decorations){.size = scene->size,
+                                          .words = d->words,
+                                          .bars = d->bars,
+                                          .strokes = d->strokes,
+                                          .labels = d->ruler_labels,
+                                          .has_axes = scene->has_axes};
+    memcpy(d->decorations.background, image->background, sizeof d->decorations.background);
+    d->background = d->decorations;
     d->background.has_axes = false;
-    choose_text_colour(image, d->all.colour);
+    choose_text_colour(image, d->decorations.colour);
     fill_axes(d, &basis->view->camera);
     if (scene->has_bars) fill_bars(d, image, basis);
     if (d->strokes) {
@@ -407,7 +407,8 @@ session_decorations *session_make_decorations(const scene_image *image, const se
 void session_free_decorations(session_decorations *decorations)
 {
     if (!decorations) return;
-    for (int i = 0; i < decorations->all.words_count; i++) base_free((void *)(uintptr_t)decorations->words[i].text);
+    for (int i = 0; i < decorations->decorations.words_count; i++)
+        base_free((void *)(uintptr_t)decorations->words[i].text);
     base_free(decorations->strokes);
     base_free(decorations);
 }

@@ -16,8 +16,8 @@ enum { SESSION_MAX_BARS = 20, SESSION_MAX_WORDS = 17, SESSION_BOX_EDGES = 12 };
 enum { SESSION_RULER_STROKES = 3 * SESSION_MAX_TICKS, SESSION_RULER_LABELS = 3 * SESSION_MAX_TICKS + 3 };
 
 typedef struct session_decorations {
-    insitu_decorations all;        /* all decorations; its pointers refer to this struct and to the layers */
-    insitu_decorations background; /* decorations that contain only the background, for files without decorations */
+    insitu_decorations decorations; /* all decorations; its pointers refer to this struct and to the layers */
+    insitu_decorations background;  /* decorations that contain only the background, for files without decorations */
     insitu_words words[SESSION_MAX_WORDS];
     insitu_colour_bar bars[SESSION_MAX_BARS];
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];

@@ -55,12 +55,12 @@ static insitu_status gather_bounds(const session_catalogue *catalogue, const ses
     double own[ENDS];
     if (!by_mesh) {
         find_bounds(catalogue, meshes, false, own);
-        return session_mpi(error, MPI_Gather(own, ENDS, MPI_DOUBLE, all, ENDS, MPI_DOUBLE, 0, team->comm),
-                           "MPI_Gather");
+        return session_check_mpi(error, MPI_Gather(own, ENDS, MPI_DOUBLE, all, ENDS, MPI_DOUBLE, 0, team->comm),
+                                 "MPI_Gather");
     }
     find_bounds(catalogue, meshes, true, all);
-    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, all, ENDS * boxes, MPI_DOUBLE, MPI_MIN, team->comm),
-                       "MPI_Allreduce");
+    return session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, all, ENDS * boxes, MPI_DOUBLE, MPI_MIN, team->comm),
+                             "MPI_Allreduce");
 }
 
 /* ---- all boxes ------------------------------------------------------------------------------------------------- */
@@ -78,7 +78,7 @@ static insitu_status find_boxes(bool by_mesh, const session_catalogue *catalogue
     const int boxes = by_mesh ? catalogue->mesh_count : team->ranks;
     double *ends = base_alloc((size_t)boxes * ENDS * sizeof *ends);
     if (!ends || (team->rank == 0 && !allocate_boxes(out, boxes)))
-        session_no_memory(error, boxes * (int64_t)(ENDS * sizeof *ends), "boxes of an outline");
+        session_fail_for_memory(error, boxes * (int64_t)(ENDS * sizeof *ends), "boxes of an outline");
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = gather_bounds(catalogue, meshes, by_mesh, boxes, team, ends, error);
     if (!status && team->rank == 0) add_boxes(ends, boxes, out);
@@ -95,7 +95,8 @@ insitu_status session_find_outline(const scene_decorations *decorations, const s
     if (!decorations->is_given || decorations->outline == SCENE_NO_BOX || extent->cell_count == 0) return INSITU_OK;
     if (decorations->outline != SCENE_BOX_OF_DATA)
         return find_boxes(decorations->outline == SCENE_BOXES_OF_MESHES, catalogue, meshes, team, out, error);
-    if (team->rank == 0 && !allocate_boxes(out, 1)) session_no_memory(error, (int64_t)sizeof *out->boxes, "an outline");
+    if (team->rank == 0 && !allocate_boxes(out, 1))
+        session_fail_for_memory(error, (int64_t)sizeof *out->boxes, "an outline");
     const insitu_status status = session_agree(team->comm, error);
     if (status || team->rank != 0) return status;
     memcpy(out->boxes[0].lower, extent->lower, sizeof extent->lower);

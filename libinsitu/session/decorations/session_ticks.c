@@ -93,7 +93,7 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
     const round_step step = choose_round_step(s->low, s->high, most);
     const double largest = fmax(fabs(s->low), fabs(s->high));
     const bool is_short = largest < 1e6 && largest >= 1e-3 && step.exponent > -9;
-    const scene_notation notation = s->numbers.notation;
+    const scene_notation notation = s->number_form.notation;
     const bool is_plain = notation == SCENE_SHORTEST ? is_short : notation == SCENE_FIXED;
     const int digits = is_plain ? -step.exponent : (int)floor(log10(largest)) - step.exponent;
     double first, last;
@@ -102,7 +102,7 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
     for (double n = first; n <= last && count < SESSION_MAX_TICKS; n++) {
         const double value = n * round_step_size(step);
         ticks[count].place = scale_position(s, value);
-        write_in_form(value, &s->numbers, is_plain, digits, &ticks[count]);
+        write_in_form(value, &s->number_form, is_plain, digits, &ticks[count]);
         count++;
     }
     return count;
@@ -113,7 +113,7 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
 /* The numbers that get a tick: 1, or 1, 2 and 5, multiplied by every n-th power of ten, where n is `every`. */
 typedef struct decade_choice {
     bool has_2_and_5;
-    int every;
+    int step;
 } decade_choice;
 
 static void add_tick(const session_scale *s, double value, insitu_tick *ticks, int *count)
@@ -123,9 +123,10 @@ static void add_tick(const session_scale *s, double value, insitu_tick *ticks, i
     if (*count < SESSION_MAX_TICKS) {
         insitu_tick *tick = &ticks[*count];
         const bool is_short = size < 1e4 && size > 9e-4;
-        const bool is_plain = s->numbers.notation == SCENE_SHORTEST ? is_short : s->numbers.notation == SCENE_FIXED;
+        const bool is_plain =
+            s->number_form.notation == SCENE_SHORTEST ? is_short : s->number_form.notation == SCENE_FIXED;
         tick->place = scale_position(s, value);
-        write_in_form(value, &s->numbers, is_plain, is_plain && size < 0.9999 ? (int)ceil(-log10(size) - 1e-9) : 0,
+        write_in_form(value, &s->number_form, is_plain, is_plain && size < 0.9999 ? (int)ceil(-log10(size) - 1e-9) : 0,
                       tick);
     }
     (*count)++;
@@ -138,7 +139,7 @@ static void add_decades(const session_scale *s, double sign, decade_choice choic
     const double smallest = s->kind == RENDER_SYMLOG ? s->threshold : s->low;
     const int last = (int)floor(log10(largest) + 1e-9), first = (int)floor(log10(smallest) + 1e-9);
     for (int n = first; n <= last; n++) {
-        if (n % choice.every) continue;
+        if (n % choice.step) continue;
         const double power = pow(10, n);
         if (power >= smallest * (1 - 1e-9)) add_tick(s, sign * power, ticks, count);
         if (choice.has_2_and_5 && 2 * power >= smallest) add_tick(s, sign * 2 * power, ticks, count);
@@ -193,17 +194,17 @@ int session_make_band_ticks(const session_scale *scale, int bands, int most, ins
 
 int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[SESSION_MAX_TICKS])
 {
-    c_numbers numbers;
-    const bool is_begun = c_numbers_begin(&numbers);
+    c_locale numbers;
+    const bool is_begun = c_locale_enter(&numbers);
     const int count = fill_ticks(scale, most, ticks);
-    if (is_begun) c_numbers_end(&numbers);
+    if (is_begun) c_locale_leave(&numbers);
     return count;
 }
 
 int session_make_constant_tick(double value, const scene_number_form *form, insitu_tick *tick)
 {
-    c_numbers numbers;
-    const bool is_begun = c_numbers_begin(&numbers);
+    c_locale numbers;
+    const bool is_begun = c_locale_enter(&numbers);
     tick->place = 0.5;
     if (form->has_digits || form->notation != SCENE_SHORTEST) {
         write_in_form(value, form, fabs(value) < 1e6, 6, tick);
@@ -211,6 +212,6 @@ int session_make_constant_tick(double value, const scene_number_form *form, insi
         snprintf(tick->text, sizeof tick->text, "%.9g", value);
         shorten_exponent(tick->text);
     }
-    if (is_begun) c_numbers_end(&numbers);
+    if (is_begun) c_locale_leave(&numbers);
     return 1;
 }

@@ -13,7 +13,7 @@ typedef struct session_scale {
     render_scale kind;
     double threshold; /* threshold of a symmetric logarithmic scale (RENDER_SYMLOG) */
     double low, high;
-    scene_number_form numbers;
+    scene_number_form number_form;
 } session_scale;
 
 /* Computes at most `most` (2 .. SESSION_MAX_TICKS) ticks at round numbers of the range. On a linear scale they are

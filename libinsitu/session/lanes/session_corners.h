@@ -11,7 +11,7 @@
 typedef struct cell_corners {
     const signed char (*corners)[4];
     int count;
-    double shares; /* the sum for a cell of volume 1 */
+    double volume_factor; /* the sum for a cell of volume 1 */
 } cell_corners;
 
 /* Constants of the first approximation of the cube root. It is a third of the upper bits of the double plus an offset,
@@ -20,7 +20,7 @@ typedef struct cell_corners {
  * 1.0, less a correction for the mantissa. */
 enum { CUBE_ROOT_THIRD = 0x55555556, CUBE_ROOT_OFFSET = 0x2a9f7893, CUBE_ROOT_STEPS = 2 };
 
-static inline __attribute__((always_inline)) cell_corners corners_of(int type)
+static inline __attribute__((always_inline)) cell_corners find_cell_corners(int type)
 {
     static const signed char tet[][4] = {{0, 1, 2, 3}};
     static const signed char hex[][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},

@@ -21,10 +21,11 @@ enum {
 /* Addresses and strides of the mesh's arrays, which are constant during a run. */
 typedef struct lane_source {
     const char *connectivity, *ghosts;
-    uintptr_t axes[3]; /* address of the coordinate with index 0; if indices begin with 1, it is outside of the array */
+    uintptr_t
+        axis_data[3]; /* address of the coordinate with index 0; if indices begin with 1, it is outside of the array */
     int64_t connectivity_stride, ghosts_stride, stride;
-    int64_t base, last; /* smallest and largest valid index */
-    int type, count;    /* type of the cells, and their number of vertices */
+    int64_t least_index, greatest_index; /* smallest and largest valid index */
+    int type, count;                     /* type of the cells, and their number of vertices */
     int ghosts_bytes;
     bool wide_index, wide_number;
 } lane_source;
@@ -72,11 +73,11 @@ LANE_INLINE lane_source make_lane_source(const lane_cells *cells, const int type
                                          const bool wide_number)
 {
     const grid *g = cells->g;
-    lane_source s = {.connectivity = g->connectivity.data + cells->entry * g->connectivity.stride,
+    lane_source s = {.connectivity = g->connectivity.data + cells->first_entry * g->connectivity.stride,
                      .connectivity_stride = g->connectivity.stride,
                      .stride = g->coordinates[0].stride,
-                     .base = g->connectivity.base,
-                     .last = g->vertex_count - 1,
+                     .least_index = g->connectivity.base,
+                     .greatest_index = g->vertex_count - 1,
                      .type = type,
                      .count = grid_type_vertices(type),
                      .wide_index = wide_index,
@@ -85,7 +86,7 @@ LANE_INLINE lane_source make_lane_source(const lane_cells *cells, const int type
     s.ghosts_stride = g->ghosts_stride;
     s.ghosts_bytes = g->ghosts_bytes;
     for (int axis = 0; axis < 3; axis++)
-        s.axes[axis] = (uintptr_t)g->coordinates[axis].data - (uintptr_t)(s.base * s.stride);
+        s.axis_data[axis] = (uintptr_t)g->coordinates[axis].data - (uintptr_t)(s.least_index * s.stride);
     return s;
 }
 
@@ -138,9 +139,10 @@ LANE_INLINE bool are_valid_narrow_indices(const uint32_t *indices, int count, in
 
 LANE_INLINE bool are_valid_indices(const lane_source *s, const char *indices)
 {
-    return s->wide_index
-               ? are_valid_wide_indices((const int64_t *)(const void *)indices, LANES * s->count, s->base, s->last)
-               : are_valid_narrow_indices((const uint32_t *)(const void *)indices, LANES * s->count, s->base, s->last);
+    return s->wide_index ? are_valid_wide_indices((const int64_t *)(const void *)indices, LANES * s->count,
+                                                  s->least_index, s->greatest_index)
+                         : are_valid_narrow_indices((const uint32_t *)(const void *)indices, LANES * s->count,
+                                                    s->least_index, s->greatest_index);
 }
 
 LANE_INLINE bool has_ghost(const lane_source *s, int64_t cell)
@@ -181,22 +183,22 @@ LANE_INLINE void gather_points(const lane_source *s, const char *indices, int fi
 #pragma GCC unroll 3
         for (int axis = 0; axis < 3; axis++) {
             if (s->wide_number)
-                out->wide[i][axis] = gather_doubles(s->axes[axis], at);
+                out->wide[i][axis] = gather_doubles(s->axis_data[axis], at);
             else
-                out->narrow[i][axis] = gather_floats(s->axes[axis], at);
+                out->narrow[i][axis] = gather_floats(s->axis_data[axis], at);
         }
     }
 }
 
 LANE_INLINE doubles coordinate(const lane_source *s, const lane_points *points, int vertex, int axis)
 {
-    return s->wide_number ? points->wide[vertex][axis] : doubles_of(points->narrow[vertex][axis]);
+    return s->wide_number ? points->wide[vertex][axis] : doubles_from_floats(points->narrow[vertex][axis]);
 }
 
-/* Returns the sum over the corners of the cells, which is the volume multiplied by cell_corners.shares. */
+/* Returns the sum over the corners of the cells, which is the volume multiplied by cell_corners.volume_factor. */
 LANE_INLINE doubles sum_of_corners(const lane_source *s, const lane_points *points)
 {
-    const cell_corners of = corners_of(s->type);
+    const cell_corners of = find_cell_corners(s->type);
     doubles sum = doubles_set(0);
 #pragma GCC unroll 8
     for (int i = 0; i < of.count; i++) {
@@ -288,8 +290,8 @@ LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *siz
 LANE_INLINE void store_bounds(const lane_bounds *b, lane_sums *out)
 {
     for (int axis = 0; axis < 3; axis++) {
-        const doubles lower = doubles_min(doubles_of(b->narrow_lower[axis]), b->lower[axis]);
-        const doubles upper = doubles_max(doubles_of(b->narrow_upper[axis]), b->upper[axis]);
+        const doubles lower = doubles_min(doubles_from_floats(b->narrow_lower[axis]), b->lower[axis]);
+        const doubles upper = doubles_max(doubles_from_floats(b->narrow_upper[axis]), b->upper[axis]);
         out->lower[axis] = (double)INFINITY;
         out->upper[axis] = -(double)INFINITY;
         for (int lane = 0; lane < LANE_WIDTH; lane++) {
@@ -318,7 +320,7 @@ LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t 
 {
     _Alignas(64) double volumes[BLOCK_CELLS];
     const lane_source s = make_lane_source(cells, type, wide_index, wide_number);
-    const double shares = corners_of(type).shares;
+    const double shares = find_cell_corners(type).volume_factor;
     lane_bounds bounds = bounds_empty();
     lane_sizes sizes = sizes_empty();
     int64_t cell = 0;

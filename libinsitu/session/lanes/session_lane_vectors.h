@@ -122,7 +122,7 @@ LANE_INLINE floats floats_max(floats a, floats b)
 
 /* Converts floats to doubles. It is not a built-in conversion, because gcc 12 would convert eight floats in two
  * halves. */
-LANE_INLINE doubles doubles_of(floats v)
+LANE_INLINE doubles doubles_from_floats(floats v)
 {
 #if defined(__AVX512F__)
     return (doubles)_mm512_cvtps_pd((__m256)v);

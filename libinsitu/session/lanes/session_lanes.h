@@ -16,7 +16,7 @@ typedef struct lane_cells {
     const grid *g; /* the grid; its coordinates are all floats or all doubles, with one stride */
     int type;      /* type of the cells: tet, hex, wedge or pyramid */
     int64_t first, count;
-    int64_t entry; /* index of the first cell's first entry in the connectivity */
+    int64_t first_entry; /* index of the first cell's first entry in the connectivity */
 } lane_cells;
 
 typedef struct lane_sums {

@@ -62,14 +62,14 @@ insitu_status session_check_array(const insitu_array *array, const session_array
                                   base_error *error)
 {
     if (!array->data) {
-        if (rule->count == 0 || rule->kind & SESSION_IS_OPTIONAL) return INSITU_OK;
+        if (rule->count == 0 || rule->flags & SESSION_IS_OPTIONAL) return INSITU_OK;
         return base_fail(error, bad, "%s are not given", rule->name);
     }
-    if (!is_allowed_type(array->type, rule->kind))
+    if (!is_allowed_type(array->type, rule->flags))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
-                         (int)array->type, describe_allowed_types(rule->kind));
-    const int64_t size = session_type_size(array->type), count = rule->count + (rule->kind & SESSION_HAS_END ? 1 : 0);
-    const bool is_anywhere = rule->kind & SESSION_ALLOW_ANY;
+                         (int)array->type, describe_allowed_types(rule->flags));
+    const int64_t size = session_type_size(array->type), count = rule->count + (rule->flags & SESSION_HAS_END ? 1 : 0);
+    const bool is_anywhere = rule->flags & SESSION_ALLOW_ANY;
     const insitu_status status = is_anywhere ? INSITU_OK : check_place(array->data, rule->name, size, bad, error);
     if (status) return status;
     const int64_t stride = array->stride_bytes ? array->stride_bytes : size * rule->per_tuple;
@@ -88,9 +88,9 @@ insitu_status session_check_pointers(const insitu_array *array, const session_ar
                                      base_error *error)
 {
     const int64_t size = sizeof(void *);
-    if (!is_allowed_type(array->type, rule->kind))
+    if (!is_allowed_type(array->type, rule->flags))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
-                         (int)array->type, describe_allowed_types(rule->kind));
+                         (int)array->type, describe_allowed_types(rule->flags));
     const insitu_status status = check_place(array->data, rule->name, size, bad, error);
     if (status) return status;
     return check_stride(array->data, rule->name, rule->count, array->stride_bytes ? array->stride_bytes : size, size,

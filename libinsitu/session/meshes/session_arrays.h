@@ -19,7 +19,7 @@ enum {
 typedef struct session_array_rule {
     const char *name; /* name of the elements in messages, in the plural */
     int64_t count;    /* number of its elements */
-    int kind;         /* a combination of the SESSION_* bits above */
+    int flags;        /* a combination of the SESSION_* bits above */
     int per_tuple;    /* distance from one element to the next, in elements, if no stride is given */
 } session_array_rule;
 

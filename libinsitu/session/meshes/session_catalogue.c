@@ -133,7 +133,7 @@ static size_t write_table(const session_meshes *meshes, char *text, size_t capac
         at = append_line(text, capacity, at, 'm', 0, 0, meshes->pending_mesh);
         at = append_line(text, capacity, at, 'f', 0, 0, meshes->pending_field);
     }
-    at = append_fault(text, capacity, at, &meshes->pending);
+    at = append_fault(text, capacity, at, &meshes->pending_error);
     for (int i = 0; i < meshes->count;) {
         const session_parts parts = session_parts_at(meshes, i);
         at = append_parts(text, capacity, at, &parts);
@@ -178,7 +178,7 @@ void session_hanging_free(session_hanging *hanging, bool with_borders)
 {
     session_border *borders = hanging->borders;
     const int border_count = hanging->border_count;
-    const uint64_t twins = hanging->twins;
+    const uint64_t twins = hanging->twins_version;
     base_free(hanging->vertices);
     base_free(hanging->sent_counts);
     base_free(hanging->sent_groups);
@@ -192,16 +192,16 @@ void session_hanging_free(session_hanging *hanging, bool with_borders)
     if (with_borders) return;
     hanging->borders = borders;
     hanging->border_count = border_count;
-    hanging->twins = twins;
+    hanging->twins_version = twins;
 }
 
 void session_vertex_groups_free(session_vertex_groups *groups)
 {
-    base_free(groups->firsts);
-    base_free(groups->of_vertex);
-    base_free(groups->starts);
+    base_free(groups->first_vertices);
+    base_free(groups->group_of_vertex);
+    base_free(groups->corner_starts);
     session_keys_free(&groups->keys);
-    base_free(groups->shared);
+    base_free(groups->shared_groups);
     base_free(groups->shared_keys);
     base_free(groups->shared_counts);
     *groups = (session_vertex_groups){0};
@@ -453,28 +453,28 @@ void session_catalogue_drop_derived(session_catalogue *catalogue)
 /* ---- tables of all ranks ------------------------------------------------------------------------------------- */
 
 typedef struct gathered_tables {
-    char *mine, *all;
-    int *sizes, *places;
+    char *own_table, *tables;
+    int *sizes, *offsets;
     int64_t total;
 } gathered_tables;
 
 static void free_tables(gathered_tables *tables)
 {
-    base_free(tables->mine);
-    base_free(tables->all);
+    base_free(tables->own_table);
+    base_free(tables->tables);
     base_free(tables->sizes);
-    base_free(tables->places);
+    base_free(tables->offsets);
 }
 
 static insitu_status write_own_table(const session_meshes *meshes, gathered_tables *tables, int *size,
                                      base_error *error)
 {
     const size_t bytes = write_table(meshes, NULL, 0);
-    if (bytes > INT32_MAX / 2) return session_no_memory(error, (int64_t)bytes, "names of meshes and fields");
+    if (bytes > INT32_MAX / 2) return session_fail_for_memory(error, (int64_t)bytes, "names of meshes and fields");
     *size = (int)bytes;
-    tables->mine = base_alloc(bytes + 1);
-    if (!tables->mine) return session_no_memory(error, (int64_t)bytes, "names of meshes and fields");
-    write_table(meshes, tables->mine, bytes + 1);
+    tables->own_table = base_alloc(bytes + 1);
+    if (!tables->own_table) return session_fail_for_memory(error, (int64_t)bytes, "names of meshes and fields");
+    write_table(meshes, tables->own_table, bytes + 1);
     return INSITU_OK;
 }
 
@@ -482,12 +482,13 @@ static insitu_status compute_table_offsets(int ranks, gathered_tables *tables, b
 {
     tables->total = 0;
     for (int rank = 0; rank < ranks; rank++) {
-        tables->places[rank] = (int)tables->total;
+        tables->offsets[rank] = (int)tables->total;
         tables->total += tables->sizes[rank];
-        if (tables->total > INT32_MAX) return session_no_memory(error, tables->total, "names of meshes and fields");
+        if (tables->total > INT32_MAX)
+            return session_fail_for_memory(error, tables->total, "names of meshes and fields");
     }
-    tables->all = base_alloc((size_t)tables->total + 1);
-    return tables->all ? INSITU_OK : session_no_memory(error, tables->total, "names of meshes and fields");
+    tables->tables = base_alloc((size_t)tables->total + 1);
+    return tables->tables ? INSITU_OK : session_fail_for_memory(error, tables->total, "names of meshes and fields");
 }
 
 static insitu_status gather_tables(const session_meshes *meshes, const session_team *team, gathered_tables *tables,
@@ -496,27 +497,27 @@ static insitu_status gather_tables(const session_meshes *meshes, const session_t
     int size = 0;
     write_own_table(meshes, tables, &size, error);
     tables->sizes = base_calloc((size_t)team->ranks, sizeof(int));
-    tables->places = base_calloc((size_t)team->ranks, sizeof(int));
-    if (!tables->sizes || !tables->places) session_no_memory(error, 8 * (int64_t)team->ranks, "counts");
+    tables->offsets = base_calloc((size_t)team->ranks, sizeof(int));
+    if (!tables->sizes || !tables->offsets) session_fail_for_memory(error, 8 * (int64_t)team->ranks, "counts");
     insitu_status status = session_agree(team->comm, error);
     if (status) return status;
-    status =
-        session_mpi(error, MPI_Allgather(&size, 1, MPI_INT, tables->sizes, 1, MPI_INT, team->comm), "MPI_Allgather");
+    status = session_check_mpi(error, MPI_Allgather(&size, 1, MPI_INT, tables->sizes, 1, MPI_INT, team->comm),
+                               "MPI_Allgather");
     if (status) return status;
     compute_table_offsets(team->ranks, tables, error);
     status = session_agree(team->comm, error);
     if (status) return status;
-    return session_mpi(
-        error,
-        MPI_Allgatherv(tables->mine, size, MPI_CHAR, tables->all, tables->sizes, tables->places, MPI_CHAR, team->comm),
-        "MPI_Allgatherv");
+    return session_check_mpi(error,
+                             MPI_Allgatherv(tables->own_table, size, MPI_CHAR, tables->tables, tables->sizes,
+                                            tables->offsets, MPI_CHAR, team->comm),
+                             "MPI_Allgatherv");
 }
 
 static bool read_tables(int ranks, const gathered_tables *tables, session_catalogue *out)
 {
-    if (!add_meshes(out, tables->all, (size_t)tables->total)) return false;
+    if (!add_meshes(out, tables->tables, (size_t)tables->total)) return false;
     for (int rank = 0; rank < ranks; rank++)
-        if (!read_table(out, tables->all + tables->places[rank], (size_t)tables->sizes[rank], rank)) return false;
+        if (!read_table(out, tables->tables + tables->offsets[rank], (size_t)tables->sizes[rank], rank)) return false;
     return true;
 }
 
@@ -525,7 +526,7 @@ static void put_faulty_aside(const session_catalogue *catalogue, session_meshes 
     for (int i = 0; i < catalogue->mesh_count; i++) {
         if (!catalogue->meshes[i].fault) continue;
         const session_parts parts = session_find_parts(meshes, catalogue->meshes[i].name);
-        for (int n = parts.count; n > 0; n--) session_put_aside(meshes, parts.items[n - 1]);
+        for (int n = parts.count; n > 0; n--) session_exclude_mesh(meshes, parts.items[n - 1]);
     }
 }
 
@@ -538,12 +539,13 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
     if (is_shared) {
         int size = 0;
         if (write_own_table(meshes, &tables, &size, error) == INSITU_OK &&
-            !(add_meshes(&found, tables.mine, (size_t)size) && read_table(&found, tables.mine, (size_t)size, 0)))
-            session_no_memory(error, size, "the catalogue of meshes and fields");
+            !(add_meshes(&found, tables.own_table, (size_t)size) &&
+              read_table(&found, tables.own_table, (size_t)size, 0)))
+            session_fail_for_memory(error, size, "the catalogue of meshes and fields");
     } else {
         status = gather_tables(meshes, team, &tables, error);
         if (status == INSITU_OK && !read_tables(team->ranks, &tables, &found))
-            session_no_memory(error, tables.total, "the catalogue of meshes and fields");
+            session_fail_for_memory(error, tables.total, "the catalogue of meshes and fields");
     }
     if (status == INSITU_OK) status = session_agree(team->comm, error);
     free_tables(&tables);
@@ -575,7 +577,7 @@ static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2]
         if (!part->is_given) continue;
         has_any = true;
         session_hash_bytes(&hashes[0], &part->cells_stamp, sizeof part->cells_stamp);
-        session_hash_bytes(&hashes[1], &part->places_stamp, sizeof part->places_stamp);
+        session_hash_bytes(&hashes[1], &part->coordinates_stamp, sizeof part->coordinates_stamp);
     }
     if (!has_any) hashes[0] = hashes[1] = 0;
 }
@@ -586,22 +588,22 @@ static insitu_status update_parts(session_catalogue *catalogue, const session_me
 {
     const int count = catalogue->mesh_count;
     uint64_t *sums = base_calloc((size_t)count * 2 + 1, sizeof *sums);
-    if (!sums) session_no_memory(error, count * 16LL, "hashes of meshes");
+    if (!sums) session_fail_for_memory(error, count * 16LL, "hashes of meshes");
     for (int i = 0; i < count && sums; i++) {
         const session_parts parts = session_find_parts(meshes, catalogue->meshes[i].name);
         hash_stamps(&parts, team->rank, sums + 2 * (ptrdiff_t)i);
     }
     insitu_status status = session_agree(team->comm, error);
     if (!status)
-        status = session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, 2 * count, MPI_UINT64_T, MPI_SUM, team->comm),
-                             "MPI_Allreduce");
+        status = session_check_mpi(
+            error, MPI_Allreduce(MPI_IN_PLACE, sums, 2 * count, MPI_UINT64_T, MPI_SUM, team->comm), "MPI_Allreduce");
     for (int i = 0; i < count && !status; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
-        if (mesh->places != (sums[2 * i + 1] | 1)) session_homes_free(&mesh->homes);
-        mesh->cells = sums[2 * i] | 1;
-        mesh->places = sums[2 * i + 1] | 1;
+        if (mesh->positions_hash != (sums[2 * i + 1] | 1)) session_homes_free(&mesh->homes);
+        mesh->cells_hash = sums[2 * i] | 1;
+        mesh->positions_hash = sums[2 * i + 1] | 1;
     }
-    catalogue->are_parts_known = !status;
+    catalogue->are_hashes_known = !status;
     base_free(sums);
     return status;
 }
@@ -609,9 +611,9 @@ static insitu_status update_parts(session_catalogue *catalogue, const session_me
 bool session_list_joint_parts(const session_joint *joint, const session_meshes *meshes, session_joint_parts *out)
 {
     *out = (session_joint_parts){0};
-    out->firsts = base_calloc((size_t)joint->count + 1, sizeof *out->firsts);
+    out->first_parts = base_calloc((size_t)joint->count + 1, sizeof *out->first_parts);
     out->items = base_calloc((size_t)meshes->count + 1, sizeof *out->items);
-    if (!out->firsts || !out->items) {
+    if (!out->first_parts || !out->items) {
         session_joint_parts_free(out);
         return false;
     }
@@ -619,14 +621,14 @@ bool session_list_joint_parts(const session_joint *joint, const session_meshes *
         const session_parts parts = session_find_parts(meshes, joint->meshes[m]->name);
         for (int i = 0; i < parts.count; i++)
             if (parts.items[i]->is_given) out->items[out->count++] = parts.items[i];
-        out->firsts[m + 1] = out->count;
+        out->first_parts[m + 1] = out->count;
     }
     return true;
 }
 
 void session_joint_parts_free(session_joint_parts *parts)
 {
-    base_free(parts->firsts);
+    base_free(parts->first_parts);
     base_free(parts->items);
     *parts = (session_joint_parts){0};
 }
@@ -636,17 +638,17 @@ static insitu_status update_joint(session_joint *joint, const session_meshes *me
 {
     uint64_t places = SESSION_HASH_BEGIN;
     for (int i = 0; i < joint->count; i++)
-        session_hash_bytes(&places, &joint->meshes[i]->places, sizeof joint->meshes[i]->places);
-    const bool is_known = (places | 1) == joint->places && joint->homes && joint->homes->is_known;
-    joint->places = places | 1;
+        session_hash_bytes(&places, &joint->meshes[i]->positions_hash, sizeof joint->meshes[i]->positions_hash);
+    const bool is_known = (places | 1) == joint->positions_hash && joint->homes && joint->homes->is_computed;
+    joint->positions_hash = places | 1;
     joint->homes = joint->count == 1 ? &joint->meshes[0]->homes : &joint->own_homes;
     if (is_known || joint->count == 1) return INSITU_OK;
     session_joint_parts parts;
     if (!session_list_joint_parts(joint, meshes, &parts))
-        session_no_memory(error, meshes->count * (int64_t)sizeof *parts.items, "homes of meshes");
+        session_fail_for_memory(error, meshes->count * (int64_t)sizeof *parts.items, "homes of meshes");
     const insitu_status status =
         session_homes_find(&joint->own_homes, parts.items, parts.count, false, half_diagonal, team, error);
-    if (status) joint->places = 0;
+    if (status) joint->positions_hash = 0;
     session_joint_parts_free(&parts);
     return status;
 }
@@ -655,11 +657,11 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
                                    const session_team *team, base_error *error)
 {
     insitu_status status = INSITU_OK;
-    if (!catalogue->are_parts_known) status = update_parts(catalogue, meshes, team, error);
+    if (!catalogue->are_hashes_known) status = update_parts(catalogue, meshes, team, error);
     for (int i = 0; i < catalogue->mesh_count && !status; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
         const session_parts parts = session_find_parts(meshes, mesh->name);
-        if (!mesh->homes.is_known)
+        if (!mesh->homes.is_computed)
             status = session_homes_find(&mesh->homes, (const session_mesh *const *)parts.items, parts.count,
                                         mesh->has_ids, half_diagonal, team, error);
     }
@@ -670,5 +672,5 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
 
 void session_forget_homes(session_catalogue *catalogue)
 {
-    catalogue->are_parts_known = false;
+    catalogue->are_hashes_known = false;
 }

@@ -37,13 +37,14 @@ static bool has_turned_cells(const session_mesh *mesh)
 /* The entries of the caller's connectivity that belong to cells, and their layout in rows. */
 typedef struct cell_rows {
     const grid_array *connectivity;
-    int64_t count, row, used; /* number of entries, entries of each row, and how many of these are read */
+    int64_t count, row_length, used_length; /* number of entries, entries of each row, and how many of these are read */
 } cell_rows;
 
 static int64_t read_entry(const cell_rows *rows, int64_t i)
 {
-    return grid_array_index(rows->connectivity,
-                            rows->row == rows->used ? i : i / rows->used * rows->row + i % rows->used);
+    return grid_array_index(rows->connectivity, rows->row_length == rows->used_length
+                                                    ? i
+                                                    : i / rows->used_length * rows->row_length + i % rows->used_length);
 }
 
 static cell_rows make_cell_rows(const session_mesh *mesh)
@@ -51,9 +52,9 @@ static cell_rows make_cell_rows(const session_mesh *mesh)
     const insitu_mesh *given = &mesh->given;
     cell_rows rows = {&mesh->cells.connectivity, given->connectivity_count, 1, 1};
     if (!given->connectivity_row) return rows;
-    rows.row = given->connectivity_row;
-    rows.used = grid_type_vertices((int)given->cell_type);
-    rows.count = given->cell_count * rows.used;
+    rows.row_length = given->connectivity_row;
+    rows.used_length = grid_type_vertices((int)given->cell_type);
+    rows.count = given->cell_count * rows.used_length;
     return rows;
 }
 
@@ -92,7 +93,7 @@ static void reorder_cell(const session_mesh *mesh, int64_t cell, int64_t entries
     int64_t vertices[GRID_MAX_CELL_VERTICES], first;
     if (!turn || !locate_cell(&mesh->cells, cell, count, entries, &first)) return;
     for (int i = 0; i < count; i++) vertices[i] = grid_array_index(out, first + turn[i]);
-    for (int i = 0; i < count; i++) session_put_index(out, first + i, vertices[i]);
+    for (int i = 0; i < count; i++) session_store_index(out, first + i, vertices[i]);
 }
 
 void session_turn_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out)
@@ -118,7 +119,7 @@ insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *e
     {
         region_enter();
 #pragma omp for schedule(static) nowait
-        for (int64_t i = 0; i < rows.count; i++) session_put_index(&t->connectivity, i, read_entry(&rows, i));
+        for (int64_t i = 0; i < rows.count; i++) session_store_index(&t->connectivity, i, read_entry(&rows, i));
         region_leave();
     }
     session_turn_cells(mesh, rows.count, threads, &t->connectivity);

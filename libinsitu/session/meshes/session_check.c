@@ -52,7 +52,7 @@ typedef enum face_fault {
 typedef struct face_place {
     int64_t count; /* number of the cell's faces */
     int64_t face;  /* index as stored in the connectivity */
-    int64_t first, next;
+    int64_t first, end;
     int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
     int sharing;           /* number of faces that have the edge */
     double position[3];
@@ -85,11 +85,11 @@ static face_fault check_face(const session_mesh *mesh, bool is_ghost, face_place
 {
     const grid *g = &mesh->cells;
     if (place->face < 0 || place->face >= g->face_count) return FACE_BAD_INDEX;
-    grid_face_vertices(g, place->face, &place->first, &place->next);
-    if (place->first < 0 || place->next < place->first || place->next > mesh->topology.face_connectivity_count)
+    grid_face_vertices(g, place->face, &place->first, &place->end);
+    if (place->first < 0 || place->end < place->first || place->end > mesh->topology.face_connectivity_count)
         return FACE_BAD_OFFSETS;
-    if (place->next - place->first < 3) return FACE_TOO_SMALL;
-    for (int64_t i = place->first; i < place->next; i++) {
+    if (place->end - place->first < 3) return FACE_TOO_SMALL;
+    for (int64_t i = place->first; i < place->end; i++) {
         place->vertex = grid_array_index(&g->face_connectivity, i);
         if (place->vertex < 0 || place->vertex >= g->vertex_count) return FACE_BAD_VERTEX;
         if (!is_ghost && !is_finite_vertex(g, place->vertex, place->position)) return FACE_BAD_COORDINATE;
@@ -99,8 +99,8 @@ static face_fault check_face(const session_mesh *mesh, bool is_ghost, face_place
 
 static int64_t add_edges(const grid *g, const face_place *place, face_edge *edges, int64_t count)
 {
-    int64_t from = grid_array_index(&g->face_connectivity, place->next - 1);
-    for (int64_t i = place->first; i < place->next; i++) {
+    int64_t from = grid_array_index(&g->face_connectivity, place->end - 1);
+    for (int64_t i = place->first; i < place->end; i++) {
         const int64_t to = grid_array_index(&g->face_connectivity, i);
         if (from != to) edges[count++] = (face_edge){from < to ? from : to, from < to ? to : from, place->face};
         from = to;
@@ -143,7 +143,7 @@ static face_fault check_faces(const session_mesh *mesh, int64_t cell, face_room 
         place->face = grid_array_index(&g->connectivity, i);
         const face_fault fault = check_face(mesh, grid_is_ghost(g, cell), place);
         if (fault) return fault;
-        if (!reserve_edges(room, edges + place->next - place->first)) return FACES_NO_MEMORY;
+        if (!reserve_edges(room, edges + place->end - place->first)) return FACES_NO_MEMORY;
         edges = add_edges(g, place, room->edges, edges);
     }
     return check_edges(room->edges, edges, place);
@@ -170,12 +170,12 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: offsets %lld and %lld do not rise within "
                          "%lld..%lld",
-                         name, at, face, place->first + base, place->next + base, base,
+                         name, at, face, place->first + base, place->end + base, base,
                          mesh->topology.face_connectivity_count + base);
     case FACE_TOO_SMALL:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld has %lld vertices, at least 3 are needed",
-                         name, at, face, (long long)(place->next - place->first));
+                         name, at, face, (long long)(place->end - place->first));
     case FACE_BAD_VERTEX:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: vertex index %lld is outside %lld..%lld",
@@ -203,8 +203,8 @@ typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORD
 
 typedef struct fault_place {
     int type;
-    int64_t first, next; /* begin and end offset of the cell */
-    int64_t vertex;      /* index as stored in the connectivity */
+    int64_t first, end; /* begin and end offset of the cell */
+    int64_t vertex;     /* index as stored in the connectivity */
     double position[3];
     face_fault fault_of_faces;
     face_place faces;
@@ -226,8 +226,8 @@ static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, face_
     const grid *g = &mesh->cells;
     if (!grid_has_faces(g) || !g->offsets.data) return BAD_TYPE;
     place->first = grid_array_index(&g->offsets, cell);
-    place->next = grid_offset_end(&g->offsets, cell);
-    if (place->first < 0 || place->next > mesh->topology.connectivity_count || place->next < place->first)
+    place->end = grid_offset_end(&g->offsets, cell);
+    if (place->first < 0 || place->end > mesh->topology.connectivity_count || place->end < place->first)
         return BAD_OFFSETS;
     place->fault_of_faces = check_faces(mesh, cell, room, &place->faces);
     return place->fault_of_faces ? BAD_FACES : CELL_GOOD;
@@ -239,11 +239,11 @@ static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_pl
     const grid *g = &mesh->cells;
     if (!g->offsets.data) return BAD_TYPE;
     place->first = grid_array_index(&g->offsets, cell);
-    place->next = grid_offset_end(&g->offsets, cell);
-    if (place->first < 0 || place->next < place->first || place->next > mesh->given.connectivity_count ||
-        place->next - place->first < 3)
+    place->end = grid_offset_end(&g->offsets, cell);
+    if (place->first < 0 || place->end < place->first || place->end > mesh->given.connectivity_count ||
+        place->end - place->first < 3)
         return BAD_OFFSETS;
-    for (int64_t i = place->first; i < place->next; i++) {
+    for (int64_t i = place->first; i < place->end; i++) {
         place->vertex = grid_array_index(&g->connectivity, i);
         if (place->vertex < 0 || place->vertex >= g->vertex_count) return BAD_INDEX;
         if (!grid_is_ghost(g, cell) && !is_finite_vertex(g, place->vertex, place->position)) return BAD_COORDINATE;
@@ -263,9 +263,9 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
     if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD;
     if (g->offsets.data) {
         place->first = grid_array_index(&g->offsets, cell);
-        place->next = grid_offset_end(&g->offsets, cell);
-        if (place->first < 0 || place->next > mesh->topology.connectivity_count || place->next < place->first ||
-            place->next - place->first != count)
+        place->end = grid_offset_end(&g->offsets, cell);
+        if (place->first < 0 || place->end > mesh->topology.connectivity_count || place->end < place->first ||
+            place->end - place->first != count)
             return BAD_OFFSETS;
     }
     int64_t vertices[GRID_MAX_CELL_VERTICES];
@@ -324,8 +324,8 @@ static const char *original_type_name(const session_mesh *mesh, int64_t cell)
 static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, const fault_place *place,
                                       base_error *error)
 {
-    const long long base = mesh->given.index_base, first = place->first + base, next = place->next + base;
-    if (place->type == GRID_POLYGON && place->first >= 0 && place->next <= mesh->given.connectivity_count)
+    const long long base = mesh->given.index_base, first = place->first + base, next = place->end + base;
+    if (place->type == GRID_POLYGON && place->first >= 0 && place->end <= mesh->given.connectivity_count)
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polygon): offsets %lld and %lld; a polygon has at least 3 vertices",
                          mesh->label, (long long)cell, first, next);
@@ -335,10 +335,10 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
             "mesh \"%s\": cell %lld (polyhedron): offsets fall from %lld to %lld; a polyhedron has at least 4 faces",
             mesh->label, (long long)cell, first, next);
     const char *format =
-        place->next < place->first
+        place->end < place->first
             ? "mesh \"%s\": cell %lld (%s): offsets fall from %lld to %lld; a cell of its type has %d vertices"
             : "mesh \"%s\": cell %lld (%s): offsets %lld and %lld do not lie %d apart, the vertices of its type";
-    if (place->first < 0 || (next >= first && place->next > mesh->topology.connectivity_count))
+    if (place->first < 0 || (next >= first && place->end > mesh->topology.connectivity_count))
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (%s): offsets %lld and %lld are outside %lld..%lld", mesh->label,
                          (long long)cell, type_name(place->type), first, next, base,
@@ -507,17 +507,17 @@ static void find_flat_cells(const grid *g, int threads, uint64_t *flat)
 /* Finds the cells without volume, which are omitted from trees. If these cells have changed, the tree is dropped. */
 static insitu_status update_flat_cells(session_mesh *mesh, int64_t count, int threads, base_error *error)
 {
-    const size_t bytes = (size_t)(mesh->cells.cell_count + 63) / 64 * sizeof *mesh->flat;
+    const size_t bytes = (size_t)(mesh->cells.cell_count + 63) / 64 * sizeof *mesh->flat_cells;
     uint64_t *flat = NULL;
     if (count) {
         flat = base_calloc(bytes, 1);
         if (!flat) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %zu bytes of flat cells", bytes);
         find_flat_cells(&mesh->cells, threads, flat);
     }
-    const bool is_same = !flat == !mesh->flat && (!flat || memcmp(flat, mesh->flat, bytes) == 0);
+    const bool is_same = !flat == !mesh->flat_cells && (!flat || memcmp(flat, mesh->flat_cells, bytes) == 0);
     if (!is_same) session_drop_tree(mesh);
-    base_free(mesh->flat);
-    mesh->cells.flat = mesh->flat = flat;
+    base_free(mesh->flat_cells);
+    mesh->cells.flat = mesh->flat_cells = flat;
     return INSITU_OK;
 }
 
@@ -563,7 +563,7 @@ static insitu_status describe_misfit(const session_mesh *mesh, base_error *error
  * arrays in place. */
 static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
-    if (mesh->misfit.is_any) return describe_misfit(mesh, error);
+    if (mesh->misfit.exists) return describe_misfit(mesh, error);
     session_fill_conformed(mesh, threads);
     if (!mesh->topology.is_made && session_make_topology(mesh, threads, error)) return error->status;
     insitu_status status = session_make_axes(mesh, error);

@@ -205,7 +205,7 @@ insitu_status session_conform_mesh(session_mesh *mesh, const insitu_mesh *origin
     if (!is_made) {
         const int64_t bytes = made.bytes;
         session_drop_conformed(&made);
-        return session_no_memory(error, bytes, "arrays in other types");
+        return session_fail_for_memory(error, bytes, "arrays in other types");
     }
     session_drop_conformed(&mesh->conformed);
     mesh->conformed = made;

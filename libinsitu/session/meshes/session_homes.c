@@ -20,9 +20,9 @@ typedef struct rank_part {
 
 void session_homes_free(session_homes *homes)
 {
-    base_free(homes->near);
+    base_free(homes->near_ranks);
     base_free(homes->boxes);
-    base_free(homes->firsts);
+    base_free(homes->first_ids);
     base_free(homes->owners);
     *homes = (session_homes){0};
 }
@@ -74,12 +74,12 @@ static bool store_near_ranks(session_homes *homes, const rank_part *parts, int r
 {
     const session_box *own = &parts[homes->rank].box;
     for (int rank = 0; rank < ranks; rank++) homes->near_count += do_boxes_intersect(&parts[rank].box, own);
-    homes->near = base_alloc((size_t)(homes->near_count + 1) * sizeof *homes->near);
+    homes->near_ranks = base_alloc((size_t)(homes->near_count + 1) * sizeof *homes->near_ranks);
     homes->boxes = base_alloc((size_t)(homes->near_count + 1) * sizeof *homes->boxes);
-    if (!homes->near || !homes->boxes) return false;
+    if (!homes->near_ranks || !homes->boxes) return false;
     for (int rank = 0, at = 0; rank < ranks; rank++) {
         if (!do_boxes_intersect(&parts[rank].box, own)) continue;
-        homes->near[at] = rank;
+        homes->near_ranks[at] = rank;
         homes->boxes[at++] = parts[rank].box;
     }
     return true;
@@ -100,14 +100,14 @@ static int compare_shares(const void *a, const void *b)
 static bool assign_id_ranges(session_homes *homes, const rank_part *parts, int ranks)
 {
     id_share *shares = base_alloc((size_t)ranks * sizeof *shares);
-    homes->firsts = base_alloc((size_t)ranks * sizeof *homes->firsts);
+    homes->first_ids = base_alloc((size_t)ranks * sizeof *homes->first_ids);
     homes->owners = base_alloc((size_t)ranks * sizeof *homes->owners);
-    const bool has_room = shares && homes->firsts && homes->owners;
+    const bool has_room = shares && homes->first_ids && homes->owners;
     for (int rank = 0; rank < ranks && has_room; rank++)
         if (parts[rank].has_ids) shares[homes->share_count++] = (id_share){parts[rank].first, rank};
     if (has_room) qsort(shares, (size_t)homes->share_count, sizeof *shares, compare_shares);
     for (int i = 0; i < homes->share_count; i++) {
-        homes->firsts[i] = shares[i].first;
+        homes->first_ids[i] = shares[i].first;
         homes->owners[i] = shares[i].owner;
     }
     base_free(shares);
@@ -117,18 +117,18 @@ static bool assign_id_ranges(session_homes *homes, const rank_part *parts, int r
 insitu_status session_homes_find(session_homes *homes, const session_mesh *const *meshes, int count, bool by_id,
                                  double half_diagonal, const session_team *team, base_error *error)
 {
-    session_homes found = {.is_known = true, .by_id = by_id, .rank = team->rank};
+    session_homes found = {.is_computed = true, .by_id = by_id, .rank = team->rank};
     rank_part own = {{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}}, 0, 0};
     for (int i = 0; i < count; i++) add_part(&own, meshes[i], by_id, 2e-5 * half_diagonal, team);
     rank_part *parts = base_alloc((size_t)team->ranks * sizeof *parts);
-    if (!parts) session_no_memory(error, team->ranks * (int64_t)sizeof *parts, "boxes of ranks");
+    if (!parts) session_fail_for_memory(error, team->ranks * (int64_t)sizeof *parts, "boxes of ranks");
     insitu_status status = session_agree(team->comm, error);
     if (!status)
-        status = session_mpi(error, MPI_Allgather(&own, sizeof own, MPI_BYTE, parts, sizeof own, MPI_BYTE, team->comm),
-                             "MPI_Allgather");
+        status = session_check_mpi(
+            error, MPI_Allgather(&own, sizeof own, MPI_BYTE, parts, sizeof own, MPI_BYTE, team->comm), "MPI_Allgather");
     if (!status &&
         (!store_near_ranks(&found, parts, team->ranks) || (by_id && !assign_id_ranges(&found, parts, team->ranks))))
-        session_no_memory(error, team->ranks * (int64_t)sizeof *parts, "boxes of ranks");
+        session_fail_for_memory(error, team->ranks * (int64_t)sizeof *parts, "boxes of ranks");
     base_free(parts);
     if (!status) status = session_agree(team->comm, error);
     if (status) {
@@ -143,7 +143,7 @@ insitu_status session_homes_find(session_homes *homes, const session_mesh *const
 bool session_homes_share(const session_homes *homes, const double point[3])
 {
     for (int i = 0; i < homes->near_count; i++)
-        if (homes->near[i] != homes->rank && session_is_in_box(&homes->boxes[i], point)) return true;
+        if (homes->near_ranks[i] != homes->rank && session_is_in_box(&homes->boxes[i], point)) return true;
     return false;
 }
 
@@ -152,7 +152,7 @@ static int home_by_id(const session_homes *homes, int64_t id)
     int low = 0, high = homes->share_count;
     while (high - low > 1) {
         const int middle = low + (high - low) / 2;
-        if (homes->firsts[middle] <= id)
+        if (homes->first_ids[middle] <= id)
             low = middle;
         else
             high = middle;
@@ -167,13 +167,13 @@ static bool are_in_box(const session_box *box, const double (*points)[3], int co
     return true;
 }
 
-int session_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id)
+int session_find_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id)
 {
     int among = 0;
     if (homes->by_id) return home_by_id(homes, id);
     for (int i = 0; i < homes->near_count; i++) among += are_in_box(&homes->boxes[i], points, count);
     int left = among ? (int)(hash % (uint64_t)among) : 0;
     for (int i = 0; i < homes->near_count; i++)
-        if (are_in_box(&homes->boxes[i], points, count) && left-- == 0) return homes->near[i];
+        if (are_in_box(&homes->boxes[i], points, count) && left-- == 0) return homes->near_ranks[i];
     return homes->rank;
 }

@@ -25,17 +25,17 @@ typedef struct session_box {
 
 /* The data that a rank has about the parts, on all ranks, of one or several meshes. */
 typedef struct session_homes {
-    bool is_known, by_id;
+    bool is_computed, by_id;
     int rank;
     /* The ranks whose drawn cells' box intersects this rank's box, in ascending order, including this rank. The
      * relation is symmetric. A rank without cells has no such ranks. Boxes are extended by 2e-5 of the scene's half
      * diagonal, so that the boxes of a vertex and of a face on which it lies up to rounding intersect. */
     int near_count;
-    int *near;
+    int *near_ranks;
     session_box *boxes;
     /* If by_id: the first id of each share, and the rank that owns the share. */
     int share_count;
-    int64_t *firsts;
+    int64_t *first_ids;
     int *owners;
 } session_homes;
 
@@ -55,6 +55,6 @@ bool session_homes_share(const session_homes *homes, const double point[3]);
 
 /* Returns the home of an item. points are the positions of its vertices (at least one), which lie in this rank's box,
  * and id is the least id of its vertices. Without ids, the home is determined by the hash. */
-int session_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id);
+int session_find_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id);
 
 #endif

@@ -305,7 +305,7 @@ void session_take_lattice(session_mesh *mesh)
         out->cells[axis] = l->cells[axis];
         out->drawn_first[axis] = has_all ? 0 : l->interior_first[axis];
         out->drawn_end[axis] = has_all ? cells[axis] : l->interior_end[axis];
-        out->axes[axis] = (grid_axis){own->places[axis], vertices[axis], &out->by_vertex, axis};
+        out->axes[axis] = (grid_axis){own->axis_coordinates[axis], vertices[axis], &out->by_vertex, axis};
     }
     compute_packed_strides(vertices, packed);
     out->by_vertex = make_numbering(are_all_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
@@ -354,7 +354,7 @@ insitu_status session_make_axes(session_mesh *mesh, base_error *error)
             return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld coordinates along %c",
                              mesh->label, (long long)count, axis_name[axis]);
         fill_axis(l, axis, places);
-        own->places[axis] = places;
+        own->axis_coordinates[axis] = places;
         own->cells.axes[axis].places = places;
         own->bytes += count * (int64_t)sizeof *places;
         for (int64_t n = 0; n < count; n++)

@@ -90,9 +90,9 @@ void session_drop_array(grid_array *array)
 
 void session_drop_gradients(session_scalar *scalar)
 {
-    base_free(scalar->gradient_entries);
+    base_free(scalar->gradient_indices);
     base_free(scalar->gradients);
-    scalar->gradient_entries = NULL;
+    scalar->gradient_indices = NULL;
     scalar->gradients = NULL;
     scalar->gradient_count = 0;
 }
@@ -102,7 +102,7 @@ static void free_scalar(session_scalar *scalar)
     base_free(scalar->vertex_values);
     base_free(scalar->distances);
     session_drop_gradients(scalar);
-    base_free(scalar->pairs);
+    base_free(scalar->node_ranges);
     base_free(scalar->intervals);
 }
 
@@ -128,8 +128,8 @@ void session_drop_tree(session_mesh *mesh)
     mesh->has_tree = mesh->is_partial = false;
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
-        base_free(scalar->pairs);
-        scalar->pairs = NULL;
+        base_free(scalar->node_ranges);
+        scalar->node_ranges = NULL;
         scalar->has_own_ranges = false;
         scalar->are_ranges_stale = true;
     }
@@ -181,8 +181,8 @@ void session_drop_torn(session_torn *torn)
 void session_drop_axes(session_lattice *lattice)
 {
     for (int axis = 0; axis < 3; axis++) {
-        base_free(lattice->places[axis]);
-        lattice->places[axis] = NULL;
+        base_free(lattice->axis_coordinates[axis]);
+        lattice->axis_coordinates[axis] = NULL;
         lattice->cells.axes[axis].places = NULL;
     }
     lattice->bytes = 0;
@@ -199,10 +199,10 @@ void session_drop_field_tables(session_field *field)
 {
     base_free(field->patches);
     base_free(field->components);
-    base_free(field->apart);
+    base_free(field->component_arrays);
     field->patches = NULL;
     field->components = NULL;
-    field->apart = NULL;
+    field->component_arrays = NULL;
 }
 
 void session_drop_copy(session_field *field)
@@ -211,7 +211,7 @@ void session_drop_copy(session_field *field)
     field->copy = NULL;
     field->copy_bytes = 0;
     field->is_copy_stale = true;
-    field->made_of = 0;
+    field->inputs_hash = 0;
 }
 
 session_field *session_add_field(session_mesh *mesh, const char *name)
@@ -274,7 +274,7 @@ void session_drop_outer(session_outer *outer, bool with_faces)
     base_free(outer->vertex_origins);
     base_free(outer->cell_origins);
     if (with_faces) base_free(outer->faces);
-    *outer = (session_outer){.threshold = last.threshold, .version = last.version, .is_wanted = last.is_wanted};
+    *outer = (session_outer){.threshold = last.threshold, .version = last.version, .is_needed = last.is_needed};
     if (with_faces) return;
     outer->are_faces_known = last.are_faces_known;
     outer->face_count = last.face_count;
@@ -298,14 +298,14 @@ bool session_next_part(session_part_walk *walk)
     const session_meshes *meshes = walk->meshes;
     walk->whole = NULL;
     walk->outer = NULL;
-    if (walk->mesh_at < meshes->count) {
-        walk->part = meshes->items[walk->mesh_at++];
+    if (walk->mesh_index < meshes->count) {
+        walk->part = meshes->items[walk->mesh_index++];
         return true;
     }
-    for (; walk->whole_at < meshes->count; walk->whole_at++, walk->outer_at = 0) {
-        session_mesh *whole = meshes->items[walk->whole_at];
-        while (walk->outer_at < whole->outer_count) {
-            session_outer *outer = whole->outers[walk->outer_at++];
+    for (; walk->whole_index < meshes->count; walk->whole_index++, walk->outer_index = 0) {
+        session_mesh *whole = meshes->items[walk->whole_index];
+        while (walk->outer_index < whole->outer_count) {
+            session_outer *outer = whole->outers[walk->outer_index++];
             if (!outer->mesh) continue;
             walk->part = outer->mesh;
             walk->whole = whole;
@@ -324,16 +324,16 @@ static void drop_derived_data(session_mesh *mesh)
     session_drop_tree(mesh);
     session_drop_topology(&mesh->topology);
     session_drop_torn(&mesh->torn);
-    base_free(mesh->flat);
-    mesh->flat = NULL;
+    base_free(mesh->flat_cells);
+    mesh->flat_cells = NULL;
 }
 
-void session_renew_cells(session_meshes *meshes, session_mesh *mesh)
+void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh)
 {
     drop_derived_data(mesh);
-    mesh->rent = 0;
+    mesh->partial_tree_seconds = 0;
     mesh->is_topology_stale = mesh->is_geometry_stale = mesh->is_check_stale = true;
-    mesh->cells_stamp = mesh->places_stamp = ++meshes->stamp;
+    mesh->cells_stamp = mesh->coordinates_stamp = ++meshes->stamp;
     meshes->are_cells_changed = true;
 }
 
@@ -432,7 +432,7 @@ static bool reserve_mesh(session_meshes *meshes)
     return true;
 }
 
-void session_keep_problem(session_field *field, const base_error *problem, base_error *first)
+void session_store_problem(session_field *field, const base_error *problem, base_error *first)
 {
     field->problem = *problem;
     field->is_problem_of_contents = true;
@@ -466,7 +466,7 @@ session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t
         mesh->block = block;
     }
     if (!mesh || !mesh->name || !mesh->label || !reserve_mesh(meshes)) {
-        session_no_memory(error, (int64_t)sizeof *mesh, "a mesh's description");
+        session_fail_for_memory(error, (int64_t)sizeof *mesh, "a mesh's description");
         free_mesh(mesh);
         return NULL;
     }
@@ -515,42 +515,42 @@ const base_error *session_pending_error(const session_meshes *meshes)
             if (mesh->fields[f].problem.status && !mesh->fields[f].is_problem_of_contents)
                 return &mesh->fields[f].problem;
     }
-    return meshes->pending.status ? &meshes->pending : NULL;
+    return meshes->pending_error.status ? &meshes->pending_error : NULL;
 }
 
 void session_drop_pending(session_meshes *meshes)
 {
-    meshes->pending = (base_error){0};
+    meshes->pending_error = (base_error){0};
     base_free(meshes->pending_mesh);
     base_free(meshes->pending_field);
     meshes->pending_mesh = meshes->pending_field = NULL;
 }
 
-void session_keep_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field)
+void session_store_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field)
 {
     session_drop_pending(meshes);
-    meshes->pending = *error;
+    meshes->pending_error = *error;
     if (mesh && field) {
         meshes->pending_mesh = base_strdup(mesh);
         meshes->pending_field = base_strdup(field);
     }
 }
 
-void session_put_aside(session_meshes *meshes, session_mesh *mesh)
+void session_exclude_mesh(session_meshes *meshes, session_mesh *mesh)
 {
     int at = 0;
     while (meshes->items[at] != mesh) at++;
     meshes->count--;
-    for (int i = at; i < meshes->count + meshes->aside_count; i++) meshes->items[i] = meshes->items[i + 1];
-    meshes->items[meshes->count + meshes->aside_count++] = mesh;
+    for (int i = at; i < meshes->count + meshes->excluded_count; i++) meshes->items[i] = meshes->items[i + 1];
+    meshes->items[meshes->count + meshes->excluded_count++] = mesh;
     mesh->is_needed = false;
-    for (int i = 0; i < mesh->outer_count; i++) mesh->outers[i]->is_wanted = false;
+    for (int i = 0; i < mesh->outer_count; i++) mesh->outers[i]->is_needed = false;
 }
 
-void session_take_back(session_meshes *meshes)
+void session_restore_excluded(session_meshes *meshes)
 {
-    if (meshes->aside_count) meshes->are_cells_changed = meshes->are_names_changed = true;
-    for (; meshes->aside_count; meshes->aside_count--) insert_mesh(meshes, meshes->items[meshes->count]);
+    if (meshes->excluded_count) meshes->are_cells_changed = meshes->are_names_changed = true;
+    for (; meshes->excluded_count; meshes->excluded_count--) insert_mesh(meshes, meshes->items[meshes->count]);
 }
 
 bool session_refuse_in_fill(session_meshes *meshes, const char *call)

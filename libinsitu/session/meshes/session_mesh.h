@@ -9,21 +9,22 @@
 
 typedef struct session_field {
     insitu_field given; /* the name is a copy that the session owns, the values are the caller's */
-    grid_array values;  /* array of all components or, if each component has its own array (apart), of the first one */
-    grid_array *apart;
+    grid_array values;  /* array of all components or, if each component has its own array (component_arrays), of the
+                           first one */
+    grid_array *component_arrays;
     int64_t component_stride;
     base_error problem;          /* error of the last insitu_set_field(), or an error of the values */
     bool is_problem_of_contents; /* set if the error is one of the values, found by the check of this step */
     bool has_index;
-    bool is_copy_stale; /* the values or the index have changed since the copy was made */
-    bool is_wanted;     /* set if statistics of this step need the field; fields that images show have scalars */
+    bool is_copy_stale;    /* the values or the index have changed since the copy was made */
+    bool is_in_statistics; /* set if statistics of this step need the field; fields that images show have scalars */
     /* set if given.fill was called in this step; the values are valid unless fill_problem holds an error */
     bool is_filled;
     base_error fill_problem;
     /* set if the session computes the field from other fields, in `copy` (plan/session_derived.h) */
     bool is_derived;
     bool is_source;           /* set if a derived field that this step needs is computed from it */
-    uint64_t made_of;         /* hash of the inputs of a derived field's values; 0: there are no values yet */
+    uint64_t inputs_hash;     /* hash of the inputs of a derived field's values; 0: there are no values yet */
     int64_t version;          /* incremented at each known change of the values */
     insitu_patch *patches;    /* copy of the table given.patches, owned by the session */
     insitu_array *components; /* copy of the table given.components, owned by the session */
@@ -54,7 +55,7 @@ typedef struct session_plane {
     bool is_central;
     /* offset of the point; share is an additional shift along the normal, as a fraction (-1 .. 1) of half the data's
      * extent */
-    double offset, share;
+    double offset, extent_fraction;
 } session_plane;
 
 /* A scalar that a layer uses: a component or the magnitude of a field, as given or recentred to vertices; or the
@@ -63,37 +64,37 @@ typedef struct session_scalar {
     int field;     /* index of the field in the mesh; -1: the scalar is the distance from a plane */
     int component; /* same as grid_field.component */
     bool is_recentred;
-    uint64_t joined;    /* value of scene_field.joined, if the values are recentred */
-    int64_t made;       /* number of times that the values have been computed */
-    uint64_t of_places; /* value of session_joint.places for which the values were computed */
-    bool is_used;       /* set if an image of this step uses the scalar */
+    uint64_t joint_name;     /* value of scene_field.joint_name, if the values are recentred */
+    int64_t computed_count;  /* number of times that the values have been computed */
+    uint64_t positions_hash; /* value of session_joint.positions_hash for which the values were computed */
+    bool is_used;            /* set if an image of this step uses the scalar */
     /* set if an image of this step needs ranges of its values in the tree; scalars that only give colours need none */
-    bool wants_ranges;
-    bool needs_all; /* set if an image of this step may need any cell */
-    /* Intervals of the values that this step's images show, unless needs_all is set. Only cells whose values intersect
-     * an interval are needed. */
+    bool needs_ranges;
+    bool needs_all_cells; /* set if an image of this step may need any cell */
+    /* Intervals of the values that this step's images show, unless needs_all_cells is set. Only cells whose values
+     * intersect an interval are needed. */
     int interval_count;
     mmbvh_interval *intervals;
     session_plane plane; /* the plane from which distances are computed */
     float *distances;    /* distance of each vertex, a copy reported to the user; NULL: not computed yet */
     /* cell values recentred to vertices, a copy reported to the user; NULL: not computed yet */
     double *vertex_values;
-    grid_field own; /* the original values of the cells, if recentred ones are used */
+    grid_field original_values; /* the original values of the cells, if recentred ones are used */
     /* index of each vertex in `gradients`, or -1; NULL: not computed yet. A copy reported to the user, for smooth
      * normals of the last step that drew some */
-    int32_t *gradient_entries;
+    int32_t *gradient_indices;
     float (*gradients)[3];
     int64_t gradient_count;
     bool are_values_stale; /* set if recentred values must be computed again */
-    bool is_suspect;       /* set if the caller passed the values again, so that they may have changed */
+    bool may_have_changed; /* set if the caller passed the values again, so that they may have changed */
     bool has_checksum;
     uint64_t checksum;
-    uint64_t sample;     /* checksum of a few of the values */
-    int64_t version;     /* checksum of a sample of the values */
-    bool has_own_ranges; /* set if ranges are stored in `pairs`, and not in the tree's nodes */
-    float *pairs;        /* minimum and maximum of the values in each node of the tree; NULL: not computed yet */
+    uint64_t sample_checksum; /* checksum of a few of the values */
+    int64_t version;          /* checksum of a sample of the values */
+    bool has_own_ranges;      /* set if ranges are stored in `pairs`, and not in the tree's nodes */
+    float *node_ranges;       /* minimum and maximum of the values in each node of the tree; NULL: not computed yet */
     bool are_ranges_stale;
-    int64_t unusable;
+    int64_t unusable_count;
     session_extremes extremes[SESSION_EXTENTS];
 } session_scalar;
 
@@ -119,7 +120,7 @@ typedef struct session_threshold {
 typedef struct session_outer {
     session_threshold threshold;
     int64_t version; /* version of the values to which the threshold was applied, if there is a threshold */
-    bool is_wanted;  /* set if an image of this step needs it */
+    bool is_needed;  /* set if an image of this step needs it */
     bool are_faces_known;
     int64_t face_count;
     session_face *faces;       /* sorted by cell */
@@ -177,8 +178,9 @@ typedef struct session_torn {
 typedef struct session_lattice {
     insitu_lattice given; /* given.lattice of the mesh points to it, or is NULL if the mesh is not structured */
     grid_lattice cells;
-    double *places[3]; /* coordinates along the axes, if they are uniform or rectilinear; a copy reported to the user */
-    int64_t bytes;     /* size of places in bytes */
+    double *axis_coordinates[3]; /* coordinates along the axes, if they are uniform or rectilinear; a copy reported to
+                                    the user */
+    int64_t bytes;               /* size of places in bytes */
 } session_lattice;
 
 enum { SESSION_CONFORMED = 9 };
@@ -201,7 +203,7 @@ typedef struct session_level_box {
 
 /* Describes a finer block that covers only part of a cell of this block, which is an error. */
 typedef struct session_misfit {
-    bool is_any;
+    bool exists;
     int axis;                  /* axis along which the finer block ends within the cell */
     int64_t block, refinement; /* the finer block's number on its rank, and its refinement along the axis */
     int rank;
@@ -238,7 +240,7 @@ typedef struct session_mesh {
     session_field *fields;
 
     /* values of session_meshes.stamp when the cells and the coordinates last changed */
-    int64_t cells_stamp, places_stamp;
+    int64_t cells_stamp, coordinates_stamp;
     bool is_check_stale;
     bool is_topology_stale;    /* set if the tree was built for other cells */
     bool is_geometry_stale;    /* set if the tree was computed for other coordinates */
@@ -248,11 +250,11 @@ typedef struct session_mesh {
     session_counts given_counts; /* numbers of the caller's cells */
     bool has_shells_alone;       /* same as session_catalogue_mesh.has_shells_alone, that is, over all ranks */
     double size_sum;             /* sum of the cube roots of the volumes of the drawn cells */
-    uint64_t *flat;              /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
+    uint64_t *flat_cells;        /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
 
-    uint64_t apart;  /* same as session_catalogue_mesh.apart */
-    bool is_refined; /* same as session_catalogue_mesh.is_refined */
-    bool is_needed;  /* set if an image of this step draws the mesh */
+    uint64_t single_joint_name; /* same as session_catalogue_mesh.single_joint_name */
+    bool is_refined;            /* same as session_catalogue_mesh.is_refined */
+    bool is_needed;             /* set if an image of this step draws the mesh */
     bool has_tree;
     mmbvh tree;
     /* set if the tree contains only the candidates of candidates_key, as long as nothing changes */
@@ -265,7 +267,7 @@ typedef struct session_mesh {
     int full_tree_steps;
     /* seconds spent on partial trees since the cells last changed, minus the time that refits of a full tree would have
      * taken */
-    double rent;
+    double partial_tree_seconds;
     int scalar_count;
     session_scalar *scalars;
 
@@ -292,10 +294,10 @@ typedef struct session_meshes {
     session_level_box *level_boxes;
     int64_t stamp; /* incremented by each change of cells or coordinates */
     /* error of a set call that cannot be stored with a mesh; it is kept for one step */
-    base_error pending;
+    base_error pending_error;
     char *pending_mesh, *pending_field; /* mesh and field of this error; NULL: it belongs to no particular one */
     /* number of meshes that this step ignores; they are stored in items, after the first `count` */
-    int aside_count;
+    int excluded_count;
     session_filling filling;
 } session_meshes;
 
@@ -341,7 +343,7 @@ grid session_given_grid(const insitu_mesh *mesh);
 bool session_make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
                           base_error *error);
 
-static inline void session_put_index(const grid_array *array, int64_t i, int64_t value)
+static inline void session_store_index(const grid_array *array, int64_t i, int64_t value)
 {
     char *p = (char *)(uintptr_t)array->data + i * array->stride;
     if (array->is_wide)
@@ -396,7 +398,7 @@ void session_drop_copy(session_field *field);
 /* Frees the copies of the caller's tables: patches and components. */
 void session_drop_field_tables(session_field *field);
 /* Frees the data that depends on the cells, after these have changed. Fields are kept. */
-void session_renew_cells(session_meshes *meshes, session_mesh *mesh);
+void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh);
 /* Removes the derived fields, and with them all scalars and thresholds, which refer to fields by index. */
 void session_drop_derived(session_mesh *mesh);
 /* Frees the mesh of outer faces and, if with_faces, the faces themselves. The threshold is kept. */
@@ -418,7 +420,7 @@ typedef struct session_part_walk {
     session_mesh *part;
     session_mesh *whole;  /* the mesh whose outer faces the part contains; NULL: the part is a mesh of the caller */
     session_outer *outer; /* the outer surface that the part belongs to; NULL: the part is a mesh of the caller */
-    int mesh_at, whole_at, outer_at;
+    int mesh_index, whole_index, outer_index;
 } session_part_walk;
 
 /* Advances to the next part. Returns false after the last one. */
@@ -447,16 +449,16 @@ const base_error *session_pending_error(const session_meshes *meshes);
 
 /* Stores an error of a set call that cannot be stored with a mesh. field is NULL if the error does not belong to a
  * single field. */
-void session_keep_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field);
+void session_store_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field);
 void session_drop_pending(session_meshes *meshes);
 
 /* Stores an error of a field's values for the rest of the step, and copies it to *first if that holds no error yet. */
-void session_keep_problem(session_field *field, const base_error *problem, base_error *first);
+void session_store_problem(session_field *field, const base_error *problem, base_error *first);
 
 /* Removes a mesh from the list for the rest of the step, as if this rank had no part of it. */
-void session_put_aside(session_meshes *meshes, session_mesh *mesh);
+void session_exclude_mesh(session_meshes *meshes, session_mesh *mesh);
 /* Puts the meshes that were put aside back into the list. */
-void session_take_back(session_meshes *meshes);
+void session_restore_excluded(session_meshes *meshes);
 
 /* Refuses a public call made inside a fill function, as it would change data that the step reads. Returns whether it
  * was refused; the error is stored in filling.refused, and the step fails with it. Local. */

@@ -373,7 +373,7 @@ static void store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_
     }
 
     if (changed & INSITU_CHANGED_TOPOLOGY) {
-        session_renew_cells(meshes, mesh);
+        session_drop_cell_data(meshes, mesh);
         base_free(mesh->covered);
         mesh->covered = NULL;
         meshes->are_levels_changed = meshes->are_levels_changed || had_levels || session_has_levels(given);
@@ -381,7 +381,7 @@ static void store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_
     if (had_ids != (given->vertex_ids.data != NULL) || had_levels != session_has_levels(given))
         meshes->are_names_changed = true;
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) {
-        mesh->places_stamp = ++meshes->stamp;
+        mesh->coordinates_stamp = ++meshes->stamp;
         mesh->is_check_stale = true;
         mesh->torn.is_made = false;
         session_drop_outers(mesh, (changed & INSITU_CHANGED_TOPOLOGY) != 0);
@@ -396,7 +396,7 @@ static void store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_
     mesh->problem = (base_error){0};
 }
 
-insitu_status session_place_error(base_error *error, const char *mesh, const char *field, const base_error *what)
+insitu_status session_prefix_error(base_error *error, const char *mesh, const char *field, const base_error *what)
 {
     if (field) return base_fail(error, what->status, "mesh \"%s\": field \"%s\": %.700s", mesh, field, what->message);
     return base_fail(error, what->status, "mesh \"%s\": %.700s", mesh, what->message);
@@ -430,7 +430,7 @@ static insitu_status set_mesh(session_meshes *meshes, const char *name, int64_t 
     meshes->are_names_changed = true;
     mesh->problem = (base_error){0};
     mesh->is_problem_of_contents = false;
-    session_place_error(&mesh->problem, mesh->label, NULL, &what);
+    session_prefix_error(&mesh->problem, mesh->label, NULL, &what);
     *error = mesh->problem;
     return error->status;
 }
@@ -446,10 +446,10 @@ insitu_status session_set_mesh(session_meshes *meshes, const char *name, int64_t
         base_fail(error, INSITU_ERROR_ARGUMENT, "%s: mesh \"%s\": the number of the block is %lld, expected 0 or more",
                   call, name, (long long)block);
     if (error->status) {
-        session_keep_pending(meshes, error, NULL, NULL);
+        session_store_pending(meshes, error, NULL, NULL);
         return error->status;
     }
     const insitu_status status = set_mesh(meshes, name, block, given, error);
-    if (status == INSITU_ERROR_MEMORY) session_keep_pending(meshes, error, NULL, NULL);
+    if (status == INSITU_ERROR_MEMORY) session_store_pending(meshes, error, NULL, NULL);
     return status;
 }

@@ -12,6 +12,6 @@ insitu_status session_set_mesh(session_meshes *meshes, const char *name, int64_t
 
 /* Stores the error of a check, with `mesh "name": ` and, if there is a field, its name in front of the message. Returns
  * its status. */
-insitu_status session_place_error(base_error *error, const char *mesh, const char *field, const base_error *what);
+insitu_status session_prefix_error(base_error *error, const char *mesh, const char *field, const base_error *what);
 
 #endif

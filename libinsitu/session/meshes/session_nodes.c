@@ -252,16 +252,16 @@ static const signed char *quadratic_permutation(int type, insitu_vertex_order or
                                   : NULL;
 }
 
-int session_quadratic_place(const session_nodes *of, insitu_vertex_order order, int n)
+int session_quadratic_index(const session_nodes *of, insitu_vertex_order order, int n)
 {
     const int corners = grid_type_vertices(of->type);
     const signed char *turn = n < corners || of->order != 2 ? NULL : quadratic_permutation(of->type, order);
     return turn ? turn[n - corners] : n;
 }
 
-int session_node_place(const session_nodes *of, insitu_vertex_order order, int i, int j, int k)
+int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k)
 {
     if (order == INSITU_ORDER_LEXICOGRAPHIC) return number_lexicographic_node(of->type, of->order, i, j, k);
     const bool is_old = order == INSITU_ORDER_VTK_BEFORE_9_1 && of->is_lagrange;
-    return session_quadratic_place(of, order, number_vtk_node(of, is_old, i, j, k));
+    return session_quadratic_index(of, order, number_vtk_node(of, is_old, i, j, k));
 }

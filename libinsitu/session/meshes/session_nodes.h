@@ -32,10 +32,10 @@ const char *session_order_refused(const session_nodes *of, insitu_vertex_order o
 
 /* Returns the position in the row of a complete cell's node i, j, k of its lattice, whose axes are the edges at the
  * first corner. Each layer k of a pyramid has one node less along i and j than the layer below. */
-int session_node_place(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
+int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
 
 /* Returns the position in the row of the node with number n in VTK's order, for cells of order 2. */
-int session_quadratic_place(const session_nodes *of, insitu_vertex_order order, int n);
+int session_quadratic_index(const session_nodes *of, insitu_vertex_order order, int n);
 
 /* Returns the number of nodes of each cell of a mesh of one type, or 0 if the mesh does not say. */
 int64_t session_cell_nodes(const insitu_mesh *mesh);

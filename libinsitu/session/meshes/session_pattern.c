@@ -23,7 +23,8 @@
 
 /* ---- listed pieces --------------------------------------------------------------------------------------------- */
 
-/* A list of pieces in the making. The pieces are counted while `places` and `types` are NULL, and then stored. */
+/* A list of pieces in the making. The pieces are counted while `piece_positions` and `types` are NULL, and then stored.
+ */
 typedef struct pattern_list {
     session_pattern *out;
     insitu_vertex_order order;
@@ -33,9 +34,9 @@ static void add_piece(const pattern_list *list, int type, const int nodes[][3])
 {
     session_pattern *out = list->out;
     const int count = grid_type_vertices(type);
-    for (int n = 0; n < count && out->places; n++)
-        out->places[out->piece_size + n] =
-            session_node_place(&out->nodes, list->order, nodes[n][0], nodes[n][1], nodes[n][2]);
+    for (int n = 0; n < count && out->piece_positions; n++)
+        out->piece_positions[out->piece_size + n] =
+            session_node_index(&out->nodes, list->order, nodes[n][0], nodes[n][1], nodes[n][2]);
     if (out->types) out->types[out->piece_count] = (unsigned char)type;
     out->piece_count++;
     out->piece_size += count;
@@ -219,11 +220,11 @@ static void find_polygons(session_pattern *out, insitu_vertex_order order)
     for (int i = 0; i < out->polygon_count; i++) {
         pattern_polygon *p = &out->polygons[i];
         if (p->count > 2 && shape->type != GRID_QUAD) orient_outwards(shape, p);
-        for (int n = 0; n < p->count; n++) p->nodes[n] = session_quadratic_place(&out->nodes, order, p->nodes[n]);
+        for (int n = 0; n < p->count; n++) p->nodes[n] = session_quadratic_index(&out->nodes, order, p->nodes[n]);
     }
-    out->middle_count = count_edges(shape);
-    for (int e = 0; e < out->middle_count; e++)
-        out->middles[e] = session_quadratic_place(&out->nodes, order, corners + e);
+    out->midpoint_count = count_edges(shape);
+    for (int e = 0; e < out->midpoint_count; e++)
+        out->midpoints[e] = session_quadratic_index(&out->nodes, order, corners + e);
 }
 
 /* Splits a polygon into triangles of the same orientation by the diagonals from the node of the lowest rank. */
@@ -260,12 +261,12 @@ static int split_quad(const session_pattern *of, const int *ranks, int places[][
     return count;
 }
 
-int session_cut(const session_pattern *pattern, const int *ranks, int places[PATTERN_MOST_LOOSE][4])
+int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int places[PATTERN_MOST_LOOSE][4])
 {
-    int count = 0, apex = pattern->middles[0], triangles[2][3];
+    int count = 0, apex = pattern->midpoints[0], triangles[2][3];
     if (pattern->nodes.type == GRID_QUAD) return split_quad(pattern, ranks, places);
-    for (int n = 1; n < pattern->middle_count; n++)
-        if (ranks[pattern->middles[n]] < ranks[apex]) apex = pattern->middles[n];
+    for (int n = 1; n < pattern->midpoint_count; n++)
+        if (ranks[pattern->midpoints[n]] < ranks[apex]) apex = pattern->midpoints[n];
     for (int i = 0; i < pattern->polygon_count; i++) {
         const pattern_polygon *p = &pattern->polygons[i];
         const int cut = split_into_triangles(p, ranks, triangles);
@@ -286,10 +287,10 @@ static bool make_linear(int type, insitu_vertex_order order, session_pattern *ou
     out->piece_count = 1;
     out->piece_size = grid_type_vertices(type);
     out->types = base_alloc(1);
-    out->places = base_alloc((size_t)out->piece_size * sizeof *out->places);
-    if (!out->types || !out->places) return false;
+    out->piece_positions = base_alloc((size_t)out->piece_size * sizeof *out->piece_positions);
+    if (!out->types || !out->piece_positions) return false;
     out->types[0] = (unsigned char)type;
-    for (int n = 0; n < out->piece_size; n++) out->places[n] = turn ? turn[n] : n;
+    for (int n = 0; n < out->piece_size; n++) out->piece_positions[n] = turn ? turn[n] : n;
     return true;
 }
 
@@ -304,8 +305,8 @@ bool session_make_pattern(int type, const session_nodes *nodes, insitu_vertex_or
     const pattern_list list = {out, order};
     list_pieces(&list);
     out->types = base_alloc((size_t)out->piece_count);
-    out->places = base_alloc((size_t)out->piece_size * sizeof *out->places);
-    if (!out->types || !out->places) return false;
+    out->piece_positions = base_alloc((size_t)out->piece_size * sizeof *out->piece_positions);
+    if (!out->types || !out->piece_positions) return false;
     list_pieces(&list);
     return true;
 }
@@ -313,6 +314,6 @@ bool session_make_pattern(int type, const session_nodes *nodes, insitu_vertex_or
 void session_drop_pattern(session_pattern *pattern)
 {
     base_free(pattern->types);
-    base_free(pattern->places);
+    base_free(pattern->piece_positions);
     *pattern = (session_pattern){0};
 }

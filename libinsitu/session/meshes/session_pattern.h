@@ -14,17 +14,17 @@ typedef struct pattern_polygon {
 } pattern_polygon;
 
 /* The pieces of one type and order of cell. For complete cells they are listed here; those of serendipity cells depend
- * on the coordinates of the nodes (session_cut()). */
+ * on the coordinates of the nodes (session_cut_serendipity()). */
 typedef struct session_pattern {
     int type; /* the caller's type */
     session_nodes nodes;
-    int piece_count, piece_size; /* number of listed pieces, and of entries of `places` */
+    int piece_count, piece_size; /* number of listed pieces, and of entries of `piece_positions` */
     unsigned char *types;
-    int *places;       /* positions of the pieces' vertices, one piece after the other */
-    int polygon_count; /* 0 unless it is a serendipity cell */
+    int *piece_positions; /* positions of the pieces' vertices, one piece after the other */
+    int polygon_count;    /* 0 unless it is a serendipity cell */
     pattern_polygon polygons[PATTERN_MOST_POLYGONS];
-    int middle_count;
-    int middles[12]; /* positions of the midpoints of edges */
+    int midpoint_count;
+    int midpoints[12]; /* positions of the midpoints of edges */
 } session_pattern;
 
 /* Returns false if there is no memory. Of a linear cell (order 1) the only piece is the cell. */
@@ -34,6 +34,6 @@ void session_drop_pattern(session_pattern *pattern);
 /* Stores the positions of the vertices of a serendipity cell's pieces: 4 for each tet, or 3 for each triangle of a
  * quad. ranks: indexed by position, the rank of each midpoint in the order of coordinates. Returns the number of
  * pieces. */
-int session_cut(const session_pattern *pattern, const int *ranks, int places[PATTERN_MOST_LOOSE][4]);
+int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int places[PATTERN_MOST_LOOSE][4]);
 
 #endif

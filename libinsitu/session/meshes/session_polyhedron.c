@@ -8,8 +8,8 @@
 
 typedef struct cell_frame {
     double mean[3]; /* mean of the vertices, each weighted by the number of its faces */
-    double least[3];
-    double box; /* volume of the bounding box */
+    double least_vertex[3];
+    double box_volume; /* volume of the bounding box */
 } cell_frame;
 
 static bool comes_before(const double a[3], const double b[3])
@@ -48,15 +48,15 @@ static void add_face(const grid *g, int64_t face, frame_sums *sums, double least
 
 static cell_frame find_cell_frame(const grid *g, int64_t cell)
 {
-    cell_frame frame = {.least = {INFINITY, INFINITY, INFINITY}, .box = 1};
+    cell_frame frame = {.least_vertex = {INFINITY, INFINITY, INFINITY}, .box_volume = 1};
     frame_sums sums = {.lower = {INFINITY, INFINITY, INFINITY}, .upper = {-INFINITY, -INFINITY, -INFINITY}};
     int64_t first, end;
     grid_cell_faces(g, cell, &first, &end);
-    for (int64_t i = first; i < end; i++) add_face(g, grid_array_index(&g->connectivity, i), &sums, frame.least);
+    for (int64_t i = first; i < end; i++) add_face(g, grid_array_index(&g->connectivity, i), &sums, frame.least_vertex);
     if (sums.count == 0) return (cell_frame){0};
     for (int axis = 0; axis < 3; axis++) {
         frame.mean[axis] = sums.sum[axis] / sums.count;
-        frame.box *= sums.upper[axis] - sums.lower[axis];
+        frame.box_volume *= sums.upper[axis] - sums.lower[axis];
     }
     return frame;
 }
@@ -137,9 +137,9 @@ double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat)
     double origin[3];
     volume_sums sums = {0};
     const cell_frame frame = find_cell_frame(g, cell);
-    for (int axis = 0; axis < 3; axis++) origin[axis] = frame.least[axis] - frame.mean[axis];
+    for (int axis = 0; axis < 3; axis++) origin[axis] = frame.least_vertex[axis] - frame.mean[axis];
     grid_cell_faces(g, cell, &first, &end);
     for (int64_t i = first; i < end; i++) add_fan(g, grid_array_index(&g->connectivity, i), frame.mean, origin, &sums);
-    *is_flat = sums.from_corner <= flat_share * (double)sums.triangles * frame.box;
+    *is_flat = sums.from_corner <= flat_share * (double)sums.triangles * frame.box_volume;
     return *is_flat ? 0 : sums.from_mean;
 }

@@ -36,11 +36,14 @@ static insitu_status reduce_extent(const session_meshes *meshes, MPI_Comm comm, 
         sizes += mesh->size_sum;
     }
     counts[1] = counts[0] > 0;
-    insitu_status status = session_mpi(error, MPI_Allreduce(mine, all, 6, MPI_DOUBLE, MPI_MIN, comm), "MPI_Allreduce");
+    insitu_status status =
+        session_check_mpi(error, MPI_Allreduce(mine, all, 6, MPI_DOUBLE, MPI_MIN, comm), "MPI_Allreduce");
     if (!status)
-        status = session_mpi(error, MPI_Allreduce(counts, totals, 3, MPI_INT64_T, MPI_SUM, comm), "MPI_Allreduce");
+        status =
+            session_check_mpi(error, MPI_Allreduce(counts, totals, 3, MPI_INT64_T, MPI_SUM, comm), "MPI_Allreduce");
     if (!status)
-        status = session_mpi(error, MPI_Allreduce(&sizes, &all_sizes, 1, MPI_DOUBLE, MPI_SUM, comm), "MPI_Allreduce");
+        status =
+            session_check_mpi(error, MPI_Allreduce(&sizes, &all_sizes, 1, MPI_DOUBLE, MPI_SUM, comm), "MPI_Allreduce");
     if (status) return status;
     *out = (session_extent){.cell_count = totals[0], .solid_count = totals[2], .rank_count = (int)totals[1]};
     /* The mean is computed over cells with a volume, because samples are not taken in flat cells. */

@@ -18,16 +18,16 @@ enum { MOST_PATTERNS = 64, LINEAR_TYPES = GRID_POLYHEDRON + 1 };
 /* The caller's cells while they are split. */
 typedef struct split_work {
     const session_mesh *mesh;
-    grid given;         /* the caller's cells; without connectivity, entry i is vertex i */
-    int64_t nodes, row; /* without offsets: nodes per cell, and distance in entries from cell to cell */
+    grid caller_cells;                  /* the caller's cells; without connectivity, entry i is vertex i */
+    int64_t nodes_per_cell, row_stride; /* without offsets: nodes per cell, and distance in entries from cell to cell */
     int pattern_count;
     session_pattern patterns[MOST_PATTERNS];
-    bool is_of_type[LINEAR_TYPES]; /* set for the types that pieces have */
-    int only_type;                 /* the type of all pieces; 0 if they differ */
-    int64_t *firsts,
-        *entries; /* the first piece and entry of each cell, and the ends; entries is NULL if pieces have one type */
+    bool is_of_type[LINEAR_TYPES];         /* set for the types that pieces have */
+    int only_type;                         /* the type of all pieces; 0 if they differ */
+    int64_t *first_pieces, *first_entries; /* the first piece and entry of each cell, and the ends; entries is NULL if
+                                              pieces have one type */
     bool gives_entries; /* set if entries of the caller's connectivity are stored instead of vertices */
-    grid_array out;
+    grid_array piece_entries;
 } split_work;
 
 /* ---- the caller's cells ---------------------------------------------------------------------------------------- */
@@ -50,19 +50,19 @@ int64_t session_entry_place(const insitu_mesh *given, int64_t entry)
 
 static int64_t first_cell_entry(const split_work *w, int64_t cell)
 {
-    return w->given.offsets.data ? grid_array_index(&w->given.offsets, cell) : cell * w->row;
+    return w->caller_cells.offsets.data ? grid_array_index(&w->caller_cells.offsets, cell) : cell * w->row_stride;
 }
 
 static int64_t count_cell_entries(const split_work *w, int64_t cell)
 {
-    if (!w->given.offsets.data) return w->nodes;
-    return (int64_t)((uint64_t)grid_offset_end(&w->given.offsets, cell) -
-                     (uint64_t)grid_array_index(&w->given.offsets, cell));
+    if (!w->caller_cells.offsets.data) return w->nodes_per_cell;
+    return (int64_t)((uint64_t)grid_offset_end(&w->caller_cells.offsets, cell) -
+                     (uint64_t)grid_array_index(&w->caller_cells.offsets, cell));
 }
 
 static int64_t read_vertex(const split_work *w, int64_t entry)
 {
-    return w->given.connectivity.data ? grid_array_index(&w->given.connectivity, entry) : entry;
+    return w->caller_cells.connectivity.data ? grid_array_index(&w->caller_cells.connectivity, entry) : entry;
 }
 
 static const session_pattern *find_pattern(const split_work *w, int type, int64_t count)
@@ -74,7 +74,7 @@ static const session_pattern *find_pattern(const split_work *w, int type, int64_
 
 static const session_pattern *find_cell_pattern(const split_work *w, int64_t cell)
 {
-    return find_pattern(w, grid_cell_type(&w->given, cell), count_cell_entries(w, cell));
+    return find_pattern(w, grid_cell_type(&w->caller_cells, cell), count_cell_entries(w, cell));
 }
 
 /* ---- patterns and checks ---------------------------------------------------------------------------------------- */
@@ -122,7 +122,7 @@ static insitu_status check_offsets(const split_work *w, int64_t cell, base_error
     const long long base = given->index_base, first = first_cell_entry(w, cell) + base,
                     next = first + count_cell_entries(w, cell);
     const long long last = given->connectivity_count + base;
-    if (!w->given.offsets.data || (first >= base && next >= first && next <= last)) return INSITU_OK;
+    if (!w->caller_cells.offsets.data || (first >= base && next >= first && next <= last)) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MESH,
                      "mesh \"%s\": cell %lld: offsets %lld and %lld do not rise or are outside %lld..%lld",
                      w->mesh->label, (long long)cell, first, next, base, last);
@@ -142,12 +142,12 @@ static void choose_type(split_work *w)
 static insitu_status find_patterns(split_work *w, base_error *error)
 {
     const insitu_mesh *given = &w->mesh->given;
-    const int64_t cells = w->given.offsets.data ? given->cell_count : 1;
+    const int64_t cells = w->caller_cells.offsets.data ? given->cell_count : 1;
     int last_type = -1;
     int64_t last_size = -1;
     for (int64_t cell = 0; cell < cells; cell++) {
         if (check_offsets(w, cell, error)) return error->status;
-        const int type = grid_cell_type(&w->given, cell);
+        const int type = grid_cell_type(&w->caller_cells, cell);
         const int64_t size = count_cell_entries(w, cell);
         if (type == last_type && size == last_size) continue;
         if (!find_pattern(w, type, size) && add_pattern(w, cell, type, size, error)) return error->status;
@@ -155,7 +155,7 @@ static insitu_status find_patterns(split_work *w, base_error *error)
         last_size = size;
     }
     const int64_t end =
-        w->given.offsets.data ? grid_offset_end(&w->given.offsets, cells - 1) : given->connectivity_count;
+        w->caller_cells.offsets.data ? grid_offset_end(&w->caller_cells.offsets, cells - 1) : given->connectivity_count;
     if (end != given->connectivity_count)
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": the last offset is %lld, not connectivity_count%s, %lld", w->mesh->label,
@@ -210,15 +210,15 @@ static bool comes_before(const double a[3], const double b[3])
 static void rank_midpoints(const split_work *w, const session_pattern *of, int64_t first, int ranks[27])
 {
     double at[12][3];
-    for (int n = 0; n < of->middle_count; n++)
+    for (int n = 0; n < of->midpoint_count; n++)
         for (int axis = 0; axis < 3; axis++) {
-            const int64_t vertex = read_vertex(w, first + of->middles[n]);
-            at[n][axis] = grid_array_number(&w->given.coordinates[axis], vertex);
+            const int64_t vertex = read_vertex(w, first + of->midpoints[n]);
+            at[n][axis] = grid_array_number(&w->caller_cells.coordinates[axis], vertex);
         }
-    for (int n = 0; n < of->middle_count; n++) {
+    for (int n = 0; n < of->midpoint_count; n++) {
         int rank = 0;
-        for (int m = 0; m < of->middle_count; m++) rank += comes_before(at[m], at[n]);
-        ranks[of->middles[n]] = rank;
+        for (int m = 0; m < of->midpoint_count; m++) rank += comes_before(at[m], at[n]);
+        ranks[of->midpoints[n]] = rank;
     }
 }
 
@@ -226,7 +226,7 @@ static int cut_cell(const split_work *w, const session_pattern *of, int64_t cell
 {
     int ranks[27] = {0};
     rank_midpoints(w, of, first_cell_entry(w, cell), ranks);
-    return session_cut(of, ranks, places);
+    return session_cut_serendipity(of, ranks, places);
 }
 
 static void count_pieces(const split_work *w, int64_t cell)
@@ -234,9 +234,9 @@ static void count_pieces(const split_work *w, int64_t cell)
     const session_pattern *of = find_cell_pattern(w, cell);
     int loose[PATTERN_MOST_LOOSE][4];
     const int cut = of->polygon_count ? cut_cell(w, of, cell, loose) : 0;
-    w->firsts[cell + 1] = of->polygon_count ? cut : of->piece_count;
-    if (w->entries)
-        w->entries[cell + 1] = of->polygon_count ? cut * (of->nodes.type == GRID_QUAD ? 3 : 4) : of->piece_size;
+    w->first_pieces[cell + 1] = of->polygon_count ? cut : of->piece_count;
+    if (w->first_entries)
+        w->first_entries[cell + 1] = of->polygon_count ? cut * (of->nodes.type == GRID_QUAD ? 3 : 4) : of->piece_size;
 }
 
 static void accumulate_counts(int64_t *counts, int64_t cells)
@@ -247,10 +247,10 @@ static void accumulate_counts(int64_t *counts, int64_t cells)
 static insitu_status count_all_pieces(split_work *w, int threads, base_error *error)
 {
     const int64_t cells = w->mesh->given.cell_count, most = 4294967294;
-    const size_t bytes = (size_t)(cells + 1) * sizeof *w->firsts;
-    w->firsts = base_calloc(bytes, 1);
-    if (!w->only_type) w->entries = base_calloc(bytes, 1);
-    if (!w->firsts || (!w->only_type && !w->entries))
+    const size_t bytes = (size_t)(cells + 1) * sizeof *w->first_pieces;
+    w->first_pieces = base_calloc(bytes, 1);
+    if (!w->only_type) w->first_entries = base_calloc(bytes, 1);
+    if (!w->first_pieces || (!w->only_type && !w->first_entries))
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %zu bytes of cells' pieces",
                          w->mesh->label, bytes);
 #pragma omp parallel num_threads(session_region_threads(threads, cells))
@@ -260,32 +260,32 @@ static insitu_status count_all_pieces(split_work *w, int threads, base_error *er
         for (int64_t cell = 0; cell < cells; cell++) count_pieces(w, cell);
         region_leave();
     }
-    accumulate_counts(w->firsts, cells);
-    if (w->entries) accumulate_counts(w->entries, cells);
-    if (w->firsts[cells] <= most) return INSITU_OK;
+    accumulate_counts(w->first_pieces, cells);
+    if (w->first_entries) accumulate_counts(w->first_entries, cells);
+    if (w->first_pieces[cells] <= most) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": its cells have %lld pieces, at most %lld are supported",
-                     w->mesh->label, (long long)w->firsts[cells], (long long)most);
+                     w->mesh->label, (long long)w->first_pieces[cells], (long long)most);
 }
 
 static int64_t entry_count(const split_work *w)
 {
     const int64_t cells = w->mesh->given.cell_count;
-    return w->entries ? w->entries[cells] : w->firsts[cells] * grid_type_vertices(w->only_type);
+    return w->first_entries ? w->first_entries[cells] : w->first_pieces[cells] * grid_type_vertices(w->only_type);
 }
 
 /* Stores the corner at the given position of the cell's row, as its entry or as its vertex. */
 static void store_corner(const split_work *w, int64_t cell, int64_t at, int place)
 {
     const int64_t first = first_cell_entry(w, cell);
-    const int64_t corner = w->given.offsets.data ? first + place : cell * w->nodes + place;
-    session_put_index(&w->out, at, w->gives_entries ? corner : read_vertex(w, first + place));
+    const int64_t corner = w->caller_cells.offsets.data ? first + place : cell * w->nodes_per_cell + place;
+    session_store_index(&w->piece_entries, at, w->gives_entries ? corner : read_vertex(w, first + place));
 }
 
 static void store_cell(const split_work *w, int64_t cell)
 {
     const session_pattern *of = find_cell_pattern(w, cell);
-    int64_t at = w->entries ? w->entries[cell] : w->firsts[cell] * grid_type_vertices(w->only_type);
-    for (int n = 0; n < of->piece_size; n++) store_corner(w, cell, at++, of->places[n]);
+    int64_t at = w->first_entries ? w->first_entries[cell] : w->first_pieces[cell] * grid_type_vertices(w->only_type);
+    for (int n = 0; n < of->piece_size; n++) store_corner(w, cell, at++, of->piece_positions[n]);
     if (!of->polygon_count) return;
     int loose[PATTERN_MOST_LOOSE][4];
     const int size = of->nodes.type == GRID_QUAD ? 3 : 4, count = cut_cell(w, of, cell, loose);
@@ -313,25 +313,25 @@ static void store_parents(const split_work *w, session_topology *t)
     const insitu_mesh *given = &w->mesh->given;
     for (int64_t cell = 0; cell < given->cell_count; cell++) {
         const session_pattern *of = find_cell_pattern(w, cell);
-        int64_t at = w->entries ? w->entries[cell] : 0;
-        for (int64_t i = w->firsts[cell]; i < w->firsts[cell + 1]; i++) {
+        int64_t at = w->first_entries ? w->first_entries[cell] : 0;
+        for (int64_t i = w->first_pieces[cell]; i < w->first_pieces[cell + 1]; i++) {
             const int loose = of->nodes.type == GRID_QUAD ? GRID_TRIANGLE : GRID_TET;
-            const int type = of->polygon_count ? loose : of->types[i - w->firsts[cell]];
+            const int type = of->polygon_count ? loose : of->types[i - w->first_pieces[cell]];
             t->parents[i] = (uint32_t)cell;
-            if (t->ghosts) t->ghosts[i] = grid_is_ghost(&w->given, cell);
-            if (!w->entries) continue;
+            if (t->ghosts) t->ghosts[i] = grid_is_ghost(&w->caller_cells, cell);
+            if (!w->first_entries) continue;
             t->cell_types[i] = (unsigned char)type;
-            session_put_index(&t->offsets, i, at);
+            session_store_index(&t->offsets, i, at);
             at += grid_type_vertices(type);
         }
     }
-    if (w->entries) session_put_index(&t->offsets, w->firsts[given->cell_count], entry_count(w));
+    if (w->first_entries) session_store_index(&t->offsets, w->first_pieces[given->cell_count], entry_count(w));
 }
 
 static insitu_status make_topology(split_work *w, session_mesh *mesh, int threads, base_error *error)
 {
     session_topology *t = &mesh->topology;
-    const int64_t pieces = w->firsts[mesh->given.cell_count], entries = entry_count(w);
+    const int64_t pieces = w->first_pieces[mesh->given.cell_count], entries = entry_count(w);
     t->has_own_cells = t->is_split = true;
     t->cell_type = w->only_type;
     t->cell_count = pieces;
@@ -339,19 +339,19 @@ static insitu_status make_topology(split_work *w, session_mesh *mesh, int thread
     for (int i = 0; i < w->pattern_count; i++) t->follows_places = t->follows_places || w->patterns[i].polygon_count;
     if (!session_make_indices(mesh, "cells' pieces", entries, mesh->given.vertex_count, &t->connectivity, error))
         return error->status;
-    if (w->entries && !session_make_indices(mesh, "cells' pieces", pieces, entries, &t->offsets, error))
+    if (w->first_entries && !session_make_indices(mesh, "cells' pieces", pieces, entries, &t->offsets, error))
         return error->status;
     t->parents = base_alloc((size_t)(pieces + 1) * sizeof *t->parents);
-    if (w->entries) t->cell_types = base_alloc((size_t)pieces + 1);
+    if (w->first_entries) t->cell_types = base_alloc((size_t)pieces + 1);
     if (mesh->given.ghosts.data) t->ghosts = base_alloc((size_t)pieces + 1);
-    if (!t->parents || (w->entries && !t->cell_types) || (mesh->given.ghosts.data && !t->ghosts))
+    if (!t->parents || (w->first_entries && !t->cell_types) || (mesh->given.ghosts.data && !t->ghosts))
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld pieces of cells", mesh->label,
                          (long long)pieces);
     store_parents(w, t);
-    w->out = t->connectivity;
+    w->piece_entries = t->connectivity;
     store_cells(w, threads);
     t->cell_bytes = (entries + 1) * t->connectivity.stride + pieces * (int64_t)sizeof *t->parents;
-    if (w->entries) t->cell_bytes += (pieces + 1) * t->offsets.stride + pieces;
+    if (w->first_entries) t->cell_bytes += (pieces + 1) * t->offsets.stride + pieces;
     if (t->ghosts) t->cell_bytes += pieces;
     return INSITU_OK;
 }
@@ -361,15 +361,17 @@ static split_work begin_split(const session_mesh *mesh)
     const insitu_mesh *given = &mesh->given;
     const grid g = session_given_grid(given);
     const int64_t nodes = session_cell_nodes(given);
-    return (split_work){
-        .mesh = mesh, .given = g, .nodes = nodes, .row = given->connectivity_row ? given->connectivity_row : nodes};
+    return (split_work){.mesh = mesh,
+                        .caller_cells = g,
+                        .nodes_per_cell = nodes,
+                        .row_stride = given->connectivity_row ? given->connectivity_row : nodes};
 }
 
 static void end_split(split_work *w)
 {
     for (int i = 0; i < w->pattern_count; i++) session_drop_pattern(&w->patterns[i]);
-    base_free(w->firsts);
-    base_free(w->entries);
+    base_free(w->first_pieces);
+    base_free(w->first_entries);
 }
 
 insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error)
@@ -388,12 +390,12 @@ insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_
     split_work w = begin_split(mesh);
     insitu_status status = find_patterns(&w, error);
     const int64_t nodes = session_cell_nodes(&mesh->given), cells = mesh->given.cell_count;
-    const int64_t largest = w.given.offsets.data ? mesh->given.connectivity_count : cells * nodes;
+    const int64_t largest = w.caller_cells.offsets.data ? mesh->given.connectivity_count : cells * nodes;
     w.gives_entries = true;
     if (!status) status = count_all_pieces(&w, threads, error);
     if (!status && !session_make_indices(mesh, "cells' corners", entry_count(&w), largest, out, error))
         status = error->status;
-    w.out = *out;
+    w.piece_entries = *out;
     if (!status) store_cells(&w, threads);
     end_split(&w);
     return status;

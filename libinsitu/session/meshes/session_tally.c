@@ -43,10 +43,10 @@ MMBVH_INLINE double corner_volume(double points[][3], const signed char corner[4
 
 MMBVH_INLINE double signed_volume(int type, double points[][3])
 {
-    const cell_corners of = corners_of(type);
+    const cell_corners of = find_cell_corners(type);
     double sum = 0;
     for (int i = 0; i < of.count; i++) sum += corner_volume(points, of.corners[i]);
-    return sum / of.shares;
+    return sum / of.volume_factor;
 }
 
 double tally_signed_volume(int type, double points[][3])
@@ -85,10 +85,10 @@ MMBVH_INLINE double box_volume(double points[][3], int count)
  * without being flat. */
 static bool is_flat_everywhere(int type, double points[][3])
 {
-    const cell_corners of = corners_of(type);
+    const cell_corners of = find_cell_corners(type);
     double sum = 0;
     for (int i = 0; i < of.count; i++) sum += fabs(corner_volume(points, of.corners[i]));
-    return is_flat_volume(sum / of.shares, box_volume(points, grid_type_vertices(type)));
+    return is_flat_volume(sum / of.volume_factor, box_volume(points, grid_type_vertices(type)));
 }
 
 /* Computes the cube root of the volume in the same way as the vectorized code (session_lane_loops.c). The math
@@ -191,7 +191,7 @@ static void quad_corner_areas(double points[][3], double out[4])
 bool tally_has_both_signs(int type, double points[][3])
 {
     const bool is_quad = type == GRID_QUAD;
-    const cell_corners of = corners_of(is_quad ? GRID_TET : type);
+    const cell_corners of = find_cell_corners(is_quad ? GRID_TET : type);
     double volumes[8], largest = 0;
     const int count = is_quad ? 4 : of.count;
     if (is_quad) quad_corner_areas(points, volumes);
@@ -270,11 +270,11 @@ MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell,
     const grid *g = &mesh->cells;
     const int type = shape == FETCH_TETS ? GRID_TET : grid_cell_type(g, cell);
     const int count = grid_type_vertices(type);
-    lane_cells alike = {.g = g, .type = type, .first = cell, .count = end - cell, .entry = cell * count};
+    lane_cells alike = {.g = g, .type = type, .first = cell, .count = end - cell, .first_entry = cell * count};
     if (shape != FETCH_BY_CELL) return alike;
     int64_t next = cell;
     while (next < end && grid_cell_type(g, next) == type && offsets_are_good(mesh, next, count)) next++;
-    if (next > cell) alike.entry = fetch_first(g, cell, count, shape);
+    if (next > cell) alike.first_entry = fetch_first(g, cell, count, shape);
     alike.count = next > cell ? next - cell : 1; /* a cell with wrong offsets is a run of length 1 */
     return alike;
 }
@@ -447,7 +447,7 @@ MMBVH_INLINE int64_t run(const session_mesh *mesh, int64_t begin, int64_t end, m
         while (cell < first + alone && is_good)
             if ((is_good = tally_one_cell(mesh, cell, &t, &least, shape, wide_index, wide_number))) cell++;
         alike.first += taken + alone;
-        alike.entry += (taken + alone) * grid_type_vertices(alike.type);
+        alike.first_entry += (taken + alone) * grid_type_vertices(alike.type);
         alike.count -= taken + alone;
     }
     if (may_be_flat(&t, least)) t = tally_run_again(&mesh->cells, begin, cell);

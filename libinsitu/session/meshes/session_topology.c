@@ -69,7 +69,7 @@ void session_read_topology(session_mesh *mesh)
         g.ghosts_stride = g.ghosts_bytes = 1;
     }
     session_read_lattice(mesh, &g);
-    g.flat = mesh->flat;
+    g.flat = mesh->flat_cells;
     mesh->cells = g;
 }
 
@@ -154,9 +154,9 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
                 return base_fail(error, INSITU_ERROR_MESH,
                                  "mesh \"%s\": face %lld: vertex index %lld is outside %lld..%lld (index_base is %lld)",
                                  mesh->label, face + base, vertex + base, base, given->vertex_count - 1 + base, base);
-            session_put_index(&t->face_connectivity, at++, vertex);
+            session_store_index(&t->face_connectivity, at++, vertex);
         }
-        session_put_index(&t->face_offsets, face + 1, at);
+        session_store_index(&t->face_offsets, face + 1, at);
     }
     t->face_connectivity_count = total;
     t->face_bytes = (count + 1) * t->face_offsets.stride + (total + 1) * t->face_connectivity.stride;
@@ -221,7 +221,7 @@ static insitu_status count_faces(const session_mesh *mesh, const session_face_si
         session_cells_of_face(sides, face, cells);
         if (check_sides(mesh, face, cells, error)) return error->status;
         for (int i = 0; i < 2 && cells[i] >= 0; i++)
-            session_put_index(offsets, cells[i] + 1, grid_array_index(offsets, cells[i] + 1) + 1);
+            session_store_index(offsets, cells[i] + 1, grid_array_index(offsets, cells[i] + 1) + 1);
     }
     return INSITU_OK;
 }
@@ -232,18 +232,19 @@ static void store_faces(const session_mesh *mesh, const session_face_sides *side
 {
     const int64_t count = mesh->given.cell_count;
     for (int64_t c = 0; c < count; c++)
-        session_put_index(&t->offsets, c + 1, grid_array_index(&t->offsets, c + 1) + grid_array_index(&t->offsets, c));
+        session_store_index(&t->offsets, c + 1,
+                            grid_array_index(&t->offsets, c + 1) + grid_array_index(&t->offsets, c));
     for (int64_t face = 0; face < session_face_count(&mesh->given); face++) {
         int64_t cells[2];
         session_cells_of_face(sides, face, cells);
         for (int i = 0; i < 2 && cells[i] >= 0; i++) {
             const int64_t at = grid_array_index(&t->offsets, cells[i]);
-            session_put_index(&t->connectivity, at, face);
-            session_put_index(&t->offsets, cells[i], at + 1);
+            session_store_index(&t->connectivity, at, face);
+            session_store_index(&t->offsets, cells[i], at + 1);
         }
     }
-    for (int64_t c = count; c > 0; c--) session_put_index(&t->offsets, c, grid_array_index(&t->offsets, c - 1));
-    session_put_index(&t->offsets, 0, 0);
+    for (int64_t c = count; c > 0; c--) session_store_index(&t->offsets, c, grid_array_index(&t->offsets, c - 1));
+    session_store_index(&t->offsets, 0, 0);
 }
 
 static insitu_status list_faces(session_mesh *mesh, base_error *error)
@@ -411,8 +412,8 @@ enum { TYPES = GRID_POLYHEDRON + 1 };
 typedef struct recognition {
     bool is_faulty;                /* set if some cell is invalid */
     int64_t polyhedra, recognised; /* numbers of original polyhedra, and of those that are read as another type */
-    int64_t of_type[TYPES];        /* number of cells by their new type */
-    int64_t entries;               /* number of entries of all cells, with their new types */
+    int64_t type_counts[TYPES];    /* number of cells by their new type */
+    int64_t entry_count;           /* number of entries of all cells, with their new types */
     unsigned char *types;
 } recognition;
 
@@ -445,8 +446,8 @@ static void recognise_cell(const session_mesh *mesh, int64_t cell, recognition *
     r->types[cell] = (unsigned char)now;
     r->polyhedra += type == GRID_POLYHEDRON;
     r->recognised += now != type;
-    r->of_type[now]++;
-    r->entries += now == GRID_POLYHEDRON ? end - first : grid_type_vertices(now);
+    r->type_counts[now]++;
+    r->entry_count += now == GRID_POLYHEDRON ? end - first : grid_type_vertices(now);
 }
 
 static void recognise_cells(const session_mesh *mesh, int threads, recognition *r)
@@ -463,8 +464,8 @@ static void recognise_cells(const session_mesh *mesh, int threads, recognition *
             r->is_faulty = r->is_faulty || mine.is_faulty;
             r->polyhedra += mine.polyhedra;
             r->recognised += mine.recognised;
-            for (int type = 0; type < TYPES; type++) r->of_type[type] += mine.of_type[type];
-            r->entries += mine.entries;
+            for (int type = 0; type < TYPES; type++) r->type_counts[type] += mine.type_counts[type];
+            r->entry_count += mine.entry_count;
         }
         region_leave();
     }
@@ -474,7 +475,7 @@ static void recognise_cells(const session_mesh *mesh, int threads, recognition *
 static int find_common_type(const recognition *r, int64_t count)
 {
     int type = TYPES - 1;
-    while (type > 0 && r->of_type[type] != count) type--;
+    while (type > 0 && r->type_counts[type] != count) type--;
     return type;
 }
 
@@ -484,11 +485,11 @@ static void store_cell(const session_mesh *mesh, int64_t cell, int type, int64_t
     int64_t vertices[GRID_MAX_CELL_VERTICES], first, end;
     if (type == grid_cell_type(g, cell)) {
         grid_cell_faces(g, cell, &first, &end);
-        for (int64_t i = first; i < end; i++) session_put_index(out, at++, grid_array_index(&g->connectivity, i));
+        for (int64_t i = first; i < end; i++) session_store_index(out, at++, grid_array_index(&g->connectivity, i));
         return;
     }
     recognise_polyhedron(mesh, cell, vertices);
-    for (int i = 0; i < grid_type_vertices(type); i++) session_put_index(out, at++, vertices[i]);
+    for (int i = 0; i < grid_type_vertices(type); i++) session_store_index(out, at++, vertices[i]);
 }
 
 static void store_offsets(const session_mesh *mesh, const recognition *r, const grid_array *out)
@@ -498,7 +499,7 @@ static void store_offsets(const session_mesh *mesh, const recognition *r, const 
         int64_t first = 0, end = grid_type_vertices(r->types[cell]);
         if (r->types[cell] == GRID_POLYHEDRON) grid_cell_faces(&mesh->cells, cell, &first, &end);
         at += end - first;
-        session_put_index(out, cell + 1, at);
+        session_store_index(out, cell + 1, at);
     }
 }
 
@@ -510,10 +511,10 @@ static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads
     const int64_t count = mesh->cells.cell_count, vertices = mesh->cells.vertex_count, faces = mesh->cells.face_count;
     const int type = find_common_type(r, count), size = grid_type_vertices(type);
     grid_array offsets = {0}, connectivity;
-    if (!session_make_indices(mesh, "recognised cells", r->entries, vertices > faces ? vertices : faces, &connectivity,
-                              error))
+    if (!session_make_indices(mesh, "recognised cells", r->entry_count, vertices > faces ? vertices : faces,
+                              &connectivity, error))
         return error->status;
-    if (!type && !session_make_indices(mesh, "recognised cells' offsets", count, r->entries, &offsets, error)) {
+    if (!type && !session_make_indices(mesh, "recognised cells' offsets", count, r->entry_count, &offsets, error)) {
         session_drop_array(&connectivity);
         return error->status;
     }
@@ -533,8 +534,8 @@ static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads
     t->offsets = offsets;
     t->connectivity = connectivity;
     t->cell_type = type;
-    t->connectivity_count = r->entries;
-    t->cell_bytes = (r->entries + 1) * connectivity.stride + (type ? 0 : (count + 1) * offsets.stride + count);
+    t->connectivity_count = r->entry_count;
+    t->cell_bytes = (r->entry_count + 1) * connectivity.stride + (type ? 0 : (count + 1) * offsets.stride + count);
     if (type) return INSITU_OK;
     t->cell_types = r->types;
     r->types = NULL;

@@ -7,7 +7,7 @@
 
 static int64_t bin_index_along(const session_bins *b, double place, int axis)
 {
-    const double at = (place - b->lower[axis]) * b->per_place;
+    const double at = (place - b->lower[axis]) * b->bins_per_length;
     return at < 0 ? 0 : at >= (double)b->counts[axis] ? b->counts[axis] - 1 : (int64_t)at;
 }
 
@@ -37,9 +37,9 @@ static int64_t choose_bin_size(session_bins *b, const double *places, int64_t st
     }
     const double across = fmin(fmax(sqrt((double)count) / 2, 1), 128);
     int64_t bins = 1;
-    b->per_place = widest > 0 ? across / widest : 1;
+    b->bins_per_length = widest > 0 ? across / widest : 1;
     for (int axis = 0; axis < 3; axis++) {
-        b->counts[axis] = count ? (int64_t)((upper[axis] - b->lower[axis]) * b->per_place) + 1 : 1;
+        b->counts[axis] = count ? (int64_t)((upper[axis] - b->lower[axis]) * b->bins_per_length) + 1 : 1;
         bins *= b->counts[axis];
     }
     return bins;
@@ -68,9 +68,9 @@ void session_bins_free(session_bins *bins)
 static void enter_bin_row(session_bin_walk *walk)
 {
     const session_bins *b = walk->bins;
-    const int64_t row = b->counts[0] * (walk->at[1] + b->counts[1] * walk->at[2]);
-    walk->next = b->starts[row + walk->low[0]];
-    walk->end = b->starts[row + walk->high[0] + 1];
+    const int64_t row = b->counts[0] * (walk->bin[1] + b->counts[1] * walk->bin[2]);
+    walk->next = b->starts[row + walk->first_bin[0]];
+    walk->end = b->starts[row + walk->last_bin[0] + 1];
 }
 
 session_bin_walk session_walk_bins(const session_bins *bins, const double lower[3], const double upper[3],
@@ -78,8 +78,8 @@ session_bin_walk session_walk_bins(const session_bins *bins, const double lower[
 {
     session_bin_walk walk = {.bins = bins};
     for (int axis = 0; axis < 3; axis++) {
-        walk.at[axis] = walk.low[axis] = bin_index_along(bins, lower[axis] - margin, axis);
-        walk.high[axis] = bin_index_along(bins, upper[axis] + margin, axis);
+        walk.bin[axis] = walk.first_bin[axis] = bin_index_along(bins, lower[axis] - margin, axis);
+        walk.last_bin[axis] = bin_index_along(bins, upper[axis] + margin, axis);
     }
     enter_bin_row(&walk);
     return walk;
@@ -88,9 +88,9 @@ session_bin_walk session_walk_bins(const session_bins *bins, const double lower[
 bool session_next_binned(session_bin_walk *walk, int64_t *point)
 {
     while (walk->next == walk->end) {
-        if (++walk->at[1] > walk->high[1]) {
-            walk->at[1] = walk->low[1];
-            if (++walk->at[2] > walk->high[2]) return false;
+        if (++walk->bin[1] > walk->last_bin[1]) {
+            walk->bin[1] = walk->first_bin[1];
+            if (++walk->bin[2] > walk->last_bin[2]) return false;
         }
         enter_bin_row(walk);
     }

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 typedef struct session_bins {
-    double lower[3], per_place; /* lower corner of the bins, and the number of bins per unit of length */
+    double lower[3], bins_per_length; /* lower corner of the bins, and the number of bins per unit of length */
     int64_t counts[3];
     int64_t *starts, *items; /* bin b contains the points items[starts[b]] .. items[starts[b + 1] - 1] */
 } session_bins;
@@ -22,7 +22,7 @@ void session_bins_free(session_bins *bins);
  * &point);) */
 typedef struct session_bin_walk {
     const session_bins *bins;
-    int64_t low[3], high[3], at[3];
+    int64_t first_bin[3], last_bin[3], bin[3];
     int64_t next, end;
 } session_bin_walk;
 

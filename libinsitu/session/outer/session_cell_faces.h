@@ -75,7 +75,7 @@ static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t ce
 typedef struct session_face_loop {
     const session_cell_faces *faces;
     /* corner numbers within the cell; NULL: the vertices are the entries of the list from `first` on */
-    const signed char *places;
+    const signed char *corners;
     const grid_array *list;
     int64_t first, size;
 } session_face_loop;
@@ -84,8 +84,8 @@ static inline session_face_loop session_face_of(const session_cell_faces *faces,
 {
     session_face_loop out = {.faces = faces};
     if (faces->table) {
-        out.places = faces->table->vertices[face];
-        out.size = out.places[3] < 0 ? 3 : 4;
+        out.corners = faces->table->vertices[face];
+        out.size = out.corners[3] < 0 ? 3 : 4;
         return out;
     }
     if (faces->size) {
@@ -104,7 +104,7 @@ static inline session_face_loop session_face_of(const session_cell_faces *faces,
 
 static inline int64_t session_face_vertex(const session_face_loop *loop, int64_t i)
 {
-    if (loop->places) return loop->faces->vertices[(int)loop->places[i]];
+    if (loop->corners) return loop->faces->vertices[(int)loop->corners[i]];
     return grid_array_index(loop->list, loop->first + i);
 }
 

@@ -13,14 +13,14 @@ enum { PARTS = 96 };
 
 /* ---- faces ---------------------------------------------------------------------------------------------------- */
 
-int session_compare_places(const double a[3], const double b[3])
+int session_compare_positions(const double a[3], const double b[3])
 {
     for (int axis = 0; axis < 3; axis++)
         if (a[axis] != b[axis]) return a[axis] < b[axis] ? -1 : 1;
     return 0;
 }
 
-double session_place_rounding(const session_mesh *mesh)
+double session_position_rounding(const session_mesh *mesh)
 {
     double rounding = 0;
     for (int axis = 0; axis < 3 && mesh && mesh->drawn_count; axis++) {
@@ -30,7 +30,7 @@ double session_place_rounding(const session_mesh *mesh)
     return rounding;
 }
 
-double session_place_distance(const double a[3], const double b[3])
+double session_distance_to_face(const double a[3], const double b[3])
 {
     const double off[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
     return sqrt(vector3_dot(off, off));
@@ -56,10 +56,10 @@ static void measure_face(session_coarse_face *f, double side)
 {
     double a[3], b[3];
     for (int axis = 0; axis < 3; axis++) {
-        a[axis] = f->places[2][axis] - f->places[0][axis];
-        b[axis] = f->places[f->count == 4 ? 3 : 2][axis] - f->places[1][axis];
+        a[axis] = f->corner_positions[2][axis] - f->corner_positions[0][axis];
+        b[axis] = f->corner_positions[f->count == 4 ? 3 : 2][axis] - f->corner_positions[1][axis];
     }
-    f->box = find_bounding_box((const double(*)[3])f->places, f->count);
+    f->box = find_bounding_box((const double(*)[3])f->corner_positions, f->count);
     vector3_cross(a, b, f->normal);
     f->area = sqrt(vector3_dot(f->normal, f->normal)) / 2;
     f->width = sqrt(fmax(vector3_dot(a, a), vector3_dot(b, b)));
@@ -79,7 +79,7 @@ static double find_cell_side(const grid *g, int64_t cell, const session_coarse_f
     }
     for (int axis = 0; axis < 3; axis++) {
         off[axis] = -sums[axis] / (double)count;
-        for (int i = 0; i < f->count; i++) off[axis] += f->places[i][axis] / f->count;
+        for (int i = 0; i < f->count; i++) off[axis] += f->corner_positions[i][axis] / f->count;
     }
     const double along = vector3_dot(f->normal, off);
     return (along > 0) - (along < 0);
@@ -93,10 +93,10 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
     out->count = (int)loop.size;
     for (int i = 0; i < out->count; i++) {
         out->vertices[i] = session_face_vertex(&loop, i);
-        grid_vertex(g, out->vertices[i], out->places[i]);
+        grid_vertex(g, out->vertices[i], out->corner_positions[i]);
     }
-    out->box = find_bounding_box((const double(*)[3])out->places, out->count);
-    out->reach = session_place_distance(out->box.lower, out->box.upper);
+    out->box = find_bounding_box((const double(*)[3])out->corner_positions, out->count);
+    out->diameter = session_distance_to_face(out->box.lower, out->box.upper);
     return true;
 }
 
@@ -104,20 +104,21 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
 static bool is_beyond(const session_face_outline *f, const double place[3], const double direction[3], double slack)
 {
     const double at = vector3_dot(direction, place), most = slack * sqrt(vector3_dot(direction, direction));
-    double low = vector3_dot(direction, f->places[0]), high = low;
+    double low = vector3_dot(direction, f->corner_positions[0]), high = low;
     for (int i = 1; i < f->count; i++) {
-        const double corner = vector3_dot(direction, f->places[i]);
+        const double corner = vector3_dot(direction, f->corner_positions[i]);
         low = fmin(low, corner);
         high = fmax(high, corner);
     }
     return at < low - most || at > high + most;
 }
 
-bool session_may_hold(const session_face_outline *f, const double place[3], double slack)
+bool session_may_contain(const session_face_outline *f, const double place[3], double slack)
 {
     double edges[4][3], normal[3], across[3];
     for (int i = 0; i < f->count; i++)
-        for (int axis = 0; axis < 3; axis++) edges[i][axis] = f->places[(i + 1) % f->count][axis] - f->places[i][axis];
+        for (int axis = 0; axis < 3; axis++)
+            edges[i][axis] = f->corner_positions[(i + 1) % f->count][axis] - f->corner_positions[i][axis];
     vector3_cross(edges[0], edges[1], normal);
     if (is_beyond(f, place, normal, slack)) return false;
     for (int i = 0; i < f->count; i++) {
@@ -133,18 +134,18 @@ bool session_read_coarse_face(const grid *g, const session_face *face, session_c
     int least = 0;
     if (!session_read_outline(g, face, &outline)) return false;
     const int count = outline.count;
-    const double(*places)[3] = (const double(*)[3])outline.places;
+    const double(*places)[3] = (const double(*)[3])outline.corner_positions;
     for (int i = 0; i < count; i++) {
         for (int k = 0; k < i; k++)
-            if (session_compare_places(places[k], places[i]) == 0) return false;
-        if (session_compare_places(places[i], places[least]) < 0) least = i;
+            if (session_compare_positions(places[k], places[i]) == 0) return false;
+        if (session_compare_positions(places[i], places[least]) < 0) least = i;
     }
     const int step =
-        session_compare_places(places[(least + count - 1) % count], places[(least + 1) % count]) < 0 ? count - 1 : 1;
+        session_compare_positions(places[(least + count - 1) % count], places[(least + 1) % count]) < 0 ? count - 1 : 1;
     out->count = count;
     for (int i = 0; i < 4; i++) {
         const int from = (least + step * (i < count ? i : count - 1)) % count;
-        memcpy(out->places[i], places[from], sizeof places[from]);
+        memcpy(out->corner_positions[i], places[from], sizeof places[from]);
         vertices[i] = outline.vertices[from];
     }
     measure_face(out, 1);
@@ -158,14 +159,14 @@ void session_pack_coarse_face(const session_coarse_face *face, uint64_t words[SE
     session_coarse_face other = *face;
     measure_face(&other, 1);
     const double along = vector3_dot(other.normal, face->normal);
-    memcpy(words, face->places, sizeof face->places);
+    memcpy(words, face->corner_positions, sizeof face->corner_positions);
     words[SESSION_FACE_WORDS - 1] = (uint64_t)(4 * face->count + (along > 0) - (along < 0));
 }
 
 void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], session_coarse_face *out)
 {
     const int64_t last = (int64_t)words[SESSION_FACE_WORDS - 1];
-    memcpy(out->places, words, sizeof out->places);
+    memcpy(out->corner_positions, words, sizeof out->corner_positions);
     out->count = (int)((last + 1) / 4);
     measure_face(out, (double)(last - 4 * out->count));
 }
@@ -174,7 +175,7 @@ bool session_is_larger_face(const session_coarse_face *a, const session_coarse_f
 {
     if (a->area != b->area) return a->area > b->area;
     for (int i = 0; i < 4; i++) {
-        const int sign = session_compare_places(a->places[i], b->places[i]);
+        const int sign = session_compare_positions(a->corner_positions[i], b->corner_positions[i]);
         if (sign) return sign < 0;
     }
     return false;
@@ -185,7 +186,7 @@ bool session_is_larger_face(const session_coarse_face *a, const session_coarse_f
 bool session_is_at_corner(const session_coarse_face *face, const double place[3], double slack)
 {
     for (int i = 0; i < face->count; i++)
-        if (session_place_distance(face->places[i], place) <= slack) return true;
+        if (session_distance_to_face(face->corner_positions[i], place) <= slack) return true;
     return false;
 }
 
@@ -200,8 +201,9 @@ static void evaluate_face(const session_coarse_face *f, const double at[2], doub
 {
     const double bent = f->count == 4;
     for (int axis = 0; axis < 3; axis++) {
-        const double a = f->places[0][axis], b = f->places[1][axis], d = f->places[f->count - 1][axis];
-        const double c = bent > 0 ? f->places[2][axis] : b + d - a;
+        const double a = f->corner_positions[0][axis], b = f->corner_positions[1][axis],
+                     d = f->corner_positions[f->count - 1][axis];
+        const double c = bent > 0 ? f->corner_positions[2][axis] : b + d - a;
         slopes[0][axis] = (1 - at[1]) * (b - a) + at[1] * (c - d);
         slopes[1][axis] = (1 - at[0]) * (d - a) + at[0] * (c - b);
         out[axis] = (1 - at[1]) * (a + at[0] * (b - a)) + at[1] * (d + at[0] * (c - d));
@@ -228,7 +230,7 @@ static bool solve_face_coordinates(const session_coarse_face *f, const double pl
     return true;
 }
 
-bool session_find_on_face(const session_coarse_face *f, const double place[3], double slack, double weights[4])
+bool session_find_weights(const session_coarse_face *f, const double place[3], double slack, double weights[4])
 {
     double at[2], on[3], slopes[2][3];
     for (int axis = 0; axis < 3; axis++)
@@ -237,7 +239,7 @@ bool session_find_on_face(const session_coarse_face *f, const double place[3], d
     for (int k = 0; k < 2; k++) at[k] = round_coordinate(at[k]);
     const double u = at[0], w = at[1];
     evaluate_face(f, at, on, slopes);
-    if (!(u >= 0 && u <= 1 && w >= 0 && w <= 1 && session_place_distance(on, place) <= slack)) return false;
+    if (!(u >= 0 && u <= 1 && w >= 0 && w <= 1 && session_distance_to_face(on, place) <= slack)) return false;
     if (f->count == 4) {
         const double bilinear[4] = {(1 - u) * (1 - w), u * (1 - w), u * w, (1 - u) * w};
         memcpy(weights, bilinear, sizeof bilinear);

@@ -9,7 +9,7 @@ typedef struct session_coarse_face {
     int count; /* number of corners: 3 or 4 */
     /* corners in loop order, beginning with the least one and continuing to the lesser of its neighbours; a triangle's
      * fourth corner equals its third */
-    double places[4][3];
+    double corner_positions[4][3];
     double normal[3]; /* unit vector that points away from the cell */
     session_box box;
     double area, width;
@@ -21,16 +21,16 @@ enum { SESSION_FACE_WORDS = 13 };
 typedef struct session_face_outline {
     int count;
     int64_t vertices[4]; /* vertices in the order in which the cell has them */
-    double places[4][3];
+    double corner_positions[4][3];
     session_box box;
-    double reach; /* upper bound of the distance between any two corners */
+    double diameter; /* upper bound of the distance between any two corners */
 } session_face_outline;
 
 /* Reads the outline of a face. Returns false if the face is not a triangle or quad of a cell with volume. */
 bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out);
 /* Returns whether a position in the outline's box may be within `slack` of the face. It returns false if the position
  * is beyond all corners of the face, either along its normal or across one of its edges. */
-bool session_may_hold(const session_face_outline *outline, const double place[3], double slack);
+bool session_may_contain(const session_face_outline *outline, const double place[3], double slack);
 
 /* Reads a face. *vertices receives its vertices in the order of out->places. Returns false if the face is not a
  * triangle or quad of a cell with volume, or if its area is 0. */
@@ -45,15 +45,15 @@ bool session_is_at_corner(const session_coarse_face *face, const double place[3]
 
 /* Computes the corners' weights at a position on the face; the fourth weight of a triangle is 0. Returns false if the
  * position is farther than `slack` from the face. */
-bool session_find_on_face(const session_coarse_face *face, const double place[3], double slack, double weights[4]);
+bool session_find_weights(const session_coarse_face *face, const double place[3], double slack, double weights[4]);
 
 /* Returns an upper bound of the rounding errors of the mesh's coordinates; 0 if mesh is NULL. */
-double session_place_rounding(const session_mesh *mesh);
+double session_position_rounding(const session_mesh *mesh);
 
-double session_place_distance(const double a[3], const double b[3]);
+double session_distance_to_face(const double a[3], const double b[3]);
 
 /* Defines an order of positions, and an order of faces by area and then by positions. */
-int session_compare_places(const double a[3], const double b[3]);
+int session_compare_positions(const double a[3], const double b[3]);
 bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b);
 
 #endif

@@ -177,16 +177,16 @@ static insitu_status exchange_boxes(cover_search *s, const session_meshes *meshe
     session_mail out = {0}, in = {0};
     const session_box own = common_box(meshes);
     session_box *commons = base_alloc((size_t)s->team->ranks * sizeof *commons);
-    if (!commons) session_no_memory(error, s->team->ranks * (int64_t)sizeof *commons, "boxes of blocks");
+    if (!commons) session_fail_for_memory(error, s->team->ranks * (int64_t)sizeof *commons, "boxes of blocks");
     insitu_status status = session_agree(s->team->comm, error);
     if (!status)
-        status =
-            session_mpi(error, MPI_Allgather(&own, sizeof own, MPI_BYTE, commons, sizeof own, MPI_BYTE, s->team->comm),
-                        "MPI_Allgather");
+        status = session_check_mpi(
+            error, MPI_Allgather(&own, sizeof own, MPI_BYTE, commons, sizeof own, MPI_BYTE, s->team->comm),
+            "MPI_Allgather");
     if (!status && !pack_boxes(s, commons, &out))
-        session_no_memory(error, s->count * (int64_t)sizeof *s->boxes, "boxes of blocks");
+        session_fail_for_memory(error, s->count * (int64_t)sizeof *s->boxes, "boxes of blocks");
     if (!status) status = session_mail_exchange(s->team->comm, &out, &in, error);
-    if (!status && !receive_boxes(s, &in)) session_no_memory(error, in.total * 8, "boxes of blocks");
+    if (!status && !receive_boxes(s, &in)) session_fail_for_memory(error, in.total * 8, "boxes of blocks");
     session_mail_free(&out);
     session_mail_free(&in);
     base_free(commons);
@@ -266,7 +266,7 @@ static bool find_covered_cells(const cover_search *s, session_mesh *mesh, unsign
     int64_t near, first[3], end[3];
     find_box_bounds(&box, lower, upper);
     *out = NULL;
-    mesh->misfit = (session_misfit){.is_any = false};
+    mesh->misfit = (session_misfit){.exists = false};
     session_bin_walk walk = session_walk_bins(&s->finer.bins, lower, upper, s->finer.widest);
     while (session_next_binned(&walk, &near)) {
         const session_level_box *fine = &s->boxes[s->finer.boxes[near]];
@@ -302,11 +302,11 @@ static bool update_block(const cover_search *s, session_meshes *meshes, session_
     if (covered) add_caller_ghosts(mesh, s->team->threads, covered);
     const bool is_same =
         !covered == !mesh->covered && (!covered || memcmp(covered, mesh->covered, (size_t)mesh->given.cell_count) == 0);
-    if (!is_same) session_renew_cells(meshes, mesh);
+    if (!is_same) session_drop_cell_data(meshes, mesh);
     base_free(mesh->covered);
     mesh->covered = covered;
     session_read_topology(mesh);
-    if (mesh->misfit.is_any) mesh->is_check_stale = true;
+    if (mesh->misfit.exists) mesh->is_check_stale = true;
     return true;
 }
 
@@ -314,12 +314,13 @@ insitu_status session_update_covers(session_meshes *meshes, const session_team *
 {
     cover_search s = {.team = team};
     if (!list_own_boxes(meshes, &s))
-        session_no_memory(error, meshes->count * (int64_t)sizeof *s.boxes, "boxes of blocks");
+        session_fail_for_memory(error, meshes->count * (int64_t)sizeof *s.boxes, "boxes of blocks");
     insitu_status status = exchange_boxes(&s, meshes, error);
     bool is_done = !status && !error->status && bin_boxes(s.boxes, s.count, false, &s.finer);
     for (int i = 0; i < meshes->count && is_done; i++)
         if (is_level_block(meshes->items[i])) is_done = update_block(&s, meshes, meshes->items[i]);
-    if (!status && !error->status && !is_done) session_no_memory(error, s.count * 100, "cells that finer blocks cover");
+    if (!status && !error->status && !is_done)
+        session_fail_for_memory(error, s.count * 100, "cells that finer blocks cover");
     if (is_done) {
         base_free(meshes->level_boxes);
         meshes->level_boxes = s.boxes;
@@ -398,7 +399,7 @@ insitu_status session_drop_faces_between_levels(const session_meshes *meshes, co
     bool has_levels = false;
     for (int i = 0; i < count; i++) has_levels = has_levels || is_level_block(parts[i].mesh);
     if (has_levels && !bin_boxes(meshes->level_boxes, meshes->level_box_count, true, &bins))
-        session_no_memory(error, meshes->level_box_count * 32, "faces between levels");
+        session_fail_for_memory(error, meshes->level_box_count * 32, "faces between levels");
     for (int i = 0; i < count && has_levels && !error->status; i++)
         if (is_level_block(parts[i].mesh) && !session_is_plane(parts[i].mesh->given.lattice) &&
             !parts[i].outer->threshold.is_given)

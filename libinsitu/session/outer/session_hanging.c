@@ -29,25 +29,25 @@ enum { MOST_ROUNDS = 64 };
 
 typedef struct searched_face {
     session_coarse_face face;
-    int64_t groups[4]; /* the groups of the corners if the face is this rank's own; all -1 if it was received */
-    int source;        /* the rank that sent the face */
-    int64_t number;    /* index of the face in that rank's message */
+    int64_t groups[4];     /* the groups of the corners if the face is this rank's own; all -1 if it was received */
+    int source_rank;       /* the rank that sent the face */
+    int64_t message_index; /* index of the face in that rank's message */
 } searched_face;
 
 /* A vertex that may hang, and the faces that were found at its position. */
 typedef struct candidate {
-    double place[3];
+    double position[3];
     int64_t group;
     /* heads of two linked lists of contacts: with the faces on which the vertex lies, and with the faces of which it is
      * a corner; -1: the list is empty */
-    int64_t hits, corners;
+    int64_t hit_list, corner_list;
     int64_t face; /* the face on which the vertex hangs; -1: it does not hang */
     double weights[4];
 } candidate;
 
 /* A face at a candidate's position, and the index of the contact that precedes it in the list. */
 typedef struct contact {
-    int64_t face, last;
+    int64_t face, next_contact;
     double weights[4]; /* set if the candidate is not a corner of the face */
 } contact;
 
@@ -115,20 +115,20 @@ static bool list_part_faces(const session_joint_parts *parts, int first, int cou
 static insitu_status update_mesh_borders(const session_joint *joint, int m, const session_joint_parts *parts,
                                          const session_team *team, base_error *error)
 {
-    const int first = parts->firsts[m], count = parts->firsts[m + 1] - first;
+    const int first = parts->first_parts[m], count = parts->first_parts[m + 1] - first;
     session_border *borders = joint->hanging.borders + first;
     session_outer *outers = base_calloc((size_t)count + 1, sizeof *outers);
     session_face_part *of = base_calloc((size_t)count + 1, sizeof *of);
     for (int i = 0; i < count && outers && of; i++) of[i].outer = &outers[i];
     if (!outers || !of || !list_part_faces(parts, first, count, of))
-        session_no_memory(error, count * 100LL, "hanging vertices");
+        session_fail_for_memory(error, count * 100LL, "hanging vertices");
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = session_find_outer_faces(of, count, &joint->meshes[m]->homes, team, error);
     for (int i = 0; i < count && !status && !error->status; i++)
         if (!store_border(of[i].mesh, &outers[i], of[i].is_border, &borders[i]))
-            session_no_memory(error, of[i].mesh->cells.vertex_count * 8, "hanging vertices");
+            session_fail_for_memory(error, of[i].mesh->cells.vertex_count * 8, "hanging vertices");
     if (!status) status = session_agree(team->comm, error);
-    for (int i = 0; i < count && !status; i++) borders[i].cells = joint->meshes[m]->cells;
+    for (int i = 0; i < count && !status; i++) borders[i].cells_hash = joint->meshes[m]->cells_hash;
     for (int i = 0; i < count && of && outers; i++) {
         session_drop_outer(&outers[i], true);
         base_free(of[i].is_border);
@@ -154,27 +154,27 @@ static insitu_status find_stale_borders(const session_joint *joint, const sessio
                                         const session_team *team, int *stale, base_error *error)
 {
     for (int m = 0; m < joint->count; m++)
-        for (int i = parts->firsts[m]; i < parts->firsts[m + 1]; i++)
-            if (joint->hanging.borders[i].cells != joint->meshes[m]->cells) stale[m] = 1;
-    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, joint->count, MPI_INT, MPI_MAX, team->comm),
-                       "MPI_Allreduce");
+        for (int i = parts->first_parts[m]; i < parts->first_parts[m + 1]; i++)
+            if (joint->hanging.borders[i].cells_hash != joint->meshes[m]->cells_hash) stale[m] = 1;
+    return session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, joint->count, MPI_INT, MPI_MAX, team->comm),
+                             "MPI_Allreduce");
 }
 
 insitu_status session_update_borders(session_joint *joint, const session_joint_parts *parts, const session_team *team,
                                      base_error *error)
 {
     session_hanging *hanging = &joint->hanging;
-    if (hanging->borders && hanging->twins == joint->places) return INSITU_OK;
+    if (hanging->borders && hanging->twins_version == joint->positions_hash) return INSITU_OK;
     int *stale = base_calloc((size_t)joint->count, sizeof *stale);
     if (!stale || !make_borders(hanging, parts->count))
-        session_no_memory(error, parts->count * (int64_t)sizeof *hanging->borders, "hanging vertices");
+        session_fail_for_memory(error, parts->count * (int64_t)sizeof *hanging->borders, "hanging vertices");
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = find_stale_borders(joint, parts, team, stale, error);
     for (int m = 0; m < joint->count && !status; m++)
         if (stale[m]) status = update_mesh_borders(joint, m, parts, team, error);
     if (!status && session_has_twins(joint)) status = session_find_twins(joint, parts, team, error);
     if (!status) status = session_agree(team->comm, error);
-    if (!status) hanging->twins = joint->places;
+    if (!status) hanging->twins_version = joint->positions_hash;
     base_free(stale);
     return status;
 }
@@ -195,11 +195,11 @@ static bool list_candidates(hanging_search *s)
     }
     for (int m = 0; m < basis->part_count; m++)
         for (int64_t i = 0; i < borders[m].vertex_count; i++) {
-            const int64_t v = borders[m].vertices[i], group = basis->of_vertex[basis->firsts[m] + v];
+            const int64_t v = borders[m].vertices[i], group = basis->group_of_vertex[basis->first_vertices[m] + v];
             if (group < 0 || is_listed[group]) continue;
             candidate *c = &s->candidates[s->candidate_count++];
-            *c = (candidate){.group = group, .hits = -1, .corners = -1, .face = -1};
-            grid_vertex(&basis->meshes[m]->cells, v, c->place);
+            *c = (candidate){.group = group, .hit_list = -1, .corner_list = -1, .face = -1};
+            grid_vertex(&basis->meshes[m]->cells, v, c->position);
             is_listed[group] = 1;
         }
     base_free(is_listed);
@@ -208,7 +208,7 @@ static bool list_candidates(hanging_search *s)
 
 static bool bin_candidates(hanging_search *s)
 {
-    return session_bins_create(&s->bins, s->candidates->place, (int64_t)sizeof *s->candidates, s->candidate_count);
+    return session_bins_create(&s->bins, s->candidates->position, (int64_t)sizeof *s->candidates, s->candidate_count);
 }
 
 /* ---- faces: outlines rule most of them out, so that few are read ------------------------------------------------- */
@@ -230,7 +230,7 @@ static bool do_boxes_intersect(const session_box *a, const session_box *b, doubl
 static bool is_own(const hanging_search *s, int m, const session_face_outline *f, const candidate *c)
 {
     for (int i = 0; i < f->count; i++)
-        if (s->basis->of_vertex[s->basis->firsts[m] + f->vertices[i]] == c->group) return true;
+        if (s->basis->group_of_vertex[s->basis->first_vertices[m] + f->vertices[i]] == c->group) return true;
     return false;
 }
 
@@ -249,8 +249,9 @@ static bool has_candidate(const hanging_search *s, int m, const session_face_out
     int64_t near;
     while (session_next_binned(&walk, &near)) {
         const candidate *c = &s->candidates[near];
-        if (!is_in_box(&f->box, c->place, slack)) continue;
-        if ((is_hit ? c->hits >= 0 : !is_own(s, m, f, c)) && session_may_hold(f, c->place, slack)) return true;
+        if (!is_in_box(&f->box, c->position, slack)) continue;
+        if ((is_hit ? c->hit_list >= 0 : !is_own(s, m, f, c)) && session_may_contain(f, c->position, slack))
+            return true;
     }
     return false;
 }
@@ -259,7 +260,7 @@ static bool intersects_rank_box(const hanging_search *s, const session_box *box,
 {
     const session_homes *homes = s->basis->joint->homes;
     for (int n = 0; n < homes->near_count; n++)
-        if (homes->near[n] != s->team->rank && do_boxes_intersect(box, &homes->boxes[n], slack)) return true;
+        if (homes->near_ranks[n] != s->team->rank && do_boxes_intersect(box, &homes->boxes[n], slack)) return true;
     return false;
 }
 
@@ -267,7 +268,8 @@ static bool is_face_needed(const hanging_search *s, int m, const session_face *f
 {
     session_face_outline f;
     if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
-    const double slack = place_slack * f.reach + s->rounding; /* at least as large as the result of find_face_slack() */
+    const double slack =
+        place_slack * f.diameter + s->rounding; /* at least as large as the result of find_face_slack() */
     return has_candidate(s, m, &f, slack, is_hit) || (!is_hit && intersects_rank_box(s, &f.box, slack));
 }
 
@@ -284,8 +286,8 @@ static bool read_face(hanging_search *s, int m, const session_face *face)
     }
     searched_face *f = &s->faces[s->face_count];
     if (!session_read_coarse_face(&s->basis->meshes[m]->cells, face, &f->face, vertices)) return true;
-    for (int k = 0; k < 4; k++) f->groups[k] = s->basis->of_vertex[s->basis->firsts[m] + vertices[k]];
-    f->source = s->team->rank;
+    for (int k = 0; k < 4; k++) f->groups[k] = s->basis->group_of_vertex[s->basis->first_vertices[m] + vertices[k]];
+    f->source_rank = s->team->rank;
     s->face_count++;
     return true;
 }
@@ -343,7 +345,7 @@ static void write_faces(const hanging_search *s, session_mail *mail, int64_t *se
     mail->total = 0;
     for (int n = 0; n < homes->near_count; n++) {
         const int64_t first = mail->total;
-        for (int64_t i = 0; i < s->own_count && homes->near[n] != s->team->rank; i++) {
+        for (int64_t i = 0; i < s->own_count && homes->near_ranks[n] != s->team->rank; i++) {
             const session_coarse_face *f = &s->faces[i].face;
             if (!do_boxes_intersect(&f->box, &homes->boxes[n], find_face_slack(s, f))) continue;
             if (mail->words) {
@@ -352,7 +354,7 @@ static void write_faces(const hanging_search *s, session_mail *mail, int64_t *se
             }
             mail->total += SESSION_FACE_WORDS;
         }
-        mail->counts[homes->near[n]] = mail->total - first;
+        mail->counts[homes->near_ranks[n]] = mail->total - first;
     }
 }
 
@@ -382,8 +384,8 @@ static bool receive_faces(hanging_search *s, const session_mail *in)
             searched_face *f = &faces[s->face_count++];
             session_unpack_coarse_face(in->words + SESSION_FACE_WORDS * at, &f->face);
             for (int i = 0; i < 4; i++) f->groups[i] = -1;
-            f->source = rank;
-            f->number = number;
+            f->source_rank = rank;
+            f->message_index = number;
         }
     return true;
 }
@@ -401,7 +403,7 @@ static bool add_contact(hanging_search *s, int64_t number, const double weights[
         s->contact_room = room;
     }
     contact *c = &s->contacts[s->contact_count];
-    *c = (contact){.face = number, .last = *last};
+    *c = (contact){.face = number, .next_contact = *last};
     if (weights) memcpy(c->weights, weights, sizeof c->weights);
     *last = s->contact_count++;
     return true;
@@ -414,8 +416,9 @@ static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
     const session_coarse_face *f = &s->faces[number].face;
     const double slack = find_face_slack(s, f);
     double weights[4];
-    if (session_is_at_corner(f, c->place, slack) || !session_find_on_face(f, c->place, slack, weights)) return true;
-    return add_contact(s, number, weights, &c->hits);
+    if (session_is_at_corner(f, c->position, slack) || !session_find_weights(f, c->position, slack, weights))
+        return true;
+    return add_contact(s, number, weights, &c->hit_list);
 }
 
 /* Adds the face to the list of faces that have the candidate as a corner, if it has, and if the candidate lies on some
@@ -423,8 +426,8 @@ static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
 static bool test_face_corner(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
-    if (c->hits < 0 || !session_is_at_corner(f, c->place, find_face_slack(s, f))) return true;
-    return add_contact(s, number, NULL, &c->corners);
+    if (c->hit_list < 0 || !session_is_at_corner(f, c->position, find_face_slack(s, f))) return true;
+    return add_contact(s, number, NULL, &c->corner_list);
 }
 
 typedef bool try_function(hanging_search *s, int64_t number, candidate *c);
@@ -446,7 +449,7 @@ static bool test_faces(hanging_search *s, try_function *try_one)
 static double largest_opposite_area(const hanging_search *s, const candidate *c, const session_coarse_face *f)
 {
     double area = 0;
-    for (int64_t i = c->corners; i >= 0; i = s->contacts[i].last) {
+    for (int64_t i = c->corner_list; i >= 0; i = s->contacts[i].next_contact) {
         const session_coarse_face *other = &s->faces[s->contacts[i].face].face;
         if (vector3_dot(f->normal, other->normal) < opposite) area = fmax(area, other->area);
     }
@@ -455,7 +458,7 @@ static double largest_opposite_area(const hanging_search *s, const candidate *c,
 
 static void choose_face(const hanging_search *s, candidate *c)
 {
-    for (int64_t i = c->hits; i >= 0; i = s->contacts[i].last) {
+    for (int64_t i = c->hit_list; i >= 0; i = s->contacts[i].next_contact) {
         const session_coarse_face *f = &s->faces[s->contacts[i].face].face;
         const double area = largest_opposite_area(s, c, f);
         if (!(area > 0 && f->area > least_ratio * area)) continue;
@@ -490,8 +493,8 @@ static bool request_faces(const hanging_search *s, session_mail *wanted, int64_t
     for (int64_t i = s->own_count; i < s->face_count; i++) { /* these faces are sorted by rank */
         if (first[i] < 0) continue;
         first[i] = 4 * wanted->total;
-        wanted->words[wanted->total++] = (uint64_t)s->faces[i].number;
-        wanted->counts[s->faces[i].source]++;
+        wanted->words[wanted->total++] = (uint64_t)s->faces[i].message_index;
+        wanted->counts[s->faces[i].source_rank]++;
     }
     return true;
 }
@@ -545,16 +548,16 @@ static insitu_status find_hanging_vertices(hanging_search *s, session_hanging *o
     session_mail faces = {0}, in = {0}, wanted = {0}, requests = {0};
     int64_t *sent = NULL, *firsts = NULL;
     if (!error->status && !pack_faces(s, &faces, &sent))
-        session_no_memory(error, s->own_count * 96, "hanging vertices");
+        session_fail_for_memory(error, s->own_count * 96, "hanging vertices");
     insitu_status status = session_mail_deliver(s->team->comm, SESSION_MAIL_THERE, &faces, &in, error);
     if (!status && !error->status) {
         const bool is_done = receive_faces(s, &in) && find_contacts(s) && request_faces(s, &wanted, &firsts) &&
                              store_vertices(s, firsts, out);
-        if (!is_done) session_no_memory(error, s->face_count * 150, "hanging vertices");
+        if (!is_done) session_fail_for_memory(error, s->face_count * 150, "hanging vertices");
     }
     if (!status) status = session_mail_deliver(s->team->comm, SESSION_MAIL_BACK, &wanted, &requests, error);
     if (!status && !error->status && !store_requests(s, &faces, sent, &requests, out))
-        session_no_memory(error, requests.total * 32, "hanging vertices");
+        session_fail_for_memory(error, requests.total * 32, "hanging vertices");
     session_mail_free(&faces);
     session_mail_free(&in);
     session_mail_free(&wanted);
@@ -567,8 +570,8 @@ static insitu_status find_hanging_vertices(hanging_search *s, session_hanging *o
 static insitu_status count_hanging_vertices(const session_team *team, session_hanging *out, base_error *error)
 {
     int64_t count = out->count;
-    const insitu_status status =
-        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT64_T, MPI_SUM, team->comm), "MPI_Allreduce");
+    const insitu_status status = session_check_mpi(
+        error, MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT64_T, MPI_SUM, team->comm), "MPI_Allreduce");
     out->total = count;
     return status;
 }
@@ -577,12 +580,12 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
 {
     session_joint *joint = basis->joint;
     hanging_search search = {.basis = basis, .team = team};
-    session_hanging found = {.places = joint->places};
-    if (joint->hanging.places == joint->places) return INSITU_OK;
+    session_hanging found = {.positions_hash = joint->positions_hash};
+    if (joint->hanging.positions_hash == joint->positions_hash) return INSITU_OK;
     for (int i = 0; i < basis->part_count; i++)
-        search.rounding = fmax(search.rounding, session_place_rounding(basis->meshes[i]));
+        search.rounding = fmax(search.rounding, session_position_rounding(basis->meshes[i]));
     if (!list_candidates(&search) || !bin_candidates(&search) || !read_own_faces(&search))
-        session_no_memory(error, (search.own_count + basis->group_count) * 200, "hanging vertices");
+        session_fail_for_memory(error, (search.own_count + basis->group_count) * 200, "hanging vertices");
     insitu_status status = find_hanging_vertices(&search, &found, error);
     search_free(&search);
     if (!status) status = session_agree(team->comm, error);
@@ -594,7 +597,7 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
     session_hanging_free(&joint->hanging, false);
     found.borders = joint->hanging.borders;
     found.border_count = joint->hanging.border_count;
-    found.twins = joint->hanging.twins;
+    found.twins_version = joint->hanging.twins_version;
     joint->hanging = found;
     return INSITU_OK;
 }
@@ -627,7 +630,7 @@ static insitu_status exchange_and_constrain(const session_hanging *hanging, cons
     insitu_status status = INSITU_OK;
     if (team->ranks > 1) {
         out.words = base_alloc((size_t)(out.total + 1) * sizeof *out.words);
-        if (!out.words) session_no_memory(error, out.total * 8, "values at hanging vertices");
+        if (!out.words) session_fail_for_memory(error, out.total * 8, "values at hanging vertices");
         for (int64_t i = 0; i < out.total && out.words; i++)
             memcpy(&out.words[i], &means[hanging->sent_groups[i]], sizeof out.words[i]);
         status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, &out, &in, error);
@@ -637,8 +640,8 @@ static insitu_status exchange_and_constrain(const session_hanging *hanging, cons
     if (status) return status;
     *is_changed = apply_constraints(hanging, (const double *)(const void *)in.words, means);
     session_mail_free(&in);
-    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, is_changed, 1, MPI_INT, MPI_MAX, team->comm),
-                       "MPI_Allreduce");
+    return session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, is_changed, 1, MPI_INT, MPI_MAX, team->comm),
+                             "MPI_Allreduce");
 }
 
 insitu_status session_constrain_hanging(const session_hanging *hanging, const session_team *team, double *means,

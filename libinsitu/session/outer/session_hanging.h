@@ -24,8 +24,8 @@ typedef struct session_hanging_basis {
     session_joint *joint;
     int part_count;
     const session_mesh *const *meshes; /* the parts of the joint's meshes on this rank */
-    const int64_t *firsts;             /* for each part, the number of its first vertex */
-    const int64_t *of_vertex;          /* for each vertex, its group; -1: it belongs to no drawn cell */
+    const int64_t *first_vertices;     /* for each part, the number of its first vertex */
+    const int64_t *group_of_vertex;    /* for each vertex, its group; -1: it belongs to no drawn cell */
     int64_t group_count;
 } session_hanging_basis;
 

@@ -172,7 +172,7 @@ static void add_face(const xor_table *x, const session_face_loop *loop)
     if (vertices < 3) return;
     for (int64_t i = 0; i < loop->size; i++)
         if (is_first_occurrence(p, loop, i))
-            add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix(sum), x->is_shared);
+            add_xor(&x->vertex_sums[session_face_vertex(loop, i)], session_mix_bits(sum), x->is_shared);
 }
 
 /* Adds the hashes of all faces of a cell whose type has a table of faces. If two of its vertices have the same hash,
@@ -190,7 +190,7 @@ static inline bool add_cell(const xor_table *x, const session_face_table *table,
         const signed char *places = table->vertices[f];
         const bool is_quad = places[3] >= 0;
         const uint64_t sum = hashes[(int)places[0]] + hashes[(int)places[1]] + hashes[(int)places[2]];
-        const uint64_t hash = session_mix(is_quad ? sum + hashes[(int)places[3]] : sum);
+        const uint64_t hash = session_mix_bits(is_quad ? sum + hashes[(int)places[3]] : sum);
         for (int i = 0; i < 3; i++) sums[(int)places[i]] ^= hash;
         if (is_quad) sums[(int)places[3]] ^= hash;
     }
@@ -253,10 +253,10 @@ static void cancel_faces(const face_search *s)
 
 /* The faces found in some of the cells. */
 typedef struct face_list {
-    int64_t count, room;
+    int64_t count, capacity;
     found_face *faces;
     session_key *keys;
-    bool is_lost; /* set if memory ran out */
+    bool is_out_of_memory; /* set if memory ran out */
 } face_list;
 
 static void face_list_free(face_list *list)
@@ -267,15 +267,15 @@ static void face_list_free(face_list *list)
 
 static bool face_list_reserve(face_list *list)
 {
-    if (list->count < list->room) return true;
-    const int64_t room = list->room * 2 + 1024;
+    if (list->count < list->capacity) return true;
+    const int64_t room = list->capacity * 2 + 1024;
     found_face *faces = base_realloc(list->faces, (size_t)room * sizeof *faces);
     if (faces) list->faces = faces;
     session_key *keys = base_realloc(list->keys, (size_t)room * sizeof *keys);
     if (keys) list->keys = keys;
-    list->is_lost = !faces || !keys;
-    if (!list->is_lost) list->room = room;
-    return !list->is_lost;
+    list->is_out_of_memory = !faces || !keys;
+    if (!list->is_out_of_memory) list->capacity = room;
+    return !list->is_out_of_memory;
 }
 
 static bool is_open_face(const part_cells *p, const session_face_loop *loop)
@@ -329,7 +329,7 @@ static bool join_lists(face_search *s, const face_list *lists, int count)
 {
     int64_t total = 0;
     for (int i = 0; i < count; i++) {
-        if (lists[i].is_lost) return false;
+        if (lists[i].is_out_of_memory) return false;
         total += lists[i].count;
     }
     s->faces = base_alloc((size_t)total * sizeof *s->faces);
@@ -445,8 +445,8 @@ static insitu_status search_own_faces(face_search *s, bool by_id, base_error *er
     }
     is_done = is_done && collect_faces(s) && count_keys(s->keys, s->count, &s->groups, &s->sizes);
     if (!is_done)
-        return session_no_memory(error, s->vertex_count * (9 + 8 * s->table_count) + (int64_t)(s->mask + 1) * 8,
-                                 "outer faces");
+        return session_fail_for_memory(error, s->vertex_count * (9 + 8 * s->table_count) + (int64_t)(s->mask + 1) * 8,
+                                       "outer faces");
     keep_single_faces(s);
     return INSITU_OK;
 }
@@ -473,7 +473,8 @@ static int find_face_home(const face_search *s, const session_homes *homes, int6
     }
     grid_vertex(p->grid, first, point[0]);
     const session_key key = session_vertex_key(s->parts[face->part].mesh, first, homes->by_id);
-    return session_home(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[number]), (int64_t)key.words[0]);
+    return session_find_home(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[number]),
+                             (int64_t)key.words[0]);
 }
 
 /* Packs the keys of the faces that lie in other ranks' boxes, sorted by their home ranks. *order receives the face of
@@ -545,7 +546,7 @@ static insitu_status exchange_keys(face_search *s, const session_mail *mail, con
     insitu_status status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, mail, &in, error);
     if (status) return status;
     if (!error->status && !count_received_keys(&in, team->ranks, &reply))
-        session_no_memory(error, in.total * 24, "faces that ranks share");
+        session_fail_for_memory(error, in.total * 24, "faces that ranks share");
     status = session_mail_deliver(team->comm, SESSION_MAIL_BACK, &reply, &answers, error);
     if (!status) status = session_agree(team->comm, error);
     if (!status) drop_shared_faces(s, &answers, order);
@@ -561,7 +562,7 @@ static insitu_status search_shared_faces(face_search *s, const session_homes *ho
     session_mail mail = {0};
     int64_t *order = NULL;
     if (!error->status && !pack_keys(s, homes, team->ranks, &mail, &order))
-        session_no_memory(error, s->count * 40, "faces that ranks share");
+        session_fail_for_memory(error, s->count * 40, "faces that ranks share");
     const insitu_status status = exchange_keys(s, &mail, order, team, error);
     session_mail_free(&mail);
     base_free(order);
@@ -590,7 +591,7 @@ static void store_outer_faces(const face_search *s, base_error *error)
         while (end < s->count && s->faces[end].part == part) end++;
         session_drop_outer(outer, true);
         outer->faces = base_alloc((size_t)(end - at + 1) * sizeof *outer->faces);
-        if (!outer->faces) session_no_memory(error, (end - at) * (int64_t)sizeof *outer->faces, "outer faces");
+        if (!outer->faces) session_fail_for_memory(error, (end - at) * (int64_t)sizeof *outer->faces, "outer faces");
         for (int64_t i = at; i < end && outer->faces; i++) outer->faces[i - at] = s->faces[i].face;
         outer->face_count = outer->faces ? end - at : 0;
         outer->are_faces_known = outer->faces != NULL;

@@ -17,7 +17,7 @@
 typedef struct corner_loop {
     int count;
     int64_t vertices[4];
-    double places[4][3];
+    double positions[4][3];
 } corner_loop;
 
 static int compare_places(const double a[3], const double b[3])
@@ -30,8 +30,8 @@ static int compare_places(const double a[3], const double b[3])
 static void add_corner(corner_loop *loop, int64_t vertex, const double place[3])
 {
     for (int i = 0; i < loop->count; i++)
-        if (compare_places(loop->places[i], place) == 0) return;
-    memcpy(loop->places[loop->count], place, 3 * sizeof *place);
+        if (compare_places(loop->positions[i], place) == 0) return;
+    memcpy(loop->positions[loop->count], place, 3 * sizeof *place);
     loop->vertices[loop->count++] = vertex;
 }
 
@@ -41,12 +41,13 @@ static void order_corners(corner_loop *loop)
     const int count = in.count;
     int least = 0;
     for (int i = 1; i < count; i++)
-        if (compare_places(in.places[i], in.places[least]) < 0) least = i;
-    const bool is_turned = compare_places(in.places[(least + count - 1) % count], in.places[(least + 1) % count]) < 0;
+        if (compare_places(in.positions[i], in.positions[least]) < 0) least = i;
+    const bool is_turned =
+        compare_places(in.positions[(least + count - 1) % count], in.positions[(least + 1) % count]) < 0;
     for (int i = 0; i < count; i++) {
         const int from = (least + (is_turned ? count - i : i)) % count;
         loop->vertices[i] = in.vertices[from];
-        memcpy(loop->places[i], in.places[from], sizeof in.places[from]);
+        memcpy(loop->positions[i], in.positions[from], sizeof in.positions[from]);
     }
 }
 
@@ -59,8 +60,8 @@ static void subtract(const double a[3], const double b[3], double out[3])
 static void find_normal(const corner_loop *loop, double out[3])
 {
     double a[3], b[3];
-    subtract(loop->places[loop->count == 4 ? 2 : 1], loop->places[0], a);
-    subtract(loop->places[loop->count - 1], loop->places[loop->count == 4 ? 1 : 0], b);
+    subtract(loop->positions[loop->count == 4 ? 2 : 1], loop->positions[0], a);
+    subtract(loop->positions[loop->count - 1], loop->positions[loop->count == 4 ? 1 : 0], b);
     for (int axis = 0; axis < 3; axis++) {
         const int next = (axis + 1) % 3, last = (axis + 2) % 3;
         out[axis] = a[next] * b[last] - a[last] * b[next];
@@ -71,7 +72,7 @@ static double measure_perimeter(const corner_loop *loop)
 {
     double sum = 0, side[3];
     for (int i = 0; i < loop->count; i++) {
-        subtract(loop->places[(i + 1) % loop->count], loop->places[i], side);
+        subtract(loop->positions[(i + 1) % loop->count], loop->positions[i], side);
         sum += sqrt(vector3_dot(side, side));
     }
     return sum;
@@ -92,7 +93,7 @@ static bool find_apex(const corner_loop *loop, const double inside[3], double ap
     const double length = sqrt(vector3_dot(normal, normal)), around = measure_perimeter(loop);
     if (!(length > 1e-12 * around * around)) return false;
     for (int i = 0; i < loop->count; i++)
-        for (int axis = 0; axis < 3; axis++) middle[axis] += loop->places[i][axis] / loop->count;
+        for (int axis = 0; axis < 3; axis++) middle[axis] += loop->positions[i][axis] / loop->count;
     subtract(inside, middle, towards);
     const bool is_below = vector3_dot(towards, normal) < -side_slack * around * length;
     const double height = 0.5 * around / loop->count * (is_below ? -1 : 1);
@@ -130,7 +131,7 @@ typedef struct face_polygon {
 typedef struct outer_work {
     const grid *cells;
     session_outer *out;
-    int64_t *places; /* for each vertex of the whole mesh, its index among the new vertices; -1: it has none yet */
+    int64_t *vertex_map; /* for each vertex of the whole mesh, its index among the new vertices; -1: it has none yet */
     float *heights;
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
     face_polygon polygon; /* buffer with space for the largest polygon */
@@ -147,7 +148,7 @@ static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, 
 
 static int64_t add_copied_vertex(outer_work *w, int64_t origin, const double place[3])
 {
-    int64_t *out = &w->places[origin];
+    int64_t *out = &w->vertex_map[origin];
     if (*out < 0) *out = add_vertex(w, place, origin, 0);
     return *out;
 }
@@ -160,7 +161,7 @@ static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex,
     w->pyramid_count += loop->count == 4;
     w->out->cell_origins[w->cell_count++] = origin;
     for (int i = 0; i < loop->count; i++)
-        w->out->connectivity[w->entry_count++] = add_copied_vertex(w, loop->vertices[i], loop->places[i]);
+        w->out->connectivity[w->entry_count++] = add_copied_vertex(w, loop->vertices[i], loop->positions[i]);
     w->out->connectivity[w->entry_count++] = apex;
 }
 
@@ -180,11 +181,12 @@ static bool polygon_triangle(const face_polygon *p, int i, corner_loop *out, dou
     *out = (corner_loop){.count = 3};
     for (int k = 0; k < 3; k++) {
         out->vertices[k] = p->vertices[p->triangles[i][k]];
-        memcpy(out->places[k], p->places[p->triangles[i][k]], sizeof out->places[k]);
+        memcpy(out->positions[k], p->places[p->triangles[i][k]], sizeof out->positions[k]);
     }
     order_corners(out);
     for (int axis = 0; axis < 3; axis++)
-        inside[axis] = (out->places[0][axis] + out->places[1][axis] + out->places[2][axis]) / 3 + p->normal[axis];
+        inside[axis] =
+            (out->positions[0][axis] + out->positions[1][axis] + out->positions[2][axis]) / 3 + p->normal[axis];
     return find_apex(out, inside, apex);
 }
 
@@ -207,9 +209,9 @@ static bool find_common_apex(const face_polygon *p, double out[3])
     for (int i = 0; i + 2 < p->count; i++) {
         if (!polygon_triangle(p, i, &loop, own)) continue;
         find_normal(&loop, normal);
-        subtract(own, loop.places[0], height);
+        subtract(own, loop.positions[0], height);
         const double most = vector3_dot(height, normal);
-        subtract(out, loop.places[0], height);
+        subtract(out, loop.positions[0], height);
         if (!(vector3_dot(height, normal) / most > 0.25)) return false;
     }
     return count > 0;
@@ -269,7 +271,7 @@ static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], 
  * shape. */
 static bool is_concave(const session_face_loop *face, const double (*places)[3], int count)
 {
-    return count == 4 && !face->places && polygon_is_concave_quad(places);
+    return count == 4 && !face->corners && polygon_is_concave_quad(places);
 }
 
 /* Reads the corners of a face. */
@@ -334,13 +336,13 @@ static bool make_polygon_room(face_polygon *p, int64_t corners)
     p->vertices = base_alloc(count * sizeof *p->vertices);
     p->places = base_alloc(count * sizeof *p->places);
     p->triangles = base_alloc(count * sizeof *p->triangles);
-    p->room = base_alloc(polygon_room((int)corners));
+    p->room = base_alloc(polygon_work_bytes((int)corners));
     return p->vertices && p->places && p->triangles && p->room;
 }
 
 static void work_free(outer_work *w)
 {
-    base_free(w->places);
+    base_free(w->vertex_map);
     base_free(w->heights);
     base_free(w->polygon.vertices);
     base_free(w->polygon.places);
@@ -367,9 +369,9 @@ static bool work_create(const grid *g, session_outer *out, outer_work *w)
     w->loop_end = cells;
     out->cell_origins = base_alloc((size_t)cells * sizeof *out->cell_origins);
     w->heights = base_alloc((size_t)entries * sizeof *w->heights);
-    w->places = base_alloc((size_t)g->vertex_count * sizeof *w->places);
+    w->vertex_map = base_alloc((size_t)g->vertex_count * sizeof *w->vertex_map);
     return out->mesh && out->coordinates && out->connectivity && out->vertex_origins && out->offsets && out->types &&
-           (out->loops || !loops) && out->cell_origins && w->heights && w->places &&
+           (out->loops || !loops) && out->cell_origins && w->heights && w->vertex_map &&
            make_polygon_room(&w->polygon, most.corners);
 }
 
@@ -407,7 +409,7 @@ static bool finish_mesh(const session_mesh *whole, outer_work *w)
     session_scalar *scalar = session_add_scalar(out);
     if (!scalar) return false;
     scalar->field = -1;
-    scalar->are_values_stale = scalar->is_suspect = false;
+    scalar->are_values_stale = scalar->may_have_changed = false;
     scalar->distances = w->heights;
     w->heights = NULL;
     return true;
@@ -419,7 +421,7 @@ insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *
     if (outer->mesh) return INSITU_OK;
     bool is_made = work_create(&whole->cells, outer, &work);
     if (is_made) {
-        for (int64_t v = 0; v < whole->cells.vertex_count; v++) work.places[v] = -1;
+        for (int64_t v = 0; v < whole->cells.vertex_count; v++) work.vertex_map[v] = -1;
         for (int64_t i = 0; i < outer->face_count; i++) add_face(&work, &outer->faces[i]);
         outer->offsets[work.cell_count] = work.entry_count;
         is_made = finish_mesh(whole, &work);
@@ -427,7 +429,7 @@ insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *
     work_free(&work);
     if (is_made) return INSITU_OK;
     session_drop_outer(outer, false);
-    return session_no_memory(error, outer->face_count * 250, "the mesh of outer faces");
+    return session_fail_for_memory(error, outer->face_count * 250, "the mesh of outer faces");
 }
 
 double *session_gather_outer_values(const session_outer *outer, const grid_field *field)

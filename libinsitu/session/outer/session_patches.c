@@ -20,9 +20,9 @@ typedef struct patch_faces {
     const session_mesh *mesh;
     const session_field *field;
     const session_vertex_numbers *numbers;
-    int64_t count;   /* number of faces of all patches */
-    int64_t *starts; /* index of each face's first group, count + 1 entries */
-    int64_t *groups; /* groups of the faces' vertices; -1: the vertex belongs to no drawn cell */
+    int64_t count;         /* number of faces of all patches */
+    int64_t *first_groups; /* index of each face's first group, count + 1 entries */
+    int64_t *groups;       /* groups of the faces' vertices; -1: the vertex belongs to no drawn cell */
     unsigned char *is_drawn;
 } patch_faces;
 
@@ -34,7 +34,7 @@ typedef struct patch_face {
 
 static insitu_status fail_for_memory(int64_t entries, base_error *error)
 {
-    return session_no_memory(error, entries * (int64_t)sizeof(int64_t), "faces of patches");
+    return session_fail_for_memory(error, entries * (int64_t)sizeof(int64_t), "faces of patches");
 }
 
 /* Stores an error about a face and returns its status. The message is 'mesh ...: field ...: patch 2: face 17', or 'its
@@ -107,7 +107,7 @@ static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const
         const int64_t vertex = grid_array_index(&face->row.list, face->row.first + k);
         if (vertex < 0 || vertex >= count)
             return fail_range_at_face(p, patch, i, "has a vertex index outside", count, error);
-        groups[k] = p->mesh->torn.is_torn ? -1 : p->numbers->of_vertex[vertex];
+        groups[k] = p->mesh->torn.is_torn ? -1 : p->numbers->group_of_vertex[vertex];
         if (groups[k] >= 0) continue;
         const session_key key = session_given_vertex_key(p->mesh, vertex, p->numbers->by_id);
         groups[k] = session_keys_find(p->numbers->keys, &key);
@@ -124,17 +124,18 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
         for (int64_t i = 0; i < field->patches[patch].count; i++) {
             patch_face face;
             if (find_face(p, patch, i, &face, error)) return error->status;
-            p->starts[f++] = entries;
+            p->first_groups[f++] = entries;
             entries += face.row.size;
         }
-    p->starts[f] = entries;
+    p->first_groups[f] = entries;
     p->groups = base_alloc((size_t)entries * sizeof *p->groups);
     if (!p->groups) return fail_for_memory(entries, error);
     f = 0;
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
             patch_face face;
-            if (find_face(p, patch, i, &face, error) || read_face(p, patch, i, &face, p->groups + p->starts[f], error))
+            if (find_face(p, patch, i, &face, error) ||
+                read_face(p, patch, i, &face, p->groups + p->first_groups[f], error))
                 return error->status;
         }
     return INSITU_OK;
@@ -184,32 +185,33 @@ static insitu_status check_owners(patch_faces *p, base_error *error)
 /* ---- the cells behind them, by a search of all cells ------------------------------------------------------------- */
 
 typedef struct cell_search {
-    session_key_table keys;  /* keys of those faces all of whose vertices have groups */
-    int64_t *of_face;        /* for each face, the index of its key; -1: it has none */
-    int64_t *given, *cells;  /* for each key, how often it is given, and how many cells have the face */
-    unsigned char *is_drawn; /* for each key, set if one of these cells is drawn */
-    unsigned char *is_met;   /* for each group, set if a face with a key contains it */
+    session_key_table keys;              /* keys of those faces all of whose vertices have groups */
+    int64_t *key_of_face;                /* for each face, the index of its key; -1: it has none */
+    int64_t *given_counts, *cell_counts; /* for each key, how often it is given, and how many cells have the face */
+    unsigned char *is_drawn;             /* for each key, set if one of these cells is drawn */
+    unsigned char *has_face;             /* for each group, set if a face with a key contains it */
 } cell_search;
 
 static void search_free(cell_search *s)
 {
     session_keys_free(&s->keys);
-    base_free(s->of_face);
-    base_free(s->given);
-    base_free(s->cells);
+    base_free(s->key_of_face);
+    base_free(s->given_counts);
+    base_free(s->cell_counts);
     base_free(s->is_drawn);
-    base_free(s->is_met);
+    base_free(s->has_face);
 }
 
 static bool search_create(cell_search *s, const patch_faces *p)
 {
     const size_t count = (size_t)p->count;
-    s->of_face = base_alloc(count * sizeof *s->of_face);
-    s->given = base_calloc(count, sizeof *s->given);
-    s->cells = base_calloc(count, sizeof *s->cells);
+    s->key_of_face = base_alloc(count * sizeof *s->key_of_face);
+    s->given_counts = base_calloc(count, sizeof *s->given_counts);
+    s->cell_counts = base_calloc(count, sizeof *s->cell_counts);
     s->is_drawn = base_calloc(count, 1);
-    s->is_met = base_calloc((size_t)p->numbers->keys->count, 1);
-    return s->of_face && s->given && s->cells && s->is_drawn && s->is_met && session_keys_create(&s->keys, p->count);
+    s->has_face = base_calloc((size_t)p->numbers->keys->count, 1);
+    return s->key_of_face && s->given_counts && s->cell_counts && s->is_drawn && s->has_face &&
+           session_keys_create(&s->keys, p->count);
 }
 
 static void add_vertex(session_key *key, int64_t group)
@@ -225,13 +227,13 @@ static void add_faces_to_table(cell_search *s, const patch_faces *p)
     for (int64_t f = 0; f < p->count; f++) {
         session_key key = {{0}};
         bool is_whole = true;
-        for (int64_t k = p->starts[f]; k < p->starts[f + 1]; k++) {
+        for (int64_t k = p->first_groups[f]; k < p->first_groups[f + 1]; k++) {
             is_whole = is_whole && p->groups[k] >= 0;
             add_vertex(&key, p->groups[k]);
         }
-        s->of_face[f] = is_whole ? session_keys_add(&s->keys, &key) : -1;
-        for (int64_t k = p->starts[f]; k < p->starts[f + 1] && is_whole; k++) s->is_met[p->groups[k]] = 1;
-        if (is_whole) s->given[s->of_face[f]]++;
+        s->key_of_face[f] = is_whole ? session_keys_add(&s->keys, &key) : -1;
+        for (int64_t k = p->first_groups[f]; k < p->first_groups[f + 1] && is_whole; k++) s->has_face[p->groups[k]] = 1;
+        if (is_whole) s->given_counts[s->key_of_face[f]]++;
     }
 }
 
@@ -240,8 +242,8 @@ static bool find_face_key(const cell_search *s, const patch_faces *p, const sess
 {
     *key = (session_key){{0}};
     for (int64_t i = 0; i < loop->size; i++) {
-        const int64_t group = p->numbers->of_vertex[session_face_vertex(loop, i)];
-        if (group < 0 || !s->is_met[group]) return false;
+        const int64_t group = p->numbers->group_of_vertex[session_face_vertex(loop, i)];
+        if (group < 0 || !s->has_face[group]) return false;
         add_vertex(key, group);
     }
     return true;
@@ -258,7 +260,7 @@ static void count_cells(cell_search *s, const patch_faces *p)
             session_key key;
             const int64_t found = find_face_key(s, p, &loop, &key) ? session_keys_find(&s->keys, &key) : -1;
             if (found < 0) continue;
-            s->cells[found]++;
+            s->cell_counts[found]++;
             if (!grid_is_ghost(g, cell)) s->is_drawn[found] = 1;
         }
     }
@@ -270,12 +272,12 @@ static insitu_status check_cell_counts(const cell_search *s, patch_faces *p, bas
     int64_t f = 0;
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
-            const int64_t key = s->of_face[f];
+            const int64_t key = s->key_of_face[f];
             if (key < 0) continue; /* the face belongs to a ghost cell */
-            if (s->cells[key] > s->given[key])
+            if (s->cell_counts[key] > s->given_counts[key])
                 return fail_at_face(p, patch, i, "is between two cells, not on the boundary", error);
-            if (s->cells[key] == 0) return fail_at_face(p, patch, i, "is no face of a cell", error);
-            if (s->cells[key] < s->given[key]) return fail_at_face(p, patch, i, "is given twice", error);
+            if (s->cell_counts[key] == 0) return fail_at_face(p, patch, i, "is no face of a cell", error);
+            if (s->cell_counts[key] < s->given_counts[key]) return fail_at_face(p, patch, i, "is given twice", error);
             p->is_drawn[f] = s->is_drawn[key];
         }
     return INSITU_OK;
@@ -321,7 +323,7 @@ static bool is_first_in_groups(const int64_t *groups, int64_t i)
 
 static insitu_status store_values(const patch_faces *p, int component, session_patch_values *out, base_error *error)
 {
-    const int64_t most = p->starts[p->count];
+    const int64_t most = p->first_groups[p->count];
     int64_t f = 0;
     out->groups = base_alloc((size_t)most * sizeof *out->groups);
     out->values = base_alloc((size_t)most * sizeof *out->values);
@@ -330,7 +332,7 @@ static insitu_status store_values(const patch_faces *p, int component, session_p
         const grid_field values = find_patch_field(p, patch, component);
         for (int64_t i = 0; i < p->field->given.patches[patch].count; i++, f++) {
             const double value = grid_field_value(&values, i);
-            const int64_t *groups = p->groups + p->starts[f], size = p->starts[f + 1] - p->starts[f];
+            const int64_t *groups = p->groups + p->first_groups[f], size = p->first_groups[f + 1] - p->first_groups[f];
             for (int64_t k = 0; k < size && p->is_drawn[f] && isfinite(value); k++) {
                 if (!is_first_in_groups(groups, k)) continue;
                 out->groups[out->count] = groups[k];
@@ -356,13 +358,13 @@ insitu_status session_find_patch_values(const session_mesh *mesh, int field, int
     const insitu_field *given = &p.field->given;
     for (int i = 0; i < given->patch_count; i++) p.count += given->patches[i].count;
     if (p.count == 0) return INSITU_OK;
-    p.starts = base_alloc((size_t)(p.count + 1) * sizeof *p.starts);
+    p.first_groups = base_alloc((size_t)(p.count + 1) * sizeof *p.first_groups);
     p.is_drawn = base_calloc((size_t)p.count, 1);
-    insitu_status status = p.starts && p.is_drawn ? list_faces(&p, error) : fail_for_memory(p.count * 2, error);
+    insitu_status status = p.first_groups && p.is_drawn ? list_faces(&p, error) : fail_for_memory(p.count * 2, error);
     const bool has_sides = session_has_owners(&mesh->given) && are_by_number(given);
     if (!status) status = has_sides ? check_owners(&p, error) : check_faces_by_cells(&p, error);
     if (!status) status = store_values(&p, component, out, error);
-    base_free(p.starts);
+    base_free(p.first_groups);
     base_free(p.groups);
     base_free(p.is_drawn);
     return status;

@@ -7,8 +7,8 @@
 
 /* Numbers by which equal vertices of this rank are recognized. */
 typedef struct session_vertex_numbers {
-    const session_key_table *keys; /* keys of the vertices of drawn cells; the numbers of the keys are the groups */
-    const int64_t *of_vertex;      /* for each vertex of mesh->cells, its group; -1: it belongs to no drawn cell */
+    const session_key_table *keys;  /* keys of the vertices of drawn cells; the numbers of the keys are the groups */
+    const int64_t *group_of_vertex; /* for each vertex of mesh->cells, its group; -1: it belongs to no drawn cell */
     bool by_id;
 } session_vertex_numbers;
 

@@ -28,7 +28,7 @@ static const float nearly_opaque = 0.99999994F;
 
 scene_surface session_shells_of(const scene_isosurface *layer, int height)
 {
-    scene_surface out = {.on = layer->field,
+    scene_surface out = {.meshes_field = layer->field,
                          .is_of_shells = true,
                          .has_colour_by = layer->has_colour_by,
                          .colour_by = layer->colour_by,
@@ -49,5 +49,5 @@ scene_surface session_shells_of(const scene_isosurface *layer, int height)
 
 bool session_surface_is_on(const scene_surface *layer, const session_mesh *mesh)
 {
-    return scene_field_is_on(&layer->on, mesh->name) && (!layer->is_of_shells || mesh->has_shells_alone);
+    return scene_field_is_on(&layer->meshes_field, mesh->name) && (!layer->is_of_shells || mesh->has_shells_alone);
 }

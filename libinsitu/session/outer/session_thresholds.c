@@ -48,7 +48,7 @@ bool session_mark_outer(session_mesh *mesh, const scene_threshold *threshold)
     session_outer *outer = session_find_outer(mesh, threshold);
     if (!outer) outer = add_outer(mesh, threshold);
     if (!outer) return false;
-    outer->is_wanted = true;
+    outer->is_needed = true;
     return !threshold->is_given || session_mark_scalar(mesh, &threshold->field, false, &scalar);
 }
 
@@ -57,7 +57,7 @@ void session_drop_thresholds(session_mesh *mesh)
     int kept = 0;
     for (int i = 0; i < mesh->outer_count; i++) {
         session_outer *outer = mesh->outers[i];
-        if (outer->threshold.is_given && !outer->is_wanted) {
+        if (outer->threshold.is_given && !outer->is_needed) {
             session_drop_outer(outer, true);
             base_free(outer);
         } else {

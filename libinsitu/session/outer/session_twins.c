@@ -14,13 +14,13 @@ enum { CORNER_WORDS = 4 };
 
 /* A vertex of an outer face. */
 typedef struct face_corner {
-    double place[3];
+    double position[3];
     double slack; /* vertices that are nearer to it than this are treated as equal */
 } face_corner;
 
 /* A vertex of a face that only one cell of this rank has, and the least position of all vertices equal to it. */
 typedef struct border_vertex {
-    double place[3], least[3];
+    double position[3], least_position[3];
 } border_vertex;
 
 typedef struct twin_search {
@@ -46,7 +46,7 @@ static void measure_edges(const grid *g, const session_face *face, double *edges
         double a[3], b[3];
         grid_vertex(g, from, a);
         grid_vertex(g, to, b);
-        const double length = session_place_distance(a, b);
+        const double length = session_distance_to_face(a, b);
         if (!(length > 0)) continue;
         edges[from] = fmin(edges[from], length);
         edges[to] = fmin(edges[to], length);
@@ -64,7 +64,7 @@ static bool add_corners(twin_search *s, const session_mesh *mesh, const session_
         const double edge = edges[border->vertices[i]];
         if (isinf(edge)) continue;
         face_corner *c = &s->corners[s->corner_count++];
-        grid_vertex(g, border->vertices[i], c->place);
+        grid_vertex(g, border->vertices[i], c->position);
         c->slack = fmin(fmax(1e-5 * edge, s->rounding), edge / 4);
     }
     base_free(edges);
@@ -82,12 +82,12 @@ static bool list_own_corners(twin_search *s)
     for (int m = 0; m < s->parts->count; m++) {
         for (int64_t i = 0; i < borders[m].vertex_count; i++) {
             border_vertex *v = &s->vertices[s->vertex_count++];
-            grid_vertex(&s->parts->items[m]->cells, borders[m].vertices[i], v->place);
-            memcpy(v->least, v->place, sizeof v->least);
+            grid_vertex(&s->parts->items[m]->cells, borders[m].vertices[i], v->position);
+            memcpy(v->least_position, v->position, sizeof v->least_position);
         }
         if (!add_corners(s, s->parts->items[m], &borders[m])) return false;
     }
-    return session_bins_create(&s->bins, s->vertices->place, (int64_t)sizeof *s->vertices, s->vertex_count);
+    return session_bins_create(&s->bins, s->vertices->position, (int64_t)sizeof *s->vertices, s->vertex_count);
 }
 
 /* ---- corners of several ranks --------------------------------------------------------------------------------- */
@@ -99,12 +99,12 @@ static void write_corners(const twin_search *s, session_mail *mail)
     mail->total = 0;
     for (int n = 0; n < homes->near_count; n++) {
         const int64_t first = mail->total;
-        for (int64_t i = 0; i < s->corner_count && homes->near[n] != s->team->rank; i++) {
-            if (!session_is_in_box(&homes->boxes[n], s->corners[i].place)) continue;
+        for (int64_t i = 0; i < s->corner_count && homes->near_ranks[n] != s->team->rank; i++) {
+            if (!session_is_in_box(&homes->boxes[n], s->corners[i].position)) continue;
             if (mail->words) memcpy(mail->words + mail->total, &s->corners[i], sizeof s->corners[i]);
             mail->total += CORNER_WORDS;
         }
-        mail->counts[homes->near[n]] = mail->total - first;
+        mail->counts[homes->near_ranks[n]] = mail->total - first;
     }
 }
 
@@ -135,13 +135,13 @@ static void find_least_corners(twin_search *s)
 {
     for (int64_t i = 0; i < s->corner_count && s->vertex_count; i++) {
         const face_corner *c = &s->corners[i];
-        session_bin_walk walk = session_walk_bins(&s->bins, c->place, c->place, c->slack);
+        session_bin_walk walk = session_walk_bins(&s->bins, c->position, c->position, c->slack);
         int64_t near;
         while (session_next_binned(&walk, &near)) {
             border_vertex *v = &s->vertices[near];
-            if (session_place_distance(v->place, c->place) <= c->slack &&
-                session_compare_places(c->place, v->least) < 0)
-                memcpy(v->least, c->place, sizeof v->least);
+            if (session_distance_to_face(v->position, c->position) <= c->slack &&
+                session_compare_positions(c->position, v->least_position) < 0)
+                memcpy(v->least_position, c->position, sizeof v->least_position);
         }
     }
 }
@@ -150,17 +150,17 @@ static bool store_twins(const border_vertex *vertices, session_border *border)
 {
     int64_t count = 0;
     for (int64_t i = 0; i < border->vertex_count; i++)
-        count += session_compare_places(vertices[i].least, vertices[i].place) != 0;
+        count += session_compare_positions(vertices[i].least_position, vertices[i].position) != 0;
     session_twin *twins = base_alloc((size_t)(count + 1) * sizeof *twins);
     if (!twins) return false;
     base_free(border->twins);
     border->twins = twins;
     border->twin_count = 0;
     for (int64_t i = 0; i < border->vertex_count; i++) {
-        if (session_compare_places(vertices[i].least, vertices[i].place) == 0) continue;
+        if (session_compare_positions(vertices[i].least_position, vertices[i].position) == 0) continue;
         session_twin *twin = &twins[border->twin_count++];
         twin->vertex = border->vertices[i];
-        memcpy(twin->place, vertices[i].least, sizeof twin->place);
+        memcpy(twin->position, vertices[i].least_position, sizeof twin->position);
     }
     return true;
 }
@@ -182,15 +182,15 @@ insitu_status session_find_twins(session_joint *joint, const session_joint_parts
 {
     twin_search s = {.joint = joint, .parts = parts, .team = team};
     session_mail out = {0}, in = {0};
-    for (int i = 0; i < parts->count; i++) s.rounding = fmax(s.rounding, session_place_rounding(parts->items[i]));
+    for (int i = 0; i < parts->count; i++) s.rounding = fmax(s.rounding, session_position_rounding(parts->items[i]));
     if (!error->status && (!list_own_corners(&s) || !pack_corners(&s, &out)))
-        session_no_memory(error, (s.corner_count + s.vertex_count) * 80, "vertices of several meshes");
+        session_fail_for_memory(error, (s.corner_count + s.vertex_count) * 80, "vertices of several meshes");
     const insitu_status status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, &out, &in, error);
     if (!status && !error->status) {
         const bool is_taken = receive_corners(&s, &in);
         if (is_taken) find_least_corners(&s);
         if (!is_taken || !store_all_twins(&s))
-            session_no_memory(error, s.corner_count * 32, "vertices of several meshes");
+            session_fail_for_memory(error, s.corner_count * 32, "vertices of several meshes");
     }
     session_mail_free(&out);
     session_mail_free(&in);

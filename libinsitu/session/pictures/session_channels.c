@@ -143,7 +143,7 @@ insitu_status session_draw_channels(const session_frame_target *target, const se
         out->values = base_alloc(bytes);
         has_memory = has_memory && out->normals && out->values;
     }
-    if (!has_memory) session_no_memory(error, 2 * (int64_t)bytes, "the data of a picture");
+    if (!has_memory) session_fail_for_memory(error, 2 * (int64_t)bytes, "the data of a picture");
     insitu_status status = session_agree(team->comm, error);
     if (!status) {
         const render_job opaque = make_opaque_job(job, surfaces);

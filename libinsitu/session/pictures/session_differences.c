@@ -31,12 +31,13 @@ typedef struct differing {
     int64_t round_hits, rounds;
     /* Ranks that may have samples for any of this rank's hits, and their boxes. */
     int near_count;
-    int *near;
+    int *near_ranks;
     render_box *boxes;
     /* The hits of the current round and their samples. */
     int64_t first, count;
     render_samples_about *samples;
-    int64_t *asked; /* the hits for which samples are requested, in the order in which they are in the message */
+    int64_t
+        *requested_hits; /* the hits for which samples are requested, in the order in which they are in the message */
 } differing;
 
 /* ---- data shared by all ranks -------------------------------------------------------------------------------- */
@@ -57,8 +58,8 @@ static insitu_status share_ranges(differing *d, base_error *error)
     const int64_t rounds = (d->list->count + d->round_hits - 1) / d->round_hits;
     shared[SHARED_ROUNDS] = (double)rounds;
     shared[SHARED_FAILURE] = error->status != INSITU_OK;
-    insitu_status status =
-        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, shared, SHARED, MPI_DOUBLE, MPI_MAX, d->comm), "MPI_Allreduce");
+    insitu_status status = session_check_mpi(
+        error, MPI_Allreduce(MPI_IN_PLACE, shared, SHARED, MPI_DOUBLE, MPI_MAX, d->comm), "MPI_Allreduce");
     if (status) return status;
     if (shared[SHARED_FAILURE] > 0) return session_agree(d->comm, error);
     for (int i = 0; i < RENDER_MAX_ISOVALUES; i++) {
@@ -82,7 +83,7 @@ static void keep_near_ranks(differing *d)
         for (int a = 0; a < 3; a++)
             is_near = is_near && d->boxes[r].lower[a] <= own->upper[a] + reach &&
                       own->lower[a] - reach <= d->boxes[r].upper[a];
-        if (is_near) d->near[d->near_count++] = r;
+        if (is_near) d->near_ranks[d->near_count++] = r;
     }
 }
 
@@ -90,7 +91,7 @@ static insitu_status share_boxes(differing *d, base_error *error)
 {
     const render_box own = render_differences_box(d->job);
     const int doubles = sizeof own / sizeof(double);
-    const insitu_status status = session_mpi(
+    const insitu_status status = session_check_mpi(
         error, MPI_Allgather(&own, doubles, MPI_DOUBLE, d->boxes, doubles, MPI_DOUBLE, d->comm), "MPI_Allgather");
     if (!status) keep_near_ranks(d);
     return status;
@@ -104,24 +105,24 @@ static bool write_requests(differing *d, session_mail *out)
     int64_t capacity = d->count + 1;
     out->counts = base_calloc((size_t)d->ranks, sizeof *out->counts);
     out->words = base_alloc((size_t)capacity * QUESTION_WORDS * sizeof *out->words);
-    d->asked = base_alloc((size_t)capacity * sizeof *d->asked);
-    if (!out->counts || !out->words || !d->asked) return false;
+    d->requested_hits = base_alloc((size_t)capacity * sizeof *d->requested_hits);
+    if (!out->counts || !out->words || !d->requested_hits) return false;
     int64_t questions = 0;
     for (int n = 0; n < d->near_count; n++)
         for (int64_t i = 0; i < d->count; i++) {
             const render_waiting_hit *hit = &d->list->items[d->first + i];
-            if (!render_differences_meet(d->job, hit, &d->boxes[d->near[n]])) continue;
+            if (!render_differences_meet(d->job, hit, &d->boxes[d->near_ranks[n]])) continue;
             if (questions == capacity) {
                 capacity += capacity / 2 + 1024;
                 uint64_t *words = base_realloc(out->words, (size_t)capacity * QUESTION_WORDS * sizeof *words);
                 if (words) out->words = words;
-                int64_t *asked = base_realloc(d->asked, (size_t)capacity * sizeof *asked);
-                if (asked) d->asked = asked;
+                int64_t *asked = base_realloc(d->requested_hits, (size_t)capacity * sizeof *asked);
+                if (asked) d->requested_hits = asked;
                 if (!words || !asked) return false;
             }
             memcpy(out->words + questions * QUESTION_WORDS, hit, sizeof *hit);
-            d->asked[questions++] = i;
-            out->counts[d->near[n]] += QUESTION_WORDS;
+            d->requested_hits[questions++] = i;
+            out->counts[d->near_ranks[n]] += QUESTION_WORDS;
         }
     out->total = questions * QUESTION_WORDS;
     return true;
@@ -146,21 +147,21 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
 static insitu_status exchange_round(differing *d, base_error *error)
 {
     session_mail asked = {0}, questions = {0}, answered = {0}, answers = {0};
-    if (!write_requests(d, &asked)) session_no_memory(error, d->count * 24, "samples of other ranks");
+    if (!write_requests(d, &asked)) session_fail_for_memory(error, d->count * 24, "samples of other ranks");
     insitu_status status = session_mail_deliver(d->comm, SESSION_MAIL_THERE, &asked, &questions, error);
     if (!status && !error->status && !write_answers(d, &questions, &answered, error))
-        session_no_memory(error, questions.total * 16, "samples for other ranks");
+        session_fail_for_memory(error, questions.total * 16, "samples for other ranks");
     if (!status) status = session_mail_deliver(d->comm, SESSION_MAIL_BACK, &answered, &answers, error);
     if (!status && !error->status)
         for (int64_t i = 0; i < asked.total / QUESTION_WORDS; i++)
-            render_differences_merge(&d->samples[d->asked[i]],
+            render_differences_merge(&d->samples[d->requested_hits[i]],
                                      (const render_samples_about *)(const void *)(answers.words + i * ANSWER_WORDS));
     session_mail_free(&asked);
     session_mail_free(&questions);
     session_mail_free(&answered);
     session_mail_free(&answers);
-    base_free(d->asked);
-    d->asked = NULL;
+    base_free(d->requested_hits);
+    d->requested_hits = NULL;
     return status;
 }
 
@@ -170,7 +171,7 @@ static void light_round(const differing *d, fragment_list *fragments, base_error
     if (count > fragments->capacity) {
         fragment *items = base_realloc(fragments->items, (size_t)count * sizeof *items);
         if (!items) {
-            session_no_memory(error, count * (int64_t)sizeof *items, "fragments");
+            session_fail_for_memory(error, count * (int64_t)sizeof *items, "fragments");
             return;
         }
         fragments->items = items;
@@ -200,15 +201,15 @@ static insitu_status compute_differences(differing *d, fragment_list *fragments,
     const int64_t most = d->list->count < d->round_hits ? d->list->count : d->round_hits;
     d->samples = base_alloc((size_t)(most + 1) * sizeof *d->samples);
     d->boxes = base_alloc((size_t)d->ranks * sizeof *d->boxes);
-    d->near = base_alloc((size_t)d->ranks * sizeof *d->near);
-    if (!d->samples || !d->boxes || !d->near || !render_differences_sort(d->job, d->list))
-        session_no_memory(error, most * 64, "normals by differences");
+    d->near_ranks = base_alloc((size_t)d->ranks * sizeof *d->near_ranks);
+    if (!d->samples || !d->boxes || !d->near_ranks || !render_differences_sort(d->job, d->list))
+        session_fail_for_memory(error, most * 64, "normals by differences");
     insitu_status status = share_ranges(d, error);
     if (!status && d->rounds) status = share_boxes(d, error);
     if (!status) status = run_rounds(d, fragments, error);
     base_free(d->samples);
     base_free(d->boxes);
-    base_free(d->near);
+    base_free(d->near_ranks);
     return status;
 }
 

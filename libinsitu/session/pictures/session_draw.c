@@ -70,7 +70,7 @@ static void warn_of_wait(session_report *report, double seconds)
 {
     static const double noticed = 0.1;
     static const session_warning warning = {WARNING_WRITER, NULL, NULL, 1};
-    session_warn_own(
+    session_warn_locally(
         report, &warning, seconds > noticed,
         "the last step waited %.2g s for earlier pictures to be written: the disk, or the compression of so many "
         "pixels, is slower than the run; draw less often, or write elsewhere",
@@ -83,7 +83,7 @@ static void reserve_frame(const session_drawing *d, size_t bytes, canvas *c)
     c->memory = session_writer_reserve(d->writer, bytes);
     c->frame.rgba = c->memory.pixels;
     const double seconds = MPI_Wtime() - start; /* time spent waiting for space in the queue */
-    d->report->numbers.write_ms += 1e3 * seconds;
+    d->report->public_report.write_ms += 1e3 * seconds;
     warn_of_wait(d->report, seconds);
 }
 
@@ -99,8 +99,8 @@ static insitu_status canvas_create(const session_drawing *d, const scene_image *
     if (needs_depth(d, image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
     if (is_summed) out->sum = base_calloc(pixels * 4, sizeof *out->sum);
     if (!out->frame.rgba || (is_summed && !out->sum))
-        return session_no_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->sum : 0)),
-                                 "a picture");
+        return session_fail_for_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->sum : 0)),
+                                       "a picture");
     return session_wants_deep(image) ? session_begin_deep(&out->deep, image, error) : INSITU_OK;
 }
 
@@ -261,7 +261,7 @@ static insitu_status draw_frame(frames_basis *b, const render_job *job, image *o
     out->deep = b->deep;
     const insitu_status status = session_draw_frame(&b->target, job, out, &frame, error);
     out->deep = b->deep = NULL;
-    add_frame_to_report(&b->drawing->report->numbers, &frame);
+    add_frame_to_report(&b->drawing->report->public_report, &frame);
     if (!status && frame.overlaps > b->overlaps) b->overlaps = frame.overlaps;
     return status;
 }
@@ -276,10 +276,10 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
     bool has_memory = *pixels != NULL;
     if (has_memory && team->rank == 0)
         has_memory = comp_find_edges(&c->frame, team->threads, *pixels) && canvas_begin_edges(c, *pixels);
-    if (!has_memory) session_no_memory(error, (int64_t)bytes, "the pixels at edges");
+    if (!has_memory) session_fail_for_memory(error, (int64_t)bytes, "the pixels at edges");
     const insitu_status status = session_agree(team->comm, error);
     if (status) return status;
-    return session_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
+    return session_check_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
 }
 
 /* Draws one frame for each sample position in the pixels. If only edges are drawn, the job contains only their
@@ -342,7 +342,7 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
     session_frame taken;
     const insitu_status drawn =
         session_draw_channels(&basis.target, d->team, image, &job, &canvas->channels, &taken, error);
-    add_frame_to_report(&d->report->numbers, &taken);
+    add_frame_to_report(&d->report->public_report, &taken);
     return drawn;
 }
 
@@ -350,7 +350,7 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
 
 static scene_moment make_moment(const session_drawing *d, const scene_image *image)
 {
-    return scene_moment_of(image, d->cycle, d->report->numbers.time);
+    return scene_moment_of(image, d->cycle, d->report->public_report.time);
 }
 
 /* Passes the picture to the writer, which becomes the owner of its memory. Called on rank 0 only. */
@@ -358,7 +358,7 @@ static void queue_picture(const session_drawing *d, const scene_image *image, ca
 {
     session_files *files = base_calloc(1, sizeof *files);
     if (!files) {
-        session_no_memory(error, (int64_t)sizeof *files, "a picture that is to be written");
+        session_fail_for_memory(error, (int64_t)sizeof *files, "a picture that is to be written");
         return;
     }
     files->scene = d->scene;
@@ -376,7 +376,7 @@ static void queue_picture(const session_drawing *d, const scene_image *image, ca
     c->channels = (session_channels){0};
     c->deep = (deep_image){0};
     c->decorations = NULL;
-    session_writer_give(d->writer, files, error);
+    session_writer_queue(d->writer, files, error);
 }
 
 /* Passes an image to the writer. If nothing is written during the step, the only possible error is that rank 0 lacks
@@ -390,9 +390,9 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
     base_error later = {.status = INSITU_OK};
     if (d->team->rank == 0) {
         queue_picture(d, image, c, is_told_later ? &later : error);
-        session_writer_note(d->writer, d->cycle, &later);
+        session_writer_record_error(d->writer, d->cycle, &later);
         if (ranges) session_write_run_ranges(ranges, error);
-        d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
+        d->report->public_report.write_ms += 1e3 * (MPI_Wtime() - start);
     }
     return is_told_later ? INSITU_OK : session_agree(d->team->comm, error);
 }
@@ -405,11 +405,12 @@ static void warn_of_words(const session_drawing *d, const scene_image *image, co
 {
     insitu_word_faults faults;
     session_check_words(
-        &(insitu_image){.width = image->width, .height = image->height, .decorations = &decorations->all}, &faults);
+        &(insitu_image){.width = image->width, .height = image->height, .decorations = &decorations->decorations},
+        &faults);
     const char *const texts[] = {faults.font, faults.letters, faults.room};
     for (int i = 0; i < 3; i++)
-        session_warn_own(d->report, &(session_warning){WARNING_WORDS, image->name, NULL, i}, *texts[i] != '\0',
-                         "image \"%s\": %.900s", image->name, texts[i]);
+        session_warn_locally(d->report, &(session_warning){WARNING_WORDS, image->name, NULL, i}, *texts[i] != '\0',
+                             "image \"%s\": %.900s", image->name, texts[i]);
 }
 
 /* Computes the decorations of an image. Collective if the outline consists of boxes of meshes or ranks. An error that
@@ -426,7 +427,7 @@ static insitu_status make_image_decorations(const session_drawing *d, const scen
     if (image->decorations.is_given && d->team->rank == 0 && !error->status) {
         out->decorations = session_make_decorations(
             image, &(session_decoration_basis){&moment, &d->space->extent, view, layers, &outline, d->catalogue});
-        if (!out->decorations) session_no_memory(error, (int64_t)sizeof *out->decorations, "decorations");
+        if (!out->decorations) session_fail_for_memory(error, (int64_t)sizeof *out->decorations, "decorations");
         if (out->decorations && scene_has_words(image)) warn_of_words(d, image, out->decorations);
     }
     session_free_outline(&outline);
@@ -458,7 +459,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     if (!status) {
         if (d->kept->is_on && d->team->rank == 0) session_keep_picture(d->kept, image, &canvas.frame, error);
         status = write_outputs(d, image, &canvas, basis.run_ranges, error);
-        d->report->numbers.images++;
+        d->report->public_report.images++;
     }
     session_layers_free(&layers);
     canvas_free(&canvas, d->writer);
@@ -478,12 +479,12 @@ static void write_tables(const session_drawing *d, base_error *first)
             files->cinema = d->cinema;
             files->montages = d->montages;
             files->moment.cycle = d->cycle;
-            session_writer_give(d->writer, files, &reason);
+            session_writer_queue(d->writer, files, &reason);
         } else
-            session_no_memory(&reason, (int64_t)sizeof *files, "the tables of databases");
-        d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
+            session_fail_for_memory(&reason, (int64_t)sizeof *files, "the tables of databases");
+        d->report->public_report.write_ms += 1e3 * (MPI_Wtime() - start);
     }
-    session_agree_as_is(d->team->comm, &reason);
+    session_agree_without_rank(d->team->comm, &reason);
     if (!first->status) *first = reason;
 }
 
@@ -498,11 +499,11 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
         has_lines = has_lines || scene_has_words(plan->images[i]);
         /* a copy of the image with the camera's current position; all lists still belong to the scene */
         scene_image placed = *plan->images[i];
-        placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
+        placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->public_report.time);
         if (draw_image(d, &placed, &reason) == INSITU_OK) {
             *drawn |= (uint64_t)1 << placed.variant.source;
-            session_note_written(d->overwrites, d->scene, (int)(plan->images[i] - d->scene->images), d->cycle,
-                                 d->report->numbers.time, d->report);
+            session_record_written(d->overwrites, d->scene, (int)(plan->images[i] - d->scene->images), d->cycle,
+                                   d->report->public_report.time, d->report);
         }
         if (first.status == INSITU_OK) first = reason;
     }

@@ -42,18 +42,18 @@ static void write_output(session_files *files, const scene_output *output)
                                   .channels = files->channels.items,
                                   .deep = output->is_deep ? &deep : NULL,
                                   .decorations = !decorations              ? NULL
-                                                 : output->has_decorations ? &decorations->all
+                                                 : output->has_decorations ? &decorations->decorations
                                                                            : &decorations->background};
     base_error reason = {0};
     if (output->montage >= 0) {
-        if (session_add_cell(files->montages, files->scene, &files->image, output, &picture, path, &reason))
+        if (session_add_panel(files->montages, files->scene, &files->image, output, &picture, path, &reason))
             base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
         return;
     }
     if (session_write_image(&picture, find_image_format(output), path, &reason) != INSITU_OK)
         base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
     else if (output->database >= 0)
-        session_note_picture(files->cinema, files->scene, &files->image, output, &files->moment, &files->error);
+        session_record_picture(files->cinema, files->scene, &files->image, output, &files->moment, &files->error);
     base_free(path);
 }
 

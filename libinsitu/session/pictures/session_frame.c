@@ -127,7 +127,7 @@ static insitu_status update_turn_pixels(const session_frame_target *t, int64_t f
     enum { MOST_GROWTH = 8 };
     int64_t most = 0;
     const int code = MPI_Allreduce(&fragments, &most, 1, MPI_INT64_T, MPI_MAX, t->comm);
-    if (code != MPI_SUCCESS) return session_mpi(error, code, "MPI_Allreduce");
+    if (code != MPI_SUCCESS) return session_check_mpi(error, code, "MPI_Allreduce");
     const double growth = (double)t->fragment_limit / (double)(most > 0 ? most : 1);
     *pixels = (int64_t)((double)*pixels * fmin(growth, MOST_GROWTH));
     if (*pixels < 1) *pixels = 1;
@@ -138,7 +138,7 @@ static insitu_status update_turn_pixels(const session_frame_target *t, int64_t f
  * are neighbours. Consecutive squares are far apart (their numbers are multiples of the golden ratio of the number of
  * squares), so that each turn contains a similar fraction of dense regions. */
 typedef struct turn_order {
-    int width, height, across;
+    int width, height, squares_per_row;
     int64_t squares, stride;
 } turn_order;
 
@@ -157,7 +157,7 @@ static int64_t greatest_divisor(int64_t a, int64_t b)
 static turn_order make_turn_order(const image *out)
 {
     turn_order order = {out->width, out->height, (out->width + SQUARE - 1) / SQUARE, 0, 0};
-    order.squares = (int64_t)order.across * ((out->height + SQUARE - 1) / SQUARE);
+    order.squares = (int64_t)order.squares_per_row * ((out->height + SQUARE - 1) / SQUARE);
     order.stride = (int64_t)(0.618 * (double)order.squares) + 1;
     while (greatest_divisor(order.stride, order.squares) > 1) order.stride++;
     return order;
@@ -167,8 +167,8 @@ static turn_order make_turn_order(const image *out)
 static int64_t turn_order_pixel(const turn_order *order, int64_t k)
 {
     const int64_t square = k / (SQUARE * SQUARE) % order->squares * order->stride % order->squares;
-    const int64_t x = square % order->across * SQUARE + k % SQUARE;
-    const int64_t y = square / order->across * SQUARE + k / SQUARE % SQUARE;
+    const int64_t x = square % order->squares_per_row * SQUARE + k % SQUARE;
+    const int64_t y = square / order->squares_per_row * SQUARE + k / SQUARE % SQUARE;
     return x < order->width && y < order->height ? y * order->width + x : -1;
 }
 
@@ -210,7 +210,7 @@ static void remove_samples(const unsigned char *pixels, const image *out)
 /* A second picture on rank 0, for the pixels of a turn. */
 typedef struct second_picture {
     image picture;
-    unsigned char *turn; /* the set of pixels of the turn, on every rank */
+    unsigned char *turn_pixels; /* the set of pixels of the turn, on every rank */
 } second_picture;
 
 static insitu_status second_picture_create(const session_frame_target *t, const comp_overlaps *overlaps,
@@ -220,13 +220,13 @@ static insitu_status second_picture_create(const session_frame_target *t, const 
     image *second = &out->picture;
     int rank = 0;
     *out = (second_picture){.picture = {.width = first->width, .height = first->height, .deep = first->deep}};
-    out->turn = base_alloc(pixel_set_bytes(pixels));
+    out->turn_pixels = base_alloc(pixel_set_bytes(pixels));
     MPI_Comm_rank(t->comm, &rank);
     if (rank == 0) {
         second->rgba = base_alloc((size_t)pixels * 4 * sizeof *second->rgba);
         if (first->depth) second->depth = base_alloc((size_t)pixels * sizeof *second->depth);
     }
-    if (!out->turn || (rank == 0 && (!second->rgba || (first->depth && !second->depth))))
+    if (!out->turn_pixels || (rank == 0 && (!second->rgba || (first->depth && !second->depth))))
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld pixels in which cells overlap",
                   (long long)overlaps->count);
     return session_agree(t->comm, error);
@@ -234,7 +234,7 @@ static insitu_status second_picture_create(const session_frame_target *t, const 
 
 static void second_picture_free(second_picture *second)
 {
-    base_free(second->turn);
+    base_free(second->turn_pixels);
     base_free(second->picture.rgba);
     base_free(second->picture.depth);
 }
@@ -246,19 +246,19 @@ static insitu_status redraw_overlaps(const session_frame_target *t, const render
     const bool is_sampled = job->integration == RENDER_SAMPLES;
     int64_t doubled = 0, most = estimate_turn_pixels(job, t->fragment_limit);
     render_job again = *job;
-    again.pixels = second->turn;
+    again.pixels = second->turn_pixels;
     again.separate_samples = true;
     again.reproducible = false;
     for (int64_t left = overlaps->count, at = 0; left > 0;) {
         const int64_t before = frame->fragments;
         comp_overlaps found = {0};
-        at = take_turn_pixels(out, overlaps->pixels, at, most, second->turn);
-        if (out->deep && out->deep->counts) remove_samples(second->turn, out);
+        at = take_turn_pixels(out, overlaps->pixels, at, most, second->turn_pixels);
+        if (out->deep && out->deep->counts) remove_samples(second->turn_pixels, out);
         insitu_status status = draw(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
         doubled += found.count;
         base_free(found.pixels);
         if (status) return status;
-        if (second->picture.rgba) copy_pixels(second->turn, &second->picture, out);
+        if (second->picture.rgba) copy_pixels(second->turn_pixels, &second->picture, out);
         frame->turns++;
         left -= most;
         if (left > 0) status = update_turn_pixels(t, frame->fragments - before, &most, error);

@@ -42,10 +42,10 @@ typedef struct questions {
     int *ranks;
     int64_t *hits;
     render_hit_rays *rays;
-    int64_t at; /* index of the current hit */
-    const lighting *of;
-    int64_t *starts; /* ranks + 1 entries: the first request to each rank */
-    int64_t *sent;   /* request at each position in the message */
+    int64_t current_hit; /* index of the current hit */
+    const lighting *lighting_state;
+    int64_t *first_requests; /* ranks + 1 entries: the first request to each rank */
+    int64_t *message_order;  /* request at each position in the message */
     bool has_no_memory;
 } questions;
 
@@ -54,11 +54,11 @@ static insitu_status share_boxes(lighting *l, base_error *error)
     const render_box own = render_occluder_box(l->job);
     const int doubles = sizeof own / sizeof(double);
     l->boxes = base_alloc((size_t)l->ranks * sizeof *l->boxes);
-    if (!l->boxes) session_no_memory(error, (int64_t)((size_t)l->ranks * sizeof *l->boxes), "the ranks' bounds");
+    if (!l->boxes) session_fail_for_memory(error, (int64_t)((size_t)l->ranks * sizeof *l->boxes), "the ranks' bounds");
     const insitu_status status = session_agree(l->comm, error);
     if (status) return status;
-    return session_mpi(error, MPI_Allgather(&own, doubles, MPI_DOUBLE, l->boxes, doubles, MPI_DOUBLE, l->comm),
-                       "MPI_Allgather");
+    return session_check_mpi(error, MPI_Allgather(&own, doubles, MPI_DOUBLE, l->boxes, doubles, MPI_DOUBLE, l->comm),
+                             "MPI_Allgather");
 }
 
 /* ---- questions ----------------------------------------------------------------------------------------------- */
@@ -82,33 +82,33 @@ static void free_questions(questions *q)
     base_free(q->ranks);
     base_free(q->hits);
     base_free(q->rays);
-    base_free(q->starts);
-    base_free(q->sent);
+    base_free(q->first_requests);
+    base_free(q->message_order);
 }
 
 static void add_question(void *state, int rank, const render_hit_rays *rays)
 {
     questions *q = state;
-    if (rank == q->of->rank || q->has_no_memory) return;
+    if (rank == q->lighting_state->rank || q->has_no_memory) return;
     if (q->count == q->capacity && !reserve_questions(q)) {
         q->has_no_memory = true;
         return;
     }
     q->ranks[q->count] = rank;
-    q->hits[q->count] = q->at;
+    q->hits[q->count] = q->current_hit;
     q->rays[q->count++] = *rays;
 }
 
 /* Sorts the requests by the rank to which they are sent. */
 static bool sort_questions(questions *q)
 {
-    const int ranks = q->of->ranks;
-    q->starts = base_calloc((size_t)ranks + 1, sizeof *q->starts);
-    q->sent = base_alloc((size_t)q->count * sizeof *q->sent);
-    if (!q->starts || !q->sent) return false;
-    for (int64_t i = 0; i < q->count; i++) q->starts[q->ranks[i]]++;
-    for (int r = 1; r <= ranks; r++) q->starts[r] += q->starts[r - 1];
-    for (int64_t i = q->count; i-- > 0;) q->sent[--q->starts[q->ranks[i]]] = i;
+    const int ranks = q->lighting_state->ranks;
+    q->first_requests = base_calloc((size_t)ranks + 1, sizeof *q->first_requests);
+    q->message_order = base_alloc((size_t)q->count * sizeof *q->message_order);
+    if (!q->first_requests || !q->message_order) return false;
+    for (int64_t i = 0; i < q->count; i++) q->first_requests[q->ranks[i]]++;
+    for (int r = 1; r <= ranks; r++) q->first_requests[r] += q->first_requests[r - 1];
+    for (int64_t i = q->count; i-- > 0;) q->message_order[--q->first_requests[q->ranks[i]]] = i;
     return true;
 }
 
@@ -118,10 +118,10 @@ static bool write_questions(const lighting *l, const questions *q, session_mail 
     out->counts = base_alloc((size_t)l->ranks * sizeof *out->counts);
     out->words = base_alloc((size_t)out->total * sizeof *out->words);
     if (!out->counts || !out->words) return false;
-    for (int r = 0; r < l->ranks; r++) out->counts[r] = (q->starts[r + 1] - q->starts[r]) * ASKED_WORDS;
+    for (int r = 0; r < l->ranks; r++) out->counts[r] = (q->first_requests[r + 1] - q->first_requests[r]) * ASKED_WORDS;
     for (int64_t i = 0; i < q->count; i++) {
         uint64_t *words = out->words + i * ASKED_WORDS;
-        const int64_t k = q->sent[i];
+        const int64_t k = q->message_order[i];
         memcpy(words, &l->hits[q->hits[k]], sizeof *l->hits);
         memcpy(words + sizeof *l->hits / 8, &q->rays[k], sizeof *q->rays);
     }
@@ -131,12 +131,13 @@ static bool write_questions(const lighting *l, const questions *q, session_mail 
 static insitu_status send_questions(const lighting *l, questions *q, session_mail *in, base_error *error)
 {
     session_mail out = {0};
-    *q = (questions){.of = l};
-    for (q->at = 0; q->at < l->count; q->at++)
-        if (l->rays[q->at].samples || l->rays[q->at].lights)
-            render_rays_to_boxes(l->job, &l->hits[q->at], &l->rays[q->at], l->boxes, l->ranks, add_question, q);
+    *q = (questions){.lighting_state = l};
+    for (q->current_hit = 0; q->current_hit < l->count; q->current_hit++)
+        if (l->rays[q->current_hit].samples || l->rays[q->current_hit].lights)
+            render_rays_to_boxes(l->job, &l->hits[q->current_hit], &l->rays[q->current_hit], l->boxes, l->ranks,
+                                 add_question, q);
     if (q->has_no_memory || !sort_questions(q) || !write_questions(l, q, &out))
-        session_no_memory(error, q->count * ASKED_WORDS * 8, "rays to other ranks");
+        session_fail_for_memory(error, q->count * ASKED_WORDS * 8, "rays to other ranks");
     insitu_status status = session_agree(l->comm, error);
     if (!status) status = session_mail_exchange(l->comm, &out, in, error);
     session_mail_free(&out);
@@ -169,7 +170,7 @@ static insitu_status answer_questions(const lighting *l, session_mail *in, base_
     if (read_questions(in, &hits, &rays))
         render_occlude(l->occluders, hits, rays, count, error);
     else
-        session_no_memory(error, in->total * 8, "rays of other ranks");
+        session_fail_for_memory(error, in->total * 8, "rays of other ranks");
     if (!error->status && rays) memcpy(in->words, rays, (size_t)count * sizeof *rays);
     for (int r = 0; r < l->ranks; r++) in->counts[r] = in->counts[r] / ASKED_WORDS * ANSWER_WORDS;
     in->total = count * ANSWER_WORDS;
@@ -181,7 +182,7 @@ static insitu_status answer_questions(const lighting *l, session_mail *in, base_
 static void store_answers(lighting *l, const questions *q, const session_mail *answers)
 {
     for (int64_t i = 0; i < q->count; i++) {
-        const int64_t k = q->sent[i];
+        const int64_t k = q->message_order[i];
         const render_hit_rays *asked = &q->rays[k];
         render_hit_rays open, *rays = &l->rays[q->hits[k]];
         memcpy(&open, answers->words + i * ANSWER_WORDS, sizeof open);
@@ -232,7 +233,7 @@ static insitu_status reduce_has_more(const lighting *l, bool has_more, bool *out
 {
     int own = has_more, all = 0;
     const insitu_status status =
-        session_mpi(error, MPI_Allreduce(&own, &all, 1, MPI_INT, MPI_MAX, l->comm), "MPI_Allreduce");
+        session_check_mpi(error, MPI_Allreduce(&own, &all, 1, MPI_INT, MPI_MAX, l->comm), "MPI_Allreduce");
     *out = all;
     return status;
 }
@@ -266,7 +267,7 @@ insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, rend
     l.hits = base_alloc((size_t)(most + 1) * sizeof *l.hits);
     l.rays = base_alloc((size_t)(most + 1) * sizeof *l.rays);
     if (!l.fragments || !l.hits || !l.rays)
-        session_no_memory(error, most * 40, "hits that are lit");
+        session_fail_for_memory(error, most * 40, "hits that are lit");
     else if (!*occluders)
         render_occluders_create(job, occluders, error);
     l.occluders = *occluders;

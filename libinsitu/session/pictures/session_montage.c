@@ -34,11 +34,11 @@ static void end(session_montage *m)
     *m = (session_montage){0};
 }
 
-insitu_status session_add_cell(session_montages *montages, const scene *scene, const scene_image *image,
-                               const scene_output *output, const insitu_image *picture, char *path, base_error *error)
+insitu_status session_add_panel(session_montages *montages, const scene *scene, const scene_image *image,
+                                const scene_output *output, const insitu_image *picture, char *path, base_error *error)
 {
     const scene_montage *of = &scene->montages[output->montage];
-    const int cell = output->first_cell + image->variant.view;
+    const int cell = output->first_panel + image->variant.view;
     const insitu_status status = begin_montage(montages, scene, output->montage, error);
     if (status) {
         base_free(path);

@@ -22,8 +22,8 @@ typedef struct session_montages {
 } session_montages;
 
 /* Draws the picture into its cell. path is the path of the file; the montage takes ownership of it. Local. */
-insitu_status session_add_cell(session_montages *montages, const scene *scene, const scene_image *image,
-                               const scene_output *output, const insitu_image *picture, char *path, base_error *error);
+insitu_status session_add_panel(session_montages *montages, const scene *scene, const scene_image *image,
+                                const scene_output *output, const insitu_image *picture, char *path, base_error *error);
 
 /* Writes the montages that have cells of this step, even if some fail. The first error is returned. Local. */
 insitu_status session_write_montages(session_montages *montages, const scene *scene, base_error *error);

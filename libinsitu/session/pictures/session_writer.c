@@ -125,7 +125,7 @@ session_picture session_writer_reserve(session_writer *w, size_t bytes)
 {
     session_picture out = {0};
     pthread_mutex_lock(&w->mutex);
-    while (w->first && w->waiting_bytes + (int64_t)bytes > most_waiting_bytes)
+    while (w->first && w->queued_bytes + (int64_t)bytes > most_waiting_bytes)
         pthread_cond_wait(&w->has_changed, &w->mutex);
     for (;;) {
         take_memory(w, bytes, &out);
@@ -153,8 +153,8 @@ void session_writer_drop_memory(session_writer *w)
 int64_t session_writer_bytes(session_writer *w, int *waiting)
 {
     pthread_mutex_lock(&w->mutex);
-    const int64_t bytes = w->waiting_bytes + free_bytes(w);
-    *waiting = w->waiting;
+    const int64_t bytes = w->queued_bytes + free_bytes(w);
+    *waiting = w->queued_count;
     pthread_mutex_unlock(&w->mutex);
     return bytes;
 }
@@ -177,12 +177,12 @@ static void finish_first_files(session_writer *w)
 {
     session_files *files = w->first;
     w->first = files->next;
-    w->waiting -= files->has_picture;
-    w->waiting_bytes -= session_files_bytes(files);
+    w->queued_count -= files->has_picture;
+    w->queued_bytes -= session_files_bytes(files);
     keep_memory(w, &files->memory);
     session_free_channels(&files->channels);
     session_free_deep(&files->deep);
-    append_files(&w->done, &w->last_done, files);
+    append_files(&w->finished, &w->last_finished, files);
     pthread_cond_broadcast(&w->has_changed);
 }
 
@@ -196,7 +196,7 @@ static void *run_writer(void *of_writer)
         if (!w->first) break;
         pthread_mutex_unlock(&w->mutex);
         session_write_files(w->first);
-        if (w->written++ < FIRST_PICTURES) atexit(wait_for_all);
+        if (w->written_count++ < FIRST_PICTURES) atexit(wait_for_all);
         pthread_mutex_lock(&w->mutex);
         finish_first_files(w);
     }
@@ -239,14 +239,14 @@ double session_writer_begin(session_writer *w, const scene *scene)
 
 /* ---- input and results ---------------------------------------------------------------------------------------- */
 
-void session_writer_give(session_writer *w, session_files *files, base_error *error)
+void session_writer_queue(session_writer *w, session_files *files, base_error *error)
 {
     const bool is_behind = w->is_running && files->scene->writing == SCENE_WRITE_BEHIND;
     if (is_behind) {
         pthread_mutex_lock(&w->mutex);
         append_files(&w->first, &w->last, files);
-        w->waiting += files->has_picture;
-        w->waiting_bytes += session_files_bytes(files);
+        w->queued_count += files->has_picture;
+        w->queued_bytes += session_files_bytes(files);
         pthread_cond_broadcast(&w->has_changed);
         pthread_mutex_unlock(&w->mutex);
         return;
@@ -257,26 +257,26 @@ void session_writer_give(session_writer *w, session_files *files, base_error *er
     session_files_free(files);
 }
 
-void session_writer_note(session_writer *w, int64_t cycle, const base_error *error)
+void session_writer_record_error(session_writer *w, int64_t cycle, const base_error *error)
 {
-    if (!error->status || w->failures++) return;
+    if (!error->status || w->failure_count++) return;
     base_fail(&w->failure, error->status, "cycle %lld: %.1000s", (long long)cycle, error->message);
 }
 
 static void collect_files(session_writer *w, const session_files *files, session_report *report)
 {
-    report->numbers.background_ms += files->ms;
-    session_writer_note(w, files->moment.cycle, &files->error);
+    report->public_report.background_ms += files->ms;
+    session_writer_record_error(w, files->moment.cycle, &files->error);
 }
 
 void session_writer_collect(session_writer *w, session_report *report)
 {
     static const session_warning warning = {WARNING_WRITER, NULL, NULL, 0};
     pthread_mutex_lock(&w->mutex);
-    session_files *files = w->done;
-    w->done = w->last_done = NULL;
+    session_files *files = w->finished;
+    w->finished = w->last_finished = NULL;
     pthread_mutex_unlock(&w->mutex);
-    report->numbers.background_ms += w->loading_ms;
+    report->public_report.background_ms += w->loading_ms;
     w->loading_ms = 0;
     while (files) {
         session_files *next = files->next;
@@ -284,18 +284,18 @@ void session_writer_collect(session_writer *w, session_report *report)
         session_files_free(files);
         files = next;
     }
-    session_warn_own(report, &warning, w->is_refused,
-                     "pictures are written in the step: no thread can be started for it");
+    session_warn_locally(report, &warning, w->is_refused,
+                         "pictures are written in the step: no thread can be started for it");
 }
 
 base_error session_writer_failure(session_writer *w)
 {
     base_error out = w->failure;
     const size_t size = strlen(out.message);
-    if (w->failures > 1)
-        snprintf(out.message + size, sizeof out.message - size, " (and %d more like it)", w->failures - 1);
+    if (w->failure_count > 1)
+        snprintf(out.message + size, sizeof out.message - size, " (and %d more like it)", w->failure_count - 1);
     w->failure = (base_error){0};
-    w->failures = 0;
+    w->failure_count = 0;
     return out;
 }
 
@@ -315,10 +315,10 @@ void session_writer_end(session_writer *w)
         pthread_join(w->thread, NULL);
         w->is_running = false;
     }
-    while (w->done) {
-        session_files *next = w->done->next;
-        session_files_free(w->done);
-        w->done = next;
+    while (w->finished) {
+        session_files *next = w->finished->next;
+        session_files_free(w->finished);
+        w->finished = next;
     }
     session_writer_drop_memory(w);
     pthread_cond_destroy(&w->has_changed);

@@ -29,13 +29,13 @@ typedef struct session_writer {
     bool is_running, is_refused;        /* set if a thread was started, or if a thread could not be started */
     bool is_ending, is_loaded;          /* set if the thread must end, or if loading the image library was tried */
     struct session_files *first, *last; /* the queue; the thread is writing its first element */
-    struct session_files *done, *last_done;
-    int64_t written;                                    /* number of pictures written; used by the thread only */
-    int waiting;                                        /* number of pictures in the queue */
-    int64_t waiting_bytes;                              /* size of all data in the queue */
+    struct session_files *finished, *last_finished;
+    int64_t written_count;                              /* number of pictures written; used by the thread only */
+    int queued_count;                                   /* number of pictures in the queue */
+    int64_t queued_bytes;                               /* size of all data in the queue */
     session_picture free_memory[SESSION_FREE_PICTURES]; /* unused blocks that are kept for future pictures */
     base_error failure;          /* first error that no step has returned yet; used by the caller's thread only */
-    int failures;                /* number of errors */
+    int failure_count;           /* number of errors */
     double loading_ms;           /* time in milliseconds that loading took in insitu_create(), for the next report */
     struct session_writer *next; /* next writer of this process */
 } session_writer;
@@ -52,7 +52,7 @@ double session_writer_begin(session_writer *writer, const scene *scene);
 bool session_writer_is_behind(const session_writer *writer, const scene *scene);
 
 /* Records an error that occurred when a picture was passed to the writer. The next step returns it. Local. */
-void session_writer_note(session_writer *writer, int64_t cycle, const base_error *error);
+void session_writer_record_error(session_writer *writer, int64_t cycle, const base_error *error);
 
 /* Returns memory of at least `bytes` bytes for a picture, uninitialized. Blocks until the queue has space. pixels is
  * NULL if memory runs out even after everything in the queue has been written. Local. */
@@ -63,7 +63,7 @@ void session_writer_release(session_writer *writer, session_picture *memory);
 
 /* Passes files to the writer, which becomes their owner. They are written by the thread or, if there is none,
  * immediately; errors of the latter are stored in *error. Local. */
-void session_writer_give(session_writer *writer, struct session_files *files, base_error *error);
+void session_writer_queue(session_writer *writer, struct session_files *files, base_error *error);
 
 /* Collects the results of the thread: the time it has used is added to the report, errors to the writer's `failure`.
  * Local. */

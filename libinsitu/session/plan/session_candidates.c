@@ -41,7 +41,7 @@ static bool add_intervals(session_scalar *scalar, const mmbvh_interval *more, in
 static bool add_isovalue_intervals(session_scalar *scalar, const scene_isosurface *layer)
 {
     /* Central differences also sample neighbours of crossed cells, so all cells are kept. */
-    if (layer->normals == SCENE_DIFFERENCES) scalar->needs_all = true;
+    if (layer->normals == SCENE_DIFFERENCES) scalar->needs_all_cells = true;
     bool is_added = true;
     for (int i = 0; i < layer->value_count && is_added; i++) {
         const mmbvh_interval interval = render_isovalue_interval(layer->values[i]);
@@ -55,8 +55,8 @@ static bool add_visible_intervals(session_scalar *scalar, const scene_volume *la
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
     const int count = session_visible_intervals(layer, intervals);
     /* A range from the data is known only after a reduction over all ranks, so all cells are kept. */
-    if (!layer->colour_map.range.is_fixed) scalar->needs_all = true;
-    return scalar->needs_all || add_intervals(scalar, intervals, count);
+    if (!layer->colour_map.range.is_fixed) scalar->needs_all_cells = true;
+    return scalar->needs_all_cells || add_intervals(scalar, intervals, count);
 }
 
 static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
@@ -128,12 +128,12 @@ bool session_mark_needs(session_meshes *meshes, const scene_image *const *images
         session_mesh *mesh = meshes->items[m];
         mesh->is_needed = false;
         for (int i = 0; i < mesh->outer_count; i++) {
-            mesh->outers[i]->is_wanted = false;
+            mesh->outers[i]->is_needed = false;
             if (mesh->outers[i]->mesh) mesh->outers[i]->mesh->is_needed = false;
         }
         for (int i = 0; i < mesh->scalar_count; i++) {
-            mesh->scalars[i].is_used = mesh->scalars[i].wants_ranges = false;
-            mesh->scalars[i].needs_all = false;
+            mesh->scalars[i].is_used = mesh->scalars[i].needs_ranges = false;
+            mesh->scalars[i].needs_all_cells = false;
             mesh->scalars[i].interval_count = 0;
         }
         for (int i = 0; i < count && mesh->is_given; i++)
@@ -150,11 +150,11 @@ bool session_find_candidates(const session_mesh *mesh, uint64_t *key)
     *key = SESSION_HASH_BEGIN;
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *s = &mesh->scalars[i];
-        if (!s->wants_ranges) continue;
-        if (s->needs_all) return false;
+        if (!s->needs_ranges) continue;
+        if (s->needs_all_cells) return false;
         const int names[4] = {s->field, s->component, s->is_recentred, s->interval_count};
         session_hash_bytes(key, names, sizeof names);
-        session_hash_bytes(key, &s->joined, sizeof s->joined);
+        session_hash_bytes(key, &s->joint_name, sizeof s->joint_name);
         session_hash_bytes(key, s->plane.normal, sizeof s->plane.normal);
         session_hash_bytes(key, s->plane.point, sizeof s->plane.point);
         session_hash_bytes(key, s->intervals, (size_t)s->interval_count * sizeof *s->intervals);
@@ -173,7 +173,7 @@ insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_s
         int count = 0;
         for (int i = 0; i < mesh->scalar_count; i++) {
             const session_scalar *s = &mesh->scalars[i];
-            if (!s->wants_ranges) continue;
+            if (!s->needs_ranges) continue;
             fields[count] = session_scalar_field(mesh, s);
             wishes[count] = (mmbvh_wish){&fields[count], s->interval_count, s->intervals};
             count++;
@@ -181,7 +181,7 @@ insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_s
         const mmbvh_options options = {.threads = threads};
         status = mmbvh_select(&mesh->cells, wishes, count, &options, out, unusable, error);
         for (int i = 0, wish = 0; i < mesh->scalar_count && !status; i++)
-            if (mesh->scalars[i].wants_ranges) mesh->scalars[i].unusable = unusable[wish++];
+            if (mesh->scalars[i].needs_ranges) mesh->scalars[i].unusable_count = unusable[wish++];
     } else {
         base_fail(error, status, "mesh \"%s\": no memory to plan its tree", mesh->label);
     }

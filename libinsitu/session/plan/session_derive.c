@@ -86,7 +86,7 @@ static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mes
 
 static uint64_t find_joint_name(const session_catalogue_mesh *mesh, const scene_field *input)
 {
-    return session_joint_name(mesh, input->joined);
+    return session_joint_name(mesh, input->joint_name);
 }
 
 /* ---- cell values recentred to vertices ------------------------------------------------------------------------- */
@@ -102,8 +102,8 @@ static bool add_to_part(const session_catalogue_mesh *mesh, session_mesh *part, 
     scalar->field = index;
     scalar->component = component;
     scalar->is_recentred = true;
-    scalar->joined = joint;
-    scalar->own = session_given_field(part, index, component);
+    scalar->joint_name = joint;
+    scalar->original_values = session_given_field(part, index, component);
     return true;
 }
 
@@ -159,14 +159,15 @@ static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh 
     uint64_t hash = SESSION_HASH_BEGIN;
     session_hash_bytes(&hash, &part->cells_stamp, sizeof part->cells_stamp);
     session_hash_bytes(&hash, &mesh->has_shells_alone, sizeof mesh->has_shells_alone);
-    if (w->derived->kind != SCENE_EXPRESSION) session_hash_bytes(&hash, &part->places_stamp, sizeof part->places_stamp);
+    if (w->derived->kind != SCENE_EXPRESSION)
+        session_hash_bytes(&hash, &part->coordinates_stamp, sizeof part->coordinates_stamp);
     for (int k = 0; k < w->derived->input_count; k++) {
         const int index = session_find_field(part, w->derived->inputs[k].name);
         const int count = index < 0 ? 0 : part->fields[index].given.component_count;
         if (index >= 0) session_hash_bytes(&hash, &part->fields[index].version, sizeof part->fields[index].version);
         for (int c = -1; c < count; c++) {
             const session_scalar *scalar = find_recentred(w, mesh, part, k, c);
-            if (scalar) session_hash_bytes(&hash, &scalar->made, sizeof scalar->made);
+            if (scalar) session_hash_bytes(&hash, &scalar->computed_count, sizeof scalar->computed_count);
         }
     }
     return hash | 1;
@@ -181,12 +182,12 @@ static insitu_status find_stale(derive_work *w, base_error *error)
     for (int m = 0; m < count; m++) {
         w->stale[m] = 0;
         for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_visited_part(w, &v);)
-            if (v.part->fields[v.index].made_of != hash_sources(w, &catalogue->meshes[m], v.part)) w->stale[m] = 1;
+            if (v.part->fields[v.index].inputs_hash != hash_sources(w, &catalogue->meshes[m], v.part)) w->stale[m] = 1;
     }
     w->stale[count] = error->status != INSITU_OK;
     const MPI_Comm comm = w->basis->team->comm;
-    const insitu_status status =
-        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, w->stale, count + 1, MPI_INT, MPI_MAX, comm), "MPI_Allreduce");
+    const insitu_status status = session_check_mpi(
+        error, MPI_Allreduce(MPI_IN_PLACE, w->stale, count + 1, MPI_INT, MPI_MAX, comm), "MPI_Allreduce");
     return status || !w->stale[count] ? status : session_agree(comm, error);
 }
 
@@ -244,12 +245,12 @@ static void store_values(const session_field *field, int64_t place, const double
 /* Records that the values are new, for the scalars and fields that depend on them. */
 static void mark_values_new(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part, int index)
 {
-    session_spoil_scalars(part, index);
-    part->fields[index].made_of = hash_sources(w, mesh, part);
+    session_mark_scalars_stale(part, index);
+    part->fields[index].inputs_hash = hash_sources(w, mesh, part);
     part->fields[index].is_copy_stale = false;
     for (int i = 0; i < part->scalar_count; i++)
         if (part->scalars[i].field == index)
-            part->scalars[i].own = session_given_field(part, index, part->scalars[i].component);
+            part->scalars[i].original_values = session_given_field(part, index, part->scalars[i].component);
 }
 
 /* ---- expressions --------------------------------------------------------------------------------------------------
@@ -346,7 +347,7 @@ static void make_expressions(const derive_work *w, base_error *error)
         if (!w->stale[m]) continue;
         for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_visited_part(w, &v) && !error->status;)
             if (!make_expression(w, &catalogue->meshes[m], v.part, v.index))
-                session_no_memory(error, count_values(v.part, &v.part->fields[v.index]) * 8, "a derived field");
+                session_fail_for_memory(error, count_values(v.part, &v.part->fields[v.index]) * 8, "a derived field");
     }
 }
 
@@ -391,9 +392,9 @@ static void store_gradients(const derive_work *w, const session_vertex_sums *sum
 #pragma omp for schedule(dynamic, REGION_ITEMS) nowait
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
             double gradient[SPACE][SPACE] = {{0}}, values[SPACE] = {(double)NAN, (double)NAN, (double)NAN};
-            if (part->entries[v] >= 0) {
-                session_mean_gradients(sums->sums + (int64_t)part->entries[v] * words, sums->field_count, &sums->bounds,
-                                       sums->length, gradient);
+            if (part->key_indices[v] >= 0) {
+                session_mean_gradients(sums->sums + (int64_t)part->key_indices[v] * words, sums->field_count,
+                                       &sums->bounds, sums->length, gradient);
                 compute_values(w->derived, (const double(*)[SPACE])gradient, values);
             }
             store_values(field, v, values);
@@ -436,7 +437,7 @@ static insitu_status begin_sums(const derive_work *w, const session_joint *joint
                                 base_error *error)
 {
     sums->parts = base_calloc((size_t)w->basis->meshes->count + 1, sizeof *sums->parts);
-    if (!sums->parts) return session_no_memory(error, w->basis->meshes->count * 100LL, "gradients at vertices");
+    if (!sums->parts) return session_fail_for_memory(error, w->basis->meshes->count * 100LL, "gradients at vertices");
     for (int m = 0; m < joint->count; m++)
         for (part_visit v = visit_parts(w, joint->meshes[m]); next_visited_part(w, &v);) {
             session_sum_part *part = &sums->parts[sums->part_count++];
@@ -444,7 +445,7 @@ static insitu_status begin_sums(const derive_work *w, const session_joint *joint
             part->of_shells = joint->meshes[m]->has_shells_alone;
             list_scalars(w, joint->meshes[m], v.part, part->fields);
             if (!allocate_values(w, v.part, &v.part->fields[v.index]))
-                return session_no_memory(error, v.part->cells.vertex_count * 8, "a derived field");
+                return session_fail_for_memory(error, v.part->cells.vertex_count * 8, "a derived field");
         }
     return session_key_all_vertices(sums, error);
 }
@@ -482,7 +483,8 @@ static insitu_status derive_joints(const derive_work *w, base_error *error)
     for (int m = 0; m < catalogue->mesh_count && !status; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_joint *joint =
-            find_field(w, mesh) ? session_find_joint(catalogue, session_joint_name(mesh, w->derived->joined)) : NULL;
+            find_field(w, mesh) ? session_find_joint(catalogue, session_joint_name(mesh, w->derived->joint_name))
+                                : NULL;
         if (joint && find_first_faultless(w, joint) == mesh && is_joint_stale(w, joint))
             status = derive_joint(w, joint, error);
     }
@@ -496,7 +498,7 @@ static insitu_status derive_field(derive_work *w, base_error *error)
 {
     const session_derive_basis *b = w->basis;
     const bool is_expression = w->derived->kind == SCENE_EXPRESSION;
-    if (!list_recentrings(w)) session_no_memory(error, 1000, "the plan of derived fields");
+    if (!list_recentrings(w)) session_fail_for_memory(error, 1000, "the plan of derived fields");
     insitu_status status = session_agree(b->team->comm, error);
     if (!status && (!is_expression || w->recentring_count))
         status = session_update_homes(b->catalogue, b->meshes, b->extent->half_diagonal, b->team, error);

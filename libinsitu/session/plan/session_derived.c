@@ -254,7 +254,7 @@ insitu_status session_name_derived(const scene *scene, const char *scene_path, s
             if (parts.items[i]->is_given) is_done = name_on_mesh(&catalogue->meshes[m], parts.items[i]);
     }
     catalogue->are_joined = catalogue->are_joined && scene->derived_count == 0;
-    if (!is_done) session_no_memory(error, scene->derived_count * 100LL, "the names of derived fields");
+    if (!is_done) session_fail_for_memory(error, scene->derived_count * 100LL, "the names of derived fields");
     const insitu_status status = scene->derived_count ? session_agree(team->comm, error) : INSITU_OK;
     catalogue->are_derived = !status;
     return status;

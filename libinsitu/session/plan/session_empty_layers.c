@@ -16,7 +16,7 @@
 
 /* The minimum and the negated maximum of a range, so that one reduction by minimum computes both. */
 typedef struct field_range {
-    double low, minus_high;
+    double low, negated_high;
 } field_range;
 
 static const field_range no_range = {INFINITY, INFINITY};
@@ -32,7 +32,7 @@ typedef struct planned_layer {
     field_range range;
     bool is_empty; /* set if the surface is empty */
     /* set if the layer shows nothing according to the trees, and no warning has been reported yet */
-    bool is_news;
+    bool is_unreported;
 } planned_layer;
 
 /* ---- layers ---------------------------------------------------------------------------------------------------- */
@@ -102,7 +102,7 @@ static const scene_field *find_layer_field(const planned_layer *layer)
 static void widen_range(double low, double high, field_range *range)
 {
     range->low = fmin(range->low, low);
-    range->minus_high = fmin(range->minus_high, -high);
+    range->negated_high = fmin(range->negated_high, -high);
 }
 
 /* Takes the range at the root of the tree, which contains all visible values. */
@@ -125,7 +125,7 @@ static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, i
 static void add_face_range(const session_mesh *mesh, const scene_surface *surface, field_range *range)
 {
     const session_outer *outer =
-        scene_field_is_on(&surface->on, mesh->name) ? session_find_outer(mesh, &surface->threshold) : NULL;
+        scene_field_is_on(&surface->meshes_field, mesh->name) ? session_find_outer(mesh, &surface->threshold) : NULL;
     if (outer && outer->face_count > 0) widen_range(0, 0, range);
 }
 
@@ -153,7 +153,7 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
 /* Further data that is part of the reduction. */
 typedef struct layer_news {
     bool has_other_cells; /* set if some rank has cells that are not shown (session_unusable.h) */
-    int telling;          /* maximum of all ranks' session_telling_word() */
+    int telling;          /* maximum of all ranks' session_reporting_word() */
 } layer_news;
 
 /* Reduces the layers' ranges over all ranks, together with earlier errors and the news; after an error the rest is
@@ -168,15 +168,17 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
     lows[last + 2] = -news->telling;
     for (int i = 0; i < window->count && !error->status; i++) {
         planned_layer *layer = &window->layers[i];
-        if (!of_all_cells || layer->is_news) layer->range = find_own_range(meshes, layer, team->threads, of_all_cells);
+        if (!of_all_cells || layer->is_unreported)
+            layer->range = find_own_range(meshes, layer, team->threads, of_all_cells);
     }
     for (int i = 0; i < window->count; i++) {
         lows[2 * i] = window->layers[i].range.low;
-        lows[2 * i + 1] = window->layers[i].range.minus_high;
+        lows[2 * i + 1] = window->layers[i].range.negated_high;
     }
     const int code = MPI_Allreduce(MPI_IN_PLACE, lows, last + 3, MPI_DOUBLE, MPI_MIN, team->comm);
-    const insitu_status status = code == MPI_SUCCESS && lows[last] < 0 ? session_agree(team->comm, error)
-                                                                       : session_mpi(error, code, "MPI_Allreduce");
+    const insitu_status status = code == MPI_SUCCESS && lows[last] < 0
+                                     ? session_agree(team->comm, error)
+                                     : session_check_mpi(error, code, "MPI_Allreduce");
     for (int i = 0; i < window->count; i++) window->layers[i].range = (field_range){lows[2 * i], lows[2 * i + 1]};
     *news = (layer_news){lows[last + 1] < 0, (int)-lows[last + 2]};
     return status;
@@ -198,7 +200,7 @@ static session_warning make_warning(const planned_layer *layer, int value)
  * that the minimum of all values has none. */
 static bool is_outside(double value, const field_range *range)
 {
-    return value <= range->low || value > -range->minus_high;
+    return value <= range->low || value > -range->negated_high;
 }
 
 static bool is_transparent(const scene_volume *volume, const field_range *range)
@@ -206,7 +208,7 @@ static bool is_transparent(const scene_volume *volume, const field_range *range)
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
     const int count = session_visible_intervals(volume, intervals);
     for (int i = 0; i < count; i++)
-        if ((double)intervals[i].high >= range->low && (double)intervals[i].low <= -range->minus_high) return false;
+        if ((double)intervals[i].high >= range->low && (double)intervals[i].low <= -range->negated_high) return false;
     return true;
 }
 
@@ -215,7 +217,7 @@ static bool is_transparent(const scene_volume *volume, const field_range *range)
 static field_range least_of_trees(const field_range *range)
 {
     const double low = range->low < INFINITY ? (double)nextafterf((float)range->low, INFINITY) : INFINITY;
-    return (field_range){range->low < low ? nextafter(low, -INFINITY) : low, range->minus_high};
+    return (field_range){range->low < low ? nextafter(low, -INFINITY) : low, range->negated_high};
 }
 
 static int count_values(const planned_layer *layer)
@@ -235,13 +237,14 @@ static bool find_new_warnings(const session_report *report, layer_window *window
     bool is_any = false;
     for (int i = 0; i < window->count; i++) {
         planned_layer *layer = &window->layers[i];
-        layer->is_empty = layer->range.low > -layer->range.minus_high;
+        layer->is_empty = layer->range.low > -layer->range.negated_high;
         layer->range = least_of_trees(&layer->range);
         for (int v = 0; v < count_values(layer); v++) {
             const session_warning warning = make_warning(layer, v);
-            if (is_layer_empty(layer, v, &layer->range) && !session_is_warned(report, &warning)) layer->is_news = true;
+            if (is_layer_empty(layer, v, &layer->range) && !session_is_warned(report, &warning))
+                layer->is_unreported = true;
         }
-        is_any = is_any || layer->is_news;
+        is_any = is_any || layer->is_unreported;
     }
     return is_any;
 }
@@ -251,7 +254,7 @@ static bool find_new_warnings(const session_report *report, layer_window *window
 static void warn_of_value(session_report *report, const planned_layer *layer, int value, bool holds)
 {
     const session_warning warning = make_warning(layer, value);
-    const double low = layer->range.low, high = -layer->range.minus_high, at = layer->isosurface->values[value];
+    const double low = layer->range.low, high = -layer->range.negated_high, at = layer->isosurface->values[value];
     session_warn(report, &warning, holds,
                  "image \"%s\": the isosurface of \"%s\" at %g is empty: the field goes from %g to %g%s",
                  layer->image->name, layer->isosurface->field.name, at, low, high,
@@ -264,7 +267,7 @@ static void warn_of_volume(session_report *report, const planned_layer *layer, b
     session_warn(report, &warning, holds,
                  "image \"%s\": the volume of \"%s\" shows nothing: the field goes from %g to %g, where its opacity is "
                  "0; check its range and opacity",
-                 layer->image->name, layer->volume->field.name, layer->range.low, -layer->range.minus_high);
+                 layer->image->name, layer->volume->field.name, layer->range.low, -layer->range.negated_high);
 }
 
 static void warn_of_threshold(session_report *report, const planned_layer *layer, bool holds)
@@ -275,13 +278,13 @@ static void warn_of_threshold(session_report *report, const planned_layer *layer
                  "image \"%s\": a surface is empty: no cell is within its threshold, from %g to %g of \"%s\", which "
                  "goes from %g to %g",
                  layer->image->name, threshold->low, threshold->high, threshold->field.name, layer->range.low,
-                 -layer->range.minus_high);
+                 -layer->range.negated_high);
 }
 
 /* Warns of an empty layer. If the field has no value at all, other warnings give the reason. */
 static void warn_of_layer(session_report *report, const planned_layer *layer)
 {
-    const bool has_values = layer->range.low <= -layer->range.minus_high || !layer->is_news;
+    const bool has_values = layer->range.low <= -layer->range.negated_high || !layer->is_unreported;
     for (int v = 0; v < count_values(layer); v++) {
         const bool holds = has_values && is_layer_empty(layer, v, &layer->range);
         if (layer->isosurface) warn_of_value(report, layer, v, holds);
@@ -295,7 +298,7 @@ insitu_status session_check_layers(const session_plan *plan, const session_catal
                                    base_error *error)
 {
     const int count = plan->cell_count ? list_layers(plan, &(layer_window){.first = 0}) : 0;
-    layer_news news = {false, session_telling_word(report, team)};
+    layer_news news = {false, session_reporting_word(report, team)};
     if (count && !error->status) news.has_other_cells = session_unusable_key(plan, meshes) != report->unusable_key;
     insitu_status status = INSITU_OK;
     for (int first = 0; (first == 0 || first < count) && !status; first += WINDOW) {
@@ -307,7 +310,7 @@ insitu_status session_check_layers(const session_plan *plan, const session_catal
         for (int i = 0; i < window.count && !status; i++) warn_of_layer(report, &window.layers[i]);
     }
     if (!status && news.telling)
-        status = session_share_lines(report, session_telling_rank(news.telling, team), team, error);
+        status = session_share_lines(report, session_reporting_rank(news.telling, team), team, error);
     if (!status && news.has_other_cells)
         status = session_warn_of_unusable(plan, catalogue, meshes, team, report, error);
     return status;

@@ -42,8 +42,8 @@ static session_joint *add_joint(session_catalogue *catalogue, uint64_t name, int
 
 static bool add_joint_of_one(session_catalogue *catalogue, session_catalogue_mesh *mesh)
 {
-    if (session_find_joint(catalogue, mesh->apart)) return true;
-    session_joint *joint = add_joint(catalogue, mesh->apart, 1);
+    if (session_find_joint(catalogue, mesh->single_joint_name)) return true;
+    session_joint *joint = add_joint(catalogue, mesh->single_joint_name, 1);
     if (!joint) return false;
     joint->meshes[joint->count++] = mesh;
     joint->by_id = true;
@@ -60,7 +60,7 @@ static bool join_meshes(session_catalogue *catalogue, const join_wish *wish, uin
     for (int m = 0; m < catalogue->mesh_count && is_done; m++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[m];
         if (!is_joint_member(mesh, wish)) continue;
-        if (mesh->apart) {
+        if (mesh->single_joint_name) {
             is_done = add_joint_of_one(catalogue, mesh);
             continue;
         }
@@ -72,7 +72,7 @@ static bool join_meshes(session_catalogue *catalogue, const join_wish *wish, uin
     if (session_find_joint(catalogue, *joined)) return true;
     session_joint *joint = add_joint(catalogue, *joined, count);
     for (int m = 0; m < catalogue->mesh_count && joint; m++)
-        if (!catalogue->meshes[m].apart && is_joint_member(&catalogue->meshes[m], wish))
+        if (!catalogue->meshes[m].single_joint_name && is_joint_member(&catalogue->meshes[m], wish))
             joint->meshes[joint->count++] = &catalogue->meshes[m];
     return joint != NULL;
 }
@@ -80,15 +80,15 @@ static bool join_meshes(session_catalogue *catalogue, const join_wish *wish, uin
 static bool join_field(session_catalogue *catalogue, scene_field *field)
 {
     const join_wish wish = {field, -1};
-    field->joined = 0;
-    return !field->name || join_meshes(catalogue, &wish, &field->joined);
+    field->joint_name = 0;
+    return !field->name || join_meshes(catalogue, &wish, &field->joint_name);
 }
 
 static bool join_derived(session_catalogue *catalogue, scene *scene, int number)
 {
     scene_derived *derived = &scene->derived[number];
     const join_wish wish = {NULL, number};
-    bool is_done = join_meshes(catalogue, &wish, &derived->joined);
+    bool is_done = join_meshes(catalogue, &wish, &derived->joint_name);
     for (int k = 0; k < derived->input_count && is_done; k++) is_done = join_field(catalogue, &derived->inputs[k]);
     return is_done;
 }
@@ -101,9 +101,9 @@ static void add_joints_of_one(session_catalogue *catalogue, const session_meshes
         const session_parts parts = session_find_parts(meshes, mesh->name);
         uint64_t hash = SESSION_HASH_BEGIN;
         session_hash_text(&hash, mesh->name);
-        mesh->apart = mesh->has_ids ? hash | 1 : 0;
+        mesh->single_joint_name = mesh->has_ids ? hash | 1 : 0;
         for (int i = 0; i < parts.count; i++) {
-            parts.items[i]->apart = mesh->apart;
+            parts.items[i]->single_joint_name = mesh->single_joint_name;
             parts.items[i]->is_refined = mesh->is_refined;
         }
     }
@@ -123,7 +123,7 @@ static void drop_other_scalars(const session_catalogue *catalogue, session_meshe
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         for (int i = mesh->scalar_count - 1; i >= 0; i--)
-            if (mesh->scalars[i].is_recentred && !session_find_joint(catalogue, mesh->scalars[i].joined))
+            if (mesh->scalars[i].is_recentred && !session_find_joint(catalogue, mesh->scalars[i].joint_name))
                 session_drop_scalar(mesh, i);
     }
 }
@@ -140,6 +140,6 @@ void session_join_meshes(scene *scene, session_catalogue *catalogue, session_mes
     if (is_done)
         drop_other_scalars(catalogue, meshes);
     else
-        session_no_memory(error, (int64_t)sizeof(session_joint), "meshes that have one field");
+        session_fail_for_memory(error, (int64_t)sizeof(session_joint), "meshes that have one field");
     catalogue->are_joined = is_done;
 }

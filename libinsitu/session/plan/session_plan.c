@@ -225,12 +225,14 @@ static insitu_status check_lines(const session_plan_basis *basis, const scene_li
 
 static insitu_status check_surface(const session_plan_basis *basis, const scene_surface *layer, base_error *error)
 {
-    insitu_status status = refuse_fault(find_hidden_fault(basis, &layer->on), error);
-    for (int i = 0; i < layer->on.mesh_count && !status; i++)
-        status = check_named_mesh(basis, &layer->on, layer->on.meshes[i], error);
-    if (!status && layer->threshold.is_given) status = check_field(basis, &layer->threshold.field, &layer->on, error);
-    if (!status) status = check_lines(basis, &layer->lines, &layer->on, error);
-    return status || !layer->has_colour_by ? status : check_field(basis, &layer->colour_by, &layer->on, error);
+    insitu_status status = refuse_fault(find_hidden_fault(basis, &layer->meshes_field), error);
+    for (int i = 0; i < layer->meshes_field.mesh_count && !status; i++)
+        status = check_named_mesh(basis, &layer->meshes_field, layer->meshes_field.meshes[i], error);
+    if (!status && layer->threshold.is_given)
+        status = check_field(basis, &layer->threshold.field, &layer->meshes_field, error);
+    if (!status) status = check_lines(basis, &layer->lines, &layer->meshes_field, error);
+    return status || !layer->has_colour_by ? status
+                                           : check_field(basis, &layer->colour_by, &layer->meshes_field, error);
 }
 
 static insitu_status check_image(const session_plan_basis *basis, const scene_image *image, base_error *error)
@@ -261,7 +263,7 @@ static bool add_recentrings(const session_catalogue *catalogue, session_plan *pl
         const session_catalogue_field *shown = find_drawn_field(mesh, field);
         const bool is_wished = shown && session_is_recentred(field, shown->centring, mesh->is_refined);
         session_joint *joint =
-            is_wished ? session_find_joint(catalogue, session_joint_name(mesh, field->joined)) : NULL;
+            is_wished ? session_find_joint(catalogue, session_joint_name(mesh, field->joint_name)) : NULL;
         if (!joint) continue;
         const session_recentring item = {joint, field->name, session_resolve_component(field, shown->component_count)};
         if (!session_add_recentring(&plan->recentrings, &plan->recentring_count, &item)) return false;
@@ -294,10 +296,10 @@ static double count_intervals(double time, double interval)
 
 static bool is_due(const scene_image *image, const session_moment *m)
 {
-    if (image->every_time > 0)
+    if (image->time_interval > 0)
         return m->is_first ||
-               count_intervals(m->time, image->every_time) != count_intervals(m->last_time, image->every_time);
-    return image->every <= 1 || m->cycle % image->every == 0;
+               count_intervals(m->time, image->time_interval) != count_intervals(m->last_time, image->time_interval);
+    return image->cycle_interval <= 1 || m->cycle % image->cycle_interval == 0;
 }
 
 /* Returns whether any rank has cells, or any mesh has a fault. If not, fields are not required, and the picture is its
@@ -340,7 +342,7 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        const bool is_grey = mesh->first_rank >= 0 && scene_field_is_on(&layer->on, mesh->name) &&
+        const bool is_grey = mesh->first_rank >= 0 && scene_field_is_on(&layer->meshes_field, mesh->name) &&
                              !session_catalogue_find(mesh, layer->colour_by.name);
         const session_warning warning = {WARNING_GREY, image->name, mesh->name, layer->colour_by.line};
         session_warn(report, &warning, is_grey,
@@ -395,7 +397,7 @@ static void warn_of_apart(const session_catalogue *catalogue, const scene_image 
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_catalogue_field *shown = mesh->first_rank >= 0 ? find_drawn_field(mesh, field) : NULL;
         if (!shown || !session_is_recentred(field, shown->centring, mesh->is_refined)) continue;
-        if (mesh->apart && !name) name = mesh->name;
+        if (mesh->single_joint_name && !name) name = mesh->name;
         count++;
     }
     const session_warning warning = {WARNING_APART, image->name, field->name, field->line};
@@ -425,7 +427,7 @@ static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_
     for (int i = 0; i < image->isosurface_count; i++)
         warn_of_no_lines(catalogue, image, &image->isosurfaces[i].field, &image->isosurfaces[i].lines, report);
     for (int i = 0; i < image->surface_count; i++)
-        warn_of_no_lines(catalogue, image, &image->surfaces[i].on, &image->surfaces[i].lines, report);
+        warn_of_no_lines(catalogue, image, &image->surfaces[i].meshes_field, &image->surfaces[i].lines, report);
     for (int i = 0; i < image->slice_count; i++)
         warn_of_no_lines(catalogue, image, &image->slices[i].field, &image->slices[i].lines, report);
 }
@@ -496,7 +498,7 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
                           session_mark_needs(meshes, plan.images, plan.image_count, extent);
     if (is_whole) session_mark_sources(basis->scene, session_derived_of_plan(basis->scene, &plan), meshes);
-    if (!is_whole) session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
+    if (!is_whole) session_fail_for_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
     insitu_status status =
         /* agrees only if necessary, because fill functions may be collective */
         basis->is_filled ? session_agree(team->comm, error) : INSITU_OK;

@@ -32,7 +32,7 @@ insitu_status session_find_extremes(const session_meshes *meshes, const session_
         mine[1] = fmin(mine[1], -most);
     }
     const insitu_status status =
-        session_mpi(error, MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MIN, team->comm), "MPI_Allreduce");
+        session_check_mpi(error, MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MIN, team->comm), "MPI_Allreduce");
     *low = all[0];
     *high = -all[1];
     return status;
@@ -81,7 +81,7 @@ typedef struct kept_values {
 } kept_values;
 
 typedef struct digit_count {
-    uint64_t found[2]; /* known leading bits of the low and the high percentile; the other bits are 0 */
+    uint64_t known_bits[2]; /* known leading bits of the low and the high percentile; the other bits are 0 */
     int pass;
     bool is_positive;
     bool is_kept; /* whether the stored values are read instead of cells */
@@ -106,7 +106,7 @@ static bool count_value(const digit_count *of, uint64_t order, int64_t counts[2 
     const uint64_t known = known_bits_mask(of->pass);
     bool is_counted = false;
     for (int end = 0; end < 2; end++) {
-        if ((order & known) != of->found[end]) continue;
+        if ((order & known) != of->known_bits[end]) continue;
         counts[end * DIGITS + (int)((order & ~known) >> pass_shift(of->pass))]++;
         is_counted = true;
     }
@@ -153,8 +153,8 @@ static insitu_status count_digits(const session_meshes *meshes, const session_te
 {
     memset(counts, 0, 2 * DIGITS * sizeof *counts);
     count_own_digits(meshes, team, field, of, counts);
-    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, counts, 2 * DIGITS, MPI_INT64_T, MPI_SUM, team->comm),
-                       "MPI_Allreduce");
+    return session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, counts, 2 * DIGITS, MPI_INT64_T, MPI_SUM, team->comm),
+                             "MPI_Allreduce");
 }
 
 /* Returns the digit of the value with this rank in the order; *rank becomes its rank among the values with this
@@ -179,11 +179,11 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
         for (int end = 0; end < 2; end++) {
             if (of.pass == 0) ranks[end] = (int64_t)fmax(ceil(percent[end] / 100 * (double)total), 1) - 1;
             const int digit = find_digit(counts + (ptrdiff_t)end * DIGITS, &ranks[end]);
-            of.found[end] |= (uint64_t)digit << pass_shift(of.pass);
+            of.known_bits[end] |= (uint64_t)digit << pass_shift(of.pass);
         }
     }
-    *low = total ? value_from_order(of.found[0]) : INFINITY;
-    *high = total ? value_from_order(of.found[1]) : -INFINITY;
+    *low = total ? value_from_order(of.known_bits[0]) : INFINITY;
+    *high = total ? value_from_order(of.known_bits[1]) : -INFINITY;
     return INSITU_OK;
 }
 

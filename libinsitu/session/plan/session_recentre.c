@@ -37,7 +37,7 @@ typedef struct value_groups {
     double *values;
     double *means; /* mean of each group; count entries */
     /* per group: whether its values are those of boundary faces, else those of cells or corners; count entries */
-    unsigned char *are_faces;
+    unsigned char *has_face_values;
 } value_groups;
 
 /* One of this rank's parts of the meshes whose values are recentred. */
@@ -66,8 +66,8 @@ static bool groups_create(value_groups *groups, int64_t count, const int64_t *st
     groups->ends = base_alloc((size_t)count * sizeof *groups->ends);
     groups->values = base_alloc((size_t)starts[count] * sizeof *groups->values);
     groups->means = base_alloc((size_t)count * sizeof *groups->means);
-    groups->are_faces = base_calloc((size_t)count, sizeof *groups->are_faces);
-    if (!groups->ends || !groups->values || !groups->means || !groups->are_faces) return false;
+    groups->has_face_values = base_calloc((size_t)count, sizeof *groups->has_face_values);
+    if (!groups->ends || !groups->values || !groups->means || !groups->has_face_values) return false;
     memcpy(groups->ends, starts, (size_t)count * sizeof *starts);
     return true;
 }
@@ -77,7 +77,7 @@ static void groups_free(value_groups *groups)
     base_free(groups->ends);
     base_free(groups->values);
     base_free(groups->means);
-    base_free(groups->are_faces);
+    base_free(groups->has_face_values);
     *groups = (value_groups){0};
 }
 
@@ -131,21 +131,21 @@ static void groups_average(value_groups *groups, int threads)
 
 /* The groups of a cell's vertices, each listed once. */
 typedef struct cell_groups {
-    int64_t count, room;
+    int64_t count, capacity;
     int64_t *groups;
-    bool is_lost; /* set if memory ran out */
+    bool is_out_of_memory; /* set if memory ran out */
 } cell_groups;
 
 static void add_group(cell_groups *list, int64_t group)
 {
     for (int64_t i = 0; i < list->count; i++)
         if (list->groups[i] == group) return;
-    if (list->count == list->room) {
-        int64_t *more = base_realloc(list->groups, (size_t)(list->room * 2 + 64) * sizeof *more);
-        list->is_lost = list->is_lost || !more;
+    if (list->count == list->capacity) {
+        int64_t *more = base_realloc(list->groups, (size_t)(list->capacity * 2 + 64) * sizeof *more);
+        list->is_out_of_memory = list->is_out_of_memory || !more;
         if (!more) return;
         list->groups = more;
-        list->room = list->room * 2 + 64;
+        list->capacity = list->capacity * 2 + 64;
     }
     list->groups[list->count++] = group;
 }
@@ -154,7 +154,7 @@ static void add_group(cell_groups *list, int64_t group)
 static inline void add_value(value_groups *values, int64_t group, double value, bool is_shared)
 {
     int64_t at;
-    if (values->are_faces[group]) return;
+    if (values->has_face_values[group]) return;
     if (is_shared)
 #pragma omp atomic capture
         at = values->ends[group]++;
@@ -168,7 +168,7 @@ static inline void add_value(value_groups *values, int64_t group, double value, 
 static void add_cell_values(recentring *r, int part, int64_t cell, cell_groups *list, bool is_shared)
 {
     const grid_field *field = &r->parts[part].field;
-    const int64_t *of_vertex = r->joint->groups.of_vertex + r->joint->groups.firsts[part];
+    const int64_t *of_vertex = r->joint->groups.group_of_vertex + r->joint->groups.first_vertices[part];
     grid_walk walk = grid_walk_cell(&r->list.items[part]->cells, cell);
     double value = field->is_cell_centred ? grid_field_value(field, cell) : 0;
     int64_t vertex;
@@ -189,7 +189,7 @@ static void add_cell_values(recentring *r, int part, int64_t cell, cell_groups *
 static void add_vertex_values(recentring *r, int part)
 {
     const grid_field *field = &r->parts[part].field;
-    const int64_t *of_vertex = r->joint->groups.of_vertex + r->joint->groups.firsts[part];
+    const int64_t *of_vertex = r->joint->groups.group_of_vertex + r->joint->groups.first_vertices[part];
     for (int64_t v = 0; v < r->list.items[part]->cells.vertex_count; v++) {
         const double value = of_vertex[v] < 0 ? NAN : grid_field_value(field, v);
         if (isfinite(value)) add_value(&r->values, of_vertex[v], value, false);
@@ -213,7 +213,7 @@ static bool add_part_values(recentring *r, int part, int threads)
 #pragma omp for schedule(static) nowait
         for (int64_t cell = 0; cell < g->cell_count; cell++)
             if (!grid_is_ghost(g, cell)) add_cell_values(r, part, cell, &list, is_shared);
-        is_lost = list.is_lost;
+        is_lost = list.is_out_of_memory;
         base_free(list.groups);
         region_leave();
     }
@@ -225,7 +225,7 @@ static void set_face_values(const session_patch_values *faces, value_groups *val
 {
     for (int64_t i = 0; i < faces->count; i++) {
         const int64_t group = faces->groups[i];
-        values->are_faces[group] = 1;
+        values->has_face_values[group] = 1;
         values->values[values->ends[group]++] = faces->values[i];
     }
 }
@@ -252,8 +252,8 @@ static bool update_groups(recentring *r, int ranks)
 {
     session_joint *joint = r->joint;
     const session_border *borders = session_has_twins(joint) ? joint->hanging.borders : NULL;
-    const session_vertex_groups_basis basis = {joint->places, r->list.count, r->list.items, borders,
-                                               joint->homes,  joint->by_id,  ranks};
+    const session_vertex_groups_basis basis = {joint->positions_hash, r->list.count, r->list.items, borders,
+                                               joint->homes,          joint->by_id,  ranks};
     return session_update_vertex_groups(&basis, &joint->groups);
 }
 
@@ -263,7 +263,8 @@ static void find_face_values(const recentring *r, session_patch_values *faces, b
     const session_vertex_groups *groups = &r->joint->groups;
     for (int i = 0; i < r->list.count && !error->status; i++) {
         const mesh_part *part = &r->parts[i];
-        const session_vertex_numbers numbers = {&groups->keys, groups->of_vertex + groups->firsts[i], r->joint->by_id};
+        const session_vertex_numbers numbers = {&groups->keys, groups->group_of_vertex + groups->first_vertices[i],
+                                                r->joint->by_id};
         if (part->scalar)
             session_find_patch_values(r->list.items[i], part->scalar->field, part->scalar->component, &numbers,
                                       &faces[i], error);
@@ -276,14 +277,14 @@ static bool allocate_values(recentring *r, const session_patch_values *faces)
     const session_vertex_groups *groups = &r->joint->groups;
     int64_t count = 0, added = 0;
     for (int i = 0; i < r->list.count; i++) count += faces[i].count;
-    if (count == 0) return groups_create(&r->values, groups->count, groups->starts);
+    if (count == 0) return groups_create(&r->values, groups->count, groups->corner_starts);
     r->starts = base_calloc((size_t)groups->count + 1, sizeof *r->starts);
     if (!r->starts) return false;
     for (int i = 0; i < r->list.count; i++)
         for (int64_t k = 0; k < faces[i].count; k++) r->starts[faces[i].groups[k] + 1]++;
     for (int64_t g = 1; g <= groups->count; g++) {
         added += r->starts[g];
-        r->starts[g] = groups->starts[g] + added;
+        r->starts[g] = groups->corner_starts[g] + added;
     }
     if (!groups_create(&r->values, groups->count, r->starts)) return false;
     for (int i = 0; i < r->list.count; i++) set_face_values(&faces[i], &r->values);
@@ -300,7 +301,7 @@ static void average_own_values(recentring *r, const session_team *team, base_err
     if (is_done && !error->status) is_done = allocate_values(r, faces);
     for (int i = 0; i < count && is_done && !error->status; i++)
         if (r->parts[i].scalar) is_done = add_part_values(r, i, team->threads);
-    if (!is_done) session_no_memory(error, r->joint->groups.count * 100, "values recentred to vertices");
+    if (!is_done) session_fail_for_memory(error, r->joint->groups.count * 100, "values recentred to vertices");
     if (!error->status) groups_average(&r->values, team->threads);
     for (int i = 0; i < count && faces; i++) session_patch_values_free(&faces[i]);
     base_free(faces);
@@ -324,7 +325,7 @@ static bool pack_records(const recentring *r, int ranks, session_mail *mail)
     const value_groups *values = &r->values;
     mail->counts = base_calloc((size_t)ranks, sizeof *mail->counts);
     if (!mail->counts) return false;
-    const int64_t *next = groups->shared;
+    const int64_t *next = groups->shared_groups;
     for (int rank = 0; rank < ranks; rank++) {
         for (int64_t i = 0; i < groups->shared_counts[rank]; i++)
             mail->counts[rank] += RECORD_HEAD + value_count(values, *next++);
@@ -334,9 +335,9 @@ static bool pack_records(const recentring *r, int ranks, session_mail *mail)
     if (!mail->words) return false;
     uint64_t *record = mail->words;
     for (int64_t i = 0; i < groups->shared_count; i++) {
-        const int64_t group = groups->shared[i], count = value_count(values, group);
+        const int64_t group = groups->shared_groups[i], count = value_count(values, group);
         memcpy(record, groups->shared_keys[i].words, sizeof groups->shared_keys[i].words);
-        record[RECORD_HEAD - 1] = (uint64_t)count | (values->are_faces[group] ? FACE_VALUES : 0);
+        record[RECORD_HEAD - 1] = (uint64_t)count | (values->has_face_values[group] ? FACE_VALUES : 0);
         memcpy(record + RECORD_HEAD, values->values + values->starts[group], (size_t)count * sizeof(double));
         record += RECORD_HEAD + count;
     }
@@ -359,7 +360,7 @@ static const uint64_t *next_record(const uint64_t *record)
  * ignored. */
 static bool has_values(const uint64_t *record, const value_groups *values, int64_t group)
 {
-    return !values->are_faces[group] || record[RECORD_HEAD - 1] & FACE_VALUES;
+    return !values->has_face_values[group] || record[RECORD_HEAD - 1] & FACE_VALUES;
 }
 
 /* Assigns the same number to records with the same key. */
@@ -386,7 +387,7 @@ static bool gather_records(const session_mail *in, const int64_t *groups, int64_
     if (!groups_create(values, count, starts)) return false;
     i = 0;
     for (const uint64_t *r = in->words; r < end; r = next_record(r), i++)
-        if (r[RECORD_HEAD - 1] & FACE_VALUES) values->are_faces[groups[i]] = 1;
+        if (r[RECORD_HEAD - 1] & FACE_VALUES) values->has_face_values[groups[i]] = 1;
     i = 0;
     for (const uint64_t *r = in->words; r < end; r = next_record(r), i++) {
         if (!has_values(r, values, groups[i])) continue;
@@ -430,17 +431,17 @@ static insitu_status merge_shared(const session_team *team, recentring *r, base_
     const session_vertex_groups *groups = &r->joint->groups;
     session_mail out = {0}, in = {0}, reply = {0}, means = {0};
     if (!error->status && !pack_records(r, team->ranks, &out))
-        session_no_memory(error, groups->shared_count * 100, "values at vertices that ranks share");
+        session_fail_for_memory(error, groups->shared_count * 100, "values at vertices that ranks share");
     insitu_status status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, &out, &in, error);
     session_mail_free(&out);
     if (status) return status;
     if (!error->status && !merge_records(&in, team->ranks, team->threads, &reply))
-        session_no_memory(error, in.total * 24, "values at vertices that ranks share");
+        session_fail_for_memory(error, in.total * 24, "values at vertices that ranks share");
     session_mail_free(&in);
     status = session_mail_deliver(team->comm, SESSION_MAIL_BACK, &reply, &means, error);
     session_mail_free(&reply);
     for (int64_t i = 0; i < groups->shared_count && !status && !error->status; i++)
-        memcpy(&r->values.means[groups->shared[i]], &means.words[i], sizeof(double));
+        memcpy(&r->values.means[groups->shared_groups[i]], &means.words[i], sizeof(double));
     session_mail_free(&means);
     return status;
 }
@@ -451,7 +452,7 @@ static insitu_status merge_shared(const session_team *team, recentring *r, base_
  * without means. For cell values this is checked elsewhere (grid_field.own). */
 static void copy_means_to_vertices(const recentring *r, int part, int threads)
 {
-    const int64_t *of_vertex = r->joint->groups.of_vertex + r->joint->groups.firsts[part];
+    const int64_t *of_vertex = r->joint->groups.group_of_vertex + r->joint->groups.first_vertices[part];
     const int64_t count = r->list.items[part]->cells.vertex_count;
     const grid_field *own = &r->parts[part].field;
     double *values = r->parts[part].scalar->vertex_values;
@@ -479,8 +480,8 @@ static bool is_constrained(const session_recentring *item)
 static insitu_status constrain_hanging(const recentring *r, const session_team *team, base_error *error)
 {
     const session_vertex_groups *groups = &r->joint->groups;
-    const session_hanging_basis basis = {r->joint,       r->list.count,     r->list.items,
-                                         groups->firsts, groups->of_vertex, groups->count};
+    const session_hanging_basis basis = {
+        r->joint, r->list.count, r->list.items, groups->first_vertices, groups->group_of_vertex, groups->count};
     const insitu_status status = session_update_hanging(&basis, team, error);
     return status ? status : session_constrain_hanging(&r->joint->hanging, team, r->values.means, error);
 }
@@ -493,7 +494,7 @@ static void allocate_recentred(const recentring *r, base_error *error)
         if (!scalar || scalar->vertex_values) continue;
         const int64_t count = r->list.items[i]->cells.vertex_count;
         scalar->vertex_values = base_alloc((size_t)count * sizeof(double));
-        if (!scalar->vertex_values) session_no_memory(error, count * (int64_t)sizeof(double), "recentred values");
+        if (!scalar->vertex_values) session_fail_for_memory(error, count * (int64_t)sizeof(double), "recentred values");
     }
 }
 
@@ -504,9 +505,9 @@ static void store_means(const recentring *r, int threads)
         if (!scalar) continue;
         copy_means_to_vertices(r, i, threads);
         scalar->are_values_stale = false;
-        scalar->made++;
-        scalar->of_places = r->joint->places;
-        scalar->is_suspect = true;
+        scalar->computed_count++;
+        scalar->positions_hash = r->joint->positions_hash;
+        scalar->may_have_changed = true;
     }
 }
 
@@ -516,7 +517,7 @@ static insitu_status recentre_field(const session_recentring *item, const sessio
     recentring r = {0};
     insitu_status status = INSITU_OK;
     const bool is_listed = list_parts(item, meshes, &r);
-    if (!is_listed) session_no_memory(error, item->joint->count * 64LL, "values recentred to vertices");
+    if (!is_listed) session_fail_for_memory(error, item->joint->count * 64LL, "values recentred to vertices");
     if (item->joint->count > 1 || is_constrained(item))
         status = session_update_borders(item->joint, &r.list, team, error);
     if (!status && is_listed) average_own_values(&r, team, error);
@@ -538,7 +539,8 @@ static bool is_stale(const session_recentring *item, const session_meshes *meshe
         for (int i = 0; i < parts.count; i++) {
             const session_scalar *scalar =
                 session_find_recentred(parts.items[i], item->field, item->component, item->joint->name);
-            if (scalar && (scalar->are_values_stale || scalar->of_places != item->joint->places)) return true;
+            if (scalar && (scalar->are_values_stale || scalar->positions_hash != item->joint->positions_hash))
+                return true;
         }
     }
     return false;
@@ -564,8 +566,8 @@ insitu_status session_recentre(const session_recentring *items, int count, int *
 {
     if (count == 0) return INSITU_OK;
     for (int i = 0; i < count; i++) stale[i] = is_stale(&items[i], meshes);
-    insitu_status status =
-        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
+    insitu_status status = session_check_mpi(
+        error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
     for (int i = 0; i < count && !status; i++)
         if (stale[i]) status = recentre_field(&items[i], meshes, team, error);
     return status;

@@ -115,17 +115,17 @@ static insitu_status read_lines(session_image_ranges *ranges, const file_content
 /* Reads the file of ranges; a missing file is not an error. */
 static insitu_status read_ranges(session_image_ranges *ranges, base_error *error)
 {
-    c_numbers numbers;
+    c_locale numbers;
     file_content content;
     file_failure failure;
     if (!file_read_own(ranges->path, MOST_BYTES, &content, &failure))
         return failure.is_missing ? INSITU_OK : fail_at_file(ranges, "read", &failure, error);
     insitu_status status = INSITU_OK;
-    if (c_numbers_begin(&numbers)) {
+    if (c_locale_enter(&numbers)) {
         status = read_lines(ranges, &content, error);
-        c_numbers_end(&numbers);
+        c_locale_leave(&numbers);
     } else {
-        status = session_no_memory(error, (int64_t)content.size, "ranges of a run");
+        status = session_fail_for_memory(error, (int64_t)content.size, "ranges of a run");
     }
     base_free(content.text);
     return status;
@@ -194,7 +194,7 @@ static bool prepare_ranges(session_run_ranges *all, const scene_image *image, ba
         if (entry->image && entry->path && entry->items) return true;
         free_ranges(entry);
     }
-    session_no_memory(error, (int64_t)sizeof *items, "ranges of a run");
+    session_fail_for_memory(error, (int64_t)sizeof *items, "ranges of a run");
     return false;
 }
 
@@ -204,7 +204,7 @@ static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, b
     insitu_status status = INSITU_OK;
     for (int i = 0; i < ranges->count && !status; i++) {
         double ends[2] = {ranges->items[i].low, ranges->items[i].high};
-        status = session_mpi(error, MPI_Bcast(ends, 2, MPI_DOUBLE, 0, comm), "MPI_Bcast");
+        status = session_check_mpi(error, MPI_Bcast(ends, 2, MPI_DOUBLE, 0, comm), "MPI_Bcast");
         ranges->items[i].low = ends[0];
         ranges->items[i].high = ends[1];
     }
@@ -215,7 +215,7 @@ static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, b
 static insitu_status fill_ranges(session_image_ranges *ranges, const session_team *team, base_error *error)
 {
     if (team->rank == 0) read_ranges(ranges, error);
-    const insitu_status status = session_agree_as_is(team->comm, error);
+    const insitu_status status = session_agree_without_rank(team->comm, error);
     return status ? status : share_ranges(ranges, team->comm, error);
 }
 

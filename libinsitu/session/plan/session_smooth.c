@@ -16,7 +16,7 @@ typedef struct smooth_item {
     const session_catalogue_mesh *mesh;
     const session_catalogue_field *field;
     const scene_field *scene_field; /* the field in the first layer that shows it */
-    uint64_t joined;                /* name of the joint (session_joint_name()) if values are recentred */
+    uint64_t joint_name;            /* name of the joint (session_joint_name()) if values are recentred */
     int component;
     int value_count;
     mmbvh_interval *values; /* isovalues of all layers that show the field */
@@ -41,7 +41,7 @@ static smooth_item *find_item(smooth_items *items, const smooth_item *like)
     for (int i = 0; i < items->count; i++) {
         smooth_item *item = &items->items[i];
         if (item->mesh == like->mesh && item->field == like->field && item->component == like->component &&
-            item->joined == like->joined)
+            item->joint_name == like->joint_name)
             return item;
     }
     smooth_item *more = base_realloc(items->items, (size_t)(items->count + 1) * sizeof *more);
@@ -57,7 +57,7 @@ static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, c
     if (layer->normals != SCENE_VERTEX || !field || !scene_field_is_on(&layer->field, mesh->name)) return true;
     const int component = session_resolve_component(&layer->field, field->component_count);
     const bool is_recentred = session_is_recentred(&layer->field, field->centring, mesh->is_refined);
-    const uint64_t joined = is_recentred ? session_joint_name(mesh, layer->field.joined) : 0;
+    const uint64_t joined = is_recentred ? session_joint_name(mesh, layer->field.joint_name) : 0;
     smooth_item *item = find_item(items, &(smooth_item){mesh, field, &layer->field, joined, component, 0, NULL});
     if (!item) return false;
     const size_t count = (size_t)item->value_count + (size_t)layer->value_count;
@@ -105,12 +105,12 @@ static int64_t mark_crossed_vertices(const mmbvh_selection *crossed, session_sum
 {
     const grid *g = &part->mesh->cells;
     int64_t count = 0, vertex;
-    for (int64_t v = 0; v < g->vertex_count; v++) part->entries[v] = -1;
+    for (int64_t v = 0; v < g->vertex_count; v++) part->key_indices[v] = -1;
     for (int64_t i = 0; i < crossed->count; i++) {
         grid_walk walk = grid_walk_cell(g, crossed->cells[i]);
         while (grid_walk_next(&walk, &vertex)) {
-            count += part->entries[vertex] < 0;
-            part->entries[vertex] = 0;
+            count += part->key_indices[vertex] < 0;
+            part->key_indices[vertex] = 0;
         }
     }
     return count;
@@ -123,7 +123,7 @@ static bool add_own_keys(const smooth_item *item, int64_t most, session_vertex_s
     for (int i = 0; i < sums->part_count; i++) {
         const session_sum_part *part = &sums->parts[i];
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++)
-            if (part->entries[v] == 0) {
+            if (part->key_indices[v] == 0) {
                 const session_key key = session_vertex_key(part->mesh, v, item->mesh->has_ids);
                 session_keys_add(&sums->keys, &key);
             }
@@ -142,13 +142,13 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_
         const mmbvh_wish wish = {part->fields, item->value_count, item->values};
         const int64_t vertices = part->mesh->cells.vertex_count;
         int64_t unusable;
-        part->entries = base_alloc((size_t)(vertices ? vertices : 1) * sizeof *part->entries);
-        if (!part->entries) return session_no_memory(error, vertices * 4, "gradients at vertices");
+        part->key_indices = base_alloc((size_t)(vertices ? vertices : 1) * sizeof *part->key_indices);
+        if (!part->key_indices) return session_fail_for_memory(error, vertices * 4, "gradients at vertices");
         if (mmbvh_select(&part->mesh->cells, &wish, 1, &options, &work->crossed[i], &unusable, error))
             return error->status;
         most += mark_crossed_vertices(&work->crossed[i], part);
     }
-    if (!add_own_keys(item, most, sums)) session_no_memory(error, most * 40, "gradients at vertices");
+    if (!add_own_keys(item, most, sums)) session_fail_for_memory(error, most * 40, "gradients at vertices");
     return error->status;
 }
 
@@ -164,7 +164,7 @@ static insitu_status create_work(const smooth_item *item, const session_meshes *
     work->scalars = base_calloc(room, sizeof *work->scalars);
     work->crossed = base_calloc(room, sizeof *work->crossed);
     if (!sums->parts || !work->scalars || !work->crossed)
-        return session_no_memory(error, parts.count * 100LL, "gradients at vertices");
+        return session_fail_for_memory(error, parts.count * 100LL, "gradients at vertices");
     for (int i = 0; i < parts.count; i++) {
         session_mesh *part = parts.items[i];
         session_scalar *scalar = part->is_given ? session_find_scalar(part, item->scene_field) : NULL;
@@ -192,11 +192,11 @@ static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32
 {
     int64_t count = 0;
     for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
-        const int32_t entry = part->entries[v];
-        part->entries[v] = -1;
+        const int32_t entry = part->key_indices[v];
+        part->key_indices[v] = -1;
         if (entry < 0 || entry >= own_count) continue;
         sum_of[count] = entry;
-        part->entries[v] = (int32_t)count++;
+        part->key_indices[v] = (int32_t)count++;
     }
     return count;
 }
@@ -206,7 +206,7 @@ static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32
 static bool store_gradients(const session_vertex_sums *sums, session_sum_part *part, session_scalar *scalar)
 {
     const int64_t vertices = part->mesh->cells.vertex_count, words = session_sum_words(1);
-    const session_gradient_bounds bounds = {1, sums->bounds.sharpness};
+    const session_gradient_bounds bounds = {1, sums->bounds.largest_inverse_square};
     session_drop_gradients(scalar);
     int32_t *sum_of = base_alloc((size_t)(vertices + 1) * sizeof *sum_of);
     const int64_t count = sum_of ? number_gradients(part, sums->own_count, sum_of) : 0;
@@ -221,8 +221,8 @@ static bool store_gradients(const session_vertex_sums *sums, session_sum_part *p
     base_free(sum_of);
     if (!is_done) return false;
     scalar->gradient_count = count;
-    scalar->gradient_entries = part->entries;
-    part->entries = NULL;
+    scalar->gradient_indices = part->key_indices;
+    part->key_indices = NULL;
     return true;
 }
 
@@ -234,7 +234,7 @@ static insitu_status find_item_gradients(const smooth_item *item, const session_
     const insitu_status status = session_find_sums(&item->mesh->homes, team, extent, &work.sums, error);
     for (int i = 0; i < work.sums.part_count && !status && !error->status; i++)
         if (!store_gradients(&work.sums, &work.sums.parts[i], work.scalars[i]))
-            session_no_memory(error, work.sums.own_count * 12, "gradients at vertices");
+            session_fail_for_memory(error, work.sums.own_count * 12, "gradients at vertices");
     free_work(&work);
     return status;
 }
@@ -244,7 +244,7 @@ insitu_status session_smooth(const session_plan *plan, const session_catalogue *
 {
     smooth_items items = {0};
     if (!session_is_smooth(plan)) return INSITU_OK;
-    if (!list_items(plan, catalogue, &items)) session_no_memory(error, 64, "the plan of gradients at vertices");
+    if (!list_items(plan, catalogue, &items)) session_fail_for_memory(error, 64, "the plan of gradients at vertices");
     insitu_status status = session_agree(team->comm, error);
     for (int i = 0; i < items.count && !status; i++)
         status = find_item_gradients(&items.items[i], meshes, team, extent, error);

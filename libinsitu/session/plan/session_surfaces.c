@@ -57,7 +57,7 @@ static int list_image_wishes(const scene_image *image, const session_catalogue *
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         for (int n = 0; n < image->surface_count; n++) {
             const surface_wish wish = {mesh, &image->surfaces[n].threshold};
-            if (scene_field_is_on(&image->surfaces[n].on, mesh->name)) count = add_wish(wishes, count, &wish);
+            if (scene_field_is_on(&image->surfaces[n].meshes_field, mesh->name)) count = add_wish(wishes, count, &wish);
         }
         for (int n = 0; n < image->isosurface_count && mesh->has_shells_alone; n++) {
             const scene_field *field = &image->isosurfaces[n].field;
@@ -89,11 +89,12 @@ static insitu_status find_stale_wishes(const session_meshes *meshes, const surfa
         own[1] = own[1] || stale[i];
     }
     insitu_status status =
-        session_mpi(error, MPI_Allreduce(own, all, 2, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
+        session_check_mpi(error, MPI_Allreduce(own, all, 2, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
     if (!status && all[0]) status = session_agree(team->comm, error);
     *is_any = all[1];
     if (status || !all[1]) return status;
-    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
+    return session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm),
+                             "MPI_Allreduce");
 }
 
 static insitu_status find_faces(const session_meshes *meshes, const surface_wish *wish, const session_team *team,
@@ -102,7 +103,7 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_wish
     const session_parts parts = session_find_parts(meshes, wish->mesh->name);
     int count = 0;
     session_face_part *of = base_calloc((size_t)parts.count + 1, sizeof *of);
-    if (!of) session_no_memory(error, parts.count * (int64_t)sizeof *of, "surfaces");
+    if (!of) session_fail_for_memory(error, parts.count * (int64_t)sizeof *of, "surfaces");
     for (int i = 0; i < parts.count && of; i++) {
         session_outer *outer = find_own_outer(parts.items[i], wish);
         if (outer) of[count++] = (session_face_part){parts.items[i], outer, NULL};
@@ -121,8 +122,8 @@ static insitu_status prepare_outer_mesh(const session_mesh *mesh, session_outer 
     const insitu_status status = session_make_outer_mesh(mesh, outer, error);
     if (status) return status;
     outer->mesh->is_needed = true;
-    outer->mesh->scalars[0].is_used = outer->mesh->scalars[0].wants_ranges = true;
-    outer->mesh->scalars[0].needs_all = true;
+    outer->mesh->scalars[0].is_used = outer->mesh->scalars[0].needs_ranges = true;
+    outer->mesh->scalars[0].needs_all_cells = true;
     return INSITU_OK;
 }
 
@@ -131,7 +132,7 @@ static void make_meshes(const session_meshes *meshes, base_error *error)
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
         for (int k = 0; k < mesh->outer_count && !error->status; k++)
-            if (mesh->outers[k]->is_wanted && mesh->outers[k]->are_faces_known)
+            if (mesh->outers[k]->is_needed && mesh->outers[k]->are_faces_known)
                 prepare_outer_mesh(mesh, mesh->outers[k], error);
     }
 }
@@ -144,7 +145,7 @@ insitu_status session_update_surfaces(const session_plan *plan, const session_ca
     surface_wish *wishes = base_calloc(most, sizeof *wishes);
     bool is_any = false;
     if (!stale || !wishes)
-        session_no_memory(error, (int64_t)(most * (sizeof *stale + sizeof *wishes)), "surfaces");
+        session_fail_for_memory(error, (int64_t)(most * (sizeof *stale + sizeof *wishes)), "surfaces");
     else
         count = list_wishes(plan, catalogue, wishes);
     insitu_status status = find_stale_wishes(meshes, wishes, count, team, stale, &is_any, error);

@@ -99,9 +99,9 @@ static bool expand_table(const scene_colour_map *map, session_transfer *out)
     out->table = base_alloc((size_t)count * 3 * sizeof *out->table);
     if (!out->table) return false;
     float *entry = out->table;
-    if (map->has_below) copy_colour(entry, map->outside[0]), entry += 3;
+    if (map->has_below) copy_colour(entry, map->outside_colours[0]), entry += 3;
     for (int i = 0; i < inner; i++, entry += 3) copy_colour(entry, map->colours + 3 * (size_t)(i / repeated));
-    if (map->has_above) copy_colour(entry, map->outside[1]);
+    if (map->has_above) copy_colour(entry, map->outside_colours[1]);
     const double low = scale_value_at(t, map->has_below ? -1.0 / (inner - 1) : 0);
     const double high = scale_value_at(t, map->has_above ? 1 + 1.0 / (inner - 1) : 1);
     if (map->has_below) t->low = low;
@@ -118,7 +118,7 @@ static void set_opacity(const scene_volume *volume, double half_diagonal, sessio
     render_transfer *t = &out->transfer;
     t->opacity_count = volume->opacity_count;
     for (int i = 0; i < t->opacity_count; i++) {
-        out->opacity_values[i] = scale_value_at(t, volume->opacity[i].at);
+        out->opacity_values[i] = scale_value_at(t, volume->opacity[i].position);
         out->opacities[i] = volume->opacity[i].opacity;
     }
     t->opacity_values = out->opacity_values;
@@ -150,7 +150,7 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
         return !session_takes_memory(map, volume) || expand_table(map, out);
     }
     out->transfer.is_banded = map->is_banded;
-    if (map->has_below || map->has_above || map->has_nan) out->transfer.outside = map->outside[0];
+    if (map->has_below || map->has_above || map->has_nan) out->transfer.outside = map->outside_colours[0];
     return true;
 }
 

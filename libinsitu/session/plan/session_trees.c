@@ -6,9 +6,9 @@
  *
  * A full tree is expensive to build and cheap to keep. A partial tree, over the cells that the images can show, is
  * cheap to build if they show little, but is valid only for the current values. Which is better depends on how long the
- * cells will stay unchanged, which is unknown. So partial trees are "rented" until the rent since the cells last
- * changed reaches the price of the full tree, which is then "bought". This never costs more than twice the best choice
- * in hindsight (Karlin, Manasse, Rudolph and Sleator 1988). Prices are measured in this run.
+ * cells will stay unchanged, which is unknown. So partial trees are "rented" until the time spent on them since the
+ * cells last changed reaches the price of the full tree, which is then "bought". This never costs more than twice the
+ * best choice in hindsight (Karlin, Manasse, Rudolph and Sleator 1988). Prices are measured in this run.
  *
  * If the last full tree of a mesh was used in only one step, the next one probably will be, too, as when the caller
  * sets a new mesh at every step. It is then built along a space-filling curve, in half the time, and is kept if it is
@@ -69,10 +69,10 @@ static session_scalar *choose_own_scalar(session_mesh *mesh)
 {
     session_scalar *own = find_own_scalar(mesh);
     for (int i = 0; i < mesh->scalar_count && !own; i++)
-        if (mesh->scalars[i].wants_ranges) own = &mesh->scalars[i];
+        if (mesh->scalars[i].needs_ranges) own = &mesh->scalars[i];
     if (!own->has_own_ranges) {
-        base_free(own->pairs);
-        own->pairs = NULL;
+        base_free(own->node_ranges);
+        own->node_ranges = NULL;
         own->has_own_ranges = true;
         own->are_ranges_stale = true;
     }
@@ -117,7 +117,7 @@ static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const 
     mesh->are_bounds_partial = false;
     mesh->built_surface = half_box_area(mesh);
     if (!selection) mesh->full_tree_steps = 0;
-    if (!selection) own->unusable = mesh->tree.unusable_cells;
+    if (!selection) own->unusable_count = mesh->tree.unusable_cells;
     const double seconds = omp_get_wtime() - start;
     update_rate(&u->trees->rates.build, seconds, mesh->tree.cell_count);
     u->report->build_ms += 1e3 * seconds;
@@ -129,15 +129,16 @@ static insitu_status refit_scalar(session_mesh *mesh, session_scalar *scalar, co
     const grid_field field = session_scalar_field(mesh, scalar);
     if (scalar->has_own_ranges) {
         const insitu_status status = mmbvh_refit_ranges(&mesh->tree, &mesh->cells, &field, options);
-        if (!mesh->is_partial) scalar->unusable = mesh->tree.unusable_cells;
+        if (!mesh->is_partial) scalar->unusable_count = mesh->tree.unusable_cells;
         return status;
     }
-    if (!scalar->pairs) scalar->pairs = base_alloc((size_t)mesh->tree.node_count * 2 * sizeof *scalar->pairs);
-    if (!scalar->pairs) return INSITU_ERROR_MEMORY;
+    if (!scalar->node_ranges)
+        scalar->node_ranges = base_alloc((size_t)mesh->tree.node_count * 2 * sizeof *scalar->node_ranges);
+    if (!scalar->node_ranges) return INSITU_ERROR_MEMORY;
     int64_t unusable;
     const insitu_status status =
-        mmbvh_compute_ranges(&mesh->tree, &mesh->cells, &field, options, scalar->pairs, &unusable);
-    if (!mesh->is_partial) scalar->unusable = unusable;
+        mmbvh_compute_ranges(&mesh->tree, &mesh->cells, &field, options, scalar->node_ranges, &unusable);
+    if (!mesh->is_partial) scalar->unusable_count = unusable;
     return status;
 }
 
@@ -147,7 +148,7 @@ static insitu_status refit_ranges(const tree_update *u, session_mesh *mesh, base
     choose_own_scalar(mesh);
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
-        if (!scalar->wants_ranges || !scalar->are_ranges_stale) continue;
+        if (!scalar->needs_ranges || !scalar->are_ranges_stale) continue;
         const double start = omp_get_wtime();
         const insitu_status status = refit_scalar(mesh, scalar, &options);
         if (status)
@@ -184,7 +185,7 @@ static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
     int count = 0;
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *s = &mesh->scalars[i];
-        if (!s->wants_ranges) continue;
+        if (!s->needs_ranges) continue;
         out[count++] = (mmbvh_visible){session_scalar_ranges(mesh, s), s->interval_count, s->intervals};
     }
     return count;
@@ -197,7 +198,8 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     const mmbvh_options options = make_tree_options(u);
     bool is_whole;
     mmbvh_visible *visible = base_alloc((size_t)(mesh->scalar_count + 1) * sizeof *visible);
-    if (!visible) return session_no_memory(error, (mesh->scalar_count + 1) * (int64_t)sizeof *visible, "visible nodes");
+    if (!visible)
+        return session_fail_for_memory(error, (mesh->scalar_count + 1) * (int64_t)sizeof *visible, "visible nodes");
     const int count = all ? 0 : list_visible(mesh, visible);
     const insitu_status status =
         mmbvh_refit_visible_bounds(&mesh->tree, &mesh->cells, visible, count, &options, &is_whole);
@@ -270,7 +272,7 @@ static insitu_status update_parent(const tree_update *u, const session_meshes *m
     const double start = omp_get_wtime();
     u->trees->is_parent_stale = true;
     float *boxes = base_alloc((size_t)count * 8 * sizeof *boxes);
-    if (!boxes) return session_no_memory(error, count * 32, "boxes of meshes");
+    if (!boxes) return session_fail_for_memory(error, count * 32, "boxes of meshes");
     fill_boxes(meshes, boxes, count);
     const mmbvh_options options = make_tree_options(u);
     const insitu_status status = mmbvh_build_boxes(boxes, boxes + 3 * (size_t)count, boxes + 6 * (size_t)count, count,
@@ -298,13 +300,13 @@ static bool prefers_partial_tree(const tree_update *u, const session_mesh *mesh,
 {
     if (u->choice == SCENE_TREE_FULL || !session_find_candidates(mesh, key)) return false;
     if (u->choice == SCENE_TREE_PARTIAL) return true;
-    return !has_full_tree(mesh) && mesh->rent < full_tree_cost(u, mesh);
+    return !has_full_tree(mesh) && mesh->partial_tree_seconds < full_tree_cost(u, mesh);
 }
 
 static bool has_new_values(const session_mesh *mesh)
 {
     for (int i = 0; i < mesh->scalar_count; i++)
-        if (mesh->scalars[i].wants_ranges && mesh->scalars[i].are_ranges_stale) return true;
+        if (mesh->scalars[i].needs_ranges && mesh->scalars[i].are_ranges_stale) return true;
     return false;
 }
 
@@ -332,8 +334,9 @@ static insitu_status update_partial(const tree_update *u, session_mesh *mesh, ui
     status = build_tree(u, mesh, is_partial ? &selection : NULL, error);
     mmbvh_selection_free(&selection);
     mesh->candidates_key = key;
-    mesh->rent += omp_get_wtime() - start;
-    mesh->rent -= estimate_rate(u->trees->rates.refit, first_rates.refit, u->threads) * (double)mesh->drawn_count;
+    mesh->partial_tree_seconds += omp_get_wtime() - start;
+    mesh->partial_tree_seconds -=
+        estimate_rate(u->trees->rates.refit, first_rates.refit, u->threads) * (double)mesh->drawn_count;
     return status;
 }
 
@@ -387,7 +390,7 @@ static void merge_threads(const tree_update *u, const thread_update *each, base_
 static insitu_status update_on_threads(const tree_update *u, session_mesh *const *parts, int count, base_error *error)
 {
     thread_update *each = base_calloc((size_t)u->threads, sizeof *each);
-    if (!each) return session_no_memory(error, u->threads * (int64_t)sizeof *each, "trees of blocks");
+    if (!each) return session_fail_for_memory(error, u->threads * (int64_t)sizeof *each, "trees of blocks");
     for (int t = 0; t < u->threads; t++) {
         each[t].trees.rates = u->trees->rates;
         each[t].update = *u;
@@ -425,7 +428,7 @@ static insitu_status update_all_trees(const tree_update *u, const session_meshes
 {
     const int count = list_needed(meshes, NULL);
     session_mesh **parts = base_alloc((size_t)(count + 1) * sizeof *parts);
-    if (!parts) return session_no_memory(error, count * (int64_t)sizeof(session_mesh *), "trees");
+    if (!parts) return session_fail_for_memory(error, count * (int64_t)sizeof(session_mesh *), "trees");
     list_needed(meshes, parts);
     insitu_status status = INSITU_OK;
     if (u->threads > 1 && count >= PARTS_A_THREAD * u->threads)

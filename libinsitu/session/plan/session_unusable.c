@@ -28,7 +28,7 @@ static const scene_field *next_field(field_walk *walk)
 static int64_t count_unusable(const session_mesh *mesh, const scene_field *field)
 {
     const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
-    return scalar ? scalar->unusable : 0;
+    return scalar ? scalar->unusable_count : 0;
 }
 
 static int64_t unusable_of_parts(const session_meshes *meshes, const char *name, const scene_field *field)
@@ -69,13 +69,13 @@ insitu_status session_warn_of_unusable(const session_plan *plan, const session_c
 {
     const int mesh_count = catalogue->mesh_count;
     int64_t *counts = base_alloc((size_t)(mesh_count + 1) * sizeof *counts);
-    if (!counts) session_no_memory(error, (mesh_count + 1) * (int64_t)sizeof *counts, "counts of cells");
+    if (!counts) session_fail_for_memory(error, (mesh_count + 1) * (int64_t)sizeof *counts, "counts of cells");
     insitu_status status = session_agree(team->comm, error);
     field_walk walk = {.plan = plan};
     for (const scene_field *field; !status && (field = next_field(&walk)) != NULL;) {
         for (int m = 0; m < mesh_count; m++) counts[m] = unusable_of_parts(meshes, catalogue->meshes[m].name, field);
         const int code = MPI_Allreduce(MPI_IN_PLACE, counts, mesh_count, MPI_INT64_T, MPI_SUM, team->comm);
-        status = session_mpi(error, code, "MPI_Allreduce");
+        status = session_check_mpi(error, code, "MPI_Allreduce");
         for (int m = 0; m < mesh_count && !status; m++)
             warn_of_count(catalogue->meshes[m].name, field, counts[m], report);
     }

@@ -19,14 +19,14 @@ static session_key key_of_place(const double place[3])
     return key;
 }
 
-/* Assigns groups to the vertices of a part's drawn cells. Before that, of_vertex is -2 - i for the i-th twin.
+/* Assigns groups to the vertices of a part's drawn cells. Before that, group_of_vertex is -2 - i for the i-th twin.
  * one_vertex, which is NULL unless vertices are equal by id, gets the number of one vertex of each group. */
 static void group_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
 {
     const session_mesh *mesh = basis->parts[part];
     const session_border *border = basis->borders ? &basis->borders[part] : NULL;
     const grid *g = &mesh->cells;
-    int64_t *of_vertex = out->of_vertex + out->firsts[part];
+    int64_t *of_vertex = out->group_of_vertex + out->first_vertices[part];
     for (int64_t v = 0; v < g->vertex_count; v++) of_vertex[v] = -1;
     for (int64_t i = 0; border && i < border->twin_count; i++) of_vertex[border->twins[i].vertex] = -2 - i;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
@@ -36,12 +36,12 @@ static void group_part(const groups_basis *basis, int part, session_vertex_group
         while (grid_walk_next(&walk, &vertex)) {
             if (of_vertex[vertex] < 0) {
                 const int64_t twin = -2 - of_vertex[vertex];
-                const session_key key = twin >= 0 ? key_of_place(border->twins[twin].place)
+                const session_key key = twin >= 0 ? key_of_place(border->twins[twin].position)
                                                   : session_vertex_key(mesh, vertex, basis->by_id);
                 of_vertex[vertex] = session_keys_add(&out->keys, &key);
-                if (one_vertex) one_vertex[of_vertex[vertex]] = out->firsts[part] + vertex;
+                if (one_vertex) one_vertex[of_vertex[vertex]] = out->first_vertices[part] + vertex;
             }
-            out->starts[of_vertex[vertex] + 1]++;
+            out->corner_starts[of_vertex[vertex] + 1]++;
         }
     }
 }
@@ -49,21 +49,22 @@ static void group_part(const groups_basis *basis, int part, session_vertex_group
 /* Groups the vertices of all parts. *one_vertex: if they are grouped by id, the number of one vertex of each group. */
 static bool group_vertices(const groups_basis *basis, session_vertex_groups *out, int64_t **one_vertex)
 {
-    out->firsts = base_calloc((size_t)basis->part_count + 1, sizeof *out->firsts);
-    if (!out->firsts) return false;
+    out->first_vertices = base_calloc((size_t)basis->part_count + 1, sizeof *out->first_vertices);
+    if (!out->first_vertices) return false;
     for (int i = 0; i < basis->part_count; i++)
-        out->firsts[i + 1] = out->firsts[i] + basis->parts[i]->cells.vertex_count;
-    const int64_t most = out->firsts[basis->part_count];
+        out->first_vertices[i + 1] = out->first_vertices[i] + basis->parts[i]->cells.vertex_count;
+    const int64_t most = out->first_vertices[basis->part_count];
     *one_vertex = basis->by_id ? base_alloc((size_t)most * sizeof **one_vertex) : NULL;
-    out->of_vertex = base_alloc((size_t)most * sizeof *out->of_vertex);
-    out->starts = base_calloc((size_t)most + 1, sizeof *out->starts);
-    if (!out->of_vertex || !out->starts || (basis->by_id && !*one_vertex) || !session_keys_create(&out->keys, most))
+    out->group_of_vertex = base_alloc((size_t)most * sizeof *out->group_of_vertex);
+    out->corner_starts = base_calloc((size_t)most + 1, sizeof *out->corner_starts);
+    if (!out->group_of_vertex || !out->corner_starts || (basis->by_id && !*one_vertex) ||
+        !session_keys_create(&out->keys, most))
         return false;
     for (int i = 0; i < basis->part_count; i++) group_part(basis, i, out, *one_vertex);
     out->count = out->keys.count;
-    for (int64_t group = 0; group < out->count; group++) out->starts[group + 1] += out->starts[group];
-    int64_t *starts = base_realloc(out->starts, (size_t)(out->count + 1) * sizeof *starts);
-    if (starts) out->starts = starts;
+    for (int64_t group = 0; group < out->count; group++) out->corner_starts[group + 1] += out->corner_starts[group];
+    int64_t *starts = base_realloc(out->corner_starts, (size_t)(out->count + 1) * sizeof *starts);
+    if (starts) out->corner_starts = starts;
     return true;
 }
 
@@ -75,12 +76,12 @@ static void place_of_vertex(const groups_basis *basis, const session_vertex_grou
     int part = 0, end = basis->part_count;
     while (end - part > 1) {
         const int middle = part + (end - part) / 2;
-        if (groups->firsts[middle] <= number)
+        if (groups->first_vertices[middle] <= number)
             part = middle;
         else
             end = middle;
     }
-    grid_vertex(&basis->parts[part]->cells, number - groups->firsts[part], place);
+    grid_vertex(&basis->parts[part]->cells, number - groups->first_vertices[part], place);
 }
 
 static void find_group_position(const groups_basis *basis, const session_vertex_groups *groups,
@@ -102,8 +103,8 @@ static void find_homes(const groups_basis *basis, const int64_t *one_vertex, ses
         find_group_position(basis, out, one_vertex, group, place[0]);
         home[group] = -1;
         if (!session_homes_share(basis->homes, place[0])) continue;
-        home[group] =
-            session_home(basis->homes, (const double(*)[3])place, 1, session_key_hash(key), (int64_t)key->words[0]);
+        home[group] = session_find_home(basis->homes, (const double(*)[3])place, 1, session_key_hash(key),
+                                        (int64_t)key->words[0]);
         out->shared_counts[home[group]]++;
         out->shared_count++;
     }
@@ -118,16 +119,16 @@ static bool list_shared(const groups_basis *basis, const int64_t *one_vertex, se
     bool is_done = home && places && out->shared_counts;
     if (is_done) {
         find_homes(basis, one_vertex, out, home);
-        out->shared = base_alloc((size_t)out->shared_count * sizeof *out->shared);
+        out->shared_groups = base_alloc((size_t)out->shared_count * sizeof *out->shared_groups);
         out->shared_keys = base_alloc((size_t)out->shared_count * sizeof *out->shared_keys);
-        is_done = out->shared && out->shared_keys;
+        is_done = out->shared_groups && out->shared_keys;
     }
     for (int rank = 0; rank < basis->ranks && is_done; rank++)
         places[rank + 1] = places[rank] + out->shared_counts[rank];
     for (int64_t group = 0; group < out->count && is_done; group++) {
         if (home[group] < 0) continue;
         const int64_t at = places[home[group]]++;
-        out->shared[at] = group;
+        out->shared_groups[at] = group;
         out->shared_keys[at] = out->keys.keys[group];
     }
     base_free(home);
@@ -149,13 +150,13 @@ bool session_update_vertex_groups(const session_vertex_groups_basis *basis, sess
 {
     int64_t *one_vertex = NULL;
     const bool needs_keys = has_patches(basis);
-    if (groups->places == basis->places && (groups->keys.keys || !needs_keys)) return true;
+    if (groups->positions_hash == basis->positions_hash && (groups->keys.keys || !needs_keys)) return true;
     session_vertex_groups_free(groups);
     const bool is_done =
         group_vertices(basis, groups, &one_vertex) && (basis->ranks == 1 || list_shared(basis, one_vertex, groups));
     base_free(one_vertex);
     if (!is_done) session_vertex_groups_free(groups);
     if (!needs_keys) session_keys_free(&groups->keys);
-    if (is_done) groups->places = basis->places;
+    if (is_done) groups->positions_hash = basis->positions_hash;
     return is_done;
 }

@@ -11,7 +11,7 @@
 
 /* The data from which groups are made. */
 typedef struct session_vertex_groups_basis {
-    uint64_t places;
+    uint64_t positions_hash;
     int part_count;
     const session_mesh *const *parts; /* this rank's parts of all meshes of the joint */
     const session_border *borders;    /* borders with twins of vertices, one per part; NULL: vertices have no twins */

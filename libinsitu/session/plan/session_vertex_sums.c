@@ -25,12 +25,12 @@ enum { KEY_WORDS = 3 };
 static void mark_vertices(session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
-    for (int64_t v = 0; v < g->vertex_count; v++) part->entries[v] = -1;
+    for (int64_t v = 0; v < g->vertex_count; v++) part->key_indices[v] = -1;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         if (grid_is_ghost(g, cell)) continue;
         grid_walk walk = grid_walk_cell(g, cell);
         int64_t vertex;
-        while (grid_walk_next(&walk, &vertex)) part->entries[vertex] = 0;
+        while (grid_walk_next(&walk, &vertex)) part->key_indices[vertex] = 0;
     }
 }
 
@@ -40,8 +40,8 @@ static bool key_all_vertices(session_vertex_sums *sums)
     for (int i = 0; i < sums->part_count; i++) {
         session_sum_part *part = &sums->parts[i];
         const int64_t count = part->mesh->cells.vertex_count;
-        part->entries = base_alloc((size_t)count * sizeof *part->entries);
-        if (!part->entries) return false;
+        part->key_indices = base_alloc((size_t)count * sizeof *part->key_indices);
+        if (!part->key_indices) return false;
         most += count;
     }
     if (most > INT32_MAX || !session_keys_create(&sums->keys, most)) return false;
@@ -49,9 +49,9 @@ static bool key_all_vertices(session_vertex_sums *sums)
         session_sum_part *part = &sums->parts[i];
         mark_vertices(part);
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
-            if (part->entries[v] < 0) continue;
+            if (part->key_indices[v] < 0) continue;
             const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
-            part->entries[v] = (int32_t)session_keys_add(&sums->keys, &key);
+            part->key_indices[v] = (int32_t)session_keys_add(&sums->keys, &key);
         }
     }
     sums->own_count = sums->keys.count;
@@ -67,9 +67,9 @@ static int64_t count_vertices(const session_vertex_sums *sums)
 
 insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error)
 {
-    sums->are_all = true;
+    sums->has_all_vertices = true;
     if (key_all_vertices(sums)) return INSITU_OK;
-    return session_no_memory(error, count_vertices(sums) * 60, "gradients at vertices");
+    return session_fail_for_memory(error, count_vertices(sums) * 60, "gradients at vertices");
 }
 
 /* ---- requests to other ranks ----------------------------------------------------------------------------------- */
@@ -77,7 +77,7 @@ insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *er
 /* The messages of an exchange of sums. */
 typedef struct sums_mail {
     double (*places)[3];
-    session_mail questions, asked, answers, answered;
+    session_mail questions, received_questions, answers, received_answers;
     int64_t *own_numbers, *asked_numbers;
 } sums_mail;
 
@@ -85,9 +85,9 @@ static void mail_free(sums_mail *mail)
 {
     base_free(mail->places);
     session_mail_free(&mail->questions);
-    session_mail_free(&mail->asked);
+    session_mail_free(&mail->received_questions);
     session_mail_free(&mail->answers);
-    session_mail_free(&mail->answered);
+    session_mail_free(&mail->received_answers);
     base_free(mail->own_numbers);
     base_free(mail->asked_numbers);
 }
@@ -100,9 +100,9 @@ static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3
     for (int i = 0; i < sums->part_count; i++) {
         const session_sum_part *part = &sums->parts[i];
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
-            if (part->entries[v] < 0) continue;
-            int64_t number = part->entries[v];
-            if (!sums->are_all) {
+            if (part->key_indices[v] < 0) continue;
+            int64_t number = part->key_indices[v];
+            if (!sums->has_all_vertices) {
                 const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
                 number = session_keys_find(&sums->keys, &key);
             }
@@ -121,14 +121,14 @@ static bool write_questions(const session_vertex_sums *sums, const session_team 
     out->counts = base_calloc((size_t)team->ranks, sizeof *out->counts);
     if (!out->counts) return false;
     for (int n = 0; n < homes->near_count; n++)
-        for (int64_t i = 0; i < sums->own_count && homes->near[n] != team->rank; i++)
-            out->counts[homes->near[n]] += session_is_in_box(&homes->boxes[n], places[i]);
+        for (int64_t i = 0; i < sums->own_count && homes->near_ranks[n] != team->rank; i++)
+            out->counts[homes->near_ranks[n]] += session_is_in_box(&homes->boxes[n], places[i]);
     for (int rank = 0; rank < team->ranks; rank++) total += out->counts[rank];
     out->words = base_alloc((size_t)(total ? total : 1) * KEY_WORDS * sizeof *out->words);
     *numbers = base_alloc((size_t)(total ? total : 1) * sizeof **numbers);
     if (!out->words || !*numbers) return false;
     for (int n = 0; n < homes->near_count; n++) {
-        const int rank = homes->near[n];
+        const int rank = homes->near_ranks[n];
         for (int64_t i = 0; i < sums->own_count && out->counts[rank]; i++) {
             if (!session_is_in_box(&homes->boxes[n], places[i])) continue;
             memcpy(out->words + at * KEY_WORDS, sums->keys.keys[i].words, KEY_WORDS * sizeof *out->words);
@@ -157,11 +157,12 @@ static bool read_questions(const session_mail *in, session_vertex_sums *sums, in
 {
     const int64_t count = in->total / KEY_WORDS;
     *numbers = base_alloc((size_t)(count ? count : 1) * sizeof **numbers);
-    if (!*numbers || (!sums->are_all && !extend_keys(sums, count))) return false;
+    if (!*numbers || (!sums->has_all_vertices && !extend_keys(sums, count))) return false;
     for (int64_t i = 0; i < count; i++) {
         session_key key;
         memcpy(key.words, in->words + i * KEY_WORDS, sizeof key.words);
-        (*numbers)[i] = sums->are_all ? session_keys_find(&sums->keys, &key) : session_keys_add(&sums->keys, &key);
+        (*numbers)[i] =
+            sums->has_all_vertices ? session_keys_find(&sums->keys, &key) : session_keys_add(&sums->keys, &key);
     }
     return sums->keys.count <= INT32_MAX;
 }
@@ -172,17 +173,17 @@ static insitu_status send_questions(const session_homes *homes, const session_te
     if (!error->status &&
         (!find_key_positions(sums, &mail->places) ||
          !write_questions(sums, team, homes, (const double(*)[3])mail->places, &mail->questions, &mail->own_numbers)))
-        session_no_memory(error, sums->own_count * 24, "gradients at vertices that ranks share");
+        session_fail_for_memory(error, sums->own_count * 24, "gradients at vertices that ranks share");
     const insitu_status status =
-        session_mail_deliver(team->comm, SESSION_MAIL_THERE, &mail->questions, &mail->asked, error);
-    if (!status && !error->status && !read_questions(&mail->asked, sums, &mail->asked_numbers))
-        session_no_memory(error, mail->asked.total * 24, "gradients at vertices that ranks share");
+        session_mail_deliver(team->comm, SESSION_MAIL_THERE, &mail->questions, &mail->received_questions, error);
+    if (!status && !error->status && !read_questions(&mail->received_questions, sums, &mail->asked_numbers))
+        session_fail_for_memory(error, mail->received_questions.total * 24, "gradients at vertices that ranks share");
     return status;
 }
 
 static bool write_answers(const session_vertex_sums *sums, const sums_mail *mail, int ranks, session_mail *out)
 {
-    const session_mail *questions = &mail->asked;
+    const session_mail *questions = &mail->received_questions;
     const int64_t count = questions->total / KEY_WORDS, words = session_sum_words(sums->field_count);
     out->counts = base_calloc((size_t)ranks, sizeof *out->counts);
     out->words = base_calloc((size_t)(count ? count : 1), (size_t)words * sizeof *out->words);
@@ -199,11 +200,11 @@ static bool write_answers(const session_vertex_sums *sums, const sums_mail *mail
 static void add_answers(const sums_mail *mail, session_vertex_sums *sums)
 {
     const int64_t words = session_sum_words(sums->field_count);
-    for (int64_t i = 0; i < mail->answered.total / words; i++) {
+    for (int64_t i = 0; i < mail->received_answers.total / words; i++) {
         int64_t *sum = sums->sums + mail->own_numbers[i] * words;
         for (int64_t k = 0; k < words; k++) {
             int64_t share;
-            memcpy(&share, &mail->answered.words[i * words + k], sizeof share);
+            memcpy(&share, &mail->received_answers.words[i * words + k], sizeof share);
             sum[k] += share;
         }
     }
@@ -213,9 +214,9 @@ static insitu_status send_answers(const session_team *team, session_vertex_sums 
                                   base_error *error)
 {
     if (!error->status && !write_answers(sums, mail, team->ranks, &mail->answers))
-        session_no_memory(error, mail->asked.total * 24, "gradients at vertices that ranks share");
+        session_fail_for_memory(error, mail->received_questions.total * 24, "gradients at vertices that ranks share");
     const insitu_status status =
-        session_mail_deliver(team->comm, SESSION_MAIL_BACK, &mail->answers, &mail->answered, error);
+        session_mail_deliver(team->comm, SESSION_MAIL_BACK, &mail->answers, &mail->received_answers, error);
     if (!status && !error->status) add_answers(mail, sums);
     return status;
 }
@@ -253,7 +254,7 @@ static void find_entries(const session_vertex_sums *sums, const session_sum_part
             const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
             const uint64_t bit = session_key_hash(&key) >> 32 & filter->mask;
             const bool may_be = filter->bits[bit / 64] >> bit % 64 & 1;
-            part->entries[v] = may_be ? (int32_t)session_keys_find(&sums->keys, &key) : -1;
+            part->key_indices[v] = may_be ? (int32_t)session_keys_find(&sums->keys, &key) : -1;
         }
         region_leave();
     }
@@ -271,8 +272,8 @@ static bool find_all_entries(const session_vertex_sums *sums, int threads)
 static session_gradient_basis make_gradient_basis(const session_vertex_sums *sums, const session_sum_part *part,
                                                   int threads)
 {
-    return (session_gradient_basis){&part->mesh->cells, part->fields, sums->field_count, part->of_shells, part->entries,
-                                    sums->length,       threads};
+    return (session_gradient_basis){
+        &part->mesh->cells, part->fields, sums->field_count, part->of_shells, part->key_indices, sums->length, threads};
 }
 
 /* Lists the cells of each part that contribute to sums, and computes this rank's bounds of their contributions. */
@@ -280,14 +281,14 @@ static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int 
 {
     const size_t count = (size_t)(sums->keys.count ? sums->keys.count : 1);
     sums->sums = base_calloc(count, (size_t)session_sum_words(sums->field_count) * sizeof *sums->sums);
-    if (!sums->sums || (!sums->are_all && sums->keys.count && !find_all_entries(sums, threads))) return false;
+    if (!sums->sums || (!sums->has_all_vertices && sums->keys.count && !find_all_entries(sums, threads))) return false;
     for (int i = 0; i < sums->part_count && sums->keys.count; i++) {
         session_gradient_bounds own;
         const session_sum_part *part = &sums->parts[i];
         const session_gradient_basis basis = make_gradient_basis(sums, part, threads);
         if (!session_list_cells(&basis, &lists[i]) || !session_bound_gradients(&basis, &lists[i], &own)) return false;
-        sums->bounds.rise = fmax(sums->bounds.rise, own.rise);
-        sums->bounds.sharpness = fmax(sums->bounds.sharpness, own.sharpness);
+        sums->bounds.largest_difference = fmax(sums->bounds.largest_difference, own.largest_difference);
+        sums->bounds.largest_inverse_square = fmax(sums->bounds.largest_inverse_square, own.largest_inverse_square);
     }
     return true;
 }
@@ -312,14 +313,16 @@ static insitu_status make_sums(const session_team *team, session_vertex_sums *su
 {
     const int64_t bytes = sums->keys.count * session_sum_words(sums->field_count) * (int64_t)sizeof(int64_t);
     if (!error->status && !(lists && begin_sums(sums, lists, team->threads)))
-        session_no_memory(error, bytes, "gradients at vertices");
+        session_fail_for_memory(error, bytes, "gradients at vertices");
     /* the last entry is 1 if this rank has failed */
-    double largest[3] = {sums->bounds.rise, sums->bounds.sharpness, error->status != INSITU_OK};
-    insitu_status status =
-        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, largest, 3, MPI_DOUBLE, MPI_MAX, team->comm), "MPI_Allreduce");
+    double largest[3] = {sums->bounds.largest_difference, sums->bounds.largest_inverse_square,
+                         error->status != INSITU_OK};
+    insitu_status status = session_check_mpi(
+        error, MPI_Allreduce(MPI_IN_PLACE, largest, 3, MPI_DOUBLE, MPI_MAX, team->comm), "MPI_Allreduce");
     sums->bounds = (session_gradient_bounds){largest[0], largest[1]};
     if (!status && largest[2] > 0) status = session_agree(team->comm, error);
-    if (!status && !add_sums(sums, lists, team->threads)) session_no_memory(error, bytes, "gradients at vertices");
+    if (!status && !add_sums(sums, lists, team->threads))
+        session_fail_for_memory(error, bytes, "gradients at vertices");
     return status;
 }
 
@@ -343,7 +346,7 @@ insitu_status session_find_sums(const session_homes *homes, const session_team *
 
 void session_vertex_sums_free(session_vertex_sums *sums)
 {
-    for (int i = 0; i < sums->part_count && sums->parts; i++) base_free(sums->parts[i].entries);
+    for (int i = 0; i < sums->part_count && sums->parts; i++) base_free(sums->parts[i].key_indices);
     base_free(sums->parts);
     base_free(sums->sums);
     session_keys_free(&sums->keys);

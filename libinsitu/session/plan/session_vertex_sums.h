@@ -12,7 +12,7 @@ typedef struct session_sum_part {
     session_mesh *mesh;
     bool of_shells;
     grid_field fields[SESSION_GRADIENTS];
-    int32_t *entries; /* index of each vertex's key, or -1 */
+    int32_t *key_indices; /* index of each vertex's key, or -1 */
 } session_sum_part;
 
 /* The data of this rank for the sums of the same scalars on one or several meshes. part_count is 0 if this rank has
@@ -21,8 +21,9 @@ typedef struct session_vertex_sums {
     int part_count;
     session_sum_part *parts;
     int field_count;
-    bool by_id;   /* set if vertices are equal by global ids; otherwise they are equal by coordinates */
-    bool are_all; /* set if every vertex of each part has a key, so that all ranks get the sums of all their cells */
+    bool by_id;            /* set if vertices are equal by global ids; otherwise they are equal by coordinates */
+    bool has_all_vertices; /* set if every vertex of each part has a key, so that all ranks get the sums of all their
+                              cells */
     session_key_table keys;
     int64_t own_count; /* number of this rank's keys; the keys after them were requested by other ranks */
     session_gradient_bounds bounds;

@@ -110,13 +110,14 @@ static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, ses
     if (session_is_distance(scalar)) return;
     const char *field = session_scalar_name(mesh, scalar);
     const session_warning warning = {WARNING_UNSAID, field, mesh->label, scalar->component};
-    const bool has_changed = !scalar->is_suspect && scalar->has_checksum && scalar->sample != find_sample(mesh, scalar);
-    session_warn_own(
+    const bool has_changed =
+        !scalar->may_have_changed && scalar->has_checksum && scalar->sample_checksum != find_sample(mesh, scalar);
+    session_warn_locally(
         report, &warning, has_changed,
         "mesh \"%s\": field \"%s\" has other values than in the last picture, but was not set again, or with "
         "INSITU_CHANGED_NOTHING: set it with INSITU_CHANGED_VALUES, as such changes may be missed",
         mesh->label, field);
-    scalar->is_suspect = scalar->is_suspect || has_changed;
+    scalar->may_have_changed = scalar->may_have_changed || has_changed;
 }
 
 /* Computes the checksum of the values and compares it with that of the last picture. Returns whether they are equal;
@@ -124,8 +125,8 @@ static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, ses
 static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, int threads)
 {
     const uint64_t checksum = find_checksum(mesh, scalar, threads);
-    scalar->is_suspect = false;
-    scalar->sample = find_sample(mesh, scalar);
+    scalar->may_have_changed = false;
+    scalar->sample_checksum = find_sample(mesh, scalar);
     if (scalar->has_checksum && scalar->checksum == checksum) return true;
     scalar->has_checksum = true;
     scalar->checksum = checksum;
@@ -154,7 +155,7 @@ static void compare_parts(const session_parts *parts, int threads, session_repor
         for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++) {
             session_scalar *scalar = &mesh->scalars[k];
             if (scalar->is_used) warn_of_change(mesh, scalar, report);
-            if (scalar->is_used && scalar->is_suspect && compare_checksum(mesh, scalar, threads))
+            if (scalar->is_used && scalar->may_have_changed && compare_checksum(mesh, scalar, threads))
                 report_unchanged(mesh, scalar, &blocks, report);
         }
     }

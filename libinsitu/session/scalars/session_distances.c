@@ -22,12 +22,13 @@ void session_find_plane_point(const scene_plane *plane, const session_extent *ex
         middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
         half += fabs(plane->normal[axis]) * (0.5 * extent->upper[axis] - 0.5 * extent->lower[axis]);
     }
-    offset_point(plane->has_point ? plane->point : middle, plane->normal, plane->offset + plane->share * half, point);
+    offset_point(plane->has_point ? plane->point : middle, plane->normal, plane->offset + plane->extent_fraction * half,
+                 point);
 }
 
 static session_plane plane_of_scene(const scene_plane *in)
 {
-    session_plane out = {.is_central = !in->has_point, .offset = in->offset, .share = in->share};
+    session_plane out = {.is_central = !in->has_point, .offset = in->offset, .extent_fraction = in->extent_fraction};
     memcpy(out.normal, in->normal, sizeof out.normal);
     offset_point(in->point, in->normal, in->offset, out.point);
     return out;
@@ -41,7 +42,8 @@ static bool are_equal_vectors(const double a[3], const double b[3])
 static bool is_same_plane(const session_plane *a, const session_plane *b)
 {
     if (a->is_central != b->is_central || !are_equal_vectors(a->normal, b->normal)) return false;
-    return a->is_central ? a->offset == b->offset && a->share == b->share : are_equal_vectors(a->point, b->point);
+    return a->is_central ? a->offset == b->offset && a->extent_fraction == b->extent_fraction
+                         : are_equal_vectors(a->point, b->point);
 }
 
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane)
@@ -60,7 +62,7 @@ static session_scalar *add_distance(session_mesh *mesh, const scene_plane *plane
     if (!scalar) return NULL;
     scalar->field = -1;
     scalar->plane = plane_of_scene(plane);
-    scalar->is_suspect = false;
+    scalar->may_have_changed = false;
     return scalar;
 }
 
@@ -82,7 +84,7 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
     *marked = scalar;
     if (!scalar) return false;
     recentre_plane(scalar, plane, extent);
-    scalar->is_used = scalar->wants_ranges = true;
+    scalar->is_used = scalar->needs_ranges = true;
     mesh->is_needed = true;
     return true;
 }
@@ -125,7 +127,8 @@ void session_update_distances(const session_meshes *meshes, const session_team *
             session_scalar *scalar = &mesh->scalars[k];
             if (!session_is_distance(scalar) || !scalar->is_used || !scalar->are_values_stale) continue;
             if (!update_distance(mesh, scalar, team->threads))
-                session_no_memory(error, mesh->cells.vertex_count * (int64_t)sizeof(float), "distances from a plane");
+                session_fail_for_memory(error, mesh->cells.vertex_count * (int64_t)sizeof(float),
+                                        "distances from a plane");
         }
     }
 }

@@ -21,7 +21,7 @@ void session_mail_free(session_mail *mail)
  * joins a non-blocking reduction; when that is complete, all messages have been received. */
 typedef struct letter {
     struct letter *next;
-    int from;
+    int source_rank;
     int64_t count;
     uint64_t words[];
 } letter;
@@ -31,7 +31,7 @@ typedef struct delivery {
     int tag, rank, ranks;
     int send_count;
     MPI_Request *sends;
-    letter *letters;
+    letter *messages;
 } delivery;
 
 static insitu_status start_sends(delivery *d, const session_mail *out, base_error *error)
@@ -50,9 +50,9 @@ static insitu_status start_sends(delivery *d, const session_mail *out, base_erro
     for (int n = 0; n < d->ranks; n++) {
         const int64_t count = out->counts[n];
         if (count && n != d->rank && !error->status) {
-            session_mpi(error,
-                        MPI_Issend(words, (int)count, MPI_UINT64_T, n, d->tag, d->comm, &d->sends[d->send_count]),
-                        "MPI_Issend");
+            session_check_mpi(error,
+                              MPI_Issend(words, (int)count, MPI_UINT64_T, n, d->tag, d->comm, &d->sends[d->send_count]),
+                              "MPI_Issend");
             d->send_count += !error->status;
         }
         words += count;
@@ -64,10 +64,10 @@ static letter *message_create(delivery *d, int from, int64_t count)
 {
     letter *l = base_alloc(sizeof *l + (size_t)count * sizeof *l->words);
     if (!l) return NULL;
-    l->from = from;
+    l->source_rank = from;
     l->count = count;
-    l->next = d->letters;
-    return d->letters = l;
+    l->next = d->messages;
+    return d->messages = l;
 }
 
 /* Receives a message. If memory runs out, it is received with length 0 and its data is lost, so that the sender's call
@@ -80,7 +80,7 @@ static void receive_message(delivery *d, const MPI_Status *found, base_error *er
     const int code = MPI_Recv(l ? l->words : NULL, l ? count : 0, MPI_UINT64_T, found->MPI_SOURCE, d->tag, d->comm,
                               MPI_STATUS_IGNORE);
     if (l)
-        session_mpi(error, code, "MPI_Recv");
+        session_check_mpi(error, code, "MPI_Recv");
     else if (!error->status)
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data between ranks", (long long)count * 8);
 }
@@ -96,18 +96,18 @@ static insitu_status receive_all(delivery *d, int *failed, base_error *error)
     while (!status && !is_over) {
         MPI_Status found;
         int has_come = 0;
-        status = session_mpi(error, MPI_Iprobe(MPI_ANY_SOURCE, d->tag, d->comm, &has_come, &found), "MPI_Iprobe");
+        status = session_check_mpi(error, MPI_Iprobe(MPI_ANY_SOURCE, d->tag, d->comm, &has_come, &found), "MPI_Iprobe");
         if (!status && has_come) receive_message(d, &found, &lost);
         if (has_come || status) continue;
         if (has_joined) {
-            status = session_mpi(error, MPI_Test(&all, &is_over, MPI_STATUS_IGNORE), "MPI_Test");
+            status = session_check_mpi(error, MPI_Test(&all, &is_over, MPI_STATUS_IGNORE), "MPI_Test");
             continue;
         }
-        status =
-            session_mpi(error, MPI_Testall(d->send_count, d->sends, &has_joined, MPI_STATUSES_IGNORE), "MPI_Testall");
+        status = session_check_mpi(error, MPI_Testall(d->send_count, d->sends, &has_joined, MPI_STATUSES_IGNORE),
+                                   "MPI_Testall");
         if (!status && has_joined)
-            status =
-                session_mpi(error, MPI_Iallreduce(&own, failed, 1, MPI_INT, MPI_MIN, d->comm, &all), "MPI_Iallreduce");
+            status = session_check_mpi(error, MPI_Iallreduce(&own, failed, 1, MPI_INT, MPI_MIN, d->comm, &all),
+                                       "MPI_Iallreduce");
     }
     if (!status && !error->status) *error = lost;
     return status;
@@ -132,26 +132,26 @@ static void concatenate_messages(const delivery *d, session_mail *in, base_error
 {
     int64_t *starts = base_calloc((size_t)d->ranks + 1, sizeof *starts);
     in->counts = base_calloc((size_t)d->ranks, sizeof *in->counts);
-    for (const letter *l = d->letters; l && !error->status; l = l->next) in->total += l->count;
+    for (const letter *l = d->messages; l && !error->status; l = l->next) in->total += l->count;
     in->words = base_alloc((size_t)(in->total + 1) * sizeof *in->words);
     if (!starts || !in->counts || !in->words) {
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data between ranks",
                   (long long)in->total * 8);
         in->total = 0;
     }
-    for (const letter *l = d->letters; l && !error->status; l = l->next) in->counts[l->from] = l->count;
+    for (const letter *l = d->messages; l && !error->status; l = l->next) in->counts[l->source_rank] = l->count;
     for (int r = 0; r < d->ranks && !error->status; r++) starts[r + 1] = starts[r] + in->counts[r];
-    for (const letter *l = d->letters; l && !error->status; l = l->next)
-        memcpy(in->words + starts[l->from], l->words, (size_t)l->count * sizeof *l->words);
+    for (const letter *l = d->messages; l && !error->status; l = l->next)
+        memcpy(in->words + starts[l->source_rank], l->words, (size_t)l->count * sizeof *l->words);
     base_free(starts);
 }
 
 static void free_delivery(delivery *d)
 {
-    while (d->letters) {
-        letter *next = d->letters->next;
-        base_free(d->letters);
-        d->letters = next;
+    while (d->messages) {
+        letter *next = d->messages->next;
+        base_free(d->messages);
+        d->messages = next;
     }
     base_free(d->sends);
 }

@@ -13,7 +13,7 @@
 static session_field *add_field(session_mesh *mesh, const char *name, base_error *error)
 {
     session_field *field = session_add_field(mesh, name);
-    if (!field) session_no_memory(error, (int64_t)sizeof *field, "a field's description");
+    if (!field) session_fail_for_memory(error, (int64_t)sizeof *field, "a field's description");
     return field;
 }
 
@@ -27,7 +27,7 @@ int64_t session_corner_count(const insitu_mesh *mesh)
 
 /* Returns the number of the mesh's vertices, cells or corners, depending on the field's centring. For corners in rows,
  * it is the number of all entries from the first to the last corner. */
-int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field)
+int64_t session_count_field_positions(const insitu_mesh *mesh, const insitu_field *field)
 {
     if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
     if (field->centring == INSITU_CELL) return mesh->cell_count;
@@ -44,7 +44,7 @@ static const char *describe_centring(insitu_centring centring)
  * whether it is given. */
 static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 {
-    return field->index.data || (field->index.type && session_field_places(&mesh->given, field) == 0);
+    return field->index.data || (field->index.type && session_count_field_positions(&mesh->given, field) == 0);
 }
 
 /* Checks a field each of whose components is given as a separate array. */
@@ -63,7 +63,7 @@ static insitu_status check_component_arrays(const insitu_field *field, int64_t c
 
 static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_field *field, base_error *error)
 {
-    const int64_t places = session_field_places(&mesh->given, field);
+    const int64_t places = session_count_field_positions(&mesh->given, field);
     const bool has_index = is_by_index(mesh, field), has_rows = field->corner_row != 0;
     if (field->count < 0 || (!has_index && (has_rows ? field->count < places : field->count != places)))
         return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,
@@ -205,14 +205,14 @@ static insitu_status check_field(const session_mesh *mesh, const insitu_field *f
     return status;
 }
 
-void session_spoil_scalars(session_mesh *mesh, int field)
+void session_mark_scalars_stale(session_mesh *mesh, int field)
 {
     mesh->fields[field].version++;
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
         if (scalar->field != field) continue;
         scalar->are_values_stale = true;
-        scalar->is_suspect = true;
+        scalar->may_have_changed = true;
     }
 }
 
@@ -257,22 +257,22 @@ static bool copy_tables(session_field *field, const insitu_field *given, base_er
     session_field copy = {0};
     copy.patches = bytes ? base_alloc(bytes) : NULL;
     copy.components = components ? base_alloc(components * sizeof *copy.components) : NULL;
-    copy.apart = components ? base_alloc(components * sizeof *copy.apart) : NULL;
-    if ((bytes && !copy.patches) || (components && (!copy.components || !copy.apart))) {
+    copy.component_arrays = components ? base_alloc(components * sizeof *copy.component_arrays) : NULL;
+    if ((bytes && !copy.patches) || (components && (!copy.components || !copy.component_arrays))) {
         session_drop_field_tables(&copy);
-        session_no_memory(error, (int64_t)(bytes + components * sizeof *copy.apart),
-                          "a field's table of patches or components");
+        session_fail_for_memory(error, (int64_t)(bytes + components * sizeof *copy.component_arrays),
+                                "a field's table of patches or components");
         return false;
     }
     if (bytes) memcpy(copy.patches, given->patches, bytes);
     for (size_t c = 0; c < components; c++) {
         copy.components[c] = given->components[c];
-        copy.apart[c] = session_grid_array(&given->components[c]);
+        copy.component_arrays[c] = session_grid_array(&given->components[c]);
     }
     session_drop_field_tables(field);
     field->patches = copy.patches;
     field->components = copy.components;
-    field->apart = copy.apart;
+    field->component_arrays = copy.component_arrays;
     return true;
 }
 
@@ -283,8 +283,8 @@ static void set_value_array(session_field *field, const insitu_field *given)
     insitu_array values = given->values;
     field->component_stride = given->component_stride_bytes ? given->component_stride_bytes : size;
     if (!values.stride_bytes) values.stride_bytes = size * given->component_count;
-    field->values = field->apart ? field->apart[0] : session_grid_array(&values);
-    if (!values.data || field->apart || field->component_stride % size == 0) return;
+    field->values = field->component_arrays ? field->component_arrays[0] : session_grid_array(&values);
+    if (!values.data || field->component_arrays || field->component_stride % size == 0) return;
     /* the other components are not aligned, so that the values must be read as unaligned ones */
     values.stride_bytes = field->component_stride;
     const grid_array other = session_grid_array(&values);
@@ -299,7 +299,7 @@ static void set_value_arrays(const session_mesh *mesh, session_field *field, con
 {
     const bool has_index = is_by_index(mesh, given), was_apart = field->given.components != NULL;
     if (is_other || field->has_index != has_index || field->given.corner_row != given->corner_row ||
-        field->given.values.type != given->values.type || field->values.odd || field->apart || was_apart)
+        field->given.values.type != given->values.type || field->values.odd || field->component_arrays || was_apart)
         session_drop_copy(field);
     field->has_index = has_index;
     field->is_copy_stale = field->is_copy_stale || is_stale;
@@ -325,7 +325,7 @@ static void store_field(session_meshes *meshes, session_mesh *mesh, int index, c
         field->version++;
         meshes->are_names_changed = true;
     } else if (is_stale) {
-        session_spoil_scalars(mesh, index);
+        session_mark_scalars_stale(mesh, index);
     }
     set_value_arrays(mesh, field, given, is_other, is_stale);
     field->problem = (base_error){0};
@@ -355,7 +355,7 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
     }
     field->problem = (base_error){0};
     field->is_problem_of_contents = false;
-    session_place_error(&field->problem, mesh->label, given->name, &what);
+    session_prefix_error(&field->problem, mesh->label, given->name, &what);
     *error = field->problem;
     return error->status;
 }
@@ -365,7 +365,7 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
 static insitu_status refuse_field(session_meshes *meshes, session_mesh *mesh, const char *name, base_error *error)
 {
     if (session_find_field(mesh, name) < 0 && !add_field(mesh, name, error)) {
-        session_keep_pending(meshes, error, NULL, NULL);
+        session_store_pending(meshes, error, NULL, NULL);
         return error->status;
     }
     return base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", name, mesh->label);
@@ -405,7 +405,7 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, int64_
         return refuse_field(meshes, mesh, field_name, error);
     else if (set_field(meshes, mesh, field, error) != INSITU_ERROR_MEMORY)
         return error->status;
-    session_keep_pending(meshes, error, name, field_name && *field_name ? field_name : NULL);
+    session_store_pending(meshes, error, name, field_name && *field_name ? field_name : NULL);
     return error->status;
 }
 
@@ -422,17 +422,17 @@ static insitu_status check_filled(const session_mesh *mesh, const insitu_field *
     return check_field(mesh, &values, error);
 }
 
-insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error)
+insitu_status session_store_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error)
 {
     session_field *field = &mesh->fields[index];
     const insitu_field promised = field->given;
     base_error what = {0};
     if (check_filled(mesh, &promised, filled, &what) || !copy_tables(field, filled, &what))
-        return session_place_error(error, mesh->label, promised.name, &what);
+        return session_prefix_error(error, mesh->label, promised.name, &what);
     set_value_arrays(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
     field->given.fill = promised.fill;
     field->given.fill_data = promised.fill_data;
     /* Scalars may refer to the previous table of components. */
-    if (filled->changed & INSITU_CHANGED_VALUES || filled->components) session_spoil_scalars(mesh, index);
+    if (filled->changed & INSITU_CHANGED_VALUES || filled->components) session_mark_scalars_stale(mesh, index);
     return INSITU_OK;
 }

@@ -11,16 +11,16 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, int64_
 
 /* Checks and stores a field's description after its fill function has set its values. The error message names the mesh
  * and the field. Local. */
-insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error);
+insitu_status session_store_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error);
 
 /* Marks the field's scalars as stale, because its values have changed. */
-void session_spoil_scalars(session_mesh *mesh, int field);
+void session_mark_scalars_stale(session_mesh *mesh, int field);
 
 /* Returns the number of those entries of the connectivity that are vertices of cells. The mesh must not have
  * polyhedra. */
 int64_t session_corner_count(const insitu_mesh *mesh);
 /* Returns the number of the field's values or, if it has an index, of the index's entries. For corners in rows it is
  * the smallest allowed number. */
-int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field);
+int64_t session_count_field_positions(const insitu_mesh *mesh, const insitu_field *field);
 
 #endif

@@ -5,7 +5,7 @@
 
 static bool is_needed(const session_mesh *mesh, int index, bool of_images)
 {
-    bool is_used = mesh->fields[index].is_source || (!of_images && mesh->fields[index].is_wanted);
+    bool is_used = mesh->fields[index].is_source || (!of_images && mesh->fields[index].is_in_statistics);
     for (int i = 0; i < mesh->scalar_count && of_images; i++)
         is_used = is_used || (mesh->scalars[i].is_used && mesh->scalars[i].field == index);
     return is_used;
@@ -38,10 +38,10 @@ static insitu_status fill_field(session_meshes *meshes, session_mesh *mesh, int 
     if (field->is_filled) return error->status;
     field->is_filled = true;
     insitu_status status = call_fill(meshes, mesh, &field->given, &filled, error);
-    if (!status) status = session_take_filled(mesh, index, &filled, error);
+    if (!status) status = session_store_filled(mesh, index, &filled, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)
-            mesh->scalars[i].own = session_given_field(mesh, index, mesh->scalars[i].component);
+            mesh->scalars[i].original_values = session_given_field(mesh, index, mesh->scalars[i].component);
     field->fill_problem = *error;
     return status;
 }
@@ -51,7 +51,7 @@ static void fill_part(session_meshes *meshes, session_mesh *part, const char *na
     base_error own = {0};
     const int index = part->is_given ? session_find_field(part, name) : -1;
     if (index < 0 || !part->fields[index].given.fill || !is_needed(part, index, of_images)) return;
-    if (fill_field(meshes, part, index, &own)) session_keep_problem(&part->fields[index], &own, error);
+    if (fill_field(meshes, part, index, &own)) session_store_problem(&part->fields[index], &own, error);
 }
 
 insitu_status session_fill_fields(session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
@@ -72,7 +72,7 @@ void session_forget_filled(const session_meshes *meshes)
     for (int m = 0; m < meshes->count; m++)
         for (int f = 0; f < meshes->items[m]->field_count; f++) {
             session_field *field = &meshes->items[m]->fields[f];
-            field->is_wanted = field->is_source = false;
+            field->is_in_statistics = field->is_source = false;
             if (field->is_problem_of_contents) field->problem = (base_error){0};
             field->is_problem_of_contents = false;
             if (!field->given.fill) continue;

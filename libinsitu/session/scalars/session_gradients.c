@@ -36,7 +36,7 @@ enum { HIGH_BITS = 43, MOST_NUMBERS = 10 };
     0x1.8p52 /* when this is added to a number below 2^51, the last bits of the result contain the nearest integer */
 
 typedef struct node {
-    double at[3], values[SESSION_GRADIENTS];
+    double position[3], values[SESSION_GRADIENTS];
     int64_t vertex;
 } node;
 
@@ -69,8 +69,8 @@ static double find_power_of_two(double largest)
 
 static void find_rounding_units(const session_gradient_bounds *bounds, double units[2])
 {
-    units[0] = find_power_of_two(bounds->rise * bounds->sharpness);
-    units[1] = find_power_of_two(0.2 * sqrt(bounds->sharpness));
+    units[0] = find_power_of_two(bounds->largest_difference * bounds->largest_inverse_square);
+    units[1] = find_power_of_two(0.2 * sqrt(bounds->largest_inverse_square));
 }
 
 static inline word_pair words_from_numbers(number_pair whole_with_shift)
@@ -133,9 +133,9 @@ void session_mean_gradients(const int64_t *sum, int field_count, const session_g
 
 static inline bool is_before(const node *a, const node *b)
 {
-    if (a->at[0] != b->at[0]) return a->at[0] < b->at[0];
-    if (a->at[1] != b->at[1]) return a->at[1] < b->at[1];
-    return a->at[2] < b->at[2];
+    if (a->position[0] != b->position[0]) return a->position[0] < b->position[0];
+    if (a->position[1] != b->position[1]) return a->position[1] < b->position[1];
+    return a->position[2] < b->position[2];
 }
 
 static inline __attribute__((always_inline)) void bound_corner(target *to, double squares,
@@ -143,8 +143,8 @@ static inline __attribute__((always_inline)) void bound_corner(target *to, doubl
 {
     for (int i = 0; i < 3; i++)
         for (int f = 0; f < field_count; f++)
-            if (fabs(rise[i][f]) > to->bounds.rise) to->bounds.rise = fabs(rise[i][f]);
-    if (1 / squares > to->bounds.sharpness) to->bounds.sharpness = 1 / squares;
+            if (fabs(rise[i][f]) > to->bounds.largest_difference) to->bounds.largest_difference = fabs(rise[i][f]);
+    if (1 / squares > to->bounds.largest_inverse_square) to->bounds.largest_inverse_square = 1 / squares;
 }
 
 /* Adds the contribution of a corner, given by its three sorted edges and the differences of the fields along them. If
@@ -160,7 +160,7 @@ static inline __attribute__((always_inline)) void add_edge_gradient(target *to, 
         double numbers[MOST_NUMBERS];
         number_pair pairs[MOST_NUMBERS / 2];
     } out = {{0}};
-    const int32_t entry = to->basis->entries[vertex];
+    const int32_t entry = to->basis->sum_indices[vertex];
     for (int i = 0; i < 3; i++)
         for (int a = 0; a < 3; a++) squares += edge[i][a] * edge[i][a];
     if (entry < 0 || !(squares >= LEAST_SQUARE)) return;
@@ -189,7 +189,7 @@ static inline __attribute__((always_inline)) void add_corner(target *to, const n
     if (is_before(ends[1], ends[0])) swap = ends[0], ends[0] = ends[1], ends[1] = swap;
     for (int i = 0; i < 3; i++) {
         for (int f = 0; f < field_count; f++) rise[i][f] = ends[i]->values[f] - corner->values[f];
-        for (int a = 0; a < 3; a++) edge[i][a] = ends[i]->at[a] - corner->at[a];
+        for (int a = 0; a < 3; a++) edge[i][a] = ends[i]->position[a] - corner->position[a];
     }
     add_edge_gradient(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise,
                       field_count);
@@ -205,7 +205,7 @@ static void add_shell_corner(target *to, const node *corner, const node *p, cons
     double edge[3][3], rise[3][SESSION_GRADIENTS] = {{0}};
     for (int i = 0; i < 2; i++) {
         for (int f = 0; f < field_count; f++) rise[i][f] = ends[i]->values[f] - corner->values[f];
-        for (int a = 0; a < 3; a++) edge[i][a] = ends[i]->at[a] - corner->at[a];
+        for (int a = 0; a < 3; a++) edge[i][a] = ends[i]->position[a] - corner->position[a];
     }
     vector3_cross(edge[0], edge[1], edge[2]);
     const double area = sqrt(vector3_dot(edge[2], edge[2])), scale = 1 / sqrt(area);
@@ -219,7 +219,7 @@ static inline __attribute__((always_inline)) bool read_node(const session_gradie
                                                             double scale, int field_count, node *out)
 {
     double sum = 0;
-    for (int a = 0; a < 3; a++) out->at[a] = grid_array_number(&basis->cells->coordinates[a], vertex) * scale;
+    for (int a = 0; a < 3; a++) out->position[a] = grid_array_number(&basis->cells->coordinates[a], vertex) * scale;
     for (int f = 0; f < field_count; f++) sum += out->values[f] = grid_field_value(&basis->fields[f], vertex);
     out->vertex = vertex;
     return isfinite(sum);
@@ -328,7 +328,7 @@ static node find_centre(node_list *list, int field_count)
         if (count == 0 || list->nodes[i].vertex != list->nodes[count - 1].vertex) list->nodes[count++] = list->nodes[i];
     list->count = count;
     for (int64_t i = 0; i < count; i++) {
-        for (int a = 0; a < 3; a++) centre.at[a] += list->nodes[i].at[a] / (double)count;
+        for (int a = 0; a < 3; a++) centre.position[a] += list->nodes[i].position[a] / (double)count;
         for (int f = 0; f < field_count; f++) centre.values[f] += list->nodes[i].values[f] / (double)count;
     }
     return centre;
@@ -380,7 +380,7 @@ static bool has_entry(const session_gradient_basis *basis, int64_t cell)
     grid_walk walk = grid_walk_cell(basis->cells, cell);
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex))
-        if (basis->entries[vertex] >= 0) return has_own_values(basis, cell);
+        if (basis->sum_indices[vertex] >= 0) return has_own_values(basis, cell);
     return false;
 }
 
@@ -452,8 +452,8 @@ static void claim_sums(const target *to, int64_t cell)
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex)) {
         unsigned char before = NO_OWNER;
-        if (basis->entries[vertex] < 0) continue;
-        unsigned char *owner = &to->owners[basis->entries[vertex]];
+        if (basis->sum_indices[vertex] < 0) continue;
+        unsigned char *owner = &to->owners[basis->sum_indices[vertex]];
         if (__atomic_load_n(owner, __ATOMIC_RELAXED) == to->owner ||
             __atomic_compare_exchange_n(owner, &before, to->owner, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED))
             continue;
@@ -479,8 +479,8 @@ static bool add_all_cells(const target *like, const session_cell_list *list, ses
         }
 #pragma omp for schedule(static)
         for (int64_t i = 0; i < list->count; i++) add_cell(&to, list->cells[i], &nodes);
-        rise = to.bounds.rise;
-        sharpness = to.bounds.sharpness;
+        rise = to.bounds.largest_difference;
+        sharpness = to.bounds.largest_inverse_square;
         is_out_of_memory = nodes.is_out_of_memory;
         base_free(nodes.nodes);
         region_leave();

@@ -14,8 +14,8 @@ typedef struct session_gradient_basis {
     int field_count;          /* number of scalars: 1 .. SESSION_GRADIENTS */
     /* set if sums are computed over shells, in whose planes their gradients lie; otherwise over cells with a volume */
     bool of_shells;
-    const int32_t *entries; /* for each vertex, the index of its sum; -1: it has none */
-    double length;          /* a power of two near the size of the scene, the same on all ranks */
+    const int32_t *sum_indices; /* for each vertex, the index of its sum; -1: it has none */
+    double length;              /* a power of two near the size of the scene, the same on all ranks */
     int threads;
 } session_gradient_basis;
 
@@ -35,9 +35,9 @@ static inline int session_sum_words(int field_count)
 /* Bounds of the numbers that cells add to sums. For several grids or ranks, the maximum of each member must be
  * computed. */
 typedef struct session_gradient_bounds {
-    double rise; /* largest difference of a field's values along an edge of a corner */
+    double largest_difference; /* largest difference of a field's values along an edge of a corner */
     /* largest value of 1 / (sum of the squares of a corner's edges, in units of `length`); 0: there are no corners */
-    double sharpness;
+    double largest_inverse_square;
 } session_gradient_bounds;
 
 /* List, in any order, of the cells that have a vertex with a sum. */

@@ -18,7 +18,7 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         const int index = scene_field_is_on(field, mesh->label) ? session_find_field(mesh, field->name) : -1;
-        if (index >= 0) mesh->fields[index].is_wanted = true;
+        if (index >= 0) mesh->fields[index].is_in_statistics = true;
     }
 }
 
@@ -27,9 +27,9 @@ typedef struct indexed_values {
     const uint32_t *parents;  /* NULL, or the cells that the places are pieces of */
     grid_array index;         /* no index: places have the tuples of their numbers */
     grid_field values;
-    int64_t row, used;     /* number of positions in a row, and how many of them are read */
-    int64_t count, places; /* number of tuples, and number of positions that have a tuple */
-    bool is_plain;         /* set if values are copied in their own type; otherwise they are converted to double */
+    int64_t row_length, used_length; /* number of positions in a row, and how many of them are read */
+    int64_t count, position_count;   /* number of tuples, and number of positions that have a tuple */
+    bool keeps_type; /* set if values are copied in their own type; otherwise they are converted to double */
 } indexed_values;
 
 static indexed_values make_indexed_values(const session_mesh *mesh, const session_field *field)
@@ -38,20 +38,20 @@ static indexed_values make_indexed_values(const session_mesh *mesh, const sessio
     indexed_values out = {.index = session_grid_array(&given->index),
                           .values = {.values = field->values,
                                      .component_stride = field->component_stride,
-                                     .apart = field->apart,
+                                     .apart = field->component_arrays,
                                      .component_count = given->component_count},
-                          .is_plain = session_is_plain_copy(field),
-                          .row = 1,
-                          .used = 1,
+                          .keeps_type = session_is_plain_copy(field),
+                          .row_length = 1,
+                          .used_length = 1,
                           .count = given->count,
-                          .places =
+                          .position_count =
                               given->centring == INSITU_CELL ? mesh->cells.cell_count : session_vertex_count(mesh)};
     out.index.base = mesh->given.index_base;
     if (given->centring == INSITU_VERTEX && mesh->torn.is_torn) out.mesh = mesh;
     if (given->centring == INSITU_CELL) out.parents = mesh->topology.parents;
     if (given->corner_row) {
-        out.row = given->corner_row;
-        out.used = session_cell_nodes(&mesh->given);
+        out.row_length = given->corner_row;
+        out.used_length = session_cell_nodes(&mesh->given);
     }
     return out;
 }
@@ -62,7 +62,7 @@ static int64_t find_value_entry(const indexed_values *v, int64_t place)
 {
     if (v->mesh) return session_torn_origin(v->mesh, place);
     if (v->parents) return v->parents[place];
-    return v->row == v->used ? place : place / v->used * v->row + place % v->used;
+    return v->row_length == v->used_length ? place : place / v->used_length * v->row_length + place % v->used_length;
 }
 
 /* Copies one tuple. Returns false if the index is out of range. */
@@ -72,12 +72,12 @@ static bool copy_tuple(const indexed_values *v, int64_t place, char *out)
     const int64_t at = v->index.data ? grid_array_index(&v->index, entry) : entry;
     if (at < 0 || at >= v->count) return false;
     const int count = v->values.component_count;
-    const size_t size = !v->is_plain || v->values.values.is_wide ? 8 : 4;
+    const size_t size = !v->keeps_type || v->values.values.is_wide ? 8 : 4;
     out += place * count * (int64_t)size;
     for (int i = 0; i < count; i++, out += size) {
         const grid_array from = grid_field_component(&v->values, i);
-        const double number = v->is_plain ? 0 : grid_array_number(&from, at);
-        if (!v->is_plain)
+        const double number = v->keeps_type ? 0 : grid_array_number(&from, at);
+        if (!v->keeps_type)
             memcpy(out, &number, 8);
         else if (size == 8)
             memcpy(out, from.data + at * from.stride, 8);
@@ -104,20 +104,21 @@ static insitu_status describe_fault(const session_mesh *mesh, const session_fiel
 static insitu_status copy_values(const session_mesh *mesh, session_field *field, int threads, base_error *error)
 {
     const indexed_values v = make_indexed_values(mesh, field);
-    const int64_t bytes = v.places * v.values.component_count * (!v.is_plain || v.values.values.is_wide ? 8 : 4);
-    int64_t bad = v.places;
+    const int64_t bytes =
+        v.position_count * v.values.component_count * (!v.keeps_type || v.values.values.is_wide ? 8 : 4);
+    int64_t bad = v.position_count;
     if (!field->copy) field->copy = base_alloc((size_t)(bytes ? bytes : 1));
-    if (!field->copy) return session_no_memory(error, bytes, "a field's values by their index");
+    if (!field->copy) return session_fail_for_memory(error, bytes, "a field's values by their index");
     field->copy_bytes = bytes;
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : bad) nowait
-        for (int64_t place = 0; place < v.places; place++)
+        for (int64_t place = 0; place < v.position_count; place++)
             if (!copy_tuple(&v, place, field->copy) && place < bad) bad = place;
         region_leave();
     }
-    if (bad < v.places) return describe_fault(mesh, field, &v, bad, error);
+    if (bad < v.position_count) return describe_fault(mesh, field, &v, bad, error);
     field->is_copy_stale = false;
     return INSITU_OK;
 }
@@ -131,7 +132,7 @@ static insitu_status update_copy(session_mesh *mesh, int index, int threads, bas
     const insitu_status status = copy_values(mesh, field, threads, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)
-            mesh->scalars[i].own = session_given_field(mesh, index, mesh->scalars[i].component);
+            mesh->scalars[i].original_values = session_given_field(mesh, index, mesh->scalars[i].component);
     return status;
 }
 
@@ -141,9 +142,9 @@ insitu_status session_copy_wanted(const session_meshes *meshes, int threads, bas
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         for (int f = 0; f < mesh->field_count; f++) {
-            const bool is_wanted = mesh->fields[f].is_wanted || mesh->fields[f].is_source;
+            const bool is_wanted = mesh->fields[f].is_in_statistics || mesh->fields[f].is_source;
             if (is_wanted && !status) status = update_copy(mesh, f, threads, error);
-            mesh->fields[f].is_wanted = false;
+            mesh->fields[f].is_in_statistics = false;
         }
     }
     return status;
@@ -153,7 +154,7 @@ static void copy_used_values(session_mesh *mesh, int index, int threads, base_er
 {
     base_error own = {.status = INSITU_OK};
     if (mesh->fields[index].problem.status) return;
-    if (update_copy(mesh, index, threads, &own)) session_keep_problem(&mesh->fields[index], &own, error);
+    if (update_copy(mesh, index, threads, &own)) session_store_problem(&mesh->fields[index], &own, error);
 }
 
 insitu_status session_copy_used(const session_meshes *meshes, int threads, base_error *error)

@@ -25,7 +25,7 @@ const char *session_scalar_name(const session_mesh *mesh, const session_scalar *
 
 static uint64_t find_joint_name(const session_mesh *mesh, const scene_field *field)
 {
-    return mesh->apart ? mesh->apart : field->joined;
+    return mesh->single_joint_name ? mesh->single_joint_name : field->joint_name;
 }
 
 /* Returns the scalar of the mesh with these properties; NULL if there is none. joined is the hash of the meshes over
@@ -36,7 +36,7 @@ static session_scalar *find_scalar(const session_mesh *mesh, int field, int comp
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
         if (scalar->field == field && scalar->component == component && scalar->is_recentred == is_recentred &&
-            (!is_recentred || scalar->joined == joined))
+            (!is_recentred || scalar->joint_name == joined))
             return scalar;
     }
     return NULL;
@@ -73,7 +73,7 @@ bool session_is_copied(const session_mesh *mesh, const session_field *field)
 
 bool session_is_plain_copy(const session_field *field)
 {
-    return !field->apart && !field->values.odd;
+    return !field->component_arrays && !field->values.odd;
 }
 
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field)
@@ -94,12 +94,12 @@ grid_field session_given_field(const session_mesh *mesh, int index, int componen
                       .component = component,
                       .is_cell_centred = field->given.centring == INSITU_CELL};
     if (!session_is_copied(mesh, field)) {
-        if (!field->apart) return out;
+        if (!field->component_arrays) return out;
         out.component_stride = 0; /* the array contains only the chosen component */
         if (component >= 0)
-            out.values = field->apart[component];
+            out.values = field->component_arrays[component];
         else
-            out.apart = field->apart;
+            out.apart = field->component_arrays;
         return out;
     }
     if (!session_is_plain_copy(field)) out.values = (grid_array){.is_wide = true};
@@ -129,7 +129,7 @@ grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *
         .values = {.data = (const char *)scalar->vertex_values, .stride = (int64_t)sizeof(double), .is_wide = true},
         .component_stride = (int64_t)sizeof(double),
         .component_count = 1,
-        .own = scalar->own.is_cell_centred ? &scalar->own : NULL};
+        .own = scalar->original_values.is_cell_centred ? &scalar->original_values : NULL};
 }
 
 session_scalar *session_add_scalar(session_mesh *mesh)
@@ -138,7 +138,7 @@ session_scalar *session_add_scalar(session_mesh *mesh)
     if (!scalars) return NULL;
     mesh->scalars = scalars;
     scalars[mesh->scalar_count] =
-        (session_scalar){.are_values_stale = true, .is_suspect = true, .are_ranges_stale = true};
+        (session_scalar){.are_values_stale = true, .may_have_changed = true, .are_ranges_stale = true};
     return &scalars[mesh->scalar_count++];
 }
 
@@ -155,11 +155,11 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
         scalar->field = index;
         scalar->component = session_resolve_component(field, given->component_count);
         scalar->is_recentred = session_is_recentred(field, given->centring, mesh->is_refined);
-        scalar->joined = find_joint_name(mesh, field);
+        scalar->joint_name = find_joint_name(mesh, field);
     }
     scalar->is_used = true;
-    scalar->own = session_given_field(mesh, index, scalar->component);
-    scalar->wants_ranges = scalar->wants_ranges || wants_ranges;
+    scalar->original_values = session_given_field(mesh, index, scalar->component);
+    scalar->needs_ranges = scalar->needs_ranges || wants_ranges;
     mesh->is_needed = mesh->is_needed || wants_ranges;
     *marked = scalar;
     return true;
@@ -169,7 +169,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
 
 mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar)
 {
-    return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->pairs);
+    return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->node_ranges);
 }
 
 /* Returns whether the extent includes shells. For distances from planes it does not, because planes do not cut

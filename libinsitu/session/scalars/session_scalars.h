@@ -21,8 +21,8 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
 /* Returns the scalar of a layer's field on this rank's mesh; NULL if the mesh does not have the field. */
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
 
-/* Returns the scalar that consists of means at vertices over the meshes with the hash `joined` (scene_field.joined);
- * NULL if there is none. */
+/* Returns the scalar that consists of means at vertices over the meshes with the hash `joined`
+ * (scene_field.joint_name); NULL if there is none. */
 session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component, uint64_t joined);
 
 /* Returns the mesh's field, or a component of it, with the values given by the caller, in the order of the vertices or

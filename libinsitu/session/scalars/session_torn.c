@@ -103,7 +103,7 @@ static insitu_status number_corners(const session_mesh *mesh, int threads, sessi
     }
     if (!session_make_indices(mesh, "cells' corners", torn->corner_count, torn->corner_count, &torn->corners, error))
         return error->status;
-    for (int64_t i = 0; i < torn->corner_count; i++) session_put_index(&torn->corners, i, i);
+    for (int64_t i = 0; i < torn->corner_count; i++) session_store_index(&torn->corners, i, i);
     session_turn_cells(mesh, torn->corner_count, threads, &torn->corners);
     torn->bytes = torn->corner_count * torn->corners.stride;
     return INSITU_OK;
@@ -119,7 +119,7 @@ static insitu_status tear_mesh(session_mesh *mesh, int threads, base_error *erro
     torn.is_made = copy_coordinates(mesh, threads, &torn);
     if (!torn.is_made) {
         session_drop_torn(&torn);
-        return session_no_memory(error, session_corner_count(&mesh->given) * 24, "corners' coordinates");
+        return session_fail_for_memory(error, session_corner_count(&mesh->given) * 24, "corners' coordinates");
     }
     session_drop_torn(&mesh->torn);
     mesh->torn = torn;
@@ -130,7 +130,7 @@ static insitu_status tear_mesh(session_mesh *mesh, int threads, base_error *erro
 /* Frees arrays that were computed for other vertices. */
 static void drop_vertex_data(session_meshes *meshes, session_mesh *mesh)
 {
-    mesh->cells_stamp = mesh->places_stamp = ++meshes->stamp;
+    mesh->cells_stamp = mesh->coordinates_stamp = ++meshes->stamp;
     session_drop_outers(mesh, true);
     session_drop_scalars(mesh);
     session_drop_tree(mesh);

@@ -18,15 +18,15 @@
 static insitu_status convert_name(const scene_document *d, const char *path, const scene *s, const char *name,
                                   scene_image *out)
 {
-    if (strchr(name, '/')) return scene_bad(d, path, "name", "\"%s\" holds a /, expected a name without", name);
+    if (strchr(name, '/')) return scene_fail_at_key(d, path, "name", "\"%s\" holds a /, expected a name without", name);
     for (const scene_image *other = s->images; other < out; other++) {
         if (other->variant.source != out->variant.source && strcmp(other->name, name) == 0) {
-            return scene_bad(d, path, "name", "\"%s\" is the name of the image in line %d too, expected another", name,
-                             other->line);
+            return scene_fail_at_key(
+                d, path, "name", "\"%s\" is the name of the image in line %d too, expected another", name, other->line);
         }
     }
     out->name = base_strdup(name);
-    return out->name ? INSITU_OK : scene_no_memory(d);
+    return out->name ? INSITU_OK : scene_fail_for_memory(d);
 }
 
 static void convert_background(const scene_file_image *in, float background[4])
@@ -70,11 +70,11 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
     out->is_reproducible = in->reproducible && *in->reproducible;
     out->max_seconds = in->max_seconds ? *in->max_seconds : 3600;
     if (in->step && in->step_cells)
-        return scene_bad(d, path, "sampling.step", "given beside step_cells, expected one of the two");
+        return scene_fail_at_key(d, path, "sampling.step", "given beside step_cells, expected one of the two");
     if (in->max_error && (in->step || in->step_cells))
-        return scene_bad(d, path, "sampling.max_error", "given beside a step, expected one of the two");
+        return scene_fail_at_key(d, path, "sampling.max_error", "given beside a step, expected one of the two");
     if (in->max_error && out->method == SCENE_SAMPLES)
-        return scene_bad(d, path, "sampling.max_error", "given with method: samples, expected segments");
+        return scene_fail_at_key(d, path, "sampling.max_error", "given with method: samples, expected segments");
     return INSITU_OK;
 }
 
@@ -82,7 +82,7 @@ static insitu_status convert_antialias(const scene_document *d, const char *path
                                        scene_image *out)
 {
     const int count = antialias ? *antialias : 1;
-    if (count & (count - 1)) return scene_bad(d, path, "antialias", "is %d, expected 1, 2, 4, 8 or 16", count);
+    if (count & (count - 1)) return scene_fail_at_key(d, path, "antialias", "is %d, expected 1, 2, 4, 8 or 16", count);
     out->antialias = count;
     out->frames = (out->frames + count - 1) / count * count;
     return INSITU_OK;
@@ -97,12 +97,12 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     out->line = scene_document_line(d, path);
     out->width = in->size ? in->size[0] : 1280;
     out->height = in->size ? in->size[1] : 720;
-    out->every = in->every ? *in->every : 1;
-    out->every_time = in->every_time ? *in->every_time : 0;
+    out->cycle_interval = in->every ? *in->every : 1;
+    out->time_interval = in->every_time ? *in->every_time : 0;
     convert_background(in, out->background);
     insitu_status status = convert_name(d, path, s, in->name, out);
     if (status == INSITU_OK && in->every && in->every_time)
-        status = scene_bad(d, path, "every_time", "given beside every, expected one of the two");
+        status = scene_fail_at_key(d, path, "every_time", "given beside every, expected one of the two");
     if (status == INSITU_OK) status = scene_convert_camera(d, camera_path, in->camera, &out->camera);
     if (status == INSITU_OK) status = scene_convert_lights(d, path, in, out);
     if (status == INSITU_OK) status = scene_convert_shadows(d, path, in, out);
@@ -164,7 +164,7 @@ static insitu_status convert_images(const scene_document *d, const scene_file *i
     insitu_status status = scene_count_pictures(d, in, &count);
     if (status) return status;
     out->images = base_calloc((size_t)count, sizeof *out->images);
-    if (!out->images) return scene_no_memory(d);
+    if (!out->images) return scene_fail_for_memory(d);
     for (int i = 0; i < in->images_count && !status; i++) status = convert_layers_in_turn(d, in, i, out);
     if (!status) status = scene_find_databases(d, out);
     if (!status) status = scene_find_montages(d, out);
@@ -221,11 +221,11 @@ insitu_status scene_parse(const char *text, size_t size, const char *file_name, 
 {
     base_error unheard = {.status = INSITU_OK};
     *out = (scene){0};
-    c_numbers numbers;
-    if (!c_numbers_begin(&numbers))
+    c_locale numbers;
+    if (!c_locale_enter(&numbers))
         return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", file_name);
     const insitu_status status = parse_in_c_locale(text, size, file_name, attachments, out, error ? error : &unheard);
-    c_numbers_end(&numbers);
+    c_locale_leave(&numbers);
     if (status != INSITU_OK) scene_free(out);
     return status;
 }
@@ -265,7 +265,7 @@ static void free_image(scene_image *image)
         free_colour_map(&image->volumes[i].colour_map);
     }
     for (int i = 0; i < image->surface_count; i++) {
-        scene_free_field(&image->surfaces[i].on);
+        scene_free_field(&image->surfaces[i].meshes_field);
         scene_free_field(&image->surfaces[i].colour_by);
         scene_free_field(&image->surfaces[i].lines.field);
         scene_free_field(&image->surfaces[i].threshold.field);

@@ -32,7 +32,7 @@ typedef struct scene_field {
     char **meshes;      /* names of meshes; a name also stands for the meshes below it: "a" for "a/0" */
     int meshes_line;    /* line of `meshes` in the scene file, for messages */
     /* hash of the set of meshes over which values are averaged at vertices; set by the session (session_joints.h) */
-    uint64_t joined;
+    uint64_t joint_name;
 } scene_field;
 
 /* Returns whether the layer is drawn on a mesh of this name, if the mesh has the field. */
@@ -69,7 +69,7 @@ typedef struct scene_derived {
     scene_field *inputs;
     int *made_by; /* per input, the index of the derived field from which it comes, or -1 */
     /* hash of the set of meshes over which gradients are averaged; set by the session (session_joints.h) */
-    uint64_t joined;
+    uint64_t joint_name;
 } scene_derived;
 
 /* The source of a range that is not fixed. Each source uses the values on all ranks at each drawn step. */
@@ -107,7 +107,7 @@ typedef struct scene_colour_map {
     double threshold; /* end of the linear part of SCENE_SYMLOG, which reaches from -threshold to threshold; > 0 */
     bool has_below, has_above;
     /* colours of values below and above the range (by default those of the map's ends), and of NaN */
-    float outside[3][3];
+    float outside_colours[3][3];
     bool has_nan;
     scene_range range;
 } scene_colour_map;
@@ -132,8 +132,8 @@ enum { SCENE_MAX_ATTACHMENTS = 64 };
 void scene_attachments_free(scene_attachments *attachments);
 
 typedef struct scene_opacity_point {
-    double at;     /* position in the range, 0 .. 1; positions do not decrease, and two equal ones make a step */
-    float opacity; /* opacity at this position, 0 .. 1, per unit_distance */
+    double position; /* position in the range, 0 .. 1; positions do not decrease, and two equal ones make a step */
+    float opacity;   /* opacity at this position, 0 .. 1, per unit_distance */
 } scene_opacity_point;
 
 typedef struct scene_material {
@@ -200,7 +200,7 @@ typedef struct scene_threshold {
 } scene_threshold;
 
 typedef struct scene_surface {
-    scene_field on; /* meshes whose outer surface is drawn; it has no field, so its name is NULL */
+    scene_field meshes_field; /* meshes whose outer surface is drawn; it has no field, so its name is NULL */
     /* set for layers on meshes of shells alone, which the session adds; the scene file cannot set it */
     bool is_of_shells;
     float colour[3];  /* colour of the edges, linear RGB */
@@ -226,7 +226,7 @@ typedef struct scene_plane {
     double offset; /* distance from the point to the plane, along the normal */
     /* used without a point: additional displacement along the normal, as a share of half the data's extent in this
      * direction; -1 .. 1 */
-    double share;
+    double extent_fraction;
 } scene_plane;
 
 enum { SCENE_MAX_PLANES = 64 };
@@ -333,7 +333,7 @@ typedef enum scene_anchor {
 
 typedef struct scene_words {
     char *text; /* text to draw, in which the placeholders {time}, {cycle} and {name} are replaced */
-    scene_anchor at;
+    scene_anchor anchor;
 } scene_words;
 
 /* Titles, colour bars and lines that are drawn in addition to the data. */
@@ -391,7 +391,7 @@ typedef struct scene_output {
     int folder_bytes;
     int columns, rows; /* numbers of pictures side by side in one file; 0: the picture has a file of its own */
     int montage;       /* index of the scene's montage that contains the picture; -1: none */
-    int first_cell;    /* number of the montage's cell that shows the first view */
+    int first_panel;   /* number of the montage's cell that shows the first view */
 } scene_output;
 
 /* A file that contains several pictures side by side. */
@@ -400,7 +400,7 @@ typedef struct scene_montage {
     int columns, rows;
     int width, height; /* size of each picture in pixels */
     scene_format format;
-    int cell_count; /* number of pictures in a step, at most columns × rows */
+    int panel_count; /* number of pictures in a step, at most columns × rows */
 } scene_montage;
 
 /* A Cinema database by Spec D: a folder of pictures, and a table that describes them. */
@@ -416,16 +416,16 @@ typedef enum scene_statistic { SCENE_MINIMUM, SCENE_MAXIMUM, SCENE_MEAN } scene_
 typedef struct scene_condition {
     bool is_given; /* set if there is a condition; otherwise it always holds */
     scene_field field;
-    scene_statistic of;
+    scene_statistic statistic;
     double above, below; /* bounds of the statistic; they may be infinite */
 } scene_condition;
 
 /* Statistics of a field that are written to a file, one line per step. */
 typedef struct scene_statistics {
     scene_field field;
-    char *path;       /* path of the file, relative to rank 0's working directory */
-    int every;        /* cycles that are multiples of this are written */
-    int bin_count;    /* number of the histogram's bins; 0: there is no histogram */
+    char *path;         /* path of the file, relative to rank 0's working directory */
+    int cycle_interval; /* cycles that are multiples of this are written */
+    int bin_count;      /* number of the histogram's bins; 0: there is no histogram */
     double low, high; /* range of values that the bins divide; if low > high, the range of the step's values is used */
 } scene_statistics;
 
@@ -489,8 +489,8 @@ typedef struct scene_image {
     double max_seconds; /* upper bound of the estimated time for samples, in seconds; 3600 by default */
     int output_count;   /* number of output files; 0: the picture is only passed to the caller in memory */
     scene_output *outputs;
-    int every;         /* the image is drawn at cycles that are multiples of this; 1 by default */
-    double every_time; /* if > 0, the image is instead drawn whenever the time passes a multiple of this */
+    int cycle_interval;   /* the image is drawn at cycles that are multiples of this; 1 by default */
+    double time_interval; /* if > 0, the image is instead drawn whenever the time passes a multiple of this */
     scene_condition when;
     bool once; /* whether the image is drawn only in the first step in which it is due */
 } scene_image;
@@ -508,7 +508,7 @@ typedef enum scene_field_role {
 
 typedef struct scene_field_walk {
     const scene_image *image;
-    int place; /* position of the next field among all that layers can have */
+    int position; /* position of the next field among all that layers can have */
     scene_layer_kind kind;
     scene_field_role role; /* role of the field that was returned last */
 } scene_field_walk;

@@ -14,10 +14,10 @@ static insitu_status add_clip(const scene_document *d, const char *path, const s
     /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): duplicates that are missed are only applied twice */
     while (at < image->clip_count && memcmp(&image->clips[at], clip, sizeof *clip) != 0) at++;
     if (at == SCENE_MAX_CLIPS)
-        return scene_bad(d, path, "",
-                         "is one of more than %d planes, boxes and spheres that cut, expected at most %d "
-                         "in an image",
-                         SCENE_MAX_CLIPS, SCENE_MAX_CLIPS);
+        return scene_fail_at_key(d, path, "",
+                                 "is one of more than %d planes, boxes and spheres that cut, expected at most %d "
+                                 "in an image",
+                                 SCENE_MAX_CLIPS, SCENE_MAX_CLIPS);
     if (at == image->clip_count) image->clips[image->clip_count++] = *clip;
     *set |= UINT32_C(1) << at;
     return INSITU_OK;
@@ -53,9 +53,9 @@ static insitu_status add_box(const scene_document *d, const char *path, const do
         clip.lower[axis] = box[0][axis];
         clip.upper[axis] = box[1][axis];
         if (!(box[0][axis] < box[1][axis]))
-            return scene_bad(d, path, "box",
-                             "from %g to %g along %c, expected the first corner to be less than the other",
-                             box[0][axis], box[1][axis], "xyz"[axis]);
+            return scene_fail_at_key(d, path, "box",
+                                     "from %g to %g along %c, expected the first corner to be less than the other",
+                                     box[0][axis], box[1][axis], "xyz"[axis]);
     }
     return add_clip(d, path, &clip, image, set);
 }
@@ -76,11 +76,11 @@ insitu_status scene_convert_clip(const scene_document *d, const char *path, cons
     if (!in) return INSITU_OK;
     const bool is_outside = in->keep && *in->keep == SCENE_KEEP_OUTSIDE;
     if (!in->planes && !in->box && !in->sphere)
-        return scene_bad(d, path, "", "holds nothing, expected planes, a box or a sphere");
+        return scene_fail_at_key(d, path, "", "holds nothing, expected planes, a box or a sphere");
     if (in->keep && !in->box && !in->sphere)
-        return scene_bad(d, path, "keep", "given without a box or a sphere, expected one of them beside it");
+        return scene_fail_at_key(d, path, "keep", "given without a box or a sphere, expected one of them beside it");
     if (!image->clips) image->clips = base_calloc(SCENE_MAX_CLIPS, sizeof *image->clips);
-    if (!image->clips) return scene_no_memory(d);
+    if (!image->clips) return scene_fail_for_memory(d);
     insitu_status status = add_planes(d, path, in, image, set);
     if (!status && in->box) status = add_box(d, path, (const double(*)[3])in->box, is_outside, image, set);
     return status || !in->sphere ? status : add_sphere(d, path, in->sphere, is_outside, image, set);

@@ -29,7 +29,7 @@ static insitu_status make_table(const scene_document *d, const char *name, int c
     out->count = count;
     out->name = base_strdup(name);
     out->colours = base_alloc((size_t)count * 3 * sizeof *out->colours);
-    return out->name && out->colours ? INSITU_OK : scene_no_memory(d);
+    return out->name && out->colours ? INSITU_OK : scene_fail_for_memory(d);
 }
 
 static insitu_status use_built_in_map(const scene_document *d, const char *name, scene_colour_map *out)
@@ -69,15 +69,16 @@ static insitu_status read_positions(const scene_document *d, const char *path, s
     format_path(key, "%s.at", path);
     const int count = scene_document_length(d, key);
     if (count && count != points->count)
-        return scene_bad(d, key, "", "%d places for %d colours, expected one each", count, points->count);
+        return scene_fail_at_key(d, key, "", "%d places for %d colours, expected one each", count, points->count);
     for (int i = 0; i <= last; i++) {
         colour_point *p = &points->items[i];
         format_path(key, "%s.at[%d]", path, i);
         p->at = count ? scene_document_number(d, key) : (double)i / last;
         if (i > 0 && p->at < p[-1].at)
-            return scene_bad(d, key, "", "%g comes after %g, expected places that do not fall", p->at, p[-1].at);
+            return scene_fail_at_key(d, key, "", "%g comes after %g, expected places that do not fall", p->at,
+                                     p[-1].at);
         if ((i == 0 && p->at != 0) || (i == last && p->at != 1))
-            return scene_bad(d, key, "", "%g is the %s place, expected %d", p->at, i ? "last" : "first", i > 0);
+            return scene_fail_at_key(d, key, "", "%g is the %s place, expected %d", p->at, i ? "last" : "first", i > 0);
     }
     return INSITU_OK;
 }
@@ -89,7 +90,7 @@ static insitu_status use_list(const scene_document *d, const char *path, scene_c
     format_path(key, "%s.colours", path);
     points.count = scene_document_length(d, key);
     points.items = base_calloc((size_t)points.count, sizeof *points.items);
-    if (!points.items) return scene_no_memory(d);
+    if (!points.items) return scene_fail_for_memory(d);
     for (int i = 0; i < points.count; i++)
         for (int c = 0; c < 3; c++) {
             format_path(key, "%s.colours[%d][%d]", path, i, c);
@@ -127,15 +128,16 @@ static insitu_status read_attachment(const scene_document *d, const char *key, c
 {
     scene_attachments *all = d->attachments;
     base_error reason = {.status = INSITU_OK};
-    if (!all->read) return scene_bad(d, key, "", "\"%s\": no file can be read here", path);
+    if (!all->read) return scene_fail_at_key(d, key, "", "\"%s\": no file can be read here", path);
     if (all->count == SCENE_MAX_ATTACHMENTS)
-        return scene_bad(d, key, "", "\"%s\" is one file too many, expected at most %d", path, SCENE_MAX_ATTACHMENTS);
+        return scene_fail_at_key(d, key, "", "\"%s\" is one file too many, expected at most %d", path,
+                                 SCENE_MAX_ATTACHMENTS);
     scene_attachment *items = base_realloc(all->items, ((size_t)all->count + 1) * sizeof *items);
-    if (!items) return scene_no_memory(d);
+    if (!items) return scene_fail_for_memory(d);
     all->items = items;
     const insitu_status status = all->read(path, &items[all->count].text, &items[all->count].size, &reason);
-    if (status == INSITU_ERROR_MEMORY) return scene_no_memory(d);
-    if (status != INSITU_OK) return scene_bad(d, key, "", "%s", reason.message);
+    if (status == INSITU_ERROR_MEMORY) return scene_fail_for_memory(d);
+    if (status != INSITU_OK) return scene_fail_at_key(d, key, "", "%s", reason.message);
     items[all->count++].path = path;
     return INSITU_OK;
 }
@@ -144,9 +146,9 @@ static insitu_status attach_file(const scene_document *d, const char *key, const
                                  const scene_attachment **out)
 {
     const scene_attachments *all = d->attachments;
-    if (!all) return scene_bad(d, key, "", "\"%s\": no file can be read here", name);
+    if (!all) return scene_fail_at_key(d, key, "", "\"%s\": no file can be read here", name);
     char *path = path_from_scene(d->file_name, name);
-    if (!path) return scene_no_memory(d);
+    if (!path) return scene_fail_for_memory(d);
     *out = find_attachment(all, path);
     const insitu_status status = *out ? INSITU_OK : read_attachment(d, key, path);
     if (*out || status != INSITU_OK)
@@ -173,9 +175,9 @@ static insitu_status use_file(const scene_document *d, const char *path, scene_c
     if (status == INSITU_OK)
         status = use_points(d, &points, name ? name : "", out);
     else if (status == INSITU_ERROR_MEMORY)
-        status = scene_no_memory(d);
+        status = scene_fail_for_memory(d);
     else
-        status = scene_bad(d, key, "", "%s", reason.message);
+        status = scene_fail_at_key(d, key, "", "%s", reason.message);
     base_free(points.items);
     return status;
 }
@@ -200,10 +202,12 @@ static insitu_status convert_map(const scene_document *d, const char *parent, sc
     }
     const bool has_list = has_key(d, path, "colours"), has_file = has_key(d, path, "file");
     if (has_list == has_file)
-        return scene_bad(d, path, "", "holds %s, expected one of colours and file", has_list ? "both" : "neither");
-    if (has_file && has_key(d, path, "at")) return scene_bad(d, path, "at", "given beside file, expected with colours");
+        return scene_fail_at_key(d, path, "", "holds %s, expected one of colours and file",
+                                 has_list ? "both" : "neither");
+    if (has_file && has_key(d, path, "at"))
+        return scene_fail_at_key(d, path, "at", "given beside file, expected with colours");
     if (has_list && has_key(d, path, "name"))
-        return scene_bad(d, path, "name", "given beside colours, expected with file");
+        return scene_fail_at_key(d, path, "name", "given beside colours, expected with file");
     return has_list ? use_list(d, path, out) : use_file(d, path, out);
 }
 
@@ -222,7 +226,7 @@ static void reverse_map(scene_colour_map *map)
 static insitu_status cut_into_bands(const scene_document *d, int bands, scene_colour_map *map)
 {
     float *colours = base_alloc((size_t)bands * 3 * sizeof *colours);
-    if (!colours) return scene_no_memory(d);
+    if (!colours) return scene_fail_for_memory(d);
     for (int band = 0; band < bands; band++) {
         const double place = (bands > 1 ? (double)band / (bands - 1) : 0.5) * (map->count - 1);
         const int entry = place >= map->count - 1 ? map->count - 2 : (int)place;
@@ -248,11 +252,11 @@ static void convert_outside(const scene_file_colour_map *in, scene_colour_map *o
     out->has_below = in->below != NULL;
     out->has_above = in->above != NULL;
     out->has_nan = in->nan != NULL;
-    memcpy(out->outside[0], out->colours, sizeof out->outside[0]);
-    memcpy(out->outside[1], out->colours + 3 * (size_t)(out->count - 1), sizeof out->outside[1]);
-    if (in->below) set_linear_rgb(out->outside[0], in->below);
-    if (in->above) set_linear_rgb(out->outside[1], in->above);
-    set_linear_rgb(out->outside[2], in->nan ? in->nan : grey);
+    memcpy(out->outside_colours[0], out->colours, sizeof out->outside_colours[0]);
+    memcpy(out->outside_colours[1], out->colours + 3 * (size_t)(out->count - 1), sizeof out->outside_colours[1]);
+    if (in->below) set_linear_rgb(out->outside_colours[0], in->below);
+    if (in->above) set_linear_rgb(out->outside_colours[1], in->above);
+    set_linear_rgb(out->outside_colours[2], in->nan ? in->nan : grey);
 }
 
 /* ---- ranges and scales ----------------------------------------------------------------------------------------- */
@@ -265,7 +269,8 @@ static insitu_status read_range_ends(const scene_document *d, const char *path, 
         ends[i] = scene_document_number(d, key);
     }
     if (ends[0] < ends[1]) return INSITU_OK;
-    return scene_bad(d, path, "", "[%g, %g] does not rise, expected [low, high] with low < high", ends[0], ends[1]);
+    return scene_fail_at_key(d, path, "", "[%g, %g] does not rise, expected [low, high] with low < high", ends[0],
+                             ends[1]);
 }
 
 static scene_range_source range_source(const char *word)
@@ -298,10 +303,11 @@ static insitu_status check_fixed_range(const scene_document *d, const char *path
 {
     const scene_range *r = &map->range;
     if (map->scale == SCENE_LOG && !(r->low > 0))
-        return scene_bad(d, path, "range", "begins with %g, expected above 0 for scale: log", r->low);
+        return scene_fail_at_key(d, path, "range", "begins with %g, expected above 0 for scale: log", r->low);
     if (map->scale == SCENE_LOG && r->high / r->low > widest_log_range)
-        return scene_bad(d, path, "range", "[%g, %g] is too wide for scale: log, expected a ratio of at most %g",
-                         r->low, r->high, widest_log_range);
+        return scene_fail_at_key(d, path, "range",
+                                 "[%g, %g] is too wide for scale: log, expected a ratio of at most %g", r->low, r->high,
+                                 widest_log_range);
     return INSITU_OK;
 }
 
@@ -311,11 +317,12 @@ static insitu_status convert_scale(const scene_document *d, const char *path, co
     out->scale = in->scale ? (scene_scale)*in->scale : SCENE_LINEAR;
     out->threshold = in->threshold ? *in->threshold : 0;
     if (out->scale == SCENE_SYMLOG && !in->threshold)
-        return scene_bad(d, path, "threshold", "missing, expected a number above 0 for scale: symlog");
+        return scene_fail_at_key(d, path, "threshold", "missing, expected a number above 0 for scale: symlog");
     if (out->scale != SCENE_SYMLOG && in->threshold)
-        return scene_bad(d, path, "threshold", "given without scale: symlog, expected with it");
+        return scene_fail_at_key(d, path, "threshold", "given without scale: symlog, expected with it");
     if (out->scale == SCENE_LOG && out->range.source == SCENE_RANGE_SYMMETRIC)
-        return scene_bad(d, path, "range", "symmetric is not allowed beside scale: log, expected scale: symlog");
+        return scene_fail_at_key(d, path, "range",
+                                 "symmetric is not allowed beside scale: log, expected scale: symlog");
     return out->range.is_fixed ? check_fixed_range(d, path, out) : INSITU_OK;
 }
 
@@ -326,7 +333,8 @@ insitu_status scene_convert_colour_map(const scene_document *d, const char *path
     if (status != INSITU_OK) return status;
     if (in->reversed && *in->reversed) reverse_map(out);
     if (in->discrete && out->is_banded)
-        return scene_bad(d, path, "discrete", "given beside a map of %d bands, expected one of the two", out->count);
+        return scene_fail_at_key(d, path, "discrete", "given beside a map of %d bands, expected one of the two",
+                                 out->count);
     if (in->discrete) status = cut_into_bands(d, *in->discrete, out);
     if (status == INSITU_OK) convert_outside(in, out);
     if (status == INSITU_OK) status = convert_range(d, path, &out->range);

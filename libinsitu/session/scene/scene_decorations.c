@@ -12,7 +12,7 @@ static insitu_status convert_text(const scene_document *d, const char *path, con
     const insitu_status status = scene_check_placeholders(d, path, key, text);
     if (status) return status;
     *out = base_strdup(text);
-    return *out ? INSITU_OK : scene_no_memory(d);
+    return *out ? INSITU_OK : scene_fail_for_memory(d);
 }
 
 static insitu_status convert_words(const scene_document *d, const char *path, const scene_file_decorations *in,
@@ -20,12 +20,12 @@ static insitu_status convert_words(const scene_document *d, const char *path, co
 {
     insitu_status status = INSITU_OK;
     out->words = base_calloc((size_t)in->text_count, sizeof *out->words);
-    if (!out->words) return scene_no_memory(d);
+    if (!out->words) return scene_fail_for_memory(d);
     for (int i = 0; i < in->text_count && !status; i++) {
         char words_path[SCENE_PATH_SIZE];
         snprintf(words_path, sizeof words_path, "%s.text[%d]", path, i);
         out->words_count++;
-        out->words[i].at = in->text[i].at ? (scene_anchor)*in->text[i].at : SCENE_TOP_LEFT;
+        out->words[i].anchor = in->text[i].at ? (scene_anchor)*in->text[i].at : SCENE_TOP_LEFT;
         status = convert_text(d, words_path, "text", in->text[i].text, &out->words[i].text);
     }
     return status;
@@ -58,7 +58,7 @@ insitu_status scene_convert_decorations(const scene_document *d, const char *pat
     out->has_scale_bar = in->scale_bar != NULL;
     out->scale_at = in->scale_bar && in->scale_bar->at ? (scene_anchor)*in->scale_bar->at : SCENE_BOTTOM_RIGHT;
     out->scale_unit = in->scale_bar && in->scale_bar->unit ? base_strdup(in->scale_bar->unit) : NULL;
-    if (in->scale_bar && in->scale_bar->unit && !out->scale_unit) return scene_no_memory(d);
+    if (in->scale_bar && in->scale_bar->unit && !out->scale_unit) return scene_fail_for_memory(d);
     out->has_colour = in->colour != NULL;
     for (int i = 0; in->colour && i < 3; i++) out->colour[i] = colour_linear_from_srgb((float)in->colour[i]);
     out->size = in->size ? *in->size : 0.03;

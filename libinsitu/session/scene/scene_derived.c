@@ -23,13 +23,13 @@ static insitu_status add_input(const scene_document *d, const char *path, const 
                                scene_derived *out)
 {
     scene_field *inputs = base_realloc(out->inputs, (size_t)(out->input_count + 1) * sizeof *inputs);
-    if (!inputs) return scene_no_memory(d);
+    if (!inputs) return scene_fail_for_memory(d);
     out->inputs = inputs;
     inputs[out->input_count] = (scene_field){.name = base_strdup(reference->name),
                                              .component = reference->component,
                                              .at_vertices = true,
                                              .line = scene_document_line(d, path)};
-    return inputs[out->input_count++].name ? INSITU_OK : scene_no_memory(d);
+    return inputs[out->input_count++].name ? INSITU_OK : scene_fail_for_memory(d);
 }
 
 static insitu_status store_expression(const scene_document *d, const char *path, const char *text, scene_derived *out)
@@ -37,10 +37,10 @@ static insitu_status store_expression(const scene_document *d, const char *path,
     char fault[SCENE_FAULT_SIZE];
     insitu_status status = INSITU_OK;
     const scene_parse_result result = scene_parse_expression(text, &out->expression, fault);
-    if (result == SCENE_NO_MEMORY) return scene_no_memory(d);
-    if (result == SCENE_FAULTY) return scene_bad(d, path, "", "%s", fault);
+    if (result == SCENE_NO_MEMORY) return scene_fail_for_memory(d);
+    if (result == SCENE_FAULTY) return scene_fail_at_key(d, path, "", "%s", fault);
     if (out->expression.input_count == 0)
-        return scene_bad(d, path, "", "\"%.60s\" names no field, expected one at least", text);
+        return scene_fail_at_key(d, path, "", "\"%.60s\" names no field, expected one at least", text);
     for (int i = 0; i < out->expression.input_count && !status; i++)
         status = add_input(d, path, &out->expression.inputs[i], out);
     return status;
@@ -52,14 +52,15 @@ static insitu_status add_reference(const scene_document *d, const char *path, co
     scene_expression one;
     char fault[SCENE_FAULT_SIZE];
     const scene_parse_result result = scene_parse_expression(text, &one, fault);
-    if (result == SCENE_NO_MEMORY) return scene_no_memory(d);
-    if (result == SCENE_FAULTY) return scene_bad(d, path, "", "%s", fault);
+    if (result == SCENE_NO_MEMORY) return scene_fail_for_memory(d);
+    if (result == SCENE_FAULTY) return scene_fail_at_key(d, path, "", "%s", fault);
     insitu_status status = INSITU_OK;
     if (one.count != 1 || one.input_count != 1 || one.inputs[0].component == SCENE_COMPONENT_MAGNITUDE)
-        status = scene_bad(d, path, "",
-                           "\"%.60s\" is an expression, expected the name of a field: make it a derived field of its "
-                           "own, and name that",
-                           text);
+        status = scene_fail_at_key(
+            d, path, "",
+            "\"%.60s\" is an expression, expected the name of a field: make it a derived field of its "
+            "own, and name that",
+            text);
     else
         status = add_input(d, path, &one.inputs[0], out);
     scene_expression_free(&one);
@@ -74,14 +75,14 @@ static insitu_status read_references(const scene_document *d, const char *path, 
     const bool is_list = scene_document_kind(d, path) == SCENE_LIST;
     insitu_status status = INSITU_OK;
     if (is_list && (out->kind == SCENE_GRADIENT_OF || count < 2 || count > SPACE))
-        return scene_bad(d, path, "", "a list of %d is not allowed, expected %s", count,
-                         out->kind == SCENE_GRADIENT_OF ? "the name of a field"
-                                                        : "the name of a field, or a list of 2 or 3 scalars");
+        return scene_fail_at_key(d, path, "", "a list of %d is not allowed, expected %s", count,
+                                 out->kind == SCENE_GRADIENT_OF ? "the name of a field"
+                                                                : "the name of a field, or a list of 2 or 3 scalars");
     for (int i = 0; i < count && !status; i++) status = add_reference(d, path, texts[i], out);
     for (int i = 0; i < out->input_count && !is_list && !status; i++)
         if (out->inputs[i].component >= 0 && out->kind != SCENE_GRADIENT_OF)
-            status =
-                scene_bad(d, path, "", "\"%.60s\" is a component, expected a field of 2 or 3 components", texts[i]);
+            status = scene_fail_at_key(d, path, "", "\"%.60s\" is a component, expected a field of 2 or 3 components",
+                                       texts[i]);
     return status;
 }
 
@@ -91,15 +92,15 @@ static insitu_status read_scalar(const scene_document *d, const char *path, int 
 {
     const char *text = NULL;
     if (scene_document_kind(d, path) == SCENE_LIST)
-        return scene_bad(d, path, "", "a list is not allowed, expected the name of a field");
+        return scene_fail_at_key(d, path, "", "a list is not allowed, expected the name of a field");
     scene_document_texts(d, path, &text, 1);
     insitu_status status = add_reference(d, path, text, out);
     if (status) return status;
     if (out->inputs[0].component >= 0)
-        return scene_bad(d, path, "", "\"%.60s\" is a component, expected the name of a field", text);
+        return scene_fail_at_key(d, path, "", "\"%.60s\" is a component, expected the name of a field", text);
     out->inputs[0].component = component;
     scene_instruction *program = base_alloc(sizeof *program);
-    if (!program) return scene_no_memory(d);
+    if (!program) return scene_fail_for_memory(d);
     *program = (scene_instruction){SCENE_OP_PUSH_INPUT, 0, 0};
     out->expression = (scene_expression){.count = 1, .instructions = program, .depth = 1};
     return INSITU_OK;
@@ -116,11 +117,11 @@ static insitu_status find_key(const scene_document *d, const char *path, const s
         char key_path[KEY_SIZE];
         snprintf(key_path, sizeof key_path, "%s.%s", path, keys[i].key);
         if (scene_document_kind(d, key_path) == SCENE_NOTHING) continue;
-        if (first) return scene_bad(d, path, keys[i].key, "given beside %s, expected one of the two", first);
+        if (first) return scene_fail_at_key(d, path, keys[i].key, "given beside %s, expected one of the two", first);
         first = keys[i].key;
         *found = i;
     }
-    return first ? INSITU_OK : scene_bad(d, path, "", "says not what it is, expected " KEY_WORDS);
+    return first ? INSITU_OK : scene_fail_at_key(d, path, "", "says not what it is, expected " KEY_WORDS);
 }
 
 static bool takes_component(int key)
@@ -132,11 +133,11 @@ static bool takes_component(int key)
 static insitu_status check_name(const scene_document *d, const char *path, const scene *s, const char *name)
 {
     if (name[strcspn(name, ".[]\"'")])
-        return scene_bad(d, path, "", "\"%.60s\" is no name for a derived field, expected one without . [ ] and quotes",
-                         name);
+        return scene_fail_at_key(
+            d, path, "", "\"%.60s\" is no name for a derived field, expected one without . [ ] and quotes", name);
     for (int i = 0; i < s->derived_count; i++)
         if (s->derived[i].name && strcmp(s->derived[i].name, name) == 0)
-            return scene_bad(d, path, "", "the name is given twice, expected it once");
+            return scene_fail_at_key(d, path, "", "the name is given twice, expected it once");
     return INSITU_OK;
 }
 
@@ -148,15 +149,16 @@ static insitu_status convert_derived(const scene_document *d, const char *path, 
     out->line = scene_document_line(d, path);
     insitu_status status = check_name(d, path, s, in->name);
     out->name = base_strdup(in->name);
-    if (!out->name) return scene_no_memory(d);
+    if (!out->name) return scene_fail_for_memory(d);
     if (!status) status = find_key(d, path, in, &key);
     if (!status) status = scene_convert_component(d, path, in->component, &out->component);
     if (!status && in->component && !takes_component(key))
-        status = scene_bad(d, path, "component", "given beside %s, expected it beside field, gradient or vorticity",
-                           key < 0 ? "expression" : keys[key].key);
+        status =
+            scene_fail_at_key(d, path, "component", "given beside %s, expected it beside field, gradient or vorticity",
+                              key < 0 ? "expression" : keys[key].key);
     if (!status && key >= 0 && keys[key].kind != SCENE_EXPRESSION && out->component >= SPACE)
-        status = scene_bad(d, path, "component", "is %d, expected magnitude, x, y, z or a number from 0 to 2",
-                           out->component);
+        status = scene_fail_at_key(d, path, "component", "is %d, expected magnitude, x, y, z or a number from 0 to 2",
+                                   out->component);
     if (status) return status;
     out->key = key < 0 ? "" : keys[key].key;
     out->kind = key < 0 ? SCENE_EXPRESSION : keys[key].kind;
@@ -196,8 +198,8 @@ static insitu_status refuse_cycle(const search *w, int first)
     for (int i = first + 1; i < w->length && size < sizeof circle - 80; i++)
         size +=
             (size_t)snprintf(circle + size, sizeof circle - size, "%.60s, which is made of ", fields[w->path[i]].name);
-    return scene_bad(w->d, path, "", "is made of %s%s: expected fields that are not made of themselves", circle,
-                     w->length == first + 1 ? "itself" : fields[w->path[first]].name);
+    return scene_fail_at_key(w->d, path, "", "is made of %s%s: expected fields that are not made of themselves", circle,
+                             w->length == first + 1 ? "itself" : fields[w->path[first]].name);
 }
 
 static insitu_status visit_field(search *w, int at)
@@ -223,7 +225,7 @@ static insitu_status sort_fields(const scene_document *d, scene *s)
     search w = {.d = d, .s = s};
     insitu_status status = INSITU_OK;
     scene_derived *sorted = base_calloc((size_t)s->derived_count, sizeof *sorted);
-    if (!sorted) return scene_no_memory(d);
+    if (!sorted) return scene_fail_for_memory(d);
     for (int i = 0; i < s->derived_count && !status; i++) status = visit_field(&w, i);
     for (int i = 0; i < s->derived_count && !status; i++) sorted[i] = s->derived[w.order[i]];
     if (!status) memcpy(s->derived, sorted, (size_t)s->derived_count * sizeof *sorted);
@@ -231,7 +233,7 @@ static insitu_status sort_fields(const scene_document *d, scene *s)
     for (int i = 0; i < s->derived_count && !status; i++) {
         scene_derived *field = &s->derived[i];
         field->made_by = base_calloc((size_t)field->input_count, sizeof *field->made_by);
-        if (!field->made_by) return scene_no_memory(d);
+        if (!field->made_by) return scene_fail_for_memory(d);
         for (int k = 0; k < field->input_count; k++) field->made_by[k] = find_derived(s, field->inputs[k].name);
     }
     return status;
@@ -242,7 +244,7 @@ insitu_status scene_convert_derived(const scene_document *d, const scene_file *i
     insitu_status status = INSITU_OK;
     if (in->fields_count == 0) return INSITU_OK;
     out->derived = base_calloc((size_t)in->fields_count, sizeof *out->derived);
-    if (!out->derived) return scene_no_memory(d);
+    if (!out->derived) return scene_fail_for_memory(d);
     for (int i = 0; i < in->fields_count && !status; i++) {
         const char *name = in->fields[i].name;
         char path[SCENE_PATH_SIZE];

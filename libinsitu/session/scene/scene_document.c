@@ -21,7 +21,7 @@ enum { path_size = 256, quote_size = 48, question_size = 96, list_size = 64, mos
 /* A block of memory for the schema's structs; the memory behind the header is aligned for any type. */
 struct scene_block {
     scene_block *next;
-    max_align_t room[];
+    max_align_t memory[];
 };
 
 static insitu_status fail_at_line(const scene_document *d, size_t line, const char *what)
@@ -125,7 +125,7 @@ insitu_status scene_document_open(scene_document *d, const char *text, size_t si
     yaml_parser_delete(&parser);
     if (status == INSITU_OK && !scene_expand_shorthand(&d->yaml)) {
         scene_document_close(d);
-        status = scene_no_memory(d);
+        status = scene_fail_for_memory(d);
     }
     return status;
 }
@@ -299,12 +299,12 @@ double scene_document_number(const scene_document *d, const char *path)
     return node && node->type == YAML_SCALAR_NODE ? strtod(node_text(node), NULL) : 0;
 }
 
-insitu_status scene_no_memory(const scene_document *d)
+insitu_status scene_fail_for_memory(const scene_document *d)
 {
     return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", d->file_name);
 }
 
-insitu_status scene_bad(const scene_document *d, const char *parent, const char *key, const char *format, ...)
+insitu_status scene_fail_at_key(const scene_document *d, const char *parent, const char *key, const char *format, ...)
 {
     char path[path_size], what[sizeof d->error->message / 2];
     snprintf(path, sizeof path, "%s%s%s", parent, *parent && *key && *key != '[' ? "." : "", key);
@@ -429,7 +429,7 @@ static insitu_status fail_for_value(const scene_document *d, const char *path, c
     const bool is_entry = *path && path[strlen(path) - 1] == ']';
     if (!*question && is_entry && value->type == CYAML_SEQUENCE_FIXED && node->type == YAML_SCALAR_NODE)
         snprintf(question, question_size, " (each entry is a list of its own, in [ ])");
-    return scene_bad(d, path, "", "%s is not allowed%s, expected %s", quoted, question, expected);
+    return scene_fail_at_key(d, path, "", "%s is not allowed%s, expected %s", quoted, question, expected);
 }
 
 /* Reads a decimal whole number. 010 is rejected, because it could mean 10 or 8. */
@@ -484,7 +484,7 @@ static bool allocate_values(scene_document *d, const cyaml_schema_value_t *value
     if (!block) return false;
     block->next = d->blocks;
     d->blocks = block;
-    void *made = block->room;
+    void *made = block->memory;
     memcpy(*to, &made, sizeof made);
     *to = made;
     return true;
@@ -497,7 +497,7 @@ static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, co
     const char *text = node_text(node);
     if (to && value->type == CYAML_STRING) memcpy(to, &text, sizeof text);
     if (!to || value->type == CYAML_STRING) return INSITU_OK;
-    if (!allocate_values(d, value, 1, &to)) return scene_no_memory(d);
+    if (!allocate_values(d, value, 1, &to)) return scene_fail_for_memory(d);
     switch (value->type) {
     case CYAML_INT: *(int *)to = (int)strtol(text, NULL, 10); break;
     case CYAML_ENUM: *(int *)to = (int)find_choice(text, value)->val; break;
@@ -532,9 +532,9 @@ static insitu_status check_list(scene_document *d, const char *path, const yaml_
     if ((uint32_t)count < value->sequence.min || (uint32_t)count > value->sequence.max) {
         char expected[SCENE_WORDS_SIZE];
         scene_value_words(value, key, expected);
-        return scene_bad(d, path, "", "a list of %d is not allowed, expected %s", count, expected);
+        return scene_fail_at_key(d, path, "", "a list of %d is not allowed, expected %s", count, expected);
     }
-    if (!allocate_values(d, value, count, &to)) return scene_no_memory(d);
+    if (!allocate_values(d, value, count, &to)) return scene_fail_for_memory(d);
     insitu_status status = INSITU_OK;
     for (int i = 0; i < count && status == INSITU_OK; i++) {
         char item_path[path_size];
@@ -601,8 +601,8 @@ static insitu_status check_named(scene_document *d, const char *path, const yaml
     if (node->type != YAML_MAPPING_NODE) return fail_for_value(d, path, node, value, key);
     const yaml_node_pair_t *first = node->data.mapping.pairs.start, *end = node->data.mapping.pairs.top;
     if (end - first > SCENE_MAX_NAMES)
-        return scene_bad(d, path, "", "%d names are not allowed, expected at most %d", (int)(end - first),
-                         SCENE_MAX_NAMES);
+        return scene_fail_at_key(d, path, "", "%d names are not allowed, expected at most %d", (int)(end - first),
+                                 SCENE_MAX_NAMES);
     insitu_status status = INSITU_OK;
     for (const yaml_node_pair_t *p = first; p < end && !status; p++) {
         const yaml_node_t *name = find_node_by_index(d, p->key);
@@ -712,7 +712,7 @@ static insitu_status check_mapping(scene_document *d, const char *path, const ya
         if (seen & 1u << i || mapping->fields[i].value.flags & CYAML_FLAG_OPTIONAL) continue;
         char expected[SCENE_WORDS_SIZE];
         scene_expected_words(mapping->fields[i].key, &mapping->fields[i].value, &mapping->keys[i], expected);
-        status = scene_bad(d, path, mapping->fields[i].key, "missing, expected %s", expected);
+        status = scene_fail_at_key(d, path, mapping->fields[i].key, "missing, expected %s", expected);
     }
     return status;
 }
@@ -723,7 +723,7 @@ static insitu_status check_value(scene_document *d, const char *path, const yaml
     switch (value->type) {
     case CYAML_MAPPING:
         if (node->type != YAML_MAPPING_NODE) return fail_for_value(d, path, node, value, key);
-        if (!allocate_values(d, value, 1, &to)) return scene_no_memory(d);
+        if (!allocate_values(d, value, 1, &to)) return scene_fail_for_memory(d);
         return check_mapping(d, path, node, key->child, to);
     case CYAML_SEQUENCE:
     case CYAML_SEQUENCE_FIXED: return check_list(d, path, node, value, key, to);

@@ -59,10 +59,10 @@ int scene_document_length(const scene_document *d, const char *path);
 double scene_document_number(const scene_document *d, const char *path);
 
 /* Records "file:line: parent.key: ..." and returns INSITU_ERROR_SCENE. An empty key means the parent itself. */
-insitu_status scene_bad(const scene_document *d, const char *parent, const char *key, const char *format, ...)
+insitu_status scene_fail_at_key(const scene_document *d, const char *parent, const char *key, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
 /* Records that memory ran out while the scene was read, and returns INSITU_ERROR_MEMORY. */
-insitu_status scene_no_memory(const scene_document *d);
+insitu_status scene_fail_for_memory(const scene_document *d);
 
 #endif

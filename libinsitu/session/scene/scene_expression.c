@@ -34,10 +34,10 @@ enum { FUNCTIONS = sizeof functions / sizeof *functions };
 #define FUNCTION_WORDS "sqrt, abs, exp, log, log10, sin, cos, tan, min, max, pow or mag"
 
 typedef struct parser {
-    const char *text, *at;
-    scene_expression *out;
-    int nested; /* number of open brackets and signs, which is limited */
-    int used;   /* number of stack entries in use at this point of the program */
+    const char *text, *cursor;
+    scene_expression *expression;
+    int nested;      /* number of open brackets and signs, which is limited */
+    int stack_count; /* number of stack entries in use at this point of the program */
     scene_parse_result result;
     char *fault;
 } parser;
@@ -81,14 +81,14 @@ static bool is_letter(char c)
 
 static char peek_character(parser *p)
 {
-    while (is_blank(*p->at)) p->at++;
-    return *p->at;
+    while (is_blank(*p->cursor)) p->cursor++;
+    return *p->cursor;
 }
 
 static bool accept_character(parser *p, char c)
 {
     if (peek_character(p) != c) return false;
-    p->at++;
+    p->cursor++;
     return true;
 }
 
@@ -103,16 +103,16 @@ static int word_length(const char *at)
 static bool fail_expecting(parser *p, const char *expected)
 {
     if (peek_character(p) == '\0') return fail(p, "\"%.60s\" ends too early, expected %s", p->text, expected);
-    const int before = (int)(p->at - p->text);
-    return fail(p, "\"%.*s\" stands behind \"%.*s\", expected %s", word_length(p->at), p->at, before > 40 ? 40 : before,
-                before > 40 ? p->at - 40 : p->text, expected);
+    const int before = (int)(p->cursor - p->text);
+    return fail(p, "\"%.*s\" stands behind \"%.*s\", expected %s", word_length(p->cursor), p->cursor,
+                before > 40 ? 40 : before, before > 40 ? p->cursor - 40 : p->text, expected);
 }
 
 /* ---- instructions ----------------------------------------------------------------------------------------------- */
 
 static bool add_instruction(parser *p, scene_operation operation, int input, double number)
 {
-    scene_expression *out = p->out;
+    scene_expression *out = p->expression;
     if (out->count % 16 == 0) {
         scene_instruction *more =
             base_realloc(out->instructions, (size_t)(out->count + 16) * sizeof *out->instructions);
@@ -125,27 +125,27 @@ static bool add_instruction(parser *p, scene_operation operation, int input, dou
 
 static bool push_operand(parser *p, scene_operation operation, int input, double number)
 {
-    if (++p->used > SCENE_STACK)
+    if (++p->stack_count > SCENE_STACK)
         return fail(p, "more than %d intermediate values are open at once, expected fewer brackets", SCENE_STACK);
-    if (p->used > p->out->depth) p->out->depth = p->used;
+    if (p->stack_count > p->expression->depth) p->expression->depth = p->stack_count;
     return add_instruction(p, operation, input, number);
 }
 
 static bool add_binary(parser *p, scene_operation operation)
 {
-    p->used--;
+    p->stack_count--;
     return add_instruction(p, operation, 0, 0);
 }
 
 /* Emits a power. An exponent that is a small whole number gets an instruction that needs no logarithm. */
 static bool add_power(parser *p)
 {
-    const scene_instruction *last = &p->out->instructions[p->out->count - 1];
+    const scene_instruction *last = &p->expression->instructions[p->expression->count - 1];
     const double exponent = last->number;
     if (last->operation != SCENE_OP_PUSH_NUMBER || exponent != floor(exponent) || fabs(exponent) > MOST_WHOLE_POWER)
         return add_binary(p, SCENE_OP_POWER);
-    p->out->count--;
-    p->used--;
+    p->expression->count--;
+    p->stack_count--;
     return add_instruction(p, SCENE_OP_WHOLE_POWER, 0, exponent);
 }
 
@@ -153,7 +153,7 @@ static bool add_power(parser *p)
 
 static bool push_input(parser *p, const char *name, int component)
 {
-    scene_expression *out = p->out;
+    scene_expression *out = p->expression;
     for (int i = 0; i < out->input_count; i++)
         if (strcmp(out->inputs[i].name, name) == 0 && out->inputs[i].component == component)
             return push_operand(p, SCENE_OP_PUSH_INPUT, i, 0);
@@ -168,9 +168,9 @@ static bool push_input(parser *p, const char *name, int component)
 /* Reads the component that follows a point. */
 static bool parse_component(parser *p, const char *name, int *component)
 {
-    const char *word = p->at;
+    const char *word = p->cursor;
     const int length = word_length(word), digits = (int)strspn(word, "0123456789");
-    p->at += length;
+    p->cursor += length;
     if (length == 1 && *word >= 'x' && *word <= 'z') {
         *component = *word - 'x';
         return true;
@@ -186,15 +186,15 @@ static bool parse_component(parser *p, const char *name, int *component)
 /* Reads a name, with or without quotes, that begins at p->at. */
 static bool parse_name(parser *p, char name[NAME_SIZE])
 {
-    const char quote = *p->at == '"' || *p->at == '\'' ? *p->at : '\0';
-    const char *begin = p->at + (quote != '\0'), *end = begin;
+    const char quote = *p->cursor == '"' || *p->cursor == '\'' ? *p->cursor : '\0';
+    const char *begin = p->cursor + (quote != '\0'), *end = begin;
     while (quote ? *end && *end != quote : is_letter(*end) || is_digit(*end)) end++;
-    if (quote && !*end) return fail(p, "the name %.40s has no end, expected %c behind it", p->at, quote);
+    if (quote && !*end) return fail(p, "the name %.40s has no end, expected %c behind it", p->cursor, quote);
     if (end == begin || end - begin >= NAME_SIZE)
         return fail(p, "a name of %d bytes stands there, expected 1 to %d", (int)(end - begin), NAME_SIZE - 1);
     memcpy(name, begin, (size_t)(end - begin));
     name[end - begin] = '\0';
-    p->at = end + (quote != '\0');
+    p->cursor = end + (quote != '\0');
     return true;
 }
 
@@ -249,12 +249,12 @@ static bool parse_function(parser *p, const char *name)
 static bool parse_field(parser *p)
 {
     char name[NAME_SIZE];
-    const bool is_quoted = !is_letter(*p->at);
+    const bool is_quoted = !is_letter(*p->cursor);
     int component = SCENE_COMPONENT_ONLY;
     if (!parse_name(p, name)) return false;
     if (!is_quoted && accept_character(p, '(')) return parse_function(p, name);
-    if (*p->at == '.') {
-        p->at++;
+    if (*p->cursor == '.') {
+        p->cursor++;
         if (!parse_component(p, name, &component)) return false;
     }
     return push_input(p, name, component);
@@ -265,7 +265,7 @@ static bool parse_field(parser *p)
 static bool parse_number(parser *p)
 {
     char digits[64];
-    const char *end = p->at;
+    const char *end = p->cursor;
     while (is_digit(*end)) end++;
     if (*end == '.') end++;
     while (is_digit(*end)) end++;
@@ -273,20 +273,21 @@ static bool parse_number(parser *p)
         end += 2;
         while (is_digit(*end)) end++;
     }
-    const size_t length = (size_t)(end - p->at);
-    if (length >= sizeof digits) return fail(p, "the number %.40s... is too long, expected at most 63 digits", p->at);
-    memcpy(digits, p->at, length);
+    const size_t length = (size_t)(end - p->cursor);
+    if (length >= sizeof digits)
+        return fail(p, "the number %.40s... is too long, expected at most 63 digits", p->cursor);
+    memcpy(digits, p->cursor, length);
     digits[length] = '\0';
     const double number = strtod(digits, NULL);
     if (!isfinite(number)) return fail(p, "the number %s is too large, expected one below 1.8e308", digits);
-    p->at = end;
+    p->cursor = end;
     return push_operand(p, SCENE_OP_PUSH_NUMBER, 0, number);
 }
 
 static bool parse_primary(parser *p)
 {
     const char c = peek_character(p);
-    if (is_digit(c) || (c == '.' && is_digit(p->at[1]))) return parse_number(p);
+    if (is_digit(c) || (c == '.' && is_digit(p->cursor[1]))) return parse_number(p);
     if (is_name(c)) return parse_field(p);
     if (!accept_character(p, '(')) return fail_expecting(p, "a number, a field or (");
     if (!parse_sum(p)) return false;
@@ -298,16 +299,16 @@ static bool parse_sign(parser *p);
 static bool parse_power(parser *p)
 {
     if (!parse_primary(p)) return false;
-    if (p->at[0] == '*' && p->at[1] == '*')
+    if (p->cursor[0] == '*' && p->cursor[1] == '*')
         return fail(p, "** is no operator (did you mean ^?), expected + - * / or ^");
     if (!accept_character(p, '^')) return true;
-    const int before = p->out->count;
+    const int before = p->expression->count;
     if (!parse_sign(p)) return false;
-    const scene_instruction *last = &p->out->instructions[p->out->count - 1];
-    const bool is_negative = last->operation == SCENE_OP_NEGATE && p->out->count == before + 2;
-    if (is_negative && p->out->instructions[before].operation == SCENE_OP_PUSH_NUMBER) {
-        p->out->count--;
-        p->out->instructions[before].number *= -1;
+    const scene_instruction *last = &p->expression->instructions[p->expression->count - 1];
+    const bool is_negative = last->operation == SCENE_OP_NEGATE && p->expression->count == before + 2;
+    if (is_negative && p->expression->instructions[before].operation == SCENE_OP_PUSH_NUMBER) {
+        p->expression->count--;
+        p->expression->instructions[before].number *= -1;
     }
     return add_power(p);
 }
@@ -315,7 +316,7 @@ static bool parse_power(parser *p)
 static bool parse_sign(parser *p)
 {
     bool is_negative = false;
-    for (; peek_character(p) == '-' || *p->at == '+'; p->at++) is_negative = is_negative != (*p->at == '-');
+    for (; peek_character(p) == '-' || *p->cursor == '+'; p->cursor++) is_negative = is_negative != (*p->cursor == '-');
     if (++p->nested > MOST_NESTED) return fail(p, "more than %d brackets are open, expected fewer", MOST_NESTED);
     if (!parse_power(p)) return false;
     p->nested--;
@@ -325,8 +326,8 @@ static bool parse_sign(parser *p)
 static bool parse_product(parser *p)
 {
     if (!parse_sign(p)) return false;
-    while (peek_character(p) == '*' || *p->at == '/') {
-        const scene_operation operation = *p->at++ == '*' ? SCENE_OP_MULTIPLY : SCENE_OP_DIVIDE;
+    while (peek_character(p) == '*' || *p->cursor == '/') {
+        const scene_operation operation = *p->cursor++ == '*' ? SCENE_OP_MULTIPLY : SCENE_OP_DIVIDE;
         if (!parse_sign(p) || !add_binary(p, operation)) return false;
     }
     return true;
@@ -335,8 +336,8 @@ static bool parse_product(parser *p)
 static bool parse_sum(parser *p)
 {
     if (!parse_product(p)) return false;
-    while (peek_character(p) == '+' || *p->at == '-') {
-        const scene_operation operation = *p->at++ == '+' ? SCENE_OP_ADD : SCENE_OP_SUBTRACT;
+    while (peek_character(p) == '+' || *p->cursor == '-') {
+        const scene_operation operation = *p->cursor++ == '+' ? SCENE_OP_ADD : SCENE_OP_SUBTRACT;
         if (!parse_product(p) || !add_binary(p, operation)) return false;
     }
     return true;
@@ -344,7 +345,7 @@ static bool parse_sum(parser *p)
 
 scene_parse_result scene_parse_expression(const char *text, scene_expression *out, char fault[SCENE_FAULT_SIZE])
 {
-    parser p = {.text = text, .at = text, .out = out, .fault = fault};
+    parser p = {.text = text, .cursor = text, .expression = out, .fault = fault};
     *out = (scene_expression){0};
     if (strlen(text) > SCENE_EXPRESSION_BYTES)
         fail(&p, "an expression of %zu bytes stands there, expected at most %d", strlen(text), SCENE_EXPRESSION_BYTES);

@@ -22,8 +22,8 @@ insitu_status scene_convert_component(const scene_document *d, const char *path,
     }
     const size_t digits = strspn(text, "0123456789");
     if (digits == 0 || digits > 3 || text[digits]) {
-        return scene_bad(d, path, "component",
-                         "\"%s\" is not allowed, expected magnitude, x, y, z or a number from 0 to 999", text);
+        return scene_fail_at_key(d, path, "component",
+                                 "\"%s\" is not allowed, expected magnitude, x, y, z or a number from 0 to 999", text);
     }
     *component = (int)strtol(text, NULL, 10);
     return INSITU_OK;
@@ -34,10 +34,10 @@ insitu_status scene_copy_texts(const scene_document *d, const char *path, char *
     const char *texts[SCENE_MAX_NAMES];
     const int count = path ? scene_document_texts(d, path, texts, SCENE_MAX_NAMES) : 0;
     *out = base_calloc((size_t)count, sizeof **out);
-    if (!*out) return scene_no_memory(d);
+    if (!*out) return scene_fail_for_memory(d);
     while (*out_count < count) {
         char *text = base_strdup(texts[*out_count]);
-        if (!text) return scene_no_memory(d);
+        if (!text) return scene_fail_for_memory(d);
         (*out)[(*out_count)++] = text;
     }
     return INSITU_OK;
@@ -58,7 +58,7 @@ insitu_status scene_convert_field(const scene_document *d, const char *layer, co
     snprintf(field_path, sizeof field_path, "%s.field", path);
     out->line = scene_document_line(d, field_path);
     out->name = base_strdup(name);
-    if (!out->name) return scene_no_memory(d);
+    if (!out->name) return scene_fail_for_memory(d);
     const insitu_status status = scene_convert_meshes(d, layer, out);
     return status ? status : scene_convert_component(d, path, component, &out->component);
 }
@@ -114,11 +114,11 @@ scene_field *scene_next_field(scene_field_walk *walk)
     const scene_image *image = walk->image;
     const int counts[KINDS] = {image->isosurface_count, image->volume_count, image->slice_count, image->surface_count};
     for (;;) {
-        int layer = walk->place / ROLES, kind = 0;
+        int layer = walk->position / ROLES, kind = 0;
         while (kind < KINDS && layer >= counts[kind]) layer -= counts[kind++];
         if (kind == KINDS) return NULL;
         walk->kind = (scene_layer_kind)kind;
-        walk->role = (scene_field_role)(walk->place++ % ROLES);
+        walk->role = (scene_field_role)(walk->position++ % ROLES);
         scene_field *field = find_role_field(image, walk->kind, layer, walk->role);
         if (field) return field;
     }

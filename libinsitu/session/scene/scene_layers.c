@@ -25,11 +25,11 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
             if (in->values[i] != in->values[j]) continue;
             char key[32];
             snprintf(key, sizeof key, "values[%d]", i);
-            return scene_bad(d, path, key, "%g is there twice, expected each value once", in->values[i]);
+            return scene_fail_at_key(d, path, key, "%g is there twice, expected each value once", in->values[i]);
         }
     }
     out->values = base_alloc((size_t)in->values_count * sizeof *out->values);
-    if (!out->values) return scene_no_memory(d);
+    if (!out->values) return scene_fail_for_memory(d);
     memcpy(out->values, in->values, (size_t)in->values_count * sizeof *out->values);
     out->value_count = in->values_count;
     return INSITU_OK;
@@ -41,14 +41,14 @@ static insitu_status convert_colours(const scene_document *d, const char *path, 
                                      int first, scene_isosurface *out)
 {
     if (in->colours && in->colour_by) {
-        return scene_bad(d, path, "colours", "given beside colour_by, expected one of the two");
+        return scene_fail_at_key(d, path, "colours", "given beside colour_by, expected one of the two");
     }
     if (in->colours_count > in->values_count) {
-        return scene_bad(d, path, "colours", "%d colours for %d values, expected no more than values",
-                         in->colours_count, in->values_count);
+        return scene_fail_at_key(d, path, "colours", "%d colours for %d values, expected no more than values",
+                                 in->colours_count, in->values_count);
     }
     out->colours = base_alloc((size_t)in->values_count * 3 * sizeof *out->colours);
-    if (!out->colours) return scene_no_memory(d);
+    if (!out->colours) return scene_fail_for_memory(d);
     for (int i = 0; i < in->values_count; i++) {
         const int given = i < in->colours_count ? i : in->colours_count - 1;
         for (int c = 0; c < 3; c++) {
@@ -69,9 +69,10 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
     out->field.at_vertices = true;
     out->field.joins_corners = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     if (in->interpolate && *in->interpolate == SCENE_BY_CELL)
-        return scene_bad(d, path, "interpolate",
-                         "cell is not allowed, expected vertex: values that are the same throughout a cell have no "
-                         "surface in it");
+        return scene_fail_at_key(
+            d, path, "interpolate",
+            "cell is not allowed, expected vertex: values that are the same throughout a cell have no "
+            "surface in it");
     insitu_status status = scene_convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = convert_values(d, path, in, out);
     if (status == INSITU_OK) status = convert_colours(d, path, in, first_value, out);
@@ -89,18 +90,18 @@ static insitu_status convert_opacity(const scene_document *d, const char *path, 
     const int count = in->opacity ? in->opacity_count : 2;
     const double(*points)[2] = in->opacity ? (const double(*)[2])in->opacity : ramp;
     out->opacity = base_alloc((size_t)count * sizeof *out->opacity);
-    if (!out->opacity) return scene_no_memory(d);
+    if (!out->opacity) return scene_fail_for_memory(d);
     out->opacity_count = count;
     for (int i = 0; i < count; i++) {
         char key[32];
         snprintf(key, sizeof key, "opacity[%d]", i);
         if (i > 0 && points[i][0] < points[i - 1][0]) {
-            return scene_bad(d, path, key, "%g comes after %g, expected points that do not fall", points[i][0],
-                             points[i - 1][0]);
+            return scene_fail_at_key(d, path, key, "%g comes after %g, expected points that do not fall", points[i][0],
+                                     points[i - 1][0]);
         }
         if (i > 1 && points[i][0] == points[i - 2][0]) {
-            return scene_bad(d, path, key, "%g is there three times, expected at most two points at a place",
-                             points[i][0]);
+            return scene_fail_at_key(d, path, key, "%g is there three times, expected at most two points at a place",
+                                     points[i][0]);
         }
         out->opacity[i] = (scene_opacity_point){points[i][0], (float)points[i][1]};
     }
@@ -128,8 +129,8 @@ static insitu_status count_layer(const scene_document *d, const char *path, cons
 {
     const int kinds = !!layer->isosurface + !!layer->volume + !!layer->slice + !!layer->surface;
     if (kinds != 1)
-        return scene_bad(d, path, key, "holds %s, expected one of isosurface, volume, slice and surface",
-                         kinds ? "more than one layer" : "nothing");
+        return scene_fail_at_key(d, path, key, "holds %s, expected one of isosurface, volume, slice and surface",
+                                 kinds ? "more than one layer" : "nothing");
     counts->isosurfaces += layer->isosurface != NULL;
     counts->volumes += layer->volume != NULL;
     counts->slices += layer->slice != NULL;
@@ -137,11 +138,12 @@ static insitu_status count_layer(const scene_document *d, const char *path, cons
     counts->values += layer->isosurface ? layer->isosurface->values_count : 0;
     counts->values += layer->slice ? scene_count_planes(layer->slice) : layer->surface != NULL;
     if (counts->values > SCENE_MAX_SURFACES)
-        return scene_bad(d, path, key, "%d isovalues%s up to here, expected at most %d in an image", counts->values,
-                         counts->slices || counts->surfaces ? ", planes and outer surfaces" : "", SCENE_MAX_SURFACES);
+        return scene_fail_at_key(
+            d, path, key, "%d isovalues%s up to here, expected at most %d in an image", counts->values,
+            counts->slices || counts->surfaces ? ", planes and outer surfaces" : "", SCENE_MAX_SURFACES);
     if (counts->volumes > SCENE_MAX_VOLUMES)
-        return scene_bad(d, path, key, "%d volumes up to here, expected at most %d in an image", counts->volumes,
-                         SCENE_MAX_VOLUMES);
+        return scene_fail_at_key(d, path, key, "%d volumes up to here, expected at most %d in an image",
+                                 counts->volumes, SCENE_MAX_VOLUMES);
     return INSITU_OK;
 }
 
@@ -178,8 +180,8 @@ static insitu_status convert_layer_clip(const scene_document *d, const char *pat
                                         &out->isosurfaces[out->isosurface_count - 1].clips);
     const insitu_status status = scene_convert_layer_clip(d, path, in->volume->clip, out, &volume->clips);
     if (status || volume->clips == out->volumes[0].clips) return status;
-    return scene_bad(d, path, in->volume->clip ? "clip" : "",
-                     "the first volume is clipped differently, expected one clip for all volumes of an image");
+    return scene_fail_at_key(d, path, in->volume->clip ? "clip" : "",
+                             "the first volume is clipped differently, expected one clip for all volumes of an image");
 }
 
 /* Stores the index of a layer, which must be the last layer of its kind that was converted. */
@@ -212,7 +214,7 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
     out->volumes = base_calloc((size_t)counts.volumes, sizeof *out->volumes);
     out->slices = base_calloc((size_t)counts.slices, sizeof *out->slices);
     out->surfaces = base_calloc((size_t)counts.surfaces, sizeof *out->surfaces);
-    if (!out->isosurfaces || !out->volumes || !out->slices || !out->surfaces) return scene_no_memory(d);
+    if (!out->isosurfaces || !out->volumes || !out->slices || !out->surfaces) return scene_fail_for_memory(d);
     for (int i = 0; i < in->layers_count && status == INSITU_OK; i++) {
         const scene_file_layer *layer = &in->layers[i];
         /* shorter than SCENE_PATH_SIZE, to leave space for the keys below the layer */

@@ -17,15 +17,16 @@ static int compare_values(const void *a, const void *b)
 static insitu_status convert_values(const scene_document *d, const char *path, const scene_file_lines *in,
                                     scene_lines *out)
 {
-    if (in->values && in->count) return scene_bad(d, path, "count", "given beside values, expected one of the two");
+    if (in->values && in->count)
+        return scene_fail_at_key(d, path, "count", "given beside values, expected one of the two");
     if (!in->values && !in->count)
-        return scene_bad(d, path, "", "says of no value where lines are, expected values or count");
+        return scene_fail_at_key(d, path, "", "says of no value where lines are, expected values or count");
     for (int i = 0; i < in->values_count; i++)
         for (int j = 0; j < i; j++) {
             char key[32];
             snprintf(key, sizeof key, "values[%d]", i);
             if (in->values[i] == in->values[j])
-                return scene_bad(d, path, key, "%g is there twice, expected each value once", in->values[i]);
+                return scene_fail_at_key(d, path, key, "%g is there twice, expected each value once", in->values[i]);
         }
     out->count = in->count ? *in->count : in->values_count;
     out->has_values = in->values != NULL;
@@ -39,13 +40,14 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
 static insitu_status take_field_of_colours(const scene_document *d, const char *layer, const char *path,
                                            const scene_file_lines *in, const scene_field *colours, scene_lines *out)
 {
-    if (in->component) return scene_bad(d, path, "component", "given without field, expected both");
-    if (!colours) return scene_bad(d, path, "", "no field colours the layer, expected a field whose lines are drawn");
+    if (in->component) return scene_fail_at_key(d, path, "component", "given without field, expected both");
+    if (!colours)
+        return scene_fail_at_key(d, path, "", "no field colours the layer, expected a field whose lines are drawn");
     out->is_of_colours = true;
     out->field.line = colours->line;
     out->field.component = colours->component;
     out->field.name = base_strdup(colours->name);
-    return out->field.name ? scene_convert_meshes(d, layer, &out->field) : scene_no_memory(d);
+    return out->field.name ? scene_convert_meshes(d, layer, &out->field) : scene_fail_for_memory(d);
 }
 
 float scene_line_width(int height)

@@ -119,12 +119,12 @@ static size_t expand_pattern(const char *pattern, const scene_moment *moment, ch
 
 char *scene_expand(const char *pattern, const scene_moment *moment)
 {
-    c_numbers numbers;
-    if (!c_numbers_begin(&numbers)) return NULL;
+    c_locale numbers;
+    if (!c_locale_enter(&numbers)) return NULL;
     const size_t size = expand_pattern(pattern, moment, NULL, 0) + 1;
     char *text = base_alloc(size);
     if (text) expand_pattern(pattern, moment, text, size);
-    c_numbers_end(&numbers);
+    c_locale_leave(&numbers);
     return text;
 }
 
@@ -153,15 +153,16 @@ insitu_status scene_check_placeholders(const scene_document *d, const char *path
         const placeholder_kind kind = parse_placeholder(open).kind;
         const int length = (int)strcspn(open, "}") + 1 < 40 ? (int)strcspn(open, "}") + 1 : 40;
         if (kind == PLACEHOLDER_NONE)
-            return scene_bad(d, path, key,
-                             "\"%.*s\" is unknown, expected {cycle}, {cycle:01} to {cycle:020}, {time}, {time:.0f} to "
-                             "{time:.17f} (or e, or g), {name}, {view} and {plane} as {cycle}, {isovalue} as {time} or "
-                             "{field}",
-                             length, open);
+            return scene_fail_at_key(
+                d, path, key,
+                "\"%.*s\" is unknown, expected {cycle}, {cycle:01} to {cycle:020}, {time}, {time:.0f} to "
+                "{time:.17f} (or e, or g), {name}, {view} and {plane} as {cycle}, {isovalue} as {time} or "
+                "{field}",
+                length, open);
         char image[SCENE_PATH_SIZE];
         snprintf(image, sizeof image, "%.*s", (int)strcspn(path, "."), path);
         const char *lack = find_missing_key(d, image, kind);
-        if (lack) return scene_bad(d, path, key, "\"%.*s\" is of images with %s alone", length, open, lack);
+        if (lack) return scene_fail_at_key(d, path, key, "\"%.*s\" is of images with %s alone", length, open, lack);
     }
     return INSITU_OK;
 }
@@ -170,21 +171,21 @@ static insitu_status convert_format(const scene_document *d, const char *path, c
                                     scene_format *format)
 {
     if (!in->path && !in->cinema)
-        return scene_bad(d, path, "path", "missing, expected a file's name, or cinema: and that of a database");
+        return scene_fail_at_key(d, path, "path", "missing, expected a file's name, or cinema: and that of a database");
     const char *file = in->path ? in->path : ".png";
     const size_t length = strlen(file);
     const char *ending = length >= 4 ? file + length - 4 : "";
     if (strcasecmp(ending, ".exr") == 0) {
         *format = SCENE_EXR;
-        return in->bits ? scene_bad(d, path, "bits", "given for an EXR, expected for a PNG only") : INSITU_OK;
+        return in->bits ? scene_fail_at_key(d, path, "bits", "given for an EXR, expected for a PNG only") : INSITU_OK;
     }
     if (strcasecmp(ending, ".png") != 0) {
-        return scene_bad(d, path, "path", "\"%.100s\" has an unknown ending, expected .png or .exr", file);
+        return scene_fail_at_key(d, path, "path", "\"%.100s\" has an unknown ending, expected .png or .exr", file);
     }
     const int bits = in->bits ? *in->bits : 8;
     *format = bits == 16 ? SCENE_PNG16 : SCENE_PNG8;
     return bits == 8 || bits == 16 ? INSITU_OK
-                                   : scene_bad(d, path, "bits", "%d is not allowed, expected 8 or 16", bits);
+                                   : scene_fail_at_key(d, path, "bits", "%d is not allowed, expected 8 or 16", bits);
 }
 
 static insitu_status convert_deep(const scene_document *d, const char *path, const scene_file_output *in,
@@ -192,10 +193,11 @@ static insitu_status convert_deep(const scene_document *d, const char *path, con
 {
     out->is_deep = in->deep && *in->deep;
     if (!out->is_deep) return INSITU_OK;
-    if (out->format != SCENE_EXR) return scene_bad(d, path, "deep", "given for a PNG, expected for an EXR only");
-    if (out->has_data) return scene_bad(d, path, "deep", "given with data: true, expected a file for each");
+    if (out->format != SCENE_EXR)
+        return scene_fail_at_key(d, path, "deep", "given for a PNG, expected for an EXR only");
+    if (out->has_data) return scene_fail_at_key(d, path, "deep", "given with data: true, expected a file for each");
     if (in->decorations && *in->decorations)
-        return scene_bad(d, path, "deep", "given with decorations: true, which a deep picture has none of");
+        return scene_fail_at_key(d, path, "deep", "given with decorations: true, which a deep picture has none of");
     return INSITU_OK;
 }
 
@@ -204,8 +206,9 @@ static insitu_status convert_grid(const scene_document *d, const char *path, con
 {
     out->montage = -1;
     if (!in->grid) return INSITU_OK;
-    if (out->format == SCENE_EXR) return scene_bad(d, path, "grid", "given for an EXR, expected for a PNG only");
-    if (in->cinema) return scene_bad(d, path, "grid", "given beside cinema, expected one of the two");
+    if (out->format == SCENE_EXR)
+        return scene_fail_at_key(d, path, "grid", "given for an EXR, expected for a PNG only");
+    if (in->cinema) return scene_fail_at_key(d, path, "grid", "given beside cinema, expected one of the two");
     out->columns = in->grid[0];
     out->rows = in->grid[1];
     return INSITU_OK;
@@ -220,21 +223,21 @@ static insitu_status convert_output(const scene_document *d, const char *path, c
     if (status) return status;
     out->has_data = in->data && *in->data;
     if (out->has_data && out->format != SCENE_EXR)
-        return scene_bad(d, path, "data", "given for a PNG, expected for an EXR only");
+        return scene_fail_at_key(d, path, "data", "given for a PNG, expected for an EXR only");
     status = convert_deep(d, path, in, out);
     if (!status) status = convert_grid(d, path, in, out);
     if (status) return status;
     out->has_decorations = in->decorations ? *in->decorations : out->format != SCENE_EXR;
     if (in->cinema) return scene_convert_cinema(d, path, in, image, out);
     out->path = base_strdup(in->path);
-    return out->path ? INSITU_OK : scene_no_memory(d);
+    return out->path ? INSITU_OK : scene_fail_for_memory(d);
 }
 
 insitu_status scene_convert_outputs(const scene_document *d, const char *path, const scene_file_image *in,
                                     scene_image *out)
 {
     out->outputs = base_calloc((size_t)in->outputs_count, sizeof *out->outputs);
-    if (!out->outputs) return scene_no_memory(d);
+    if (!out->outputs) return scene_fail_for_memory(d);
     out->output_count = in->outputs_count;
     insitu_status status = INSITU_OK;
     for (int i = 0; i < in->outputs_count && status == INSITU_OK; i++) {
@@ -289,10 +292,10 @@ static insitu_status refuse_file(const scene_document *d, const scene *s, const 
     char path[64];
     snprintf(path, sizeof path, "images[%d].outputs[%d]", b->source, second->output);
     if (a->source != b->source || first->output != second->output)
-        return scene_bad(d, path, "path", "\"%.100s\" is another output's file too, expected its own", pattern);
+        return scene_fail_at_key(d, path, "path", "\"%.100s\" is another output's file too, expected its own", pattern);
     const char *word = missing_placeholder(a, b);
-    return scene_bad(d, path, "path", "\"%.100s\" is one file for several %ss, expected {%s} in it", pattern, word,
-                     word);
+    return scene_fail_at_key(d, path, "path", "\"%.100s\" is one file for several %ss, expected {%s} in it", pattern,
+                             word, word);
 }
 
 static const scene_output *find_output(const scene *s, const written_file *file)
@@ -318,14 +321,14 @@ insitu_status scene_check_outputs(const scene_document *d, const scene *s)
     size_t total = 0;
     for (int i = 0; i < s->image_count; i++) total += (size_t)s->images[i].output_count;
     written_file *files = base_calloc(total, sizeof *files);
-    if (!files) return scene_no_memory(d);
+    if (!files) return scene_fail_for_memory(d);
     int count = 0;
     insitu_status status = INSITU_OK;
     for (int i = 0; i < s->image_count && !status; i++) {
         const scene_moment moment = scene_moment_of(&s->images[i], sample_cycle, sample_time);
         for (int o = 0; o < s->images[i].output_count && !status; o++) {
             files[count] = (written_file){scene_expand(s->images[i].outputs[o].path, &moment), i, o, count};
-            if (files[count++].path == NULL) status = scene_no_memory(d);
+            if (files[count++].path == NULL) status = scene_fail_for_memory(d);
         }
     }
     if (!status) {

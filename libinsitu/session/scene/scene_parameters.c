@@ -11,13 +11,13 @@ insitu_status scene_convert_parameters(const scene_document *d, scene *out)
     const char *names[SCENE_MAX_NAMES];
     const int count = scene_document_names(d, "parameters", names, SCENE_MAX_NAMES);
     out->parameters = base_calloc((size_t)count, sizeof *out->parameters);
-    if (!out->parameters) return scene_no_memory(d);
+    if (!out->parameters) return scene_fail_for_memory(d);
     while (out->parameter_count < count) {
         scene_parameter *parameter = &out->parameters[out->parameter_count];
         char path[SCENE_PATH_SIZE];
         snprintf(path, sizeof path, "parameters.%s", names[out->parameter_count]);
         parameter->name = base_strdup(names[out->parameter_count]);
-        if (!parameter->name) return scene_no_memory(d);
+        if (!parameter->name) return scene_fail_for_memory(d);
         parameter->value = scene_document_number(d, path);
         out->parameter_count++;
     }

@@ -287,8 +287,8 @@ struct scene_mapping;
 /* Describes the meaning and the range of one field of a cyaml schema. */
 typedef struct scene_key {
     const char *help;
-    const char *by_default; /* default value as the reference shows it; NULL: the key is required */
-    double low, high;       /* range of a number, or of each number in a list; both 0: any finite number is allowed */
+    const char *default_text; /* default value as the reference shows it; NULL: the key is required */
+    double low, high;         /* range of a number, or of each number in a list; both 0: any finite number is allowed */
     bool is_low_excluded;
     bool is_high_excluded;
     bool is_named;                     /* for a list: set if paths identify its entries by their key `name` */

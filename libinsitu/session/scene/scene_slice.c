@@ -28,7 +28,7 @@ insitu_status scene_convert_plane(const scene_document *d, const char *path, int
     char key[32];
     snprintf(key, sizeof key, "planes[%d].normal", index);
     if (!normalize_vector(in->normal, out->normal))
-        return scene_bad(d, path, key, "[0, 0, 0] has no direction, expected a vector of any length but 0");
+        return scene_fail_at_key(d, path, key, "[0, 0, 0] has no direction, expected a vector of any length but 0");
     out->has_point = in->point != NULL;
     if (in->point) memcpy(out->point, in->point, sizeof out->point);
     out->offset = in->offset ? *in->offset : 0;
@@ -50,12 +50,12 @@ static insitu_status check_positions(const scene_document *d, const char *path, 
     char plane[SCENE_PATH_SIZE];
     snprintf(plane, sizeof plane, "%s.planes[%d]", path, index);
     if (in->offsets && in->offset)
-        return scene_bad(d, plane, "offsets", "given beside offset, expected one of the two");
+        return scene_fail_at_key(d, plane, "offsets", "given beside offset, expected one of the two");
     if (in->count && (in->offset || in->offsets || in->point))
-        return scene_bad(d, plane, "count", "given beside %s, expected one of the two",
-                         in->point    ? "point"
-                         : in->offset ? "offset"
-                                      : "offsets");
+        return scene_fail_at_key(d, plane, "count", "given beside %s, expected one of the two",
+                                 in->point    ? "point"
+                                 : in->offset ? "offset"
+                                              : "offsets");
     return INSITU_OK;
 }
 
@@ -63,13 +63,13 @@ static insitu_status check_positions(const scene_document *d, const char *path, 
 static insitu_status add_planes(const scene_document *d, const char *path, int index, const scene_file_plane *in,
                                 scene_slice *out)
 {
-    scene_plane plane = {.share = 0};
+    scene_plane plane = {.extent_fraction = 0};
     insitu_status status = check_positions(d, path, index, in);
     if (!status) status = scene_convert_plane(d, path, index, in, &plane);
     const int count = in->offsets ? in->offsets_count : in->count ? *in->count : 1;
     for (int i = 0; i < count && !status; i++) {
         if (in->offsets) plane.offset = in->offsets[i];
-        if (in->count) plane.share = (2.0 * i + 1) / count - 1;
+        if (in->count) plane.extent_fraction = (2.0 * i + 1) / count - 1;
         out->planes[out->plane_count++] = plane;
     }
     return status;
@@ -80,7 +80,7 @@ static insitu_status convert_planes(const scene_document *d, const char *path, c
 {
     insitu_status status = INSITU_OK;
     out->planes = base_calloc((size_t)scene_count_planes(in), sizeof *out->planes);
-    if (!out->planes) return scene_no_memory(d);
+    if (!out->planes) return scene_fail_for_memory(d);
     for (int i = 0; i < in->planes_count && !status; i++) status = add_planes(d, path, i, &in->planes[i], out);
     return status;
 }

@@ -21,9 +21,9 @@ static insitu_status convert_threshold(const scene_document *d, const char *laye
     out->is_given = out->field.is_as_given = true;
     out->low = in->from ? *in->from : -(double)INFINITY;
     out->high = in->to ? *in->to : (double)INFINITY;
-    if (!in->from && !in->to) return scene_bad(d, path, "", "has no bounds, expected from, to or both");
+    if (!in->from && !in->to) return scene_fail_at_key(d, path, "", "has no bounds, expected from, to or both");
     if (out->low > out->high)
-        return scene_bad(d, path, "to", "is %g, expected no less than from, which is %g", out->high, out->low);
+        return scene_fail_at_key(d, path, "to", "is %g, expected no less than from, which is %g", out->high, out->low);
     return scene_convert_field(d, layer, path, in->field, in->component, &out->field);
 }
 
@@ -37,8 +37,8 @@ insitu_status scene_convert_surface(const scene_document *d, const char *path, c
     out->has_colour_by = in->colour_by != NULL;
     for (int c = 0; c < 3; c++) out->colour[c] = colour_linear_from_srgb(in->colour ? (float)in->colour[c] : 0.8F);
     if (in->colour && in->colour_by)
-        return scene_bad(d, path, "colour", "given beside colour_by, expected one of the two");
-    insitu_status status = scene_convert_meshes(d, path, &out->on);
+        return scene_fail_at_key(d, path, "colour", "given beside colour_by, expected one of the two");
+    insitu_status status = scene_convert_meshes(d, path, &out->meshes_field);
     if (!status) status = convert_threshold(d, path, in->threshold, &out->threshold);
     if (!status && in->colour_by)
         status = scene_convert_colour_by(d, path, in->colour_by, &out->colour_by, &out->colour_map);

@@ -25,8 +25,8 @@ typedef struct fault {
     const yaml_parser_t *parser;
     const char *text;
     size_t size;
-    size_t first, last; /* range of the lines to examine, from 0 */
-    bool is_flow;       /* set if the position is within { } or [ ] */
+    size_t first_line, last_line; /* range of the lines to examine, from 0 */
+    bool is_flow;                 /* set if the position is within { } or [ ] */
     size_t *line;
     char *words;
 } fault;
@@ -212,7 +212,8 @@ static bool is_unended_before(const fault *f, text_line l)
 static bool is_left_open(const fault *f)
 {
     bool is_told = false;
-    for (text_line l = find_line(f->text, f->size, 0); l.number < f->last; l = find_next_line(l, f->text + f->size)) {
+    for (text_line l = find_line(f->text, f->size, 0); l.number < f->last_line;
+         l = find_next_line(l, f->text + f->size)) {
         const char last = has_content(l) ? l.start[l.length - 1] : ' ';
         if (last == '[' || last == '{')
             is_told =
@@ -227,7 +228,7 @@ static bool is_unended_bracket(const fault *f, text_line l)
     if (f->is_flow && strstr(problem, "node content")) return is_left_open(f);
     if (!f->is_flow || !strstr(problem, "expected ','")) return false;
     const char open = strchr(problem, '}') ? '{' : '[', close = open == '{' ? '}' : ']';
-    const text_line stop = find_line(f->text, f->size, f->last);
+    const text_line stop = find_line(f->text, f->size, f->last_line);
     size_t column = f->parser->problem_mark.column;
     if (column < stop.length && stop.start[column] == ':') /* the key in front of this colon is indented too little */
         while (column > stop.indent && !strchr(" {[,", stop.start[column - 1])) column--;
@@ -362,7 +363,7 @@ static bool is_bad_start(const fault *f)
 
 static bool is_in_lines(const fault *f, bool (*rule)(const fault *f, text_line l))
 {
-    for (text_line l = find_line(f->text, f->size, f->first); l.number <= f->last;
+    for (text_line l = find_line(f->text, f->size, f->first_line); l.number <= f->last_line;
          l = find_next_line(l, f->text + f->size))
         if (rule(f, l)) return true;
     return false;
@@ -374,14 +375,14 @@ void scene_syntax_words(const yaml_parser_t *parser, const char *text, size_t si
     const char *context = parser->context ? parser->context : "";
     fault f = {.parser = parser, .text = text, .size = size, .line = line, .words = words};
     f.is_flow = strstr(context, "flow") != NULL;
-    f.last = parser->problem_mark.line;
-    const bool is_before = (f.is_flow || strstr(context, "scan")) && parser->context_mark.line < f.last;
-    f.first = is_before ? parser->context_mark.line : f.last;
-    const text_line begin = find_line(text, size, f.first), stop = find_line(text, size, f.last);
+    f.last_line = parser->problem_mark.line;
+    const bool is_before = (f.is_flow || strstr(context, "scan")) && parser->context_mark.line < f.last_line;
+    f.first_line = is_before ? parser->context_mark.line : f.last_line;
+    const text_line begin = find_line(text, size, f.first_line), stop = find_line(text, size, f.last_line);
     if (is_in_lines(&f, is_tab_indent) || is_in_lines(&f, is_colour_comment) || is_in_lines(&f, is_bare_placeholder))
         return;
     if (is_unended_quote(&f, begin) || is_unended_bracket(&f, begin) || is_bad_line_above(&f, stop)) return;
     if (is_bad_indent(&f, stop) || is_key_without_colon(&f) || is_bad_start(&f) || is_bare_text(&f, stop)) return;
-    set_fault(&f, f.last, "not valid YAML: %.100s%s%.100s", parser->problem ? parser->problem : "unreadable",
+    set_fault(&f, f.last_line, "not valid YAML: %.100s%s%.100s", parser->problem ? parser->problem : "unreadable",
               *context ? " " : "", context);
 }

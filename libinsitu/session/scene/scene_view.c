@@ -21,10 +21,10 @@ static insitu_status convert_up(const scene_document *d, const char *path, const
         return INSITU_OK;
     }
     copy_vector(out->up, given);
-    if (!scene_normalize(out->up)) return scene_bad(d, path, "up", "has length 0, expected a direction");
+    if (!scene_normalize(out->up)) return scene_fail_at_key(d, path, "up", "has length 0, expected a direction");
     if (scene_is_parallel(out->up, out->direction)) {
-        return scene_bad(d, path, "up", "[%g, %g, %g] is parallel to the view, expected a direction across it",
-                         given[0], given[1], given[2]);
+        return scene_fail_at_key(d, path, "up", "[%g, %g, %g] is parallel to the view, expected a direction across it",
+                                 given[0], given[1], given[2]);
     }
     return INSITU_OK;
 }
@@ -33,23 +33,23 @@ static insitu_status convert_explicit(const scene_document *d, const char *path,
                                       scene_camera *out)
 {
     if (in->automatic) {
-        return scene_bad(d, path, "automatic", "given beside %s, expected one of the two",
-                         in->position ? "position" : "focal");
+        return scene_fail_at_key(d, path, "automatic", "given beside %s, expected one of the two",
+                                 in->position ? "position" : "focal");
     }
-    if (!in->position) return scene_bad(d, path, "position", "missing, expected beside focal");
-    if (!in->focal) return scene_bad(d, path, "focal", "missing, expected beside position");
+    if (!in->position) return scene_fail_at_key(d, path, "position", "missing, expected beside focal");
+    if (!in->focal) return scene_fail_at_key(d, path, "focal", "missing, expected beside position");
     out->is_automatic = false;
     copy_vector(out->eye, in->position);
     copy_vector(out->focal, in->focal);
     for (int i = 0; i < 3; i++) out->direction[i] = out->eye[i] - out->focal[i];
     for (int i = 0; i < 3; i++) {
         if (!isfinite(out->direction[i])) {
-            return scene_bad(d, path, "position", "too far from focal, expected a finite distance");
+            return scene_fail_at_key(d, path, "position", "too far from focal, expected a finite distance");
         }
     }
     if (scene_normalize(out->direction)) return INSITU_OK;
-    return scene_bad(d, path, "focal", "[%g, %g, %g] is the position too, expected another point", out->focal[0],
-                     out->focal[1], out->focal[2]);
+    return scene_fail_at_key(d, path, "focal", "[%g, %g, %g] is the position too, expected another point",
+                             out->focal[0], out->focal[1], out->focal[2]);
 }
 
 static insitu_status convert_bounds(const scene_document *d, const char *path, const double (*in)[3], scene_camera *out)
@@ -60,9 +60,9 @@ static insitu_status convert_bounds(const scene_document *d, const char *path, c
     copy_vector(out->upper, in[1]);
     for (int a = 0; a < 3; a++)
         if (!(out->lower[a] <= out->upper[a]))
-            return scene_bad(d, path, "automatic.bounds",
-                             "goes from %g to %g along %c, expected the first corner to be the lower one",
-                             out->lower[a], out->upper[a], "xyz"[a]);
+            return scene_fail_at_key(d, path, "automatic.bounds",
+                                     "goes from %g to %g along %c, expected the first corner to be the lower one",
+                                     out->lower[a], out->upper[a], "xyz"[a]);
     return INSITU_OK;
 }
 
@@ -76,7 +76,7 @@ static insitu_status convert_automatic(const scene_document *d, const char *path
     out->fits_box = in && in->fit && *in->fit == SCENE_FIT_BOX;
     if (scene_normalize(out->direction))
         return convert_bounds(d, path, in ? (const double(*)[3])in->bounds : NULL, out);
-    return scene_bad(d, path, "automatic.direction", "has length 0, expected a direction");
+    return scene_fail_at_key(d, path, "automatic.direction", "has length 0, expected a direction");
 }
 
 /* Converts the camera's position and up direction. */
@@ -107,7 +107,7 @@ insitu_status scene_convert_camera(const scene_document *d, const char *path, co
     out->is_orthographic = in->projection && *in->projection == SCENE_ORTHOGRAPHIC;
     out->height = in->height ? *in->height : 0;
     if (status == INSITU_OK && in->height && !out->is_orthographic)
-        status = scene_bad(d, path, "height", "given without projection: orthographic, expected beside that");
+        status = scene_fail_at_key(d, path, "height", "given without projection: orthographic, expected beside that");
     return status;
 }
 
@@ -121,8 +121,9 @@ static insitu_status convert_light(const scene_document *d, const char *path, co
         const float linear = in->colour ? colour_linear_from_srgb((float)in->colour[i]) : 1;
         out->colour[i] = (float)intensity * linear;
     }
-    return scene_normalize(out->direction) ? INSITU_OK
-                                           : scene_bad(d, path, "direction", "has length 0, expected a direction");
+    return scene_normalize(out->direction)
+               ? INSITU_OK
+               : scene_fail_at_key(d, path, "direction", "has length 0, expected a direction");
 }
 
 /* Sets the default lights. The fill light keeps the side that the key light does not reach readable, and is too weak to
@@ -140,7 +141,7 @@ insitu_status scene_convert_lights(const scene_document *d, const char *path, co
 {
     const int count = in->lights ? in->lights_count : 2;
     out->lights = base_calloc((size_t)count, sizeof *out->lights);
-    if (!out->lights) return scene_no_memory(d);
+    if (!out->lights) return scene_fail_for_memory(d);
     out->light_count = count;
     out->has_lights = in->lights != NULL;
     if (!in->lights) {
@@ -166,7 +167,8 @@ insitu_status scene_convert_shadows(const scene_document *d, const char *path, c
         if (in->lights[i].shadows && !in->shadows) {
             char light_path[SCENE_PATH_SIZE];
             snprintf(light_path, sizeof light_path, "%s.lights[%d]", path, i);
-            return scene_bad(d, light_path, "shadows", "given without shadows of the image, expected beside these");
+            return scene_fail_at_key(d, light_path, "shadows",
+                                     "given without shadows of the image, expected beside these");
         }
         if (in->lights[i].shadows && !*in->lights[i].shadows) out->shadows &= ~(1U << i);
     }

@@ -8,7 +8,7 @@
 
 bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle)
 {
-    return statistics->every <= 1 || cycle % statistics->every == 0;
+    return statistics->cycle_interval <= 1 || cycle % statistics->cycle_interval == 0;
 }
 
 bool session_has_events(const scene *scene, int64_t cycle, bool images)
@@ -24,36 +24,36 @@ bool session_has_events(const scene *scene, int64_t cycle, bool images)
 typedef struct event_work {
     int count;
     session_statistics_wish *wishes;
-    session_statistics *found;
+    session_statistics *results;
     /* index of the statistics in the scene; for the condition of an image, the image's index plus the number of
      * statistics */
-    int *of;
+    int *wish_origins;
 } event_work;
 
 static void work_free(event_work *w)
 {
     base_free(w->wishes);
-    base_free(w->found);
-    base_free(w->of);
+    base_free(w->results);
+    base_free(w->wish_origins);
 }
 
 static bool work_create(const scene *scene, int64_t cycle, const session_sound_events *sound, event_work *w)
 {
     const size_t most = (size_t)scene->statistics_count + (size_t)scene->image_count;
-    *w = (event_work){0, base_calloc(most, sizeof *w->wishes), base_calloc(most, sizeof *w->found),
-                      base_calloc(most, sizeof *w->of)};
-    if (!w->wishes || !w->found || !w->of) return false;
+    *w = (event_work){0, base_calloc(most, sizeof *w->wishes), base_calloc(most, sizeof *w->results),
+                      base_calloc(most, sizeof *w->wish_origins)};
+    if (!w->wishes || !w->results || !w->wish_origins) return false;
     for (int i = 0; i < scene->statistics_count; i++) {
         const scene_statistics *s = &scene->statistics[i];
         if (!session_is_statistics_due(s, cycle) || !(sound->statistics >> i & 1)) continue;
         w->wishes[w->count] = (session_statistics_wish){&s->field, s->bin_count, s->low, s->high};
-        w->of[w->count++] = i;
+        w->wish_origins[w->count++] = i;
     }
     for (int i = 0; i < scene->image_count; i++) {
         if (!scene->images[i].when.is_given || !scene_is_first_variant(&scene->images[i])) continue;
         if (!(sound->images >> scene->images[i].variant.source & 1)) continue;
         w->wishes[w->count] = (session_statistics_wish){&scene->images[i].when.field, 0, 0, -1};
-        w->of[w->count++] = scene->statistics_count + i;
+        w->wish_origins[w->count++] = scene->statistics_count + i;
     }
     return true;
 }
@@ -61,8 +61,8 @@ static bool work_create(const scene *scene, int64_t cycle, const session_sound_e
 /* Returns whether the condition holds. It does not hold if there are no values. */
 static bool condition_holds(const scene_condition *c, const session_statistics *s)
 {
-    const double value = c->of == SCENE_MEAN ? s->mean : c->of == SCENE_MINIMUM ? s->least : s->most;
-    return s->cells > 0 && value > c->above && value < c->below;
+    const double value = c->statistic == SCENE_MEAN ? s->mean : c->statistic == SCENE_MINIMUM ? s->least : s->most;
+    return s->cell_count > 0 && value > c->above && value < c->below;
 }
 
 /* Writes all statistics that are due, even if some fail; returns the first error. */
@@ -70,23 +70,23 @@ static void write_due_statistics(session_events *events, const scene *scene, con
                                  const session_event_time *now, base_error *error)
 {
     for (int i = 0; i < w->count; i++) {
-        const int at = w->of[i];
+        const int at = w->wish_origins[i];
         base_error own = {.status = INSITU_OK};
-        if (at >= scene->statistics_count || w->found[i].cells == 0) continue;
-        session_write_statistics(scene->statistics[at].path, !(events->begun >> at & 1), now->cycle, now->time,
-                                 &w->found[i], &own);
-        if (!own.status) events->begun |= (uint64_t)1 << at;
+        if (at >= scene->statistics_count || w->results[i].cell_count == 0) continue;
+        session_write_statistics(scene->statistics[at].path, !(events->begun_files >> at & 1), now->cycle, now->time,
+                                 &w->results[i], &own);
+        if (!own.status) events->begun_files |= (uint64_t)1 << at;
         if (own.status && !error->status) *error = own;
     }
 }
 
 static void store_conditions(session_events *events, const scene *scene, const event_work *w)
 {
-    events->held = 0;
+    events->held_conditions = 0;
     for (int i = 0; i < w->count; i++) {
-        const int image = w->of[i] - scene->statistics_count;
-        if (image >= 0 && condition_holds(&scene->images[image].when, &w->found[i]))
-            events->held |= (uint64_t)1 << scene->images[image].variant.source;
+        const int image = w->wish_origins[i] - scene->statistics_count;
+        if (image >= 0 && condition_holds(&scene->images[image].when, &w->results[i]))
+            events->held_conditions |= (uint64_t)1 << scene->images[image].variant.source;
     }
 }
 
@@ -95,18 +95,18 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
                                     const session_event_time *now, const session_sound_events *sound, base_error *error)
 {
     event_work work;
-    if (!work_create(scene, now->cycle, sound, &work)) session_no_memory(error, 1 << 12, "statistics of fields");
+    if (!work_create(scene, now->cycle, sound, &work)) session_fail_for_memory(error, 1 << 12, "statistics of fields");
     for (int i = 0; i < work.count; i++) session_want_field(meshes, work.wishes[i].field);
     /* ranks agree on errors before fill functions are called, because these may be collective */
     insitu_status status = session_agree(team->comm, error);
     if (!status) session_fill_fields(meshes, catalogue, false, error);
     if (!error->status) session_copy_wanted(meshes, team->threads, error);
     status = session_agree(team->comm, error);
-    if (!status) status = session_find_statistics(meshes, team, work.wishes, work.count, work.found, error);
+    if (!status) status = session_find_statistics(meshes, team, work.wishes, work.count, work.results, error);
     if (!status) {
         store_conditions(events, scene, &work);
         if (team->rank == 0) write_due_statistics(events, scene, &work, now, error);
-        status = session_agree_as_is(team->comm, error);
+        status = session_agree_without_rank(team->comm, error);
     }
     work_free(&work);
     return status;
@@ -117,8 +117,8 @@ uint64_t session_let_images(const session_events *events, const scene *scene)
     uint64_t let = 0;
     for (int i = 0; i < scene->image_count; i++) {
         const uint64_t bit = (uint64_t)1 << scene->images[i].variant.source;
-        const bool is_let = !scene->images[i].when.is_given || events->held & bit;
-        if (is_let && !(scene->images[i].once && events->drawn & bit)) let |= bit;
+        const bool is_let = !scene->images[i].when.is_given || events->held_conditions & bit;
+        if (is_let && !(scene->images[i].once && events->drawn_images & bit)) let |= bit;
     }
     return let;
 }

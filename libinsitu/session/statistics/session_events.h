@@ -14,9 +14,9 @@ typedef struct session_event_time {
 /* State of the session over its steps. Each member has one bit for each of the statistics or images of the scene file,
  * of which there are at most 64 each. All variants of an image share one bit. */
 typedef struct session_events {
-    uint64_t begun; /* statistics for which this session has written a line to the file */
-    uint64_t held;  /* images whose condition holds in this step */
-    uint64_t drawn; /* images that have been drawn by this session */
+    uint64_t begun_files;     /* statistics for which this session has written a line to the file */
+    uint64_t held_conditions; /* images whose condition holds in this step */
+    uint64_t drawn_images;    /* images that have been drawn by this session */
 } session_events;
 
 /* The statistics and images of the scene that can be computed in a step without an error, with one bit for each. */

@@ -17,25 +17,25 @@
 /* ---- one cell ------------------------------------------------------------------------------------------------ */
 
 typedef struct cell_value {
-    bool is_there, is_shell;
+    bool is_counted, is_shell;
     double least, most, mean, volume;
 } cell_value;
 
 static cell_value read_cell_value(const grid *g, const grid_field *field, int64_t cell, volume_room *room)
 {
     cell_value out = {grid_is_seen(g, cell), grid_is_shell(g, cell), INFINITY, -INFINITY, 0, 0};
-    if (!out.is_there) return out;
+    if (!out.is_counted) return out;
     out.volume = session_cell_volume(g, cell, room);
     const int count = field->is_cell_centred ? 1 : room->vertex_count;
     for (int i = 0; i < count; i++) {
         const double value = grid_field_value(field, field->is_cell_centred ? cell : room->vertices[i]);
-        out.is_there = out.is_there && isfinite(value);
+        out.is_counted = out.is_counted && isfinite(value);
         out.least = fmin(out.least, value);
         out.most = fmax(out.most, value);
         out.mean += value;
     }
     out.mean /= count;
-    out.is_there = out.is_there && count > 0 && isfinite(out.mean) && isfinite(out.volume);
+    out.is_counted = out.is_counted && count > 0 && isfinite(out.mean) && isfinite(out.volume);
     return out;
 }
 
@@ -57,9 +57,9 @@ static double sum_from_fixed_point(const int64_t sum[2])
 
 /* Results of earlier passes over the cells that a pass uses. */
 typedef struct sum_basis {
-    const session_statistics *known;
-    double largest; /* volume of the largest cell */
-    double about;   /* mean of the first pass, as a fraction of the range; used by the second pass */
+    const session_statistics *first_pass;
+    double largest;          /* volume of the largest cell */
+    double approximate_mean; /* mean of the first pass, as a fraction of the range; used by the second pass */
     bool is_second;
     bool is_of_shells; /* set if only shells are counted; otherwise only cells with a volume are */
 } sum_basis;
@@ -79,9 +79,9 @@ static int find_bin(const session_statistics *s, double value)
 
 static void add_cell(const sum_basis *b, const cell_value *cell, int64_t *sums)
 {
-    const session_statistics *s = b->known;
+    const session_statistics *s = b->first_pass;
     const double volume = b->largest > 0 ? cell->volume / b->largest : 0;
-    const double place = share_of_range(cell->mean, s->least, s->most) - b->about;
+    const double place = share_of_range(cell->mean, s->least, s->most) - b->approximate_mean;
     if (b->is_second) {
         add_fixed_point(sums, volume * place * place);
         return;
@@ -109,7 +109,7 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
 #pragma omp for schedule(static) reduction(+ : sums[:count]) nowait
         for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
             const cell_value value = read_cell_value(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
-            if (value.is_there && value.is_shell == b->is_of_shells) add_cell(b, &value, sums);
+            if (value.is_counted && value.is_shell == b->is_of_shells) add_cell(b, &value, sums);
         }
         region_leave();
     }
@@ -127,7 +127,7 @@ static void find_extremes(const statistics_pass *p, double ends[KINDS * ENDS])
 #pragma omp for schedule(static) reduction(min : ends[:KINDS * ENDS]) nowait
         for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
             const cell_value value = read_cell_value(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
-            if (!value.is_there) continue;
+            if (!value.is_counted) continue;
             double *of = ends + (value.is_shell ? ENDS : 0);
             of[0] = fmin(of[0], value.least);
             of[1] = fmin(of[1], -value.most);
@@ -168,7 +168,7 @@ static insitu_status check_buffers(const statistics_work *w, base_error *error)
     if (w->ends[KINDS * ENDS * w->count] == 0) return INSITU_OK;
     for (int thread = 0; thread < w->team->threads; thread++)
         if (w->rooms[thread].is_out_of_memory)
-            session_no_memory(error, (int64_t)w->rooms[thread].wanted, "a polyhedron");
+            session_fail_for_memory(error, (int64_t)w->rooms[thread].requested_size, "a polyhedron");
     return session_agree(w->team->comm, error);
 }
 
@@ -198,7 +198,7 @@ static insitu_status reduce_ends(const statistics_work *w, base_error *error)
     w->ends[size] = 0;
     for (int thread = 0; thread < w->team->threads; thread++)
         if (w->rooms[thread].is_out_of_memory) w->ends[size] = -1;
-    const insitu_status status = session_mpi(
+    const insitu_status status = session_check_mpi(
         error, MPI_Allreduce(MPI_IN_PLACE, w->ends, size + 1, MPI_DOUBLE, MPI_MIN, w->team->comm), "MPI_Allreduce");
     return status ? status : check_buffers(w, error);
 }
@@ -217,9 +217,9 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
             if (set_up_pass(w, i, m, &pass)) add_cells(&pass, &basis, w->sums + size * i, size);
         }
     }
-    return session_mpi(error,
-                       MPI_Allreduce(MPI_IN_PLACE, w->sums, size * w->count, MPI_INT64_T, MPI_SUM, w->team->comm),
-                       "MPI_Allreduce");
+    return session_check_mpi(error,
+                             MPI_Allreduce(MPI_IN_PLACE, w->sums, size * w->count, MPI_INT64_T, MPI_SUM, w->team->comm),
+                             "MPI_Allreduce");
 }
 
 static void begin_statistics(const statistics_work *w, int wish, session_statistics *out)
@@ -238,11 +238,11 @@ static void convert_sums(const statistics_work *w, int wish, session_statistics 
     const int64_t *sums = w->sums + MAX_SUMS * wish;
     const double largest = -find_wish_ends(w, wish)[2], volume = sum_from_fixed_point(sums + VOLUME);
     const double place = volume > 0 ? sum_from_fixed_point(sums + MOMENT) / volume : 0;
-    out->cells = sums[0];
+    out->cell_count = sums[0];
     out->volume = volume * largest;
     out->mean = (1 - place) * out->least + place * out->most;
     for (int bin = 0; bin < out->bin_count; bin++)
-        out->shares[bin] = volume > 0 ? sum_from_fixed_point(sums + BINS + 2 * bin) / volume : 0;
+        out->bin_fractions[bin] = volume > 0 ? sum_from_fixed_point(sums + BINS + 2 * bin) / volume : 0;
 }
 
 static insitu_status find_all_statistics(const statistics_work *w, session_statistics *out, base_error *error)
@@ -269,7 +269,7 @@ insitu_status session_find_statistics(const session_meshes *meshes, const sessio
     work.sums = base_alloc((size_t)count * MAX_SUMS * sizeof *work.sums);
     work.rooms = base_calloc((size_t)team->threads, sizeof *work.rooms);
     if (!work.ends || !work.sums || !work.rooms)
-        session_no_memory(error, count * MAX_SUMS * (int64_t)sizeof *work.sums, "statistics of fields");
+        session_fail_for_memory(error, count * MAX_SUMS * (int64_t)sizeof *work.sums, "statistics of fields");
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = find_all_statistics(&work, out, error);
     for (int thread = 0; work.rooms && thread < team->threads; thread++) session_volume_free(&work.rooms[thread]);

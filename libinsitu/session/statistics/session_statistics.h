@@ -18,7 +18,7 @@ typedef struct session_statistics_wish {
  * are not all finite are not counted. If no cell with a volume is counted, shells are, and areas are used instead of
  * volumes. */
 typedef struct session_statistics {
-    int64_t cells;
+    int64_t cell_count;
     bool is_of_shells;
     double volume; /* total volume of the cells */
     /* range of the values, for a vertex field of those at vertices; least > most: there are no values */
@@ -28,7 +28,7 @@ typedef struct session_statistics {
     double low, high; /* lower bound of the first bin and upper bound of the last one */
     /* fraction of the volume in each bin, by the cells' values; values outside of the bins count in the first or last
      * bin */
-    double shares[SESSION_MAX_BINS];
+    double bin_fractions[SESSION_MAX_BINS];
 } session_statistics;
 
 /* Computes the statistics of fields over all meshes that have them, restricted to a mesh if its name is given, by three

@@ -47,10 +47,10 @@ static void write_line(FILE *file, const new_lines *n)
 {
     const session_statistics *v = n->values;
     const int digits = count_needed_digits(v->least, v->most), of_bins = count_needed_digits(v->low, v->high);
-    fprintf(file, "%lld,%.9g,%lld,%.9g,%.*g,%.*g,%.*g,%.9g", (long long)n->cycle, n->time, (long long)v->cells,
+    fprintf(file, "%lld,%.9g,%lld,%.9g,%.*g,%.*g,%.*g,%.9g", (long long)n->cycle, n->time, (long long)v->cell_count,
             v->volume, digits, v->least, digits, v->most, digits, v->mean, v->deviation);
     if (v->bin_count) fprintf(file, ",%.*g,%.*g", of_bins, v->low, of_bins, v->high);
-    for (int bin = 0; bin < v->bin_count; bin++) fprintf(file, ",%.9g", v->shares[bin]);
+    for (int bin = 0; bin < v->bin_count; bin++) fprintf(file, ",%.9g", v->bin_fractions[bin]);
     fputc('\n', file);
 }
 
@@ -110,7 +110,7 @@ insitu_status session_write_statistics(const char *path, bool is_first, int64_t 
     if (!is_first && text_file_append(path, write_last, &lines, &failure)) return INSITU_OK;
     if (!failure.is_missing) return fail_at_file(path, "written", &failure, error);
     char *header = make_header(values->bin_count, values->is_of_shells);
-    if (!header) return session_no_memory(error, 1 << 12, "a line of statistics");
+    if (!header) return session_fail_for_memory(error, 1 << 12, "a line of statistics");
     lines.header = header;
     const insitu_status status = begin_file(path, &lines, error);
     base_free(header);

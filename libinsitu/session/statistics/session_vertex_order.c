@@ -156,13 +156,13 @@ insitu_status session_check_vertex_order(const session_meshes *meshes, session_c
 {
     const size_t words = (size_t)catalogue->mesh_count * CELL_SUMS;
     int64_t *sums = base_calloc(words, sizeof *sums);
-    if (!sums) session_no_memory(error, (int64_t)(words * sizeof *sums), "counts of cells");
+    if (!sums) session_fail_for_memory(error, (int64_t)(words * sizeof *sums), "counts of cells");
     insitu_status status = session_agree(comm, error);
     for (int m = 0; m < catalogue->mesh_count && !status; m++)
         sum_cells(meshes, catalogue->meshes[m].name, sums + m * CELL_SUMS);
     if (!status)
-        status = session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, (int)words, MPI_INT64_T, MPI_SUM, comm),
-                             "MPI_Allreduce");
+        status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, (int)words, MPI_INT64_T, MPI_SUM, comm),
+                                   "MPI_Allreduce");
     for (int m = 0; m < catalogue->mesh_count && !status; m++) {
         const int64_t *of_mesh = sums + m * CELL_SUMS;
         const session_parts parts = session_find_parts(meshes, catalogue->meshes[m].name);

@@ -70,9 +70,9 @@ static bool reserve_bytes(volume_room *room, size_t size)
 {
     if (size <= room->size) return true;
     base_free(room->bytes);
-    room->wanted = size + size / 2;
-    room->bytes = base_alloc(room->wanted);
-    room->size = room->bytes ? room->wanted : 0;
+    room->requested_size = size + size / 2;
+    room->bytes = base_alloc(room->requested_size);
+    room->size = room->bytes ? room->requested_size : 0;
     room->is_out_of_memory = room->is_out_of_memory || !room->bytes;
     return room->bytes;
 }
@@ -117,7 +117,7 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_room *room)
         if (!closed_face_is_patch(&c, c.triangles[i].face, positions)) volume += c.triangles[i].volume;
     for (int face = 0; face < c.face_count; face++)
         if (closed_face_is_patch(&c, face, positions))
-            volume += c.turn[face] * patch_cone_volume(positions, c.entry + c.first[face]);
+            volume += c.orientation[face] * patch_cone_volume(positions, c.entry_vertices + c.first_entries[face]);
     return fabs(volume) / 6;
 }
 

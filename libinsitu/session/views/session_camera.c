@@ -34,7 +34,7 @@ static void choose_up(const double direction[3], const double up[3], double out[
 
 /* Tangents of half the horizontal and half the vertical angle of view. */
 typedef struct camera_tangents {
-    double across, up;
+    double horizontal, vertical;
 } camera_tangents;
 
 static camera_tangents find_tangents(const scene_image *image)
@@ -57,8 +57,8 @@ typedef struct camera_frame {
 /* Extents of the data from the centre of the bounds, for a perspective camera (near) and an orthographic one (flat),
  * and the frame into which they must fit. */
 typedef struct camera_fit {
-    corner_reach near, flat;
-    camera_frame tangents, shares;
+    corner_reach perspective_reach, orthographic_reach;
+    camera_frame tangents, frame_fractions;
     bool is_centred; /* set if the data is centred in the free part of the frame */
 } camera_fit;
 
@@ -106,7 +106,7 @@ static double find_lines_height(const scene_image *image, scene_anchor middle, s
     int counts[3] = {0, 0, 0};
     bool is_long[3] = {true, false, false};
     for (int i = 0; i < d->words_count; i++) {
-        const scene_anchor at = d->words[i].at;
+        const scene_anchor at = d->words[i].anchor;
         const int place = at == middle ? 0 : at == left ? 1 : at == right ? 2 : -1;
         if (place < 0) continue;
         counts[place]++;
@@ -165,17 +165,18 @@ static camera_fit make_fit(const session_extent *e, const render_camera *axes, c
     const bool by_box = image->camera.fits_box && e->half_diagonal > 0;
     const camera_frame share = find_free_frame(image, by_box ? filled : 1);
     const double radius = e->half_diagonal > 0 ? e->half_diagonal : 1;
-    camera_fit fit = {.shares = share, .is_centred = by_box};
-    fit.tangents = (camera_frame){share.right * t.across, share.left * t.across, share.up * t.up, share.down * t.up};
-    fit.near = by_box ? reach_of_corners(e, axes, &fit.tangents) : reach_of_sphere(radius, &fit.tangents);
-    fit.flat = by_box ? reach_of_corners(e, axes, &nothing) : reach_of_sphere(radius, &nothing);
+    camera_fit fit = {.frame_fractions = share, .is_centred = by_box};
+    fit.tangents = (camera_frame){share.right * t.horizontal, share.left * t.horizontal, share.up * t.vertical,
+                                  share.down * t.vertical};
+    fit.perspective_reach = by_box ? reach_of_corners(e, axes, &fit.tangents) : reach_of_sphere(radius, &fit.tangents);
+    fit.orthographic_reach = by_box ? reach_of_corners(e, axes, &nothing) : reach_of_sphere(radius, &nothing);
     return fit;
 }
 
 /* Returns the distance of the eye from the centre of the bounds. */
 static double find_eye_distance(const camera_fit *fit, double half_diagonal)
 {
-    const corner_reach *near = &fit->near;
+    const corner_reach *near = &fit->perspective_reach;
     const camera_frame *f = &fit->tangents;
     const double back =
         fmax((near->right + near->left) / (f->right + f->left), (near->up + near->down) / (f->up + f->down));
@@ -187,8 +188,11 @@ static double find_eye_distance(const camera_fit *fit, double half_diagonal)
  * height. */
 static double fitting_height(const camera_fit *fit, double aspect)
 {
-    const double across = (fit->flat.right + fit->flat.left) / (fit->shares.right + fit->shares.left) / aspect;
-    return fmax((fit->flat.up + fit->flat.down) / (fit->shares.up + fit->shares.down), across);
+    const double across = (fit->orthographic_reach.right + fit->orthographic_reach.left) /
+                          (fit->frame_fractions.right + fit->frame_fractions.left) / aspect;
+    return fmax((fit->orthographic_reach.up + fit->orthographic_reach.down) /
+                    (fit->frame_fractions.up + fit->frame_fractions.down),
+                across);
 }
 
 /* Returns a position of the eye between low and high. It is in the middle if is_centred, and otherwise as near to 0 as
@@ -231,8 +235,8 @@ static bool automatic_camera(const session_extent *extent, const scene_image *im
     const double aspect = (double)image->width / image->height;
     const double back = is_flat ? 2 * radius : find_eye_distance(&fit, extent->half_diagonal) / c->zoom;
     const double half_height = find_half_height(image, fitting_height(&fit, aspect) / c->zoom);
-    const corner_reach *reach = is_flat ? &fit.flat : &fit.near;
-    const camera_frame *f = is_flat ? &fit.shares : &fit.tangents;
+    const corner_reach *reach = is_flat ? &fit.orthographic_reach : &fit.perspective_reach;
+    const camera_frame *f = is_flat ? &fit.frame_fractions : &fit.tangents;
     const double across = is_flat ? half_height * aspect : back, high = is_flat ? half_height : back;
     const double right =
         choose_eye_position(reach->right - f->right * across, f->left * across - reach->left, fit.is_centred);

@@ -125,7 +125,7 @@ static const render_vertex_gradients *set_gradients(const session_meshes *meshes
         const session_mesh *mesh = walk.part;
         if (!is_part(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field);
-        if (scalar) out[at] = (render_vertex_gradients){scalar->gradient_entries, (const float(*)[3])scalar->gradients};
+        if (scalar) out[at] = (render_vertex_gradients){scalar->gradient_indices, (const float(*)[3])scalar->gradients};
         at++;
     }
     return out;
@@ -164,7 +164,7 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
         session_widen_run_range(basis->run_ranges, map, &low, &high);
     warn_of_width(basis, field, low, high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
-        session_no_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
+        session_fail_for_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
     return INSITU_OK; /* a lack of memory is stored in *error and shared in the next phase */
 }
 
@@ -317,12 +317,12 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
     if (layer->has_colour_by) {
         out->colour_map = &layers->transfers[surface].transfer;
         if (!set_gathered_field(basis->meshes, layers, 2 * surface + 1, layer, &layer->colour_by, &out->colour_field))
-            session_no_memory(error, 1 << 10, "values at outer faces");
+            session_fail_for_memory(error, 1 << 10, "values at outer faces");
     }
     render_field field = {NULL, NULL};
     const int slot = find_lines_slot(layers, basis->image, surface);
     if (layer->lines.is_given && !set_gathered_field(basis->meshes, layers, slot, layer, &layer->lines.field, &field))
-        session_no_memory(error, 1 << 10, "values at outer faces");
+        session_fail_for_memory(error, 1 << 10, "values at outer faces");
     if (!layer->has_colour_by && !layer->lines.is_given) return INSITU_OK;
     insitu_status status = session_agree(basis->team->comm, error);
     if (!status && layer->has_colour_by)
@@ -407,9 +407,9 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
 {
     session_layers layers = {0};
     if (!error->status && !allocate_layers(basis, image, &layers))
-        session_no_memory(error, 1 << 10, "an image's layers");
+        session_fail_for_memory(error, 1 << 10, "an image's layers");
     /* If the scene exceeds a limit, the error is the same on all ranks and does not belong to one of them. */
-    insitu_status status = error->status == INSITU_ERROR_SCENE ? session_agree_as_is(basis->team->comm, error)
+    insitu_status status = error->status == INSITU_ERROR_SCENE ? session_agree_without_rank(basis->team->comm, error)
                                                                : session_agree(basis->team->comm, error);
     warn_of_samples(basis, image);
     if (!status) fill_parts(basis->meshes, &layers);

@@ -18,22 +18,24 @@ static insitu_status check_folder(const scene_document *d, const char *path, con
 {
     const size_t length = strlen(folder);
     if (length < 5 || strcmp(folder + length - 4, ".cdb") != 0 || folder[length - 5] == '/')
-        return scene_bad(d, path, "cinema", "\"%.100s\" has another ending, expected a folder's name that ends in .cdb",
-                         folder);
+        return scene_fail_at_key(d, path, "cinema",
+                                 "\"%.100s\" has another ending, expected a folder's name that ends in .cdb", folder);
     if (strchr(folder, '{'))
-        return scene_bad(d, path, "cinema", "\"%.100s\" holds a placeholder, expected one folder for all pictures",
-                         folder);
-    return find_control(folder) ? scene_bad(d, path, "cinema", "holds a control character, expected a folder's name")
-                                : INSITU_OK;
+        return scene_fail_at_key(d, path, "cinema",
+                                 "\"%.100s\" holds a placeholder, expected one folder for all pictures", folder);
+    return find_control(folder)
+               ? scene_fail_at_key(d, path, "cinema", "holds a control character, expected a folder's name")
+               : INSITU_OK;
 }
 
 static insitu_status check_file(const scene_document *d, const char *path, const scene_image *image, const char *file)
 {
     if (file && (file[0] == '/' || strncmp(file, "../", 3) == 0 || strstr(file, "/../")))
-        return scene_bad(d, path, "path", "\"%.100s\" is not below the folder, expected a file in the database", file);
+        return scene_fail_at_key(d, path, "path", "\"%.100s\" is not below the folder, expected a file in the database",
+                                 file);
     if (find_control(file) || find_control(image->name) || find_control(image->swept_field))
-        return scene_bad(d, path, file ? "path" : "cinema",
-                         "the picture's name or field holds a control character, expected none in a database");
+        return scene_fail_at_key(d, path, file ? "path" : "cinema",
+                                 "the picture's name or field holds a control character, expected none in a database");
     return INSITU_OK;
 }
 
@@ -50,7 +52,7 @@ static insitu_status join_output_path(const scene_document *d, const char *folde
 {
     const size_t size = strlen(folder) + strlen(file) + 2;
     out->path = base_alloc(size);
-    if (!out->path) return scene_no_memory(d);
+    if (!out->path) return scene_fail_for_memory(d);
     snprintf(out->path, size, "%s/%s", folder, file);
     out->folder_bytes = (int)strlen(folder) + 1;
     return INSITU_OK;
@@ -66,7 +68,7 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
     insitu_status status = check_folder(d, path, folder);
     if (!status) status = check_file(d, path, image, in->path);
     if (!status && out->format == SCENE_EXR)
-        status = scene_bad(d, path, "path", "\"%.100s\" is no PNG, expected .png in a database", in->path);
+        status = scene_fail_at_key(d, path, "path", "\"%.100s\" is no PNG, expected .png in a database", in->path);
     return status ? status : join_output_path(d, folder, in->path ? in->path : default_file(image, file), out);
 }
 
@@ -108,14 +110,14 @@ static insitu_status put_output_in_database(const scene_document *d, scene *s, s
     output->database = -1;
     if (output->folder_bytes == 0) return INSITU_OK;
     output->database = find_database(s, image, output);
-    if (output->database < 0) return scene_no_memory(d);
+    if (output->database < 0) return scene_fail_for_memory(d);
     set_database_columns(&s->databases[output->database], image);
     for (int i = 0; i < index; i++) {
         if (image->outputs[i].database != output->database) continue;
         char path[64];
         snprintf(path, sizeof path, "images[%d].outputs[%d]", image->variant.source, index);
-        return scene_bad(d, path, "cinema", "\"%.100s\" has this image already, expected it there once",
-                         s->databases[output->database].path);
+        return scene_fail_at_key(d, path, "cinema", "\"%.100s\" has this image already, expected it there once",
+                                 s->databases[output->database].path);
     }
     return INSITU_OK;
 }

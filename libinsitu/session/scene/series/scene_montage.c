@@ -19,12 +19,13 @@ static insitu_status check_views(const scene_document *d, const char *path, cons
                                  const scene_output *output, const char *name)
 {
     char *other = name_at_sample(image, output, 1);
-    if (!other) return scene_no_memory(d);
+    if (!other) return scene_fail_for_memory(d);
     const bool differs = strcmp(other, name) != 0;
     base_free(other);
     if (!differs) return INSITU_OK;
-    return scene_bad(d, path, "path", "\"%.100s\" is another file for each view, expected one for all cells of a grid",
-                     output->path);
+    return scene_fail_at_key(d, path, "path",
+                             "\"%.100s\" is another file for each view, expected one for all cells of a grid",
+                             output->path);
 }
 
 /* Returns the index of the montage of this name, which is added if there is none yet; -1 if memory ran out. */
@@ -54,17 +55,19 @@ static insitu_status check_panels(const scene_document *d, const char *path, con
                                   const scene_output *output, const scene_montage *m)
 {
     if (output->columns != m->columns || output->rows != m->rows)
-        return scene_bad(d, path, "grid", "[%d, %d] differs from that of the file's first picture, expected [%d, %d]",
-                         output->columns, output->rows, m->columns, m->rows);
+        return scene_fail_at_key(d, path, "grid",
+                                 "[%d, %d] differs from that of the file's first picture, expected [%d, %d]",
+                                 output->columns, output->rows, m->columns, m->rows);
     if (image->width != m->width || image->height != m->height)
-        return scene_bad(d, path, "grid",
-                         "this picture has %d x %d pixels, that of the file's first cell %d x %d, expected one size",
-                         image->width, image->height, m->width, m->height);
+        return scene_fail_at_key(
+            d, path, "grid",
+            "this picture has %d x %d pixels, that of the file's first cell %d x %d, expected one size", image->width,
+            image->height, m->width, m->height);
     if (output->format != m->format)
-        return scene_bad(d, path, "bits", "differs from that of the file's first picture, expected the same");
-    if (m->cell_count > m->columns * m->rows)
-        return scene_bad(d, path, "grid", "[%d, %d] has %d cells for %d pictures up to here, expected no fewer",
-                         m->columns, m->rows, m->columns * m->rows, m->cell_count);
+        return scene_fail_at_key(d, path, "bits", "differs from that of the file's first picture, expected the same");
+    if (m->panel_count > m->columns * m->rows)
+        return scene_fail_at_key(d, path, "grid", "[%d, %d] has %d cells for %d pictures up to here, expected no fewer",
+                                 m->columns, m->rows, m->columns * m->rows, m->panel_count);
     return INSITU_OK;
 }
 
@@ -76,7 +79,7 @@ static insitu_status put_output_in_montage(const scene_document *d, scene *s, sc
         image->camera.orbit.view_count ? image->camera.orbit.view_count * image->camera.orbit.circle_count : 1;
     output->montage = -1;
     if (!output->columns) return INSITU_OK;
-    if (!name) return scene_no_memory(d);
+    if (!name) return scene_fail_for_memory(d);
     snprintf(path, sizeof path, "images[%d].outputs[%d]", image->variant.source, index);
     const insitu_status status = views > 1 ? check_views(d, path, image, output, name) : INSITU_OK;
     if (status) {
@@ -84,10 +87,10 @@ static insitu_status put_output_in_montage(const scene_document *d, scene *s, sc
         return status;
     }
     output->montage = find_montage(s, image, output, name);
-    if (output->montage < 0) return scene_no_memory(d);
+    if (output->montage < 0) return scene_fail_for_memory(d);
     scene_montage *m = &s->montages[output->montage];
-    output->first_cell = m->cell_count;
-    m->cell_count += views;
+    output->first_panel = m->panel_count;
+    m->panel_count += views;
     return check_panels(d, path, image, output, m);
 }
 

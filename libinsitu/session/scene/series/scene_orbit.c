@@ -67,12 +67,12 @@ static void convert_elevations(const scene_document *d, const char *path, scene_
 static insitu_status refuse_replaced_keys(const scene_document *d, const char *path, const scene_file_camera *in)
 {
     static const char words[] = "given beside orbit, expected one of the two";
-    if (in->position) return scene_bad(d, path, "position", words);
-    if (in->focal) return scene_bad(d, path, "focal", words);
-    if (in->path) return scene_bad(d, path, "path", words);
-    if (in->up) return scene_bad(d, path, "up", "given beside orbit, expected the orbit's axis alone");
+    if (in->position) return scene_fail_at_key(d, path, "position", words);
+    if (in->focal) return scene_fail_at_key(d, path, "focal", words);
+    if (in->path) return scene_fail_at_key(d, path, "path", words);
+    if (in->up) return scene_fail_at_key(d, path, "up", "given beside orbit, expected the orbit's axis alone");
     if (in->automatic && in->automatic->direction)
-        return scene_bad(d, path, "automatic.direction", "given beside orbit, expected fit and zoom alone");
+        return scene_fail_at_key(d, path, "automatic.direction", "given beside orbit, expected fit and zoom alone");
     return INSITU_OK;
 }
 
@@ -86,7 +86,8 @@ insitu_status scene_convert_orbit(const scene_document *d, const char *path, con
     orbit->view_count = in->orbit->views;
     orbit->start = in->orbit->start ? *in->orbit->start : 0;
     memcpy(orbit->axis, in->orbit->axis ? in->orbit->axis : upwards, sizeof orbit->axis);
-    if (!scene_normalize(orbit->axis)) return scene_bad(d, path, "orbit.axis", "has length 0, expected a direction");
+    if (!scene_normalize(orbit->axis))
+        return scene_fail_at_key(d, path, "orbit.axis", "has length 0, expected a direction");
     convert_elevations(d, path, orbit);
     memcpy(out->up, orbit->axis, sizeof out->up);
     scene_place_view(out, 0);

@@ -27,15 +27,15 @@ static void list_numbers(const scene_camera_point *p, double out[NUMBERS_OF_POIN
 
 /* Times and values of four successive points, of which the first and the last may be missing. */
 typedef struct cubic_points {
-    double at[4], value[4];
+    double times[4], values[4];
     bool has_first, has_last;
 } cubic_points;
 
 /* Returns the slope of the curve at point i, which is 1 or 2. */
 static double slope_at(const cubic_points *p, int i)
 {
-    const double before = p->at[i] - p->at[i - 1], after = p->at[i + 1] - p->at[i];
-    const double down = (p->value[i] - p->value[i - 1]) / before, up = (p->value[i + 1] - p->value[i]) / after;
+    const double before = p->times[i] - p->times[i - 1], after = p->times[i + 1] - p->times[i];
+    const double down = (p->values[i] - p->values[i - 1]) / before, up = (p->values[i + 1] - p->values[i]) / after;
     if (!(down * up > 0)) return 0;
     const double w = 2 * after + before, v = after + 2 * before;
     return (w + v) / (w / down + v / up);
@@ -45,7 +45,7 @@ static double slope_at(const cubic_points *p, int i)
  * rounding does not take it beyond the values of these points. */
 static double cubic_value(const cubic_points *p, double share)
 {
-    const double h = p->at[2] - p->at[1], a = p->value[1], b = p->value[2], t = share;
+    const double h = p->times[2] - p->times[1], a = p->values[1], b = p->values[2], t = share;
     const double from = p->has_first ? h * slope_at(p, 1) : 0, to = p->has_last ? h * slope_at(p, 2) : 0;
     const double value = a + (b - a) * t * t * (3 - 2 * t) + t * (1 - t) * ((1 - t) * from - t * to);
     return fmax(fmin(a, b), fmin(fmax(a, b), value));
@@ -67,11 +67,11 @@ static void interpolate_camera(const scene_camera *camera, int i, double at, sce
     for (int k = 0; k < 4; k++) {
         const int n = i - 1 + k < 0 ? 0 : i - 1 + k < camera->point_count ? i - 1 + k : camera->point_count - 1;
         list_numbers(&camera->points[n], numbers[k]);
-        p.at[k] = camera->points[n].at;
+        p.times[k] = camera->points[n].at;
     }
-    const double share = (at - p.at[1]) / (p.at[2] - p.at[1]);
+    const double share = (at - p.times[1]) / (p.times[2] - p.times[1]);
     for (int n = 0; n < NUMBERS_OF_POINT; n++) {
-        for (int k = 0; k < 4; k++) p.value[k] = numbers[k][n];
+        for (int k = 0; k < 4; k++) p.values[k] = numbers[k][n];
         found[n] = cubic_value(&p, share);
     }
     memcpy(out->eye, found, sizeof out->eye);
@@ -103,15 +103,16 @@ static insitu_status convert_time(const scene_document *d, const char *path, con
 {
     const scene_camera_point *before = out > camera->points ? out - 1 : NULL;
     const char *key = camera->is_by_cycle ? "cycle" : "time";
-    if (in->time && in->cycle) return scene_bad(d, path, "cycle", "given beside time, expected one of the two");
-    if (!in->time && !in->cycle) return scene_bad(d, path, "", "has no time and no cycle, expected one of the two");
+    if (in->time && in->cycle) return scene_fail_at_key(d, path, "cycle", "given beside time, expected one of the two");
+    if (!in->time && !in->cycle)
+        return scene_fail_at_key(d, path, "", "has no time and no cycle, expected one of the two");
     if (camera->is_by_cycle != !in->time)
-        return scene_bad(d, path, in->time ? "time" : "cycle", "given where the first place has a %s, expected a %s",
-                         key, key);
+        return scene_fail_at_key(d, path, in->time ? "time" : "cycle",
+                                 "given where the first place has a %s, expected a %s", key, key);
     out->at = in->time ? *in->time : *in->cycle;
     if (before && !(out->at > before->at))
-        return scene_bad(d, path, key, "%.12g comes after %.12g, expected places in the order of time", out->at,
-                         before->at);
+        return scene_fail_at_key(d, path, key, "%.12g comes after %.12g, expected places in the order of time", out->at,
+                                 before->at);
     return INSITU_OK;
 }
 
@@ -125,12 +126,12 @@ static insitu_status convert_point(const scene_document *d, const char *path, co
     out->angle = in->angle ? *in->angle : camera->angle;
     for (int i = 0; i < 3; i++) view[i] = out->eye[i] - out->focal[i];
     if (!scene_normalize(view))
-        return scene_bad(d, path, "focal", "[%g, %g, %g] is the position too, expected another point", out->focal[0],
-                         out->focal[1], out->focal[2]);
-    if (!scene_normalize(out->up)) return scene_bad(d, path, "up", "has length 0, expected a direction");
+        return scene_fail_at_key(d, path, "focal", "[%g, %g, %g] is the position too, expected another point",
+                                 out->focal[0], out->focal[1], out->focal[2]);
+    if (!scene_normalize(out->up)) return scene_fail_at_key(d, path, "up", "has length 0, expected a direction");
     if (scene_is_parallel(out->up, view))
-        return scene_bad(d, path, "up", "[%g, %g, %g] is parallel to the view, expected a direction across it",
-                         out->up[0], out->up[1], out->up[2]);
+        return scene_fail_at_key(d, path, "up", "[%g, %g, %g] is parallel to the view, expected a direction across it",
+                                 out->up[0], out->up[1], out->up[2]);
     return convert_time(d, path, in, camera, out);
 }
 
@@ -139,11 +140,11 @@ insitu_status scene_convert_path(const scene_document *d, const char *path, cons
 {
     static const double upwards[3] = {0, 1, 0};
     static const char words[] = "given beside path, expected one of the two";
-    if (in->position) return scene_bad(d, path, "position", words);
-    if (in->focal) return scene_bad(d, path, "focal", words);
-    if (in->automatic) return scene_bad(d, path, "automatic", words);
+    if (in->position) return scene_fail_at_key(d, path, "position", words);
+    if (in->focal) return scene_fail_at_key(d, path, "focal", words);
+    if (in->automatic) return scene_fail_at_key(d, path, "automatic", words);
     out->points = base_calloc((size_t)in->path_count, sizeof *out->points);
-    if (!out->points) return scene_no_memory(d);
+    if (!out->points) return scene_fail_for_memory(d);
     out->is_automatic = false;
     out->is_by_cycle = !in->path[0].time;
     memcpy(out->up, in->up ? in->up : upwards, sizeof out->up);

@@ -46,10 +46,10 @@ static insitu_status check_fields(const scene_document *d, const char *path, con
         char key[32];
         snprintf(key, sizeof key, "sweep.fields[%d]", i);
         if (strchr(fields[i], '/'))
-            return scene_bad(d, path, key, "\"%.100s\" holds a /, expected a name without", fields[i]);
+            return scene_fail_at_key(d, path, key, "\"%.100s\" holds a /, expected a name without", fields[i]);
         for (int k = 0; k < i; k++)
             if (strcmp(fields[i], fields[k]) == 0)
-                return scene_bad(d, path, key, "\"%.100s\" is there twice, expected another field", fields[i]);
+                return scene_fail_at_key(d, path, key, "\"%.100s\" is there twice, expected another field", fields[i]);
     }
     return INSITU_OK;
 }
@@ -61,9 +61,10 @@ static insitu_status find_values(const scene_document *d, const char *path, cons
     const scene_file_slice *slice = NULL;
     const int isosurfaces = find_isosurface(in, &isosurface), slices = find_slice(in, &slice);
     if (is_over_isovalues(in) && isosurfaces != 1)
-        return scene_bad(d, path, "sweep.isovalues", "the image has %d isosurface layers, expected one", isosurfaces);
+        return scene_fail_at_key(d, path, "sweep.isovalues", "the image has %d isosurface layers, expected one",
+                                 isosurfaces);
     if (is_over_planes(in) && slices != 1)
-        return scene_bad(d, path, "sweep.planes", "the image has %d slice layers, expected one", slices);
+        return scene_fail_at_key(d, path, "sweep.planes", "the image has %d slice layers, expected one", slices);
     if (is_over_isovalues(in)) out->isovalues = isosurface->values_count;
     if (is_over_planes(in)) out->planes = scene_count_planes(slice);
     return INSITU_OK;
@@ -79,7 +80,8 @@ insitu_status scene_find_series(const scene_document *d, const char *path, const
     *out = (scene_series){field_count ? field_count : 1, 1, 1, scene_count_views(d, camera, in->camera)};
     if (!in->sweep) return INSITU_OK;
     if (!is_over_isovalues(in) && !is_over_planes(in) && field_count == 0)
-        return scene_bad(d, path, "sweep", "holds nothing, expected isovalues: true, planes: true, fields or several");
+        return scene_fail_at_key(d, path, "sweep",
+                                 "holds nothing, expected isovalues: true, planes: true, fields or several");
     const insitu_status status = find_values(d, path, in, out);
     return status ? status : check_fields(d, path, fields, field_count);
 }
@@ -95,8 +97,9 @@ insitu_status scene_count_pictures(const scene_document *d, const scene_file *in
         if (status) return status;
         sum += (int64_t)s.fields * s.isovalues * s.planes * s.views;
         if (sum > SCENE_MAX_PICTURES)
-            return scene_bad(d, path, "", "%lld pictures a step up to here, by orbits and sweeps, expected at most %d",
-                             (long long)sum, SCENE_MAX_PICTURES);
+            return scene_fail_at_key(d, path, "",
+                                     "%lld pictures a step up to here, by orbits and sweeps, expected at most %d",
+                                     (long long)sum, SCENE_MAX_PICTURES);
     }
     *count = (int)sum;
     return INSITU_OK;
@@ -174,8 +177,8 @@ insitu_status scene_apply_sweep(const scene_document *d, const char *path, const
     const char *field = fields[out->variant.field];
     out->swept_field = base_strdup(field);
     if (!out->swept_field || !replace_fields(out, field, scene_document_line(d, key), &replaced))
-        return scene_no_memory(d);
+        return scene_fail_for_memory(d);
     if (replaced) return INSITU_OK;
-    return scene_bad(d, path, "sweep.fields",
-                     "no layer is coloured by a field, expected a slice, a volume or a colour_by");
+    return scene_fail_at_key(d, path, "sweep.fields",
+                             "no layer is coloured by a field, expected a slice, a volume or a colour_by");
 }
