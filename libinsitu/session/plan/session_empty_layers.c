@@ -38,57 +38,58 @@ typedef struct planned_layer {
 /* ---- layers ---------------------------------------------------------------------------------------------------- */
 
 /* Number of layers that are processed at a time; it limits the memory on the stack. */
-enum { WINDOW = 128 };
+enum { BATCH = 128 };
 
-typedef struct layer_window {
-    int first, next; /* number of the first layer in the window, and of the next one to be listed */
-    int count;
-    planned_layer layers[WINDOW];
-} layer_window;
+/* Some consecutive layers of the plan, which are processed together. */
+typedef struct layer_batch {
+    int first, next; /* number of the first layer in the batch, and of the next one to be listed */
+    int count;       /* number of layers in the batch */
+    planned_layer layers[BATCH];
+} layer_batch;
 
-static void list_layer(layer_window *window, planned_layer layer)
+static void list_layer(layer_batch *batch, planned_layer layer)
 {
-    const int at = window->next++ - window->first;
-    if (at >= 0 && at < WINDOW) window->layers[window->count++] = layer;
+    const int at = batch->next++ - batch->first;
+    if (at >= 0 && at < BATCH) batch->layers[batch->count++] = layer;
 }
 
-static void list_isosurfaces(const scene_image *image, layer_window *window)
+static void list_isosurfaces(const scene_image *image, layer_batch *batch)
 {
     for (int n = 0, values = 0; n < image->isosurface_count; n++) {
         const int number = values + image->variant.isovalue;
-        list_layer(window, (planned_layer){.image = image, .isosurface = &image->isosurfaces[n], .number = number});
+        list_layer(batch, (planned_layer){.image = image, .isosurface = &image->isosurfaces[n], .number = number});
         values += image->isosurfaces[n].value_count;
     }
 }
 
-static void list_volumes(const scene_image *image, layer_window *window)
+static void list_volumes(const scene_image *image, layer_batch *batch)
 {
     for (int n = 0; n < image->volume_count; n++) {
         const int number = image->variant.field * RENDER_MAX_VOLUMES + n;
-        list_layer(window, (planned_layer){.image = image, .volume = &image->volumes[n], .number = number});
+        list_layer(batch, (planned_layer){.image = image, .volume = &image->volumes[n], .number = number});
     }
 }
 
-static void list_thresholds(const scene_image *image, layer_window *window)
+static void list_thresholds(const scene_image *image, layer_batch *batch)
 {
     for (int n = 0; n < image->surface_count; n++)
         if (image->surfaces[n].threshold.is_given)
-            list_layer(window, (planned_layer){.image = image, .surface = &image->surfaces[n], .number = n});
+            list_layer(batch, (planned_layer){.image = image, .surface = &image->surfaces[n], .number = n});
 }
 
-/* Lists the layers of the window, and returns the number of all layers. Each layer is listed once: views of an image
+/* Lists the layers of the batch, and returns the number of all layers. Each layer is listed once: views of an image
  * share their layers, pictures of a sweep over fields share the isosurfaces, those of a sweep over isovalues the
  * volumes, those of a sweep over planes both, and all of them share the thresholds. */
-static int list_layers(const session_plan *plan, layer_window *window)
+static int list_layers(const session_plan *plan, layer_batch *batch)
 {
     for (int i = 0; i < plan->image_count; i++) {
         const scene_image *image = plan->images[i];
         if (image->variant.view > 0) continue;
-        if (image->variant.plane == 0 && image->variant.field == 0) list_isosurfaces(image, window);
-        if (image->variant.plane == 0 && image->variant.isovalue == 0) list_volumes(image, window);
-        if (scene_is_first_variant(image)) list_thresholds(image, window);
+        if (image->variant.plane == 0 && image->variant.field == 0) list_isosurfaces(image, batch);
+        if (image->variant.plane == 0 && image->variant.isovalue == 0) list_volumes(image, batch);
+        if (scene_is_first_variant(image)) list_thresholds(image, batch);
     }
-    return window->next;
+    return batch->next;
 }
 
 static const scene_field *find_layer_field(const planned_layer *layer)
@@ -158,28 +159,28 @@ typedef struct layer_news {
 
 /* Reduces the layers' ranges over all ranks, together with earlier errors and the news; after an error the rest is
  * undefined. Collective. */
-static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, layer_window *window,
+static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, layer_batch *batch,
                                    bool of_all_cells, layer_news *news, base_error *error)
 {
-    double lows[2 * WINDOW + 3];
-    const int last = 2 * window->count;
+    double lows[2 * BATCH + 3];
+    const int last = 2 * batch->count;
     lows[last] = error->status ? -1 : 0;
     lows[last + 1] = news->has_other_cells ? -1 : 0;
     lows[last + 2] = -news->telling;
-    for (int i = 0; i < window->count && !error->status; i++) {
-        planned_layer *layer = &window->layers[i];
+    for (int i = 0; i < batch->count && !error->status; i++) {
+        planned_layer *layer = &batch->layers[i];
         if (!of_all_cells || layer->is_unreported)
             layer->range = find_own_range(meshes, layer, team->threads, of_all_cells);
     }
-    for (int i = 0; i < window->count; i++) {
-        lows[2 * i] = window->layers[i].range.low;
-        lows[2 * i + 1] = window->layers[i].range.negated_high;
+    for (int i = 0; i < batch->count; i++) {
+        lows[2 * i] = batch->layers[i].range.low;
+        lows[2 * i + 1] = batch->layers[i].range.negated_high;
     }
     const int code = MPI_Allreduce(MPI_IN_PLACE, lows, last + 3, MPI_DOUBLE, MPI_MIN, team->comm);
     const insitu_status status = code == MPI_SUCCESS && lows[last] < 0
                                      ? session_agree(team->comm, error)
                                      : session_check_mpi(error, code, "MPI_Allreduce");
-    for (int i = 0; i < window->count; i++) window->layers[i].range = (field_range){lows[2 * i], lows[2 * i + 1]};
+    for (int i = 0; i < batch->count; i++) batch->layers[i].range = (field_range){lows[2 * i], lows[2 * i + 1]};
     *news = (layer_news){lows[last + 1] < 0, (int)-lows[last + 2]};
     return status;
 }
@@ -232,11 +233,11 @@ static bool is_layer_empty(const planned_layer *layer, int value, const field_ra
     return layer->volume ? is_transparent(layer->volume, range) : layer->is_empty;
 }
 
-static bool find_new_warnings(const session_report *report, layer_window *window)
+static bool find_new_warnings(const session_report *report, layer_batch *batch)
 {
     bool is_any = false;
-    for (int i = 0; i < window->count; i++) {
-        planned_layer *layer = &window->layers[i];
+    for (int i = 0; i < batch->count; i++) {
+        planned_layer *layer = &batch->layers[i];
         layer->is_empty = layer->range.low > -layer->range.negated_high;
         layer->range = least_of_trees(&layer->range);
         for (int v = 0; v < count_values(layer); v++) {
@@ -297,17 +298,17 @@ insitu_status session_check_layers(const session_plan *plan, const session_catal
                                    const session_meshes *meshes, const session_team *team, session_report *report,
                                    base_error *error)
 {
-    const int count = plan->cell_count ? list_layers(plan, &(layer_window){.first = 0}) : 0;
+    const int count = plan->cell_count ? list_layers(plan, &(layer_batch){.first = 0}) : 0;
     layer_news news = {false, session_reporting_word(report, team)};
     if (count && !error->status) news.has_other_cells = session_unusable_key(plan, meshes) != report->unusable_key;
     insitu_status status = INSITU_OK;
-    for (int first = 0; (first == 0 || first < count) && !status; first += WINDOW) {
-        layer_window window = {.first = first};
-        if (count) list_layers(plan, &window);
-        status = reduce_ranges(meshes, team, &window, false, &news, error);
-        if (!status && find_new_warnings(report, &window))
-            status = reduce_ranges(meshes, team, &window, true, &news, error);
-        for (int i = 0; i < window.count && !status; i++) warn_of_layer(report, &window.layers[i]);
+    for (int first = 0; (first == 0 || first < count) && !status; first += BATCH) {
+        layer_batch batch = {.first = first};
+        if (count) list_layers(plan, &batch);
+        status = reduce_ranges(meshes, team, &batch, false, &news, error);
+        if (!status && find_new_warnings(report, &batch))
+            status = reduce_ranges(meshes, team, &batch, true, &news, error);
+        for (int i = 0; i < batch.count && !status; i++) warn_of_layer(report, &batch.layers[i]);
     }
     if (!status && news.telling)
         status = session_share_lines(report, session_reporting_rank(news.telling, team), team, error);
