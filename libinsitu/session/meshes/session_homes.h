@@ -25,15 +25,16 @@ typedef struct session_box {
 
 /* The data that a rank has about the parts, on all ranks, of one or several meshes. */
 typedef struct session_homes {
-    bool is_computed, by_id;
-    int rank;
+    bool is_computed; /* set if the other members are up to date */
+    bool by_id;       /* set if homes are found by global vertex ids, and not by positions */
+    int rank;         /* this rank */
     /* The ranks whose drawn cells' box intersects this rank's box, in ascending order, including this rank. The
      * relation is symmetric. A rank without cells has no such ranks. Boxes are extended by 2e-5 of the scene's half
      * diagonal, so that the boxes of a vertex and of a face on which it lies up to rounding intersect. */
     int near_count;
     int *near_ranks;
-    session_box *boxes;
-    /* If by_id: the first id of each share, and the rank that owns the share. */
+    session_box *boxes; /* box of each of these ranks */
+    /* If by_id: the ids are divided into ranges, each with its first id and the rank that is home of its ids. */
     int share_count;
     int64_t *first_ids;
     int *owners;

@@ -9,13 +9,13 @@
 
 typedef struct session_field {
     insitu_field given; /* the name is a copy that the session owns, the values are the caller's */
-    grid_array values;  /* array of all components or, if each component has its own array (component_arrays), of the
-                           first one */
-    grid_array *component_arrays;
-    int64_t component_stride;
-    base_error problem;          /* error of the last insitu_set_field(), or an error of the values */
-    bool is_problem_of_contents; /* set if the error is one of the values, found by the check of this step */
-    bool has_index;
+    /* array of all components or, if each component has its own array (component_arrays), of the first one */
+    grid_array values;
+    grid_array *component_arrays; /* array of each component; NULL: all components are in `values` */
+    int64_t component_stride;     /* distance in bytes between the components of a tuple in `values` */
+    base_error problem;           /* error of the last insitu_set_field(), or an error of the values */
+    bool is_problem_of_contents;  /* set if the error is one of the values, found by the check of this step */
+    bool has_index;        /* set if an index array gives the tuple of each vertex or cell (insitu_field.index) */
     bool is_copy_stale;    /* the values or the index have changed since the copy was made */
     bool is_in_statistics; /* set if statistics of this step need the field; fields that images show have scalars */
     /* set if given.fill was called in this step; the values are valid unless fill_problem holds an error */
@@ -29,7 +29,7 @@ typedef struct session_field {
     insitu_patch *patches;    /* copy of the table given.patches, owned by the session */
     insitu_array *components; /* copy of the table given.components, owned by the session */
     char *copy;               /* packed tuples with interleaved components; NULL: not copied yet */
-    int64_t copy_bytes;
+    int64_t copy_bytes;       /* size of `copy` in bytes */
 } session_field;
 
 /* The sets of cells over which an extent is computed. All of these cells are drawn and have only finite values. */
@@ -43,7 +43,7 @@ typedef enum session_extent_kind {
 
 /* Minimum and maximum of a scalar's values; low > high means that there are no values. */
 typedef struct session_extremes {
-    bool is_known;
+    bool is_known; /* set if low and high are up to date */
     double low, high;
 } session_extremes;
 
@@ -53,17 +53,17 @@ typedef struct session_plane {
     double point[3];  /* a point on the plane */
     /* set if the point is at `offset` along the normal from the centre of the data's bounds, and moves with them */
     bool is_central;
-    /* offset of the point; share is an additional shift along the normal, as a fraction (-1 .. 1) of half the data's
-     * extent */
-    double offset, extent_fraction;
+    double offset; /* distance along the normal from the centre of the data's bounds to the point */
+    /* additional shift along the normal, as a fraction (-1 .. 1) of half the data's extent */
+    double extent_fraction;
 } session_plane;
 
 /* A scalar that a layer uses: a component or the magnitude of a field, as given or recentred to vertices; or the
  * vertices' signed distances from a plane. */
 typedef struct session_scalar {
-    int field;     /* index of the field in the mesh; -1: the scalar is the distance from a plane */
-    int component; /* same as grid_field.component */
-    bool is_recentred;
+    int field;               /* index of the field in the mesh; -1: the scalar is the distance from a plane */
+    int component;           /* same as grid_field.component */
+    bool is_recentred;       /* set if cell or corner values are averaged to vertices */
     uint64_t joint_name;     /* value of scene_field.joint_name, if the values are recentred */
     int64_t computed_count;  /* number of times that the values have been computed */
     uint64_t positions_hash; /* value of session_joint.positions_hash for which the values were computed */
@@ -83,18 +83,18 @@ typedef struct session_scalar {
     /* index of each vertex in `gradients`, or -1; NULL: not computed yet. A copy reported to the user, for smooth
      * normals of the last step that drew some */
     int32_t *gradient_indices;
-    float (*gradients)[3];
-    int64_t gradient_count;
-    bool are_values_stale; /* set if recentred values must be computed again */
-    bool may_have_changed; /* set if the caller passed the values again, so that they may have changed */
-    bool has_checksum;
-    uint64_t checksum;
+    float (*gradients)[3];    /* gradient at each vertex that has an index */
+    int64_t gradient_count;   /* number of gradients */
+    bool are_values_stale;    /* set if recentred values must be computed again */
+    bool may_have_changed;    /* set if the caller passed the values again, so that they may have changed */
+    bool has_checksum;        /* set if the checksums below have been computed */
+    uint64_t checksum;        /* checksum of all values of the last picture */
     uint64_t sample_checksum; /* checksum of a few of the values */
-    int64_t version;          /* checksum of a sample of the values */
-    bool has_own_ranges;      /* set if ranges are stored in `pairs`, and not in the tree's nodes */
+    int64_t version;          /* incremented whenever the checksum shows that the values have changed */
+    bool has_own_ranges;      /* set if ranges are stored in node_ranges, and not in the tree's nodes */
     float *node_ranges;       /* minimum and maximum of the values in each node of the tree; NULL: not computed yet */
-    bool are_ranges_stale;
-    int64_t unusable_count;
+    bool are_ranges_stale;    /* set if the ranges in the tree were computed for other values */
+    int64_t unusable_count;   /* number of drawn cells with a value that is not finite */
     session_extremes extremes[SESSION_EXTENTS];
 } session_scalar;
 
@@ -119,9 +119,9 @@ typedef struct session_threshold {
  * pyramids that is built on these faces. It is a copy reported to the user (session_outer_mesh.h). */
 typedef struct session_outer {
     session_threshold threshold;
-    int64_t version; /* version of the values to which the threshold was applied, if there is a threshold */
-    bool is_needed;  /* set if an image of this step needs it */
-    bool are_faces_known;
+    int64_t version;      /* version of the values to which the threshold was applied, if there is a threshold */
+    bool is_needed;       /* set if an image of this step needs it */
+    bool are_faces_known; /* set if `faces` is up to date for the current cells */
     int64_t face_count;
     session_face *faces;       /* sorted by cell */
     struct session_mesh *mesh; /* the mesh, which has the name of the whole mesh; NULL: not made yet */
@@ -180,7 +180,7 @@ typedef struct session_lattice {
     grid_lattice cells;
     double *axis_coordinates[3]; /* coordinates along the axes, if they are uniform or rectilinear; a copy reported to
                                     the user */
-    int64_t bytes;               /* size of places in bytes */
+    int64_t bytes;               /* size of the coordinates along all axes in bytes */
 } session_lattice;
 
 enum { SESSION_CONFORMED = 9 };
@@ -203,10 +203,10 @@ typedef struct session_level_box {
 
 /* Describes a finer block that covers only part of a cell of this block, which is an error. */
 typedef struct session_misfit {
-    bool exists;
+    bool exists;               /* set if there is such a block */
     int axis;                  /* axis along which the finer block ends within the cell */
     int64_t block, refinement; /* the finer block's number on its rank, and its refinement along the axis */
-    int rank;
+    int rank;                  /* rank that has the finer block */
 } session_misfit;
 
 /* Numbers of the caller's cells by kind. Shells are cells that are drawn and flat. */
@@ -232,7 +232,7 @@ typedef struct session_mesh {
      * (outer/session_covers.h). A copy reported to the user; NULL: `ghosts` is read */
     unsigned char *covered;
     session_misfit misfit;
-    grid cells;
+    grid cells;                  /* the cells in the form that the session reads */
     bool is_given;               /* false after an insitu_set_mesh() that failed; `problem` then holds the error */
     base_error problem;          /* error of the last insitu_set_mesh(), or an error of the arrays' contents */
     bool is_problem_of_contents; /* set if the error is one of the arrays' contents, found by the check of this step */
@@ -241,7 +241,7 @@ typedef struct session_mesh {
 
     /* values of session_meshes.stamp when the cells and the coordinates last changed */
     int64_t cells_stamp, coordinates_stamp;
-    bool is_check_stale;
+    bool is_check_stale;       /* set if cells or coordinates have not been checked since they changed */
     bool is_topology_stale;    /* set if the tree was built for other cells */
     bool is_geometry_stale;    /* set if the tree was computed for other coordinates */
     double lower[3], upper[3]; /* bounds of the drawn cells; lower > upper: there are none */
@@ -255,14 +255,14 @@ typedef struct session_mesh {
     uint64_t single_joint_name; /* same as session_catalogue_mesh.single_joint_name */
     bool is_refined;            /* same as session_catalogue_mesh.is_refined */
     bool is_needed;             /* set if an image of this step draws the mesh */
-    bool has_tree;
-    mmbvh tree;
+    bool has_tree;              /* set if `tree` has been built */
+    mmbvh tree;                 /* tree over the drawn cells, or over some of them (is_partial) */
     /* set if the tree contains only the candidates of candidates_key, as long as nothing changes */
     bool is_partial;
     /* set if the bounds of the full tree's nodes enclose only the candidates of candidates_key */
     bool are_bounds_partial;
-    double built_surface; /* half the surface area of the mesh's bounds when the tree was built */
-    uint64_t candidates_key;
+    double built_surface;    /* half the surface area of the mesh's bounds when the tree was built */
+    uint64_t candidates_key; /* hash that identifies the candidates of the current images and values */
     /* number of steps in which the current (or last) full tree has been used; 0: there was none yet */
     int full_tree_steps;
     /* seconds spent on partial trees since the cells last changed, minus the time that refits of a full tree would have
@@ -420,6 +420,8 @@ typedef struct session_part_walk {
     session_mesh *part;
     session_mesh *whole;  /* the mesh whose outer faces the part contains; NULL: the part is a mesh of the caller */
     session_outer *outer; /* the outer surface that the part belongs to; NULL: the part is a mesh of the caller */
+    /* state of the iterator: indices of the next mesh, of the mesh whose outer faces are visited, and of the outer
+     * surface */
     int mesh_index, whole_index, outer_index;
 } session_part_walk;
 

@@ -7,8 +7,8 @@
 
 typedef struct session_bins {
     double lower[3], bins_per_length; /* lower corner of the bins, and the number of bins per unit of length */
-    int64_t counts[3];
-    int64_t *starts, *items; /* bin b contains the points items[starts[b]] .. items[starts[b + 1] - 1] */
+    int64_t counts[3];                /* number of bins along each axis */
+    int64_t *starts, *items;          /* bin b contains the points items[starts[b]] .. items[starts[b + 1] - 1] */
 } session_bins;
 
 /* Sorts `count` points into bins. Their positions begin at `places` and are `stride` bytes apart. Returns false if
@@ -22,8 +22,9 @@ void session_bins_free(session_bins *bins);
  * &point);) */
 typedef struct session_bin_walk {
     const session_bins *bins;
-    int64_t first_bin[3], last_bin[3], bin[3];
-    int64_t next, end;
+    int64_t first_bin[3], last_bin[3]; /* range of bins that the box touches, along each axis */
+    int64_t bin[3];                    /* first bin of the current row */
+    int64_t next, end;                 /* range in `items` of the points of the row that are not visited yet */
 } session_bin_walk;
 
 session_bin_walk session_walk_bins(const session_bins *bins, const double lower[3], const double upper[3],

@@ -45,10 +45,11 @@ typedef struct candidate {
     double weights[4];
 } candidate;
 
-/* A face at a candidate's position, and the index of the contact that precedes it in the list. */
+/* A face at a candidate's position. It is an element of one of the candidate's linked lists. */
 typedef struct contact {
-    int64_t face, next_contact;
-    double weights[4]; /* set if the candidate is not a corner of the face */
+    int64_t face;         /* index of the face in hanging_search.faces */
+    int64_t next_contact; /* index of the next element of the list; -1: this is the last one */
+    double weights[4];    /* set if the candidate is not a corner of the face */
 } contact;
 
 typedef struct hanging_search {

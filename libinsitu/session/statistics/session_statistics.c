@@ -17,8 +17,9 @@
 /* ---- one cell ------------------------------------------------------------------------------------------------ */
 
 typedef struct cell_value {
-    bool is_counted, is_shell;
-    double least, most, mean, volume;
+    bool is_counted, is_shell; /* set if the cell is drawn and all its values are finite; set if it is a shell */
+    double least, most, mean;  /* of the value of the cell, or of the values at its vertices */
+    double volume;             /* volume, or area of a shell */
 } cell_value;
 
 static cell_value read_cell_value(const grid *g, const grid_field *field, int64_t cell, volume_room *room)
