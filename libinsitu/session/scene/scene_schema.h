@@ -12,9 +12,9 @@
 typedef enum scene_frame { SCENE_FRAME_CAMERA, SCENE_FRAME_WORLD } scene_frame;
 
 typedef struct scene_file_automatic {
-    double *direction; /* list of 3 numbers */
-    double *zoom;
-    int *fit;            /* value of the enum scene_fit */
+    double *direction;   /* from the focal point to the eye, x y z */
+    double *zoom;        /* 1 fits the bounds into the picture; larger values are closer */
+    int *fit;            /* what must fit into the frame (scene_fit) */
     double (*bounds)[3]; /* two opposite corners, each a list of 3 numbers */
 } scene_file_automatic;
 
@@ -22,41 +22,41 @@ typedef enum scene_fit { SCENE_FIT_SPHERE, SCENE_FIT_BOX } scene_fit;
 typedef enum scene_projection { SCENE_PERSPECTIVE, SCENE_ORTHOGRAPHIC } scene_projection;
 
 typedef struct scene_file_orbit {
-    int views;
-    double *axis; /* list of 3 numbers */
-    double *start;
+    int views;     /* number of views on each circle */
+    double *axis;  /* direction of the axis, x y z */
+    double *start; /* angle of the first view, in degrees */
 } scene_file_orbit;
 
 typedef struct scene_file_point {
-    double *time;
-    int *cycle;
-    double *position, *focal, *up; /* lists of 3 numbers */
-    double *angle;
+    double *time;                  /* time at which the camera is at this point; NULL: `cycle` is given */
+    int *cycle;                    /* cycle at which the camera is at this point; NULL: `time` is given */
+    double *position, *focal, *up; /* eye, focal point and up direction, x y z each */
+    double *angle;                 /* vertical angle of view in degrees */
 } scene_file_point;
 
 typedef struct scene_file_camera {
-    double *position, *focal; /* lists of 3 numbers */
+    double *position, *focal; /* eye and focal point, x y z each */
     scene_file_automatic *automatic;
-    double *up; /* list of 3 numbers */
-    double *angle;
-    int *projection; /* value of the enum scene_projection */
-    double *height;
+    double *up;      /* up direction, x y z */
+    double *angle;   /* vertical angle of view in degrees */
+    int *projection; /* perspective or orthographic (scene_projection) */
+    double *height;  /* height of an orthographic view in scene units */
     scene_file_orbit *orbit;
     scene_file_point *path;
-    int path_count;
+    int path_count; /* number of points of the path */
 } scene_file_camera;
 
 typedef struct scene_file_light {
-    double *direction; /* list of 3 numbers */
-    double *colour;    /* list of 3 numbers */
-    double *intensity;
-    scene_frame *in;
-    bool *shadows;
+    double *direction; /* towards the light, x y z */
+    double *colour;    /* red, green and blue, sRGB, 0 .. 1 */
+    double *intensity; /* factor of the colour */
+    scene_frame *in;   /* axes of the direction: those of the camera or of the scene */
+    bool *shadows;     /* whether the light casts shadows */
 } scene_file_light;
 
 typedef struct scene_file_occlusion {
-    int *samples;
-    double *radius;
+    int *samples;   /* number of rays per hit */
+    double *radius; /* length of the rays in scene units */
 } scene_file_occlusion;
 
 typedef struct scene_file_material {
@@ -65,30 +65,30 @@ typedef struct scene_file_material {
 
 /* The keys of a colour map. The keys map and range have several forms and are read from the document. */
 typedef struct scene_file_colour_map {
-    bool *reversed;
-    int *discrete;
-    int *scale; /* value of the enum scene_scale */
-    double *threshold;
-    double *below, *above, *nan; /* lists of 3 numbers */
+    bool *reversed;              /* whether the order of the colours is reversed */
+    int *discrete;               /* number of bands of equal width */
+    int *scale;                  /* linear, logarithmic or symmetric logarithmic (scene_scale) */
+    double *threshold;           /* end of the linear part of a symmetric logarithmic scale */
+    double *below, *above, *nan; /* colours of values below and above the range, and of NaN; red, green, blue */
 } scene_file_colour_map;
 
 typedef struct scene_file_colour_by {
     char *field, *component;
-    int *interpolate; /* value of the enum scene_interpolation */
+    int *interpolate; /* whether cell values are averaged to vertices (scene_interpolation) */
     scene_file_colour_map colours;
 } scene_file_colour_by;
 
 typedef struct scene_file_plane {
-    double *normal, *point; /* lists of 3 numbers */
-    double *offset;
-    double *offsets; /* offsets of several planes; only slices may have these and a count */
+    double *normal, *point; /* normal, and a point of the plane, x y z each */
+    double *offset;         /* distance from the point to the plane, along the normal */
+    double *offsets;        /* offsets of several planes; only slices may have these and a count */
     int offsets_count;
-    int *count;
+    int *count; /* number of planes that are evenly spaced over the data */
 } scene_file_plane;
 
 typedef struct scene_file_sphere {
-    double *centre; /* list of 3 numbers */
-    double radius;
+    double *centre; /* centre, x y z */
+    double radius;  /* radius in scene units */
 } scene_file_sphere;
 
 typedef struct scene_file_clip {
@@ -96,54 +96,54 @@ typedef struct scene_file_clip {
     int planes_count;
     double (*box)[3]; /* two opposite corners, each a list of 3 numbers */
     scene_file_sphere *sphere;
-    int *keep; /* value of the enum scene_keep */
+    int *keep; /* whether the inside or the outside is kept (scene_keep) */
 } scene_file_clip;
 
 typedef struct scene_file_lines {
     char *field, *component;
-    double *values;
+    double *values; /* value of each line */
     int values_count;
-    int *count;
-    double *width, *colour; /* colour: list of 3 numbers */
+    int *count;             /* number of lines, if the scene gives no values */
+    double *width, *colour; /* width in pixels; red, green and blue */
 } scene_file_lines;
 
 typedef struct scene_file_isosurface {
     char *field, *component;
-    int *interpolate; /* value of the enum scene_interpolation */
-    double *values;
+    int *interpolate; /* whether cell values are averaged to vertices (scene_interpolation) */
+    double *values;   /* the isovalues */
     int values_count;
-    double (*colours)[3];
+    double (*colours)[3]; /* one colour per isovalue: red, green, blue */
     int colours_count;
     scene_file_colour_by *colour_by;
     double *opacity;
     scene_file_material *material;
-    int *normals; /* value of the enum scene_normal */
-    double *difference;
+    int *normals;       /* how normals are computed (scene_normal) */
+    double *difference; /* distance between the samples of differences, in cell sizes */
     scene_file_lines *lines;
     scene_file_clip *clip;
 } scene_file_isosurface;
 
 typedef struct scene_file_volume {
     char *field, *component;
-    int *interpolate; /* value of the enum scene_interpolation */
+    int *interpolate; /* whether cell values are averaged to vertices (scene_interpolation) */
     scene_file_colour_map colours;
-    double (*opacity)[2];
+    double (*opacity)[2]; /* points of the opacity curve: position in the range, and opacity */
     int opacity_count;
-    double *unit_distance;
+    double *unit_distance; /* length to which opacities refer, in scene units */
     scene_file_clip *clip;
 } scene_file_volume;
 
 typedef struct scene_file_edges {
-    double *width, *colour; /* colour: list of 3 numbers */
+    double *width, *colour; /* width in pixels; red, green and blue */
 } scene_file_edges;
 
 typedef struct scene_file_threshold {
     char *field, *component;
-    double *from, *to;
+    double *from, *to; /* least and greatest value of the cells that are drawn */
 } scene_file_threshold;
 
 typedef struct scene_file_surface {
-    double *colour; /* list of 3 numbers */
+    double *colour; /* red, green and blue */
     scene_file_colour_by *colour_by;
     scene_file_edges *edges;
     scene_file_threshold *threshold;
@@ -155,7 +155,7 @@ typedef struct scene_file_surface {
 
 typedef struct scene_file_slice {
     char *field, *component;
-    int *interpolate; /* value of the enum scene_interpolation */
+    int *interpolate; /* whether cell values are averaged to vertices (scene_interpolation) */
     scene_file_plane *planes;
     int planes_count;
     scene_file_colour_map colours;
@@ -173,29 +173,29 @@ typedef struct scene_file_layer {
 } scene_file_layer;
 
 typedef struct scene_file_sampling {
-    int *method; /* value of the enum scene_sampling_method */
-    double *max_error;
-    double *step, *step_cells;
+    int *method;               /* samples or segments (scene_sampling_method) */
+    double *max_error;         /* bound of the error of segments in a colour channel */
+    double *step, *step_cells; /* distance between samples in scene units, or in mean cell sizes */
     bool *jitter, *reproducible;
-    int *frames;
-    double *max_seconds;
+    int *frames;         /* number of frames that are averaged */
+    double *max_seconds; /* upper bound of the estimated time for samples */
 } scene_file_sampling;
 
 typedef struct scene_file_words {
-    char *text;
-    int *at; /* value of the enum scene_anchor */
+    char *text; /* the text, with placeholders */
+    int *at;    /* edge or corner of the picture at which the text stands (scene_anchor) */
 } scene_file_words;
 
 typedef struct scene_file_colour_bar {
-    int *at; /* value of the enum scene_anchor */
-    int *ticks;
-    int *notation; /* value of the enum scene_notation */
-    int *digits;
+    int *at;       /* edge or corner of the picture at which the bars stand (scene_anchor) */
+    int *ticks;    /* largest number of ticks per bar */
+    int *notation; /* form of the numbers, with or without exponents (scene_notation) */
+    int *digits;   /* number of digits after the decimal point */
 } scene_file_colour_bar;
 
 typedef struct scene_file_scale_bar {
-    char *unit;
-    int *at; /* value of the enum scene_anchor */
+    char *unit; /* unit of length, for the label */
+    int *at;    /* corner of the picture at which the bar stands (scene_anchor) */
 } scene_file_scale_bar;
 
 typedef struct scene_file_decorations {
@@ -203,11 +203,11 @@ typedef struct scene_file_decorations {
     scene_file_words *text;
     int text_count;
     scene_file_colour_bar *colour_bar;
-    int *outline; /* value of the enum scene_boxes */
+    int *outline; /* boxes that are outlined (scene_boxes) */
     bool *rulers, *axes;
     scene_file_scale_bar *scale_bar;
-    double *colour; /* list of 3 numbers */
-    double *size;
+    double *colour; /* colour of text and lines: red, green and blue */
+    double *size;   /* height of text, as a fraction of the picture's height */
 } scene_file_decorations;
 
 /* The keys of a sweep, except `fields`, which is read from the document. */
@@ -217,25 +217,25 @@ typedef struct scene_file_sweep {
 
 typedef struct scene_file_output {
     char *path, *cinema;
-    int *grid; /* list of 2 numbers */
-    int *bits;
+    int *grid; /* numbers of columns and rows of a montage */
+    int *bits; /* bits per channel of a PNG file: 8 or 16 */
     bool *decorations, *data, *deep;
 } scene_file_output;
 
 typedef struct scene_file_condition {
     char *field, *component;
-    int *of; /* value of the enum scene_statistic */
-    double *above, *below;
+    int *of;               /* statistic of the field that is compared (scene_statistic) */
+    double *above, *below; /* bounds between which the statistic must lie */
 } scene_file_condition;
 
 typedef struct scene_file_histogram {
-    int *bins;
-    double *range; /* list of 2 numbers */
+    int *bins;     /* number of bins */
+    double *range; /* lower end of the first bin and upper end of the last one */
 } scene_file_histogram;
 
 typedef struct scene_file_statistics {
     char *field, *component, *path;
-    int *every;
+    int *every; /* cycles that are multiples of this are written */
     scene_file_histogram *histogram;
 } scene_file_statistics;
 
@@ -246,15 +246,15 @@ typedef struct scene_file_derived {
 
 typedef struct scene_file_image {
     char *name;
-    int *size; /* list of 2 numbers */
-    int *every;
-    double *every_time;
+    int *size;          /* width and height of the picture in pixels */
+    int *every;         /* the image is drawn at cycles that are multiples of this */
+    double *every_time; /* interval of simulated time at which the image is drawn */
     scene_file_condition *when;
     bool *once;
-    int *antialias;
+    int *antialias; /* number of positions in a pixel that frames use in turn */
     scene_file_camera *camera;
     scene_file_sweep *sweep;
-    double *background; /* list of 3 or 4 numbers */
+    double *background; /* red, green, blue and, if background_count is 4, opacity */
     int background_count;
     scene_file_light *lights;
     int lights_count;
@@ -270,10 +270,10 @@ typedef struct scene_file_image {
 } scene_file_image;
 
 typedef struct scene_file {
-    int *threads;
-    int *tree;     /* value of the enum scene_tree */
-    int *schedule; /* value of the enum scene_schedule */
-    int *writing;  /* value of the enum scene_writing */
+    int *threads;  /* number of threads per rank */
+    int *tree;     /* whether trees are built over all cells or over candidates alone (scene_tree) */
+    int *schedule; /* schedule of compositing (scene_schedule) */
+    int *writing;  /* when pictures are written: during the step or behind it (scene_writing) */
     scene_file_image *images;
     int images_count;
     scene_file_statistics *statistics;
