@@ -24,59 +24,59 @@ typedef struct session_catalogue_field {
 typedef struct session_hanging_vertex {
     int64_t group;      /* the group of equal vertices to which it belongs (session_hanging.h) */
     int64_t corners[4]; /* indices of groups, or of the values received from other ranks */
-    double weights[4];
-    bool is_received;
+    double weights[4];  /* weight of the value at each corner; they sum to 1 */
+    bool is_received;   /* set if the corners are values received from other ranks, not groups of this rank */
 } session_hanging_vertex;
 
 /* A vertex that is equal to others up to rounding, and the least position among these vertices. */
 typedef struct session_twin {
-    int64_t vertex;
-    double position[3];
+    int64_t vertex;     /* number of the vertex among those of the part */
+    double position[3]; /* least position of the vertices that are equal to it */
 } session_twin;
 
 /* The outer faces of one of this rank's parts of a mesh, on which vertices may hang, and the vertices that may hang;
  * kept while vertices move. */
 typedef struct session_border {
-    uint64_t cells_hash; /* value of session_catalogue_mesh.cells_hash for which the border was computed; 0: not
-                            computed yet */
+    /* value of session_catalogue_mesh.cells_hash for which the border was computed; 0: not computed yet */
+    uint64_t cells_hash;
     int64_t face_count, vertex_count;
     session_face *faces; /* faces that belong to only one cell, counted over all ranks */
     int64_t *vertices;   /* vertices of the faces that only one cell of this rank has */
-    int64_t
-        twin_count; /* number of twins; the twins are updated if vertices move (see session_hanging.twins_version) */
+    int64_t twin_count;  /* number of twins, which are updated if vertices move (session_hanging.twins_version) */
     session_twin *twins; /* sorted by vertex */
 } session_border;
 
 /* This rank's hanging vertices in the meshes of a joint, and the values that it sends to other ranks for their hanging
  * vertices. */
 typedef struct session_hanging {
-    uint64_t
-        positions_hash; /* value of session_joint.positions_hash for which these were computed; 0: not computed yet */
+    /* value of session_joint.positions_hash for which these were computed; 0: not computed yet */
+    uint64_t positions_hash;
     int border_count;
     session_border *borders; /* one border per part; NULL: not computed yet */
     uint64_t twins_version;  /* version of the vertex coordinates for which the twins of the borders were found */
     int64_t count, total;    /* numbers of hanging vertices on this rank and on all ranks */
-    session_hanging_vertex *vertices;
+    session_hanging_vertex *vertices; /* the hanging vertices; `count` entries */
     /* number of values sent to each rank, and the groups of these values, sorted by rank */
     int64_t *sent_counts, *sent_groups;
-    int64_t sent_total;
+    int64_t sent_total; /* number of values sent to all ranks together */
 } session_hanging;
 
 /* Groups of equal vertices of a joint's meshes on this rank (plan/session_vertex_groups.h). They are kept while the
  * meshes stay as they are. */
 typedef struct session_vertex_groups {
-    uint64_t
-        positions_hash; /* value of session_joint.positions_hash for which these were computed; 0: not computed yet */
+    /* value of session_joint.positions_hash for which these were computed; 0: not computed yet */
+    uint64_t positions_hash;
     int64_t *first_vertices;  /* number of each part's first vertex, and at the end the total number of vertices */
     int64_t *group_of_vertex; /* group of each vertex; -1: it belongs to no drawn cell */
-    int64_t count;
-    int64_t *corner_starts; /* count + 1 entries: the number of corners of drawn cells in all groups before this one */
+    int64_t count;            /* number of groups */
+    /* for each group, the number of corners of drawn cells in all groups before it; count + 1 entries */
+    int64_t *corner_starts;
     session_key_table keys; /* keys of the groups; empty unless a mesh has patches, whose vertices are found by key */
     /* Groups that lie in the boxes of other ranks, sorted by their home; there are none if there is only one rank. */
-    int64_t shared_count;
-    int64_t *shared_groups;
-    session_key *shared_keys;
-    int64_t *shared_counts; /* for each rank, the number of these groups whose home it is */
+    int64_t shared_count;     /* number of these groups */
+    int64_t *shared_groups;   /* index of each of these groups */
+    session_key *shared_keys; /* key by which each of these groups is found on its home rank */
+    int64_t *shared_counts;   /* for each rank, the number of these groups whose home it is */
 } session_vertex_groups;
 
 typedef struct session_catalogue_mesh {
@@ -92,33 +92,33 @@ typedef struct session_catalogue_mesh {
     session_catalogue_field *fields;
     /* name of a joint that contains only this mesh (session_joint.name) if the mesh has vertex ids; otherwise 0 */
     uint64_t single_joint_name;
-    uint64_t cells_hash,
-        positions_hash; /* hashes, over all ranks, of the stamps of cells and of coordinates; 0: not computed yet */
-    /* this rank's data about the parts on all ranks; valid if computed for the current value of places */
+    /* hashes, over all ranks, of the stamps of cells and of coordinates; 0: not computed yet */
+    uint64_t cells_hash, positions_hash;
+    /* this rank's data about the parts on all ranks; valid if computed for the current positions_hash */
     session_homes homes;
 } session_catalogue_mesh;
 
 /* A set of meshes over which equal vertices have one mean of cell values: the meshes that have a layer's field, and no
  * vertex ids. A mesh with ids is a joint by itself. */
 typedef struct session_joint {
-    uint64_t name; /* value of scene_field.joint_name or session_catalogue_mesh.single_joint_name */
-    int count;
-    session_catalogue_mesh **meshes; /* sorted by name */
+    uint64_t name;                   /* value of scene_field.joint_name or session_catalogue_mesh.single_joint_name */
+    int count;                       /* number of meshes */
+    session_catalogue_mesh **meshes; /* the meshes of the joint, sorted by name; owned by the catalogue */
     /* set if the joint is a single mesh with global vertex ids: vertices are equal if their ids are */
     bool by_id;
-    uint64_t positions_hash; /* hash of the vertex positions of all its meshes */
-    session_homes own_homes; /* homes of a joint of several meshes; unused if it has one mesh */
-    const session_homes *homes;
+    uint64_t positions_hash;    /* hash of the vertex positions of all its meshes */
+    session_homes own_homes;    /* homes of a joint of several meshes; unused if it has one mesh */
+    const session_homes *homes; /* own_homes, or the homes of the single mesh */
     session_vertex_groups groups;
     session_hanging hanging;
 } session_joint;
 
 typedef struct session_catalogue {
-    bool is_known;         /* set if the joint already existed in an earlier step */
+    bool is_known;         /* set if the catalogue has been computed since the session began */
     bool has_faults;       /* set if some mesh or field has an error */
     bool are_derived;      /* set if the catalogue contains the derived fields of the current scene */
     bool are_joined;       /* set if the joints are those of the current scene */
-    bool are_hashes_known; /* set if the meshes' hashes of cells and places are up to date */
+    bool are_hashes_known; /* set if the meshes' hashes of cells and positions are up to date */
     base_error *fault;     /* error whose mesh is unknown; no image can be drawn */
     int mesh_count, joint_count;
     session_catalogue_mesh *meshes;
@@ -153,8 +153,8 @@ void session_hanging_free(session_hanging *hanging, bool with_borders);
 
 /* This rank's parts of the meshes of a joint, sorted by mesh. */
 typedef struct session_joint_parts {
-    int count;
-    const session_mesh **items;
+    int count;                  /* number of this rank's parts */
+    const session_mesh **items; /* the parts, owned by session_meshes */
     int *first_parts; /* index of the first part of each of the joint's meshes; one entry more than it has meshes */
 } session_joint_parts;
 

@@ -7,9 +7,9 @@
 #include <string.h>
 
 typedef struct cell_frame {
-    double mean[3]; /* mean of the vertices, each weighted by the number of its faces */
-    double least_vertex[3];
-    double box_volume; /* volume of the bounding box */
+    double mean[3];         /* mean of the vertices, each weighted by the number of its faces */
+    double least_vertex[3]; /* position of the first vertex in the order of coordinates */
+    double box_volume;      /* volume of the bounding box */
 } cell_frame;
 
 static bool comes_before(const double a[3], const double b[3])

@@ -9,11 +9,11 @@
 /* Global bounds of the drawn cells, and quantities derived from them. */
 typedef struct session_extent {
     double lower[3], upper[3]; /* bounds of the drawn cells; both 0 if there are no cells */
-    double half_diagonal;
-    int64_t cell_count;  /* number of drawn cells */
-    int64_t solid_count; /* cells that have a volume */
-    double cell_size;    /* mean cube root of the volumes of solid cells; 0 if there are none */
-    int rank_count;      /* number of ranks that have drawn cells */
+    double half_diagonal;      /* half the diagonal of the bounds */
+    int64_t cell_count;        /* number of drawn cells */
+    int64_t solid_count;       /* cells that have a volume */
+    double cell_size;          /* mean cube root of the volumes of solid cells; 0 if there are none */
+    int rank_count;            /* number of ranks that have drawn cells */
 } session_extent;
 
 /* Returns the axis along which the data is flat, or the last one if there are several. Returns -1 if the data is not
@@ -26,7 +26,7 @@ typedef struct session_space {
     bool has_extent, has_origin; /* set if the extent or the origin was computed in an earlier step */
     session_extent extent;
     double lower[3], upper[3]; /* bounds for which the origin and the scale were chosen */
-    double origin[3], scale;
+    double origin[3], scale;   /* the renderer's coordinates are (position - origin) * scale */
 } session_space;
 
 /* Computes the global bounds of checked meshes, then the origin and the scale. If these are new, all trees are dropped.

@@ -22,12 +22,13 @@ typedef struct split_work {
     int64_t nodes_per_cell, row_stride; /* without offsets: nodes per cell, and distance in entries from cell to cell */
     int pattern_count;
     session_pattern patterns[MOST_PATTERNS];
-    bool is_of_type[LINEAR_TYPES];         /* set for the types that pieces have */
-    int only_type;                         /* the type of all pieces; 0 if they differ */
-    int64_t *first_pieces, *first_entries; /* the first piece and entry of each cell, and the ends; entries is NULL if
-                                              pieces have one type */
-    bool gives_entries; /* set if entries of the caller's connectivity are stored instead of vertices */
-    grid_array piece_entries;
+    bool is_of_type[LINEAR_TYPES]; /* set for the types that pieces have */
+    int only_type;                 /* the type of all pieces; 0 if they differ */
+    /* index of the first piece and of its first entry, for each cell, and the totals; first_entries is NULL if pieces
+     * have one type */
+    int64_t *first_pieces, *first_entries;
+    bool gives_entries;       /* set if entries of the caller's connectivity are stored instead of vertices */
+    grid_array piece_entries; /* connectivity of the pieces */
 } split_work;
 
 /* ---- the caller's cells ---------------------------------------------------------------------------------------- */

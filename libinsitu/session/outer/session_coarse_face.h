@@ -12,7 +12,8 @@ typedef struct session_coarse_face {
     double corner_positions[4][3];
     double normal[3]; /* unit vector that points away from the cell */
     session_box box;
-    double area, width;
+    double area,
+        width; /* area of the face, and length of its longest diagonal; of a triangle, the longer of two edges */
 } session_coarse_face;
 
 enum { SESSION_FACE_WORDS = 13 };

@@ -132,7 +132,7 @@ typedef struct outer_work {
     const grid *cells;
     session_outer *out;
     int64_t *vertex_map; /* for each vertex of the whole mesh, its index among the new vertices; -1: it has none yet */
-    float *heights;
+    float *heights;      /* for each new vertex, -1 if it is an apex, 0 if it lies on a face */
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
     face_polygon polygon; /* buffer with space for the largest polygon */
     int64_t loop_end;     /* number of entries stored in the polygons' loops */

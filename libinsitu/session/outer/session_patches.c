@@ -20,10 +20,10 @@ typedef struct patch_faces {
     const session_mesh *mesh;
     const session_field *field;
     const session_vertex_numbers *numbers;
-    int64_t count;         /* number of faces of all patches */
-    int64_t *first_groups; /* index of each face's first group, count + 1 entries */
-    int64_t *groups;       /* groups of the faces' vertices; -1: the vertex belongs to no drawn cell */
-    unsigned char *is_drawn;
+    int64_t count;           /* number of faces of all patches */
+    int64_t *first_groups;   /* index of each face's first group, count + 1 entries */
+    int64_t *groups;         /* groups of the faces' vertices; -1: the vertex belongs to no drawn cell */
+    unsigned char *is_drawn; /* for each face, set if a drawn cell has it */
 } patch_faces;
 
 /* The vertices around a face. */
