@@ -10,17 +10,19 @@ typedef struct session_changes {
     int64_t cycle, lowest_cycle;
     double time;     /* rank 0's time */
     int failed_rank; /* lowest rank with an error of a set call; -1: there is none */
+    /* set if, on some rank, the scene file was edited, or cells or coordinates have changed, or names of meshes and
+     * fields have */
     bool is_scene_changed, are_cells_changed, are_names_changed;
-    bool are_levels_changed; /* set if blocks with levels of refinement have changed on some rank */
-    bool are_names_shared;   /* set if all ranks have the same tables of names */
-    bool are_threads_lacking;
-    bool are_unwritten; /* set if pictures of earlier steps could not be written */
-    bool is_filled;     /* set if some field has a fill function, which may call MPI */
-    bool writes_behind; /* set if this step's pictures are written after the step is over */
-    int isa_level;      /* lowest of the ranks' instruction sets (render_isa.h) */
-    int isa_rank;       /* lowest rank with that instruction set */
-    int isa_best;       /* highest of the ranks' instruction sets */
-    int telling_rank;   /* lowest rank that has warnings for all ranks; -1: there is none */
+    bool are_levels_changed;  /* set if blocks with levels of refinement have changed on some rank */
+    bool are_names_shared;    /* set if all ranks have the same tables of names */
+    bool are_threads_lacking; /* set if some rank must start more threads than it has */
+    bool are_unwritten;       /* set if pictures of earlier steps could not be written */
+    bool is_filled;           /* set if some field has a fill function, which may call MPI */
+    bool writes_behind;       /* set if this step's pictures are written after the step is over */
+    int isa_level;            /* lowest of the ranks' instruction sets (render_isa.h) */
+    int isa_rank;             /* lowest rank with that instruction set */
+    int isa_best;             /* highest of the ranks' instruction sets */
+    int telling_rank;         /* lowest rank that has warnings for all ranks; -1: there is none */
 } session_changes;
 
 /* Determines what has changed on any rank, by one small reduction. Collective. */

@@ -20,11 +20,11 @@ typedef struct session_text {
 } session_text;
 
 typedef struct session_report {
-    insitu_report public_report; /* its texts are set only at the end of a step */
-    session_text copied_why, left_out, warnings;
-    session_text
-        own_warnings; /* this rank's own warnings, until session_share_lines() sends those of one rank to all */
-    int reported_count;
+    insitu_report public_report;                 /* its texts are set only at the end of a step */
+    session_text copied_why, left_out, warnings; /* texts of the members of insitu_report with these names */
+    /* warnings of this rank alone, until session_share_lines() sends those of one rank to all ranks */
+    session_text own_warnings;
+    int reported_count; /* number of warnings in `reported` */
     uint64_t *reported; /* hashes of warnings that have been reported and whose condition still holds */
     /* result of session_unusable_key() when its warnings were last reported; 0: there were none */
     uint64_t unusable_key;
@@ -79,7 +79,7 @@ typedef enum session_warning_kind {
 typedef struct session_warning {
     session_warning_kind kind;
     const char *image, *mesh; /* NULL: the warning does not refer to an image, or to a mesh */
-    int number;
+    int number; /* distinguishes warnings of the same kind, image and mesh, such as those of several isovalues */
 } session_warning;
 
 /* Adds the warning if its condition holds and it has not been reported yet. session_warn() is for conditions that are

@@ -110,7 +110,7 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
 
 /* ---- logarithmic --------------------------------------------------------------------------------------------- */
 
-/* The numbers that get a tick: 1, or 1, 2 and 5, multiplied by every n-th power of ten, where n is `every`. */
+/* The numbers that get a tick: 1, or 1, 2 and 5, multiplied by every n-th power of ten, where n is `step`. */
 typedef struct decade_choice {
     bool has_2_and_5;
     int step;

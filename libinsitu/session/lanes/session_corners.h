@@ -6,12 +6,12 @@
 #include "grid.h"
 
 /* The corners of a type of cell, each with its three neighbours in right-handed order. The cell's volume is the sum,
- * over the corners, of six times the volume of the tet that a corner forms with its neighbours, divided by `shares`. It
- * is exact if opposite edges are parallel, and otherwise a mean. */
+ * over the corners, of six times the volume of the tet that a corner forms with its neighbours, divided by
+ * volume_factor. It is exact if opposite edges are parallel, and otherwise a mean. */
 typedef struct cell_corners {
     const signed char (*corners)[4];
-    int count;
-    double volume_factor; /* the sum for a cell of volume 1 */
+    int count;            /* number of corners */
+    double volume_factor; /* value of the sum for a cell of volume 1 */
 } cell_corners;
 
 /* Constants of the first approximation of the cube root. It is a third of the upper bits of the double plus an offset,

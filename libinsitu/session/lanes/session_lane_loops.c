@@ -21,13 +21,13 @@ enum {
 /* Addresses and strides of the mesh's arrays, which are constant during a run. */
 typedef struct lane_source {
     const char *connectivity, *ghosts;
-    uintptr_t
-        axis_data[3]; /* address of the coordinate with index 0; if indices begin with 1, it is outside of the array */
+    /* for each axis, the address of the coordinate with index 0; if indices begin with 1, it is outside of the array */
+    uintptr_t axis_data[3];
     int64_t connectivity_stride, ghosts_stride, stride;
     int64_t least_index, greatest_index; /* smallest and largest valid index */
     int type, count;                     /* type of the cells, and their number of vertices */
-    int ghosts_bytes;
-    bool wide_index, wide_number;
+    int ghosts_bytes;                    /* size of a ghost flag in bytes */
+    bool wide_index, wide_number;        /* set if indices, or coordinates, have 8 bytes instead of 4 */
 } lane_source;
 
 /* Positions of the vertices of LANE_WIDTH cells. They are in `narrow` if coordinates are float, and in `wide` if they
@@ -46,8 +46,8 @@ typedef struct lane_bounds {
 /* Sums of the sizes of a block's cells. */
 typedef struct lane_sizes {
     doubles sums[PARTS];
-    doubles least;
-    words inverted;
+    doubles least;  /* smallest absolute volume, times the volume factor of the type */
+    words inverted; /* minus the number of cells with a negative volume */
 } lane_sizes;
 
 LANE_INLINE lane_bounds bounds_empty(void)

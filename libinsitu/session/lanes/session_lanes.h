@@ -13,17 +13,17 @@ enum { LANES = 8 };
 
 /* A run of consecutive cells whose vertices are contiguous in the connectivity. */
 typedef struct lane_cells {
-    const grid *g; /* the grid; its coordinates are all floats or all doubles, with one stride */
-    int type;      /* type of the cells: tet, hex, wedge or pyramid */
-    int64_t first, count;
-    int64_t first_entry; /* index of the first cell's first entry in the connectivity */
+    const grid *g;        /* the grid; its coordinates are all floats or all doubles, with one stride */
+    int type;             /* type of the cells: tet, hex, wedge or pyramid */
+    int64_t first, count; /* index of the first cell, and number of cells */
+    int64_t first_entry;  /* index of the first cell's first entry in the connectivity */
 } lane_cells;
 
 typedef struct lane_sums {
-    double lower[3], upper[3];
-    double least; /* least absolute volume */
-    double sizes; /* sum of the cube roots of the volumes */
-    int64_t inverted;
+    double lower[3], upper[3]; /* bounds of the vertices */
+    double least;              /* least absolute volume */
+    double sizes;              /* sum of the cube roots of the volumes */
+    int64_t inverted;          /* number of cells with a negative volume */
 } lane_sums;
 
 /* Adds the first cells of the run to the sums; their number, which is returned, is a multiple of eight. *alone is set

@@ -28,7 +28,7 @@ typedef struct differing {
     const render_job *job;
     render_waiting_list *list;
     int rank, ranks;
-    int64_t round_hits, rounds;
+    int64_t round_hits, rounds; /* number of hits per round, and number of rounds on all ranks */
     /* Ranks that may have samples for any of this rank's hits, and their boxes. */
     int near_count;
     int *near_ranks;
@@ -36,8 +36,7 @@ typedef struct differing {
     /* The hits of the current round and their samples. */
     int64_t first, count;
     render_samples_about *samples;
-    int64_t
-        *requested_hits; /* the hits for which samples are requested, in the order in which they are in the message */
+    int64_t *requested_hits; /* hits for which samples are requested, in the order of the message */
 } differing;
 
 /* ---- data shared by all ranks -------------------------------------------------------------------------------- */

@@ -138,8 +138,8 @@ static insitu_status update_turn_pixels(const session_frame_target *t, int64_t f
  * are neighbours. Consecutive squares are far apart (their numbers are multiples of the golden ratio of the number of
  * squares), so that each turn contains a similar fraction of dense regions. */
 typedef struct turn_order {
-    int width, height, squares_per_row;
-    int64_t squares, stride;
+    int width, height, squares_per_row; /* size of the picture in pixels, and number of squares in a row of squares */
+    int64_t squares, stride;            /* number of squares, and step from one square to the next in the order */
 } turn_order;
 
 enum { SQUARE = 16 };

@@ -11,8 +11,8 @@
 #include "scene.h"
 
 typedef struct session_montage {
-    float *rgba; /* the whole picture, with the size set in the scene; NULL: no cell of this step has been drawn yet */
-    char *path;
+    float *rgba; /* the whole picture, with the size set in the scene; NULL: no panel of this step has been drawn yet */
+    char *path;  /* path of the file for this step */
 } session_montage;
 
 /* The montages on rank 0. The writing thread owns them while pictures are in its queue. */

@@ -29,7 +29,7 @@ typedef struct session_writer {
     bool is_running, is_refused;        /* set if a thread was started, or if a thread could not be started */
     bool is_ending, is_loaded;          /* set if the thread must end, or if loading the image library was tried */
     struct session_files *first, *last; /* the queue; the thread is writing its first element */
-    struct session_files *finished, *last_finished;
+    struct session_files *finished, *last_finished;     /* list of written files, which the caller's thread collects */
     int64_t written_count;                              /* number of pictures written; used by the thread only */
     int queued_count;                                   /* number of pictures in the queue */
     int64_t queued_bytes;                               /* size of all data in the queue */

@@ -76,15 +76,15 @@ static uint64_t known_bits_mask(int pass)
 enum { MOST_KEPT = 4096, FIRST_KEPT = 2 };
 
 typedef struct kept_values {
-    int count; /* number of values; MOST_KEPT + 1: there are more */
-    uint64_t orders[MOST_KEPT];
+    int count;                  /* number of values; MOST_KEPT + 1: there are more */
+    uint64_t orders[MOST_KEPT]; /* the values, mapped to integers in the same order (order_from_value()) */
 } kept_values;
 
 typedef struct digit_count {
     uint64_t known_bits[2]; /* known leading bits of the low and the high percentile; the other bits are 0 */
-    int pass;
-    bool is_positive;
-    bool is_kept; /* whether the stored values are read instead of cells */
+    int pass;               /* number of the current pass, from 0; each pass determines one more digit */
+    bool is_positive;       /* set if only positive values count */
+    bool is_kept;           /* set if the stored values are read instead of cells */
     kept_values kept;
 } digit_count;
 

@@ -21,16 +21,16 @@ void session_mail_free(session_mail *mail)
  * joins a non-blocking reduction; when that is complete, all messages have been received. */
 typedef struct letter {
     struct letter *next;
-    int source_rank;
-    int64_t count;
+    int source_rank; /* rank that sent the message */
+    int64_t count;   /* number of words */
     uint64_t words[];
 } letter;
 
 typedef struct delivery {
     MPI_Comm comm;
     int tag, rank, ranks;
-    int send_count;
-    MPI_Request *sends;
+    int send_count;     /* number of messages that this rank sends */
+    MPI_Request *sends; /* one request per message */
     letter *messages;
 } delivery;
 

@@ -12,8 +12,8 @@
 /* 8-byte words that are sent to or received from each rank, in the order of ranks. */
 typedef struct session_mail {
     int64_t *counts; /* number of words for each rank */
-    uint64_t *words;
-    int64_t total;
+    uint64_t *words; /* the words for all ranks, in the order of ranks */
+    int64_t total;   /* number of words for all ranks */
 } session_mail;
 
 void session_mail_free(session_mail *mail);

@@ -23,10 +23,10 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
 }
 
 typedef struct indexed_values {
-    const session_mesh *mesh; /* a torn one, if the places are its corners, and values are at vertices */
-    const uint32_t *parents;  /* NULL, or the cells that the places are pieces of */
-    grid_array index;         /* no index: places have the tuples of their numbers */
-    grid_field values;
+    const session_mesh *mesh;        /* a torn mesh if values at vertices are read for each corner; else NULL */
+    const uint32_t *parents;         /* for each position that is a piece of a split cell, the cell; else NULL */
+    grid_array index;                /* tuple of each position; without data, position i has tuple i */
+    grid_field values;               /* the caller's tuples */
     int64_t row_length, used_length; /* number of positions in a row, and how many of them are read */
     int64_t count, position_count;   /* number of tuples, and number of positions that have a tuple */
     bool keeps_type; /* set if values are copied in their own type; otherwise they are converted to double */

@@ -56,7 +56,7 @@ enum { SCENE_MAX_DERIVED = 64 };
 /* A field that the session derives from other fields. */
 typedef struct scene_derived {
     char *name;
-    int line;
+    int line; /* line in the scene file, for messages */
     scene_derivation kind;
     /* key that gives the kind in the scene file, for messages; "" for an expression without a key */
     const char *key;
@@ -94,8 +94,8 @@ typedef enum scene_scale { SCENE_LINEAR, SCENE_LOG, SCENE_SYMLOG } scene_scale;
 
 /* A colour map converts a value into a colour, for all kinds of layers. The position of a value is (s(value) - s(low))
  * / (s(high) - s(low)), where s is the scale and [low, high] the range. Positions below 0 and above 1 have the colours
- * of 0 and 1, or the colours in `outside`. The colour of a position is interpolated linearly between entries of the
- * table; with bands it is the colour of entry floor(position × count). */
+ * of 0 and 1, or the colours in outside_colours. The colour of a position is interpolated linearly between entries of
+ * the table; with bands it is the colour of entry floor(position × count). */
 typedef struct scene_colour_map {
     char *name; /* name of a built-in map, or path of a file with a map; "" for a list of colours */
     int count;  /* number of colours: at least 2, or at least 1 for bands */
@@ -132,7 +132,7 @@ enum { SCENE_MAX_ATTACHMENTS = 64 };
 void scene_attachments_free(scene_attachments *attachments);
 
 typedef struct scene_opacity_point {
-    double position; /* position in the range, 0 .. 1; positions do not decrease, and two equal ones make a step */
+    double position; /* position in the range, 0 .. 1, in ascending order; two equal positions make a step */
     float opacity;   /* opacity at this position, 0 .. 1, per unit_distance */
 } scene_opacity_point;
 
@@ -285,7 +285,7 @@ typedef struct scene_orbit {
 
 /* The position of a moving camera at a time or at a cycle. */
 typedef struct scene_camera_point {
-    double at;
+    double at; /* time or cycle (scene_camera.is_by_cycle) at which the camera has this position */
     double eye[3], focal[3], up[3], angle;
 } scene_camera_point;
 
@@ -332,8 +332,8 @@ typedef enum scene_anchor {
 } scene_anchor;
 
 typedef struct scene_words {
-    char *text; /* text to draw, in which the placeholders {time}, {cycle} and {name} are replaced */
-    scene_anchor anchor;
+    char *text;          /* text to draw, in which the placeholders {time}, {cycle} and {name} are replaced */
+    scene_anchor anchor; /* edge or corner of the picture at which the text stands */
 } scene_words;
 
 /* Titles, colour bars and lines that are drawn in addition to the data. */
@@ -391,7 +391,7 @@ typedef struct scene_output {
     int folder_bytes;
     int columns, rows; /* numbers of pictures side by side in one file; 0: the picture has a file of its own */
     int montage;       /* index of the scene's montage that contains the picture; -1: none */
-    int first_panel;   /* number of the montage's cell that shows the first view */
+    int first_panel;   /* number of the panel that shows the first view */
 } scene_output;
 
 /* A file that contains several pictures side by side. */
@@ -443,7 +443,7 @@ typedef struct scene_variant {
 
 typedef struct scene_image {
     char *name; /* name of the image, the same for all its variants */
-    int line;
+    int line;   /* line of the image in the scene file, for messages */
     scene_variant variant;
     bool has_isovalue; /* set if the sweep selects the isovalue */
     double isovalue;
@@ -491,8 +491,8 @@ typedef struct scene_image {
     scene_output *outputs;
     int cycle_interval;   /* the image is drawn at cycles that are multiples of this; 1 by default */
     double time_interval; /* if > 0, the image is instead drawn whenever the time passes a multiple of this */
-    scene_condition when;
-    bool once; /* whether the image is drawn only in the first step in which it is due */
+    scene_condition when; /* condition on a statistic without which the image is not drawn */
+    bool once;            /* whether the image is drawn only in the first step in which it is due */
 } scene_image;
 
 /* Iterates over the fields that an image's layers use: for each kind of layer, first the fields that are shown, then

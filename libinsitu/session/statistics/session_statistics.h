@@ -18,9 +18,9 @@ typedef struct session_statistics_wish {
  * are not all finite are not counted. If no cell with a volume is counted, shells are, and areas are used instead of
  * volumes. */
 typedef struct session_statistics {
-    int64_t cell_count;
-    bool is_of_shells;
-    double volume; /* total volume of the cells */
+    int64_t cell_count; /* number of counted cells */
+    bool is_of_shells;  /* set if shells are counted, so that areas replace volumes */
+    double volume;      /* total volume of the cells */
     /* range of the values, for a vertex field of those at vertices; least > most: there are no values */
     double least, most;
     double mean, deviation; /* mean and standard deviation of the cells' values, weighted by volume */

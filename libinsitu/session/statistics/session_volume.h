@@ -10,9 +10,9 @@
 typedef struct volume_room {
     const int64_t *vertices; /* vertices of the last cell, each listed once */
     int vertex_count;
-    int64_t corners[GRID_MAX_CELL_VERTICES];
-    char *bytes;                 /* memory for polyhedra and polygons */
-    size_t size, requested_size; /* size of the memory and the size that was requested last, in bytes */
+    int64_t corners[GRID_MAX_CELL_VERTICES]; /* memory for the vertices of cells of a fixed size */
+    char *bytes;                             /* memory for polyhedra and polygons */
+    size_t size, requested_size;             /* size of the memory and the size that was requested last, in bytes */
     bool is_out_of_memory; /* set if the requested memory was not available, so that a volume could not be computed */
 } volume_room;
 

@@ -54,8 +54,8 @@ typedef struct camera_frame {
     double right, left, up, down;
 } camera_frame;
 
-/* Extents of the data from the centre of the bounds, for a perspective camera (near) and an orthographic one (flat),
- * and the frame into which they must fit. */
+/* Extents of the data from the centre of the bounds, for a perspective and for an orthographic
+ * camera, and the frame into which they must fit. */
 typedef struct camera_fit {
     corner_reach perspective_reach, orthographic_reach;
     camera_frame tangents, frame_fractions;
