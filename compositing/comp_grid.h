@@ -21,8 +21,8 @@ typedef struct comp_grid {
     uint32_t strips_per_row, strips; /* number of strips per row of strips, and in total */
     uint32_t shift_x, shift_y;       /* a block has 2^shift_x × 2^shift_y strips */
     uint32_t blocks_across, blocks;
-    uint64_t
-        inverse; /* 2^64 / width, rounded up; 0 for width 1. The high 64 bits of inverse * pixel are pixel / width */
+    /* 2^64 / width, rounded up; 0 for width 1. The high 64 bits of inverse * pixel are pixel / width */
+    uint64_t inverse;
     int threads;
 } comp_grid;
 

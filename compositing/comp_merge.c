@@ -91,8 +91,8 @@ static int64_t count_coincident_samples(const fragment *sorted, int64_t count)
  * their common face two positions: one of the two samples is left out. */
 typedef struct sample_pass {
     uint32_t layer;
-    int64_t
-        unmatched_begins; /* number of samples at their cell's begin that no sample at a cell's end has matched yet */
+    /* number of samples at their cell's begin that no sample at a cell's end has matched yet */
+    int64_t unmatched_begins;
     int64_t counted;
 } sample_pass;
 

@@ -46,9 +46,9 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
 
 /* The range of t within which a rank has all fragments, and the list of folded fragments. */
 typedef struct fold_part {
-    float begin, end;
-    fragment *out;
-    int64_t count;
+    float begin, end; /* range of t */
+    fragment *out;    /* the folded fragments */
+    int64_t count;    /* number of folded fragments */
 } fold_part;
 
 /* Returns the t at which a leaf begins. The result is exact, because it is a product with a power of two. */

@@ -29,8 +29,8 @@ void base_free(void *block);
 /* A block that is divided into pieces aligned to 64 bytes. If begin is NULL, the sizes of the pieces are only added
  * up. */
 typedef struct base_carving {
-    char *begin;
-    size_t used;
+    char *begin; /* begin of the block; NULL: sizes are only added up */
+    size_t used; /* number of bytes of all pieces so far */
 } base_carving;
 
 void *base_carve(base_carving *from, size_t bytes);

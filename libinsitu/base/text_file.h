@@ -9,8 +9,8 @@
 
 #include "file.h"
 
-/* Between begin and end, the calling thread writes and reads numbers in the C locale. begin returns false if memory
- * runs out; then end must not be called. */
+/* Between c_locale_enter() and c_locale_leave(), the calling thread writes and reads numbers in the C locale.
+ * c_locale_enter() returns false if memory runs out; then c_locale_leave() must not be called. */
 typedef struct c_locale {
     locale_t number_locale, previous_locale;
 } c_locale;

@@ -30,11 +30,12 @@ typedef struct wave_mesh {
     void *connectivity;   /* vertices of all cells, cell by cell */
     void *offsets;        /* first entry in connectivity of each cell, and the total; NULL if all cells have one type */
     int64_t connectivity_count;
-    int64_t
-        *face_offsets;   /* own_cells + 1 entries; NULL if uniform. The faces of a cell are in the order of its shape */
-    int32_t *neighbours; /* for each face of each own cell: the neighbour across it, or -1 at a wall */
-    int64_t face_count;  /* number of faces of own cells; a face between two of them counts twice */
-    int64_t unmatched;   /* faces of own cells without a neighbour, or with two: 0 for a conforming mesh */
+    /* index of each own cell's first face; own_cells + 1 entries; NULL if uniform. The faces of a cell are in the order
+     * of its shape */
+    int64_t *face_offsets;
+    int32_t *neighbours;          /* for each face of each own cell: the neighbour across it, or -1 at a wall */
+    int64_t face_count;           /* number of faces of own cells; a face between two of them counts twice */
+    int64_t unmatched;            /* faces of own cells without a neighbour, or with two: 0 for a conforming mesh */
     int64_t *vertex_cell_offsets; /* first entry in around of each own vertex, and the total */
     int32_t *vertex_cells;        /* cells around each vertex of an own cell, in ascending order of cell id */
     int link_count;

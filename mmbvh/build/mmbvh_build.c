@@ -23,8 +23,8 @@ enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096, LIST_CELLS = 16384 };
 /* The settings, buffers and counters of one build. */
 typedef struct build {
     bounds_source source;
-    const uint32_t
-        *selected; /* indices of the cells to use, none of which may be a ghost; NULL: all cells that are drawn */
+    /* indices of the cells to use, none of which is a ghost; NULL: all cells that are drawn */
+    const uint32_t *selected;
     int64_t candidate_count; /* length of selected, or the number of all cells including ghosts */
     mmbvh_options options;
     int threads;
