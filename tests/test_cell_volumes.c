@@ -70,7 +70,7 @@ static double volume_of(const test_mesh *mesh)
 {
     const test_layout wide = {.wide_coordinates = true, .wide_indices = true, .wide_values = true, .with_types = true};
     test_view view;
-    volume_room room = {0};
+    volume_buffer room = {0};
     test_view_create(mesh, wide, &view);
     const double volume = session_cell_volume(&view.cells, 0, &room);
     assert_false(room.is_out_of_memory);

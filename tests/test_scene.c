@@ -275,10 +275,10 @@ static void scene_view_keys_are_read(void **state)
     const scene_light *lights = s.images[0].lights;
     assert_int_equal(s.images[0].light_count, 2);
     check_vector(lights[0].direction, 0, 0, 1);
-    assert_true(lights[0].in_world);
+    assert_true(lights[0].is_in_world);
     check_colour(lights[0].colour, 0.5, 0.5 * linear(0.5), 0);
     check_vector(lights[1].direction, 0.6, 0, 0.8);
-    assert_false(lights[1].in_world);
+    assert_false(lights[1].is_in_world);
     assert_int_equal(s.images[0].shadows, 1);
     assert_int_equal(s.images[0].occlusion_samples, 24);
     assert_true(s.images[0].occlusion_radius == 0.75);
@@ -394,7 +394,7 @@ static void scene_image_defaults_hold(void **state)
     assert_int_equal(image->light_count, 2);
     for (int i = 0; i < 2; i++) {
         const double *d = image->lights[i].direction;
-        assert_false(image->lights[i].in_world);
+        assert_false(image->lights[i].is_in_world);
         assert_near(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1, 1e-15);
         assert_true(d[2] > 0); /* from the eye's side */
     }
@@ -484,8 +484,8 @@ static void statistics_and_conditions_are_read(void **state)
     assert_true(first->bin_count == 8 && first->low == -1 && first->high == 1);
     assert_true(first[1].bin_count == 32 && first[1].low > first[1].high && first[1].cycle_interval == 1);
     assert_true(first[2].bin_count == 0);
-    const scene_condition *when = &s.images[1].when;
-    assert_true(s.images[1].once && !s.images[0].once && !s.images[0].when.is_given);
+    const scene_condition *when = &s.images[1].condition;
+    assert_true(s.images[1].is_drawn_once && !s.images[0].is_drawn_once && !s.images[0].condition.is_given);
     assert_true(when->is_given && when->statistic == SCENE_MEAN && when->above == 1 && when->below == 2.5);
     assert_true(when->field.component == 2 && when->field.mesh_count == 2);
     scene_free(&s);
@@ -1299,17 +1299,17 @@ static void scene_decorations_are_read(void **state)
     scene s;
     parse_good(every_key, &s);
     const scene_decorations *d = &s.images[2].decorations;
-    assert_true(d->has_rulers && d->has_scale_bar && d->scale_at == SCENE_BOTTOM);
+    assert_true(d->has_rulers && d->has_scale_bar && d->scale_bar_anchor == SCENE_BOTTOM);
     assert_string_equal(d->scale_unit, "mm");
     assert_true(d->is_given && d->outline == SCENE_BOX_OF_DATA && d->has_axes && d->has_bars && d->has_colour);
     assert_string_equal(d->title, "{name} at {time:.2f} s");
     assert_int_equal(d->words_count, 2);
     assert_string_equal(d->words[0].text, "cycle {cycle}");
     assert_true(d->words[0].anchor == SCENE_BOTTOM_RIGHT && d->words[1].anchor == SCENE_TOP_LEFT);
-    assert_true(d->bars_at == SCENE_LEFT && d->tick_count == 4 && d->label_count == 2 && d->size == 0.04);
+    assert_true(d->bar_anchor == SCENE_LEFT && d->tick_count == 4 && d->label_count == 2 && d->size == 0.04);
     assert_string_equal(d->labels[0], "p in Pa");
     assert_true(d->unit_count == 2 && strcmp(d->units[1], "K") == 0);
-    assert_true(d->numbers.notation == SCENE_FIXED && d->numbers.has_digits && d->numbers.digits == 2);
+    assert_true(d->number_form.notation == SCENE_FIXED && d->number_form.has_digits && d->number_form.digits == 2);
     assert_true(d->colour[0] == 1 && d->colour[1] == 0 && d->colour[2] == colour_linear_from_srgb(0.5F));
     assert_true(!s.images[2].outputs[0].has_decorations && s.images[2].outputs[1].has_decorations);
     scene_free(&s);

@@ -131,7 +131,7 @@ static void decorations_keep_their_room(void **state)
         image.camera.fits_box = true;
         image.camera.is_orthographic = i % 2;
         *d = (scene_decorations){.is_given = true, .size = 0.03, .has_bars = i % 3, .has_rulers = i % 5 == 0};
-        d->bars_at = i % 3 == 1 ? SCENE_LEFT : SCENE_RIGHT;
+        d->bar_anchor = i % 3 == 1 ? SCENE_LEFT : SCENE_RIGHT;
         d->title = i % 7 ? (char *)(uintptr_t) "title" : NULL;
         if (!(extent.half_diagonal > 0) || !session_make_camera(&extent, &image, &camera)) continue;
         const double size = 0.03 * image.height, ruled = d->has_rulers ? 3 : 0;
@@ -165,7 +165,7 @@ static void a_sphere_keeps_off_decorations(void **state)
         render_camera camera;
         if (!(extent.half_diagonal > 0)) continue;
         image.camera.is_orthographic = i % 2;
-        *d = (scene_decorations){.is_given = i % 5, .size = 0.03, .has_bars = i % 3, .bars_at = SCENE_RIGHT};
+        *d = (scene_decorations){.is_given = i % 5, .size = 0.03, .has_bars = i % 3, .bar_anchor = SCENE_RIGHT};
         d->words = words, d->words_count = i % 4 ? 2 : 0;
         image.slices = slices, image.slice_count = i % 8;
         if (!session_make_camera(&extent, &image, &camera)) continue;

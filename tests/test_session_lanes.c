@@ -114,9 +114,9 @@ static void assert_sums(const lane_sums *sums, const truth *t, int64_t count)
         assert_true(sums->lower[axis] == t->lower[axis]);
         assert_true(sums->upper[axis] == t->upper[axis]);
     }
-    assert_int_equal(sums->inverted, t->inverted);
+    assert_int_equal(sums->inverted_count, t->inverted);
     if (count) assert_true(fabsl((long double)sums->least - t->least) <= (long double)rounding_share * t->box);
-    assert_true(fabsl((long double)sums->sizes - t->sizes) <= (1e-14L + (long double)count * 0x1p-53L) * t->sizes);
+    assert_true(fabsl((long double)sums->size_sum - t->sizes) <= (1e-14L + (long double)count * 0x1p-53L) * t->sizes);
 }
 
 /* ---- all types and layouts ----------------------------------------------------------------------------------- */
@@ -246,7 +246,7 @@ static void unusual_cells_are_left_alone(void **state)
                 const lane_cells before = {&view.cells, GRID_TET, 0, taken, 0};
                 const lane_sums expected = sums_of(isa, &before, &again, &none);
                 assert_int_equal(again, taken);
-                assert_true(sums.sizes == expected.sizes && sums.inverted == expected.inverted);
+                assert_true(sums.size_sum == expected.size_sum && sums.inverted_count == expected.inverted_count);
                 assert_true(sums.least == expected.least);
             }
             test_view_free(&view);
@@ -339,11 +339,12 @@ static void runs_are_cells_one_by_one(void **state)
             for (int64_t cell = 0; cell < view.cells.cell_count; cell++) tally_cell(&view.cells, cell, &each);
             assert_memory_equal(all.lower, each.lower, sizeof all.lower);
             assert_memory_equal(all.upper, each.upper, sizeof all.upper);
-            assert_int_equal(all.drawn, each.drawn);
-            assert_int_equal(all.ghosts, each.ghosts);
-            assert_int_equal(all.inverted, each.inverted);
-            assert_int_equal(all.flat, 0);
-            assert_true(fabs(all.sizes - each.sizes) <= 1e-12 * each.sizes); /* 4000 roundings, and roots' 1e-14 */
+            assert_int_equal(all.drawn_count, each.drawn_count);
+            assert_int_equal(all.ghost_count, each.ghost_count);
+            assert_int_equal(all.inverted_count, each.inverted_count);
+            assert_int_equal(all.flat_count, 0);
+            assert_true(fabs(all.size_sum - each.size_sum) <=
+                        1e-12 * each.size_sum); /* 4000 roundings, and roots' 1e-14 */
             test_view_free(&view);
         }
 }

@@ -16,7 +16,7 @@
 
 static bool fail_with_errno(file_failure *failure, int code)
 {
-    *failure = (file_failure){.is_missing = code == ENOENT, .is_memory = code == ENOMEM};
+    *failure = (file_failure){.is_missing = code == ENOENT, .is_out_of_memory = code == ENOMEM};
     snprintf(failure->reason, sizeof failure->reason, "%s", strerror(code));
     return false;
 }

@@ -13,8 +13,8 @@
 typedef struct file_failure {
     /* set if there is no such file, or if the existing one must not be used but file_replace() would replace it */
     bool is_missing;
-    bool is_memory;   /* set if memory ran out */
-    char reason[128]; /* text for messages, such as "Permission denied" */
+    bool is_out_of_memory; /* set if memory ran out */
+    char reason[128];      /* text for messages, such as "Permission denied" */
 } file_failure;
 
 typedef struct file_content {

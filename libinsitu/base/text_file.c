@@ -40,7 +40,7 @@ static bool print_to(const char *path, text_writer *write, const void *what, fil
     char *text;
     size_t size;
     if (!print(write, what, &text, &size)) {
-        *failure = (file_failure){.is_memory = true, .reason = "cannot allocate memory"};
+        *failure = (file_failure){.is_out_of_memory = true, .reason = "cannot allocate memory"};
         return false;
     }
     const bool is_put = put(path, text, size, failure);

@@ -24,7 +24,7 @@ static bool is_in_fill(const insitu_session *session, const char *call)
 const char *insitu_error(const insitu_session *session)
 {
     if (!session) return thread_error.message;
-    return session->meshes.filling.mesh ? session->meshes.filling.refused.message : session->error.message;
+    return session->meshes.filling.mesh ? session->meshes.filling.refused_error.message : session->error.message;
 }
 
 const insitu_report *insitu_last_report(const insitu_session *session)
@@ -217,7 +217,7 @@ insitu_status insitu_destroy(insitu_session **session)
     insitu_session *s = *session;
     thread_error = (base_error){0};
     if (is_in_fill(s, "insitu_destroy")) {
-        thread_error = s->meshes.filling.refused;
+        thread_error = s->meshes.filling.refused_error;
         return INSITU_ERROR_ARGUMENT;
     }
     session_writer_drain(&s->writer);

@@ -107,7 +107,7 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
                              .isa_level = (int)(-all[ISA_LOW] / more_ranks),
                              .isa_rank = (int)(-all[ISA_LOW] % more_ranks),
                              .isa_best = (int)all[ISA_HIGH],
-                             .telling_rank = session_reporting_rank((int)all[TELLING], &session->team)};
+                             .reporting_rank = session_reporting_rank((int)all[TELLING], &session->team)};
     return INSITU_OK;
 }
 

@@ -22,7 +22,7 @@ typedef struct session_changes {
     int isa_level;            /* lowest of the ranks' instruction sets (render_isa.h) */
     int isa_rank;             /* lowest rank with that instruction set */
     int isa_best;             /* highest of the ranks' instruction sets */
-    int telling_rank;         /* lowest rank that has warnings for all ranks; -1: there is none */
+    int reporting_rank;       /* lowest rank that has warnings for all ranks; -1: there is none */
 } session_changes;
 
 /* Determines what has changed on any rank, by one small reduction. Collective. */

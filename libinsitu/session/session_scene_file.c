@@ -27,8 +27,8 @@ static insitu_status read_file(const char *path, scene_file_text *text, base_err
     text->has_stamp = content.stamp.st_mode != 0;
     text->stamp = content.stamp;
     if (!is_read)
-        return base_fail(error, failure.is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_SCENE, "%s: cannot be read: %s",
-                         path, failure.reason);
+        return base_fail(error, failure.is_out_of_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_SCENE,
+                         "%s: cannot be read: %s", path, failure.reason);
     text->data = content.text;
     text->size = (int64_t)content.size;
     return INSITU_OK;

@@ -114,7 +114,7 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
             session_update_events(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now, &sound, &own);
         if (!error->status) *error = own;
     }
-    basis->let_images = session_let_images(&s->events, basis->scene);
+    basis->allowed_images = session_let_images(&s->events, basis->scene);
 }
 
 static insitu_status name_derived(insitu_session *s, base_error *error)
@@ -304,8 +304,8 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     if (session->has_stepped && session->team.rank == 0)
         session_warn_of_parameters(&session->scene_file.scene, &session->asked_parameters, &session->report);
     insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
-    if (!status && changes.telling_rank >= 0)
-        status = session_share_lines(&session->report, changes.telling_rank, &session->team, &session->error);
+    if (!status && changes.reporting_rank >= 0)
+        status = session_share_lines(&session->report, changes.reporting_rank, &session->team, &session->error);
     if (!status) {
         status = run_phases(session, &changes, &guard, &session->error);
         session_drop_pending(&session->meshes);

@@ -54,7 +54,7 @@ enum { MOST_REASONS = 24, REASON_SIZE = 512 };
 typedef struct copied_reasons {
     int count;
     int64_t bytes[MOST_REASONS];
-    char words[MOST_REASONS][REASON_SIZE];
+    char texts[MOST_REASONS][REASON_SIZE];
 } copied_reasons;
 
 __attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *reasons, int64_t bytes, const char *format,
@@ -67,10 +67,10 @@ __attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *rea
     va_start(arguments, format);
     vsnprintf(words, sizeof words, format, arguments);
     va_end(arguments);
-    while (at < reasons->count && strcmp(reasons->words[at], words) != 0) at++;
+    while (at < reasons->count && strcmp(reasons->texts[at], words) != 0) at++;
     if (at == MOST_REASONS) at--; /* further reasons are added to the last one */
     if (at == reasons->count) {
-        memcpy(reasons->words[at], words, sizeof words);
+        memcpy(reasons->texts[at], words, sizeof words);
         reasons->bytes[at] = 0;
         reasons->count++;
     }
@@ -81,7 +81,7 @@ static void report_copied(const copied_reasons *reasons, const char *mesh, sessi
 {
     for (int i = 0; i < reasons->count; i++) {
         out->public_report.bytes_copied += reasons->bytes[i];
-        session_text_add(&out->copied_why, "mesh \"%s\": %s: %lld bytes", mesh, reasons->words[i],
+        session_text_add(&out->copied_why, "mesh \"%s\": %s: %lld bytes", mesh, reasons->texts[i],
                          (long long)reasons->bytes[i]);
     }
 }
@@ -178,10 +178,10 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
     report->bytes_borrowed += mesh_bytes(&mesh->original);
     report_topology(out, copied, mesh);
     if (!mesh->is_check_stale) {
-        report->cells_ghost += mesh->given_counts.ghosts;
-        report->cells_inverted += mesh->given_counts.inverted;
-        report->cells_flat += mesh->given_counts.flat - mesh->given_counts.shells;
-        report->cells_shell += mesh->given_counts.shells;
+        report->cells_ghost += mesh->given_counts.ghost_count;
+        report->cells_inverted += mesh->given_counts.inverted_count;
+        report->cells_flat += mesh->given_counts.flat_count - mesh->given_counts.shell_count;
+        report->cells_shell += mesh->given_counts.shell_count;
     }
     if (mesh->has_tree) report->bytes_trees += mmbvh_bytes(&mesh->tree);
     for (int i = 0; i < mesh->field_count; i++) report_field(out, copied, mesh, i);

@@ -19,9 +19,9 @@ typedef struct polygon_work {
     int count;
     int step; /* 1 if that order runs in the direction of the caller's list, else -1 */
     int *order;
-    double (*places)[3];  /* positions relative to the smallest corner, scaled to a width of about 1 */
-    double (*flat)[2];    /* projection of the corners along the normal, in which the order runs counterclockwise */
-    int *next, *previous; /* doubly linked list of the corners that have not been cut off */
+    double (*positions)[3];  /* positions relative to the smallest corner, scaled to a width of about 1 */
+    double (*projection)[2]; /* projection of the corners along the normal, in which the order runs counterclockwise */
+    int *next, *previous;    /* doubly linked list of the corners that have not been cut off */
     char *is_ear;
     int (*triangles)[3];
     int triangle_count;
@@ -36,8 +36,8 @@ static polygon_work divide_work(int count, char *room, int (*triangles)[3])
 {
     const size_t n = (size_t)count;
     polygon_work w = {.count = count, .triangles = triangles};
-    w.places = (double(*)[3])(void *)room;
-    w.flat = (double(*)[2])(void *)(room + 3 * n * sizeof(double));
+    w.positions = (double(*)[3])(void *)room;
+    w.projection = (double(*)[2])(void *)(room + 3 * n * sizeof(double));
     w.order = (int *)(void *)(room + 5 * n * sizeof(double));
     w.next = w.order + n;
     w.previous = w.next + n;
@@ -90,13 +90,13 @@ static bool scale_positions(polygon_work *w, const double (*p)[3])
     int exponent;
     for (int i = 0; i < w->count; i++)
         for (int axis = 0; axis < 3; axis++) {
-            w->places[i][axis] = p[w->order[i]][axis] - p[w->order[0]][axis];
-            widest = fmax(widest, fabs(w->places[i][axis]));
+            w->positions[i][axis] = p[w->order[i]][axis] - p[w->order[0]][axis];
+            widest = fmax(widest, fabs(w->positions[i][axis]));
         }
     if (!(widest > 0)) return false;
     frexp(widest, &exponent);
     for (int i = 0; i < w->count; i++)
-        for (int axis = 0; axis < 3; axis++) w->places[i][axis] = ldexp(w->places[i][axis], -exponent);
+        for (int axis = 0; axis < 3; axis++) w->positions[i][axis] = ldexp(w->positions[i][axis], -exponent);
     return true;
 }
 
@@ -109,12 +109,12 @@ static bool is_fan(const polygon_work *w, double normal[3])
     double area[3];
     normal[0] = normal[1] = normal[2] = 0;
     for (int i = 1; i + 1 < w->count; i++) {
-        vector3_cross(w->places[i], w->places[i + 1], area);
+        vector3_cross(w->positions[i], w->positions[i + 1], area);
         for (int axis = 0; axis < 3; axis++) normal[axis] += area[axis];
     }
     const double least = -fan_slack * vector3_dot(normal, normal);
     for (int i = 1; i + 1 < w->count; i++) {
-        vector3_cross(w->places[i], w->places[i + 1], area);
+        vector3_cross(w->positions[i], w->positions[i + 1], area);
         if (vector3_dot(area, normal) < least) return false;
     }
     return true;
@@ -126,7 +126,7 @@ static bool is_concave_quad(const polygon_work *w)
     double areas[4][3], normal[3] = {0, 0, 0}, sides[4][3];
     int inward = 0;
     for (int i = 0; i < 4; i++)
-        for (int axis = 0; axis < 3; axis++) sides[i][axis] = w->places[(i + 1) & 3][axis] - w->places[i][axis];
+        for (int axis = 0; axis < 3; axis++) sides[i][axis] = w->positions[(i + 1) & 3][axis] - w->positions[i][axis];
     for (int i = 0; i < 4; i++) {
         vector3_cross(sides[(i + 3) & 3], sides[i], areas[i]);
         for (int axis = 0; axis < 3; axis++) normal[axis] += areas[i][axis] / 2;
@@ -163,21 +163,21 @@ static void project_to_plane(polygon_work *w, const double normal[3])
     for (int axis = 0; axis < 3; axis++) right[axis] /= length;
     vector3_cross(normal, right, up);
     for (int i = 0; i < w->count; i++) {
-        w->flat[i][0] = vector3_dot(w->places[i], right);
-        w->flat[i][1] = vector3_dot(w->places[i], up) / size;
+        w->projection[i][0] = vector3_dot(w->positions[i], right);
+        w->projection[i][1] = vector3_dot(w->positions[i], up) / size;
     }
 }
 
 /* Returns twice the area of a triangle, which is positive if the triangle runs counterclockwise. */
 static double triangle_area(const polygon_work *w, int a, int b, int c)
 {
-    const double *p = w->flat[a], *q = w->flat[b], *r = w->flat[c];
+    const double *p = w->projection[a], *q = w->projection[b], *r = w->projection[c];
     return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
 }
 
 static bool are_coincident(const polygon_work *w, int a, int b)
 {
-    const double *p = w->places[a], *q = w->places[b];
+    const double *p = w->positions[a], *q = w->positions[b];
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 

@@ -11,13 +11,13 @@ enum { MOST_BYTES = 1 << 28 }; /* maximum size of a table that is continued; abo
 insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
                                     const file_failure *failure, base_error *error)
 {
-    return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
+    return base_fail(error, failure->is_out_of_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
                      "cinema: %.300s/%s: cannot be %s: %s", database->path, file, what, failure->reason);
 }
 
 static insitu_status fail_memory(const scene_database *database, const char *file, const char *what, base_error *error)
 {
-    const file_failure failure = {.is_memory = true, .reason = "cannot allocate memory"};
+    const file_failure failure = {.is_out_of_memory = true, .reason = "cannot allocate memory"};
     return session_fail_database(database, file, what, &failure, error);
 }
 
@@ -43,17 +43,17 @@ static bool reserve_text(session_table *t, size_t more)
     return true;
 }
 
-/* A line that is being written. is_well is set as long as memory has sufficed for all of it. */
+/* A line that is being written. is_complete is set as long as memory has sufficed for all of it. */
 typedef struct table_line {
     session_table *table;
-    bool is_well;
+    bool is_complete;
 } table_line;
 
 static void add_bytes(table_line *line, const char *bytes, size_t count)
 {
     session_table *t = line->table;
-    line->is_well = line->is_well && reserve_text(t, count);
-    if (!line->is_well) return;
+    line->is_complete = line->is_complete && reserve_text(t, count);
+    if (!line->is_complete) return;
     memcpy(t->text + t->size, bytes, count);
     t->size += count;
 }
@@ -141,7 +141,7 @@ static insitu_status copy_earlier_lines(session_table *t, const file_content *ol
                          database->path, (int)t->size - 1, t->text);
     table_line line = {t, true};
     add_bytes(&line, old->text + t->size, old->size - t->size);
-    if (!line.is_well) return fail_memory(database, "data.csv", "read", error);
+    if (!line.is_complete) return fail_memory(database, "data.csv", "read", error);
     drop_lines_from_cycle(t, cycle);
     return INSITU_OK;
 }
@@ -154,7 +154,7 @@ static insitu_status begin_table(session_table *t, int64_t cycle, base_error *er
     char *path = session_database_file(t->database, "data.csv");
     t->size = 0;
     add_header(&line);
-    if (!path || !line.is_well) {
+    if (!path || !line.is_complete) {
         base_free(path);
         return fail_memory(t->database, "data.csv", "read", error);
     }
@@ -164,7 +164,7 @@ static insitu_status begin_table(session_table *t, int64_t cycle, base_error *er
     if (!status && old.size) status = copy_earlier_lines(t, &old, cycle, error);
     base_free(old.text);
     base_free(path);
-    t->is_begun = !status;
+    t->has_earlier_lines = !status;
     t->last_cycle = INT64_MIN;
     return status;
 }
@@ -192,9 +192,9 @@ insitu_status session_record_picture(session_cinema *cinema, const scene *scene,
     c_locale numbers;
     if (!make_tables(cinema, scene)) return fail_memory(database, "data.csv", "written", error);
     session_table *t = &cinema->tables[output->database];
-    insitu_status status = t->is_begun ? INSITU_OK : begin_table(t, cinema->first_cycle, error);
+    insitu_status status = t->has_earlier_lines ? INSITU_OK : begin_table(t, cinema->first_cycle, error);
     if (status) return status;
-    if (!t->is_open && moment->cycle <= t->last_cycle) drop_lines_from_cycle(t, moment->cycle);
+    if (!t->has_step_lines && moment->cycle <= t->last_cycle) drop_lines_from_cycle(t, moment->cycle);
     char *file = scene_expand(output->path + output->folder_bytes, moment);
     if (!file || !c_locale_enter(&numbers)) {
         base_free(file);
@@ -205,11 +205,11 @@ insitu_status session_record_picture(session_cinema *cinema, const scene *scene,
     add_picture(&line, image, moment, file);
     c_locale_leave(&numbers);
     base_free(file);
-    if (!line.is_well) {
+    if (!line.is_complete) {
         t->size = before;
         return fail_memory(database, "data.csv", "written", error);
     }
-    t->is_open = t->is_changed = true;
+    t->has_step_lines = t->is_changed = true;
     t->last_cycle = moment->cycle;
     return INSITU_OK;
 }
@@ -282,7 +282,7 @@ insitu_status session_write_cinema(session_cinema *cinema, base_error *error)
     for (int i = 0; i < cinema->count; i++) {
         session_table *t = &cinema->tables[i];
         base_error own = {.status = INSITU_OK};
-        t->is_open = false;
+        t->has_step_lines = false;
         if (!t->is_changed) continue;
         insitu_status status = write_file(t, "data.csv", write_table_file, &own);
         if (!status) status = write_file(t, "data.js", write_script_file, &own);

@@ -21,11 +21,11 @@ typedef struct session_table {
     const scene_database *database; /* the database, owned by the scene */
     char *text;                     /* the lines of data.csv that are complete */
     size_t size, capacity;
-    bool is_begun;      /* set if `text` contains the earlier lines of the folder's file */
-    bool is_open;       /* set if `text` contains a line of this step */
-    bool is_changed;    /* set if the table has changed since the files were written */
-    bool has_page;      /* set if this session has written index.html */
-    int64_t last_cycle; /* cycle of the table's last line */
+    bool has_earlier_lines; /* set if `text` contains the earlier lines of the folder's file */
+    bool has_step_lines;    /* set if `text` contains a line of this step */
+    bool is_changed;        /* set if the table has changed since the files were written */
+    bool has_page;          /* set if this session has written index.html */
+    int64_t last_cycle;     /* cycle of the table's last line */
 } session_table;
 
 /* The databases' tables, on rank 0. */

@@ -38,15 +38,15 @@ void session_record_news(session_news *news, const session_report *report, const
 
 /* ---- text of report.json --------------------------------------------------------------------------------------- */
 
-/* A text that is being written. is_whole is set as long as memory has sufficed for all of it. */
+/* A text that is being written. is_complete is set as long as memory has sufficed for all of it. */
 typedef struct news_text {
     session_text text;
-    bool is_whole;
+    bool is_complete;
 } news_text;
 
 static void add_bytes(news_text *out, const char *bytes, size_t count)
 {
-    out->is_whole = out->is_whole && session_text_append(&out->text, bytes, count);
+    out->is_complete = out->is_complete && session_text_append(&out->text, bytes, count);
 }
 
 __attribute__((format(printf, 2, 3))) static void add_formatted(news_text *out, const char *format, ...)
@@ -122,7 +122,7 @@ static void add_warnings(news_text *out, const session_news *news)
 
 char *session_make_news(session_news *news, const session_news_scene *source, const insitu_report *report)
 {
-    news_text out = {.is_whole = true};
+    news_text out = {.is_complete = true};
     c_locale numbers;
     if (!c_locale_enter(&numbers)) return NULL;
     add_formatted(&out, "{\"cycle\": %lld, \"time\": ", (long long)report->cycle);
@@ -132,8 +132,8 @@ char *session_make_news(session_news *news, const session_news_scene *source, co
     add_scene(&out, source);
     add_warnings(&out, news);
     c_locale_leave(&numbers);
-    if (out.is_whole) news->is_new = false;
-    if (out.is_whole) return out.text.data;
+    if (out.is_complete) news->is_new = false;
+    if (out.is_complete) return out.text.data;
     base_free(out.text.data);
     return NULL;
 }

@@ -11,7 +11,7 @@
 
 void session_guard_begin(session_guard *guard)
 {
-    fegetenv(&guard->caller);
+    fegetenv(&guard->caller_environment);
     fesetenv(FE_DFL_ENV);
     guard->is_dynamic = omp_get_dynamic();
     omp_set_dynamic(0);
@@ -20,12 +20,12 @@ void session_guard_begin(session_guard *guard)
 void session_guard_end(const session_guard *guard)
 {
     omp_set_dynamic(guard->is_dynamic);
-    fesetenv(&guard->caller);
+    fesetenv(&guard->caller_environment);
 }
 
 void session_guard_lend(const session_guard *guard)
 {
-    fesetenv(&guard->caller);
+    fesetenv(&guard->caller_environment);
 }
 
 void session_guard_return(void)

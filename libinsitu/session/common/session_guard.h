@@ -6,7 +6,7 @@
 #include <fenv.h>
 
 typedef struct session_guard {
-    fenv_t caller;
+    fenv_t caller_environment;
     int is_dynamic;
 } session_guard;
 

@@ -77,13 +77,13 @@ static void create_exit_key(void)
 static int count_living_threads(const session_threads *threads)
 {
     const bool is_same = threads->count > 0 && pthread_equal(threads->caller, pthread_self());
-    return is_same && threads->ended == atomic_load(&ended_count) ? threads->count : 1;
+    return is_same && threads->ended_count == atomic_load(&ended_count) ? threads->count : 1;
 }
 
 bool session_lacks_threads(const session_threads *threads, int asked, int cores)
 {
     return requested_threads(asked, cores) > threads->count || !pthread_equal(threads->caller, pthread_self()) ||
-           threads->ended != atomic_load(&ended_count);
+           threads->ended_count != atomic_load(&ended_count);
 }
 
 /* ---- trial --------------------------------------------------------------------------------------------------- */
@@ -174,8 +174,9 @@ static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm 
     const insitu_status status = session_agree(comm, error);
     if (lacking > 0) join_trial_threads(&t);
     const int more = t.count > SPARE_THREADS ? t.count - SPARE_THREADS : 0;
-    *threads = (session_threads){
-        .count = lacking > 0 ? living + more : living, .caller = pthread_self(), .ended = atomic_load(&ended_count)};
+    *threads = (session_threads){.count = lacking > 0 ? living + more : living,
+                                 .caller = pthread_self(),
+                                 .ended_count = atomic_load(&ended_count)};
     return status;
 }
 

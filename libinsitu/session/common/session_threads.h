@@ -21,7 +21,7 @@ enum { SESSION_WORKER_STACK = 256 << 10, SESSION_CALLER_STACK = 320 << 10 };
 typedef struct session_threads {
     int count; /* number of threads; 0: not tried yet */
     pthread_t caller;
-    int64_t ended; /* number of threads of any team that had ended when `count` was determined */
+    int64_t ended_count; /* number of threads of any team that had ended when `count` was determined */
 } session_threads;
 
 /* Returns whether this rank requests more threads than it is known to be able to start. asked is the number set in the

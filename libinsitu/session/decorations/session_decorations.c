@@ -308,9 +308,9 @@ static void add_bar(session_decorations *d, const bar_basis *basis, const scene_
     const int i = d->decorations.bar_count, most = scene->tick_count;
     if (i == SESSION_MAX_BARS) return;
     const session_scale scale = {transfer->transfer.scale, transfer->transfer.threshold, transfer->low, transfer->high,
-                                 scene->numbers};
+                                 scene->number_form};
     const int tick_count = transfer->is_constant
-                               ? session_make_constant_tick(transfer->constant, &scene->numbers, d->ticks[i])
+                               ? session_make_constant_tick(transfer->constant, &scene->number_form, d->ticks[i])
                            : map->is_banded ? session_make_band_ticks(&scale, map->count, most, d->ticks[i])
                                             : session_make_ticks(&scale, most, d->ticks[i]);
     d->fields[i] = field;
@@ -321,7 +321,7 @@ static void add_bar(session_decorations *d, const bar_basis *basis, const scene_
                                      .is_banded = map->is_banded,
                                      .below = map->has_below ? map->outside_colours[0] : NULL,
                                      .above = map->has_above ? map->outside_colours[1] : NULL,
-                                     .at = (insitu_anchor)scene->bars_at,
+                                     .at = (insitu_anchor)scene->bar_anchor,
                                      .tick_count = tick_count,
                                      .ticks = d->ticks[i]};
     if (!is_repeated_bar(d, i)) d->decorations.bar_count++;
@@ -366,7 +366,7 @@ static void fill_length_decorations(session_decorations *d, const scene_decorati
         session_box_rulers(extent->lower, extent->upper, camera, scene->size * camera->height, &d->decorations,
                            d->strokes, d->ruler_labels);
     if (scene->has_scale_bar) d->decorations.scale_bar = session_make_scale_bar(camera, middle, scene->scale_unit);
-    d->decorations.scale_bar.at = (insitu_anchor)scene->scale_at;
+    d->decorations.scale_bar.at = (insitu_anchor)scene->scale_bar_anchor;
 }
 
 static void fill_outline(session_decorations *d, const session_outline *outline, const render_camera *camera)

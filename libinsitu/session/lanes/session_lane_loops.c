@@ -46,8 +46,8 @@ typedef struct lane_bounds {
 /* Sums of the sizes of a block's cells. */
 typedef struct lane_sizes {
     doubles sums[PARTS];
-    doubles least;  /* smallest absolute volume, times the volume factor of the type */
-    words inverted; /* minus the number of cells with a negative volume */
+    doubles least;         /* smallest absolute volume, times the volume factor of the type */
+    words inverted_counts; /* minus the number of cells with a negative volume */
 } lane_sizes;
 
 LANE_INLINE lane_bounds bounds_empty(void)
@@ -276,7 +276,7 @@ LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *siz
             const doubles volume = doubles_load(volumes + i + part * LANE_WIDTH), size = doubles_magnitude(volume);
             unusual |= ~((words)(size > 1e-280) & (words)(size < 1e280));
             s.least = doubles_min(size, s.least);
-            s.inverted += (words)(volume < 0); /* the comparison results in -1 if the volume is negative */
+            s.inverted_counts += (words)(volume < 0); /* the comparison results in -1 if the volume is negative */
             s.sums[part] += cube_root(size);
         }
     }
@@ -304,15 +304,15 @@ LANE_INLINE void store_bounds(const lane_bounds *b, lane_sums *out)
 LANE_INLINE void store_sizes(const lane_sizes *s, double shares, double root_of_shares, lane_sums *out)
 {
     double sum = 0, least = (double)INFINITY;
-    out->inverted = 0;
+    out->inverted_count = 0;
     for (int part = 0; part < PARTS; part++)
         for (int lane = 0; lane < LANE_WIDTH; lane++) sum += s->sums[part][lane];
     for (int lane = 0; lane < LANE_WIDTH; lane++) {
         least = s->least[lane] < least ? s->least[lane] : least;
-        out->inverted -= s->inverted[lane];
+        out->inverted_count -= s->inverted_counts[lane];
     }
     out->least = least / shares;
-    out->sizes = sum / root_of_shares;
+    out->size_sum = sum / root_of_shares;
 }
 
 LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t *alone, const int type,

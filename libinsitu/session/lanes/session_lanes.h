@@ -22,8 +22,8 @@ typedef struct lane_cells {
 typedef struct lane_sums {
     double lower[3], upper[3]; /* bounds of the vertices */
     double least;              /* least absolute volume */
-    double sizes;              /* sum of the cube roots of the volumes */
-    int64_t inverted;          /* number of cells with a negative volume */
+    double size_sum;           /* sum of the cube roots of the volumes */
+    int64_t inverted_count;    /* number of cells with a negative volume */
 } lane_sums;
 
 /* Adds the first cells of the run to the sums; their number, which is returned, is a multiple of eight. *alone is set

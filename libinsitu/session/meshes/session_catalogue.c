@@ -316,7 +316,7 @@ static session_catalogue_field *add_field(session_catalogue_mesh *mesh, const ch
                                        .last_rank = -1,
                                        .odd_rank = -1,
                                        .lacking_rank = mesh->first_rank,
-                                       .derived = -1};
+                                       .derived_index = -1};
     if (!field->name) return NULL;
     mesh->field_count++;
     return field;
@@ -426,7 +426,7 @@ session_catalogue_field *session_catalogue_add(session_catalogue_mesh *mesh, con
     if (!field) return NULL;
     field->component_count = component_count;
     field->centring = centring;
-    field->derived = derived;
+    field->derived_index = derived;
     field->first_rank = mesh->first_rank;
     field->lacking_rank = -1;
     return field;
@@ -438,7 +438,7 @@ void session_catalogue_drop_derived(session_catalogue *catalogue)
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
         int kept = 0;
         for (int f = 0; f < mesh->field_count; f++) {
-            if (mesh->fields[f].derived < 0) {
+            if (mesh->fields[f].derived_index < 0) {
                 mesh->fields[kept++] = mesh->fields[f];
                 continue;
             }

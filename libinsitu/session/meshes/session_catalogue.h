@@ -16,7 +16,7 @@ typedef struct session_catalogue_field {
     int last_rank;     /* highest rank that has both the field and cells of the mesh; -1: there is none */
     int odd_rank;      /* a rank on which the field has another centring or number of components; -1: there is none */
     int lacking_rank;  /* a rank that has cells of the mesh but not the field; -1: there is none */
-    int derived;       /* index among the scene's derived fields; -1: the field is the caller's */
+    int derived_index; /* index among the scene's derived fields; -1: the field is the caller's */
     base_error *fault; /* error on the lowest rank on which the field has one; NULL: there is none */
 } session_catalogue_field;
 

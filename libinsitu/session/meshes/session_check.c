@@ -32,10 +32,10 @@ typedef struct face_edge {
 } face_edge;
 
 /* A buffer of one thread that grows as needed. It must be zero initially. */
-typedef struct face_room {
+typedef struct edge_buffer {
     face_edge *edges;
     int64_t capacity;
-} face_room;
+} edge_buffer;
 
 typedef enum face_fault {
     FACES_GOOD,
@@ -58,13 +58,13 @@ typedef struct face_place {
     double position[3];
 } face_place;
 
-static void free_edge_buffer(face_room *room)
+static void free_edge_buffer(edge_buffer *room)
 {
     base_free(room->edges);
-    *room = (face_room){0};
+    *room = (edge_buffer){0};
 }
 
-static bool reserve_edges(face_room *room, int64_t count)
+static bool reserve_edges(edge_buffer *room, int64_t count)
 {
     if (count <= room->capacity) return true;
     const int64_t capacity = count + count / 2 + 64;
@@ -132,7 +132,7 @@ static face_fault check_edges(face_edge *edges, int64_t count, face_place *place
     return FACES_GOOD;
 }
 
-static face_fault check_faces(const session_mesh *mesh, int64_t cell, face_room *room, face_place *place)
+static face_fault check_faces(const session_mesh *mesh, int64_t cell, edge_buffer *room, face_place *place)
 {
     const grid *g = &mesh->cells;
     int64_t first, end, edges = 0;
@@ -221,7 +221,7 @@ static cell_fault check_coordinates(const grid *g, const int64_t *vertices, int 
     return CELL_GOOD;
 }
 
-static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, face_room *room, fault_place *place)
+static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, edge_buffer *room, fault_place *place)
 {
     const grid *g = &mesh->cells;
     if (!grid_has_faces(g) || !g->offsets.data) return BAD_TYPE;
@@ -251,7 +251,7 @@ static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_pl
     return CELL_GOOD;
 }
 
-static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *room, fault_place *place)
+static cell_fault check_cell(const session_mesh *mesh, int64_t cell, edge_buffer *room, fault_place *place)
 {
     const grid *g = &mesh->cells;
     place->type = grid_cell_type(g, cell);
@@ -355,7 +355,7 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
     fault_place place = {0};
-    face_room room = {0};
+    edge_buffer room = {0};
     const cell_fault fault = check_cell(mesh, cell, &room, &place);
     free_edge_buffer(&room);
     const long long base = mesh->given.index_base, at = session_given_cell(mesh, cell), vertex = place.vertex + base;
@@ -386,7 +386,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
 }
 
 /* Checks cells of any layout one by one. */
-static int64_t check_cells_one_by_one(const session_mesh *mesh, int64_t begin, int64_t end, face_room *room,
+static int64_t check_cells_one_by_one(const session_mesh *mesh, int64_t begin, int64_t end, edge_buffer *room,
                                       mesh_tally *tally)
 {
     mesh_tally own = tally_empty();
@@ -409,7 +409,7 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
     {
         region_enter();
         mesh_tally mine = tally_empty();
-        face_room room = {0};
+        edge_buffer room = {0};
 #pragma omp for schedule(static)
         for (int64_t begin = 0; begin < count; begin += BLOCK_CELLS) {
             if (first_bad < count) continue;
@@ -470,7 +470,7 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
 static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tally, base_error *error)
 {
     const grid *g = &mesh->cells;
-    if (mesh->given.coordinates[2].data || g->lattice || tally->drawn == tally->shells) return INSITU_OK;
+    if (mesh->given.coordinates[2].data || g->lattice || tally->drawn_count == tally->shell_count) return INSITU_OK;
     int64_t cell = 0;
     while (cell + 1 < g->cell_count && (grid_is_ghost(g, cell) || grid_is_shell_type(grid_cell_type(g, cell)))) cell++;
     return base_fail(
@@ -483,7 +483,7 @@ static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tal
 static bool has_far_coordinates(const mesh_tally *tally)
 {
     bool far = false;
-    for (int axis = 0; axis < 3 && tally->drawn; axis++)
+    for (int axis = 0; axis < 3 && tally->drawn_count; axis++)
         far = far || fmax(fabs(tally->lower[axis]), fabs(tally->upper[axis])) > largest_coordinate;
     return far;
 }
@@ -529,20 +529,21 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
     insitu_status status =
         has_far_coordinates(&tally) ? describe_far_cell(mesh, error) : check_last_offset(mesh, error);
     if (!status) status = check_plane(mesh, &tally, error);
-    if (!status) status = update_flat_cells(mesh, tally.flat, threads, error);
+    if (!status) status = update_flat_cells(mesh, tally.flat_count, threads, error);
     if (status) return status;
     for (int axis = 0; axis < 3; axis++) {
         mesh->lower[axis] = tally.lower[axis];
         mesh->upper[axis] = tally.upper[axis];
     }
-    mesh->drawn_count = tally.drawn;
-    mesh->given_counts = (session_counts){tally.drawn, tally.ghosts, tally.inverted, tally.flat, tally.shells};
-    if (mesh->topology.is_split) mesh->given_counts = session_count_parents(mesh, tally.inverted > 0);
+    mesh->drawn_count = tally.drawn_count;
+    mesh->given_counts = (session_counts){tally.drawn_count, tally.ghost_count, tally.inverted_count, tally.flat_count,
+                                          tally.shell_count};
+    if (mesh->topology.is_split) mesh->given_counts = session_count_parents(mesh, tally.inverted_count > 0);
     if (mesh->cells.lattice)
-        mesh->given_counts.ghosts -= mesh->cells.cell_count - session_cell_count(mesh); /* without padding */
-    mesh->flat_count = tally.flat;
-    mesh->shell_count = tally.shells;
-    mesh->size_sum = tally.sizes;
+        mesh->given_counts.ghost_count -= mesh->cells.cell_count - session_cell_count(mesh); /* without padding */
+    mesh->flat_count = tally.flat_count;
+    mesh->shell_count = tally.shell_count;
+    mesh->size_sum = tally.size_sum;
     mesh->is_check_stale = false;
     return INSITU_OK;
 }

@@ -18,7 +18,7 @@ typedef struct conform_array {
     insitu_array *array;
     conform_role role;
     int64_t count;
-    int64_t below; /* an upper bound of valid indices, if the array contains indices */
+    int64_t index_limit; /* an upper bound of valid indices, if the array contains indices */
 } conform_array;
 
 static conform_array find_array(insitu_mesh *m, int number)
@@ -53,7 +53,7 @@ static insitu_type read_type(const conform_array *of, bool has_map, bool *is_cop
     insitu_type as = type;
     switch (of->role) {
     case OF_PLACES: as = is_float ? type : INSITU_FLOAT64; break;
-    case OF_INDICES: as = index_type(type, of->below); break;
+    case OF_INDICES: as = index_type(type, of->index_limit); break;
     case OF_TYPES: as = session_type_size(type) == 1 || has_map ? INSITU_UINT8 : index_type(type, 0); break;
     case OF_FLAGS:
         as = session_type_size(type) < 4 || !session_is_aligned(of->array) ? INSITU_UINT8 : index_type(type, 0);

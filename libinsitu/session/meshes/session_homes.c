@@ -14,7 +14,7 @@ enum { MOST_SAMPLES = 1024 };
 /* The data that each rank sends to all others. */
 typedef struct rank_part {
     session_box box;
-    int64_t first; /* first id of this rank's share of the ids */
+    int64_t first_id; /* first id of this rank's share of the ids */
     int64_t has_ids;
 } rank_part;
 
@@ -53,7 +53,7 @@ static void add_part(rank_part *part, const session_mesh *mesh, bool by_id, doub
         part->box.upper[axis] = fmax(part->box.upper[axis], mesh->upper[axis] + margin);
     }
     part->has_ids = by_id && mesh->given.vertex_count > 0;
-    if (part->has_ids) part->first = sample_quantile(mesh, team);
+    if (part->has_ids) part->first_id = sample_quantile(mesh, team);
 }
 
 static bool do_boxes_intersect(const session_box *a, const session_box *b)
@@ -86,14 +86,14 @@ static bool store_near_ranks(session_homes *homes, const rank_part *parts, int r
 }
 
 typedef struct id_share {
-    int64_t first;
+    int64_t first_id;
     int owner;
 } id_share;
 
 static int compare_shares(const void *a, const void *b)
 {
     const id_share *x = a, *y = b;
-    if (x->first != y->first) return x->first < y->first ? -1 : 1;
+    if (x->first_id != y->first_id) return x->first_id < y->first_id ? -1 : 1;
     return (x->owner > y->owner) - (x->owner < y->owner);
 }
 
@@ -104,10 +104,10 @@ static bool assign_id_ranges(session_homes *homes, const rank_part *parts, int r
     homes->owners = base_alloc((size_t)ranks * sizeof *homes->owners);
     const bool has_room = shares && homes->first_ids && homes->owners;
     for (int rank = 0; rank < ranks && has_room; rank++)
-        if (parts[rank].has_ids) shares[homes->share_count++] = (id_share){parts[rank].first, rank};
+        if (parts[rank].has_ids) shares[homes->share_count++] = (id_share){parts[rank].first_id, rank};
     if (has_room) qsort(shares, (size_t)homes->share_count, sizeof *shares, compare_shares);
     for (int i = 0; i < homes->share_count; i++) {
-        homes->first_ids[i] = shares[i].first;
+        homes->first_ids[i] = shares[i].first_id;
         homes->owners[i] = shares[i].owner;
     }
     base_free(shares);

@@ -557,7 +557,7 @@ bool session_refuse_in_fill(session_meshes *meshes, const char *call)
 {
     session_filling *filling = &meshes->filling;
     if (!filling->mesh) return false;
-    base_fail(&filling->refused, INSITU_ERROR_ARGUMENT,
+    base_fail(&filling->refused_error, INSITU_ERROR_ARGUMENT,
               "mesh \"%s\": field \"%s\": its fill called %s() of its session, which a fill must not", filling->mesh,
               filling->field, call);
     return true;

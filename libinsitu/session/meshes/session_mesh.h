@@ -152,11 +152,11 @@ typedef struct session_topology {
     int64_t polyhedron_count; /* number of polyhedra that the caller gave */
     int64_t recognised_count; /* number of these polyhedra that are read as tets, hexes, wedges or pyramids */
     /* Cells of higher order are read as linear pieces (session_split.h); the pieces of a cell are consecutive. */
-    bool is_split;         /* if not set, the next members are empty */
-    bool follows_places;   /* set if the pieces depend on the coordinates */
-    int64_t cell_count;    /* number of pieces */
-    uint32_t *parents;     /* for each piece, the caller's cell */
-    unsigned char *ghosts; /* for each piece, whether its cell is a ghost; NULL: no cell is */
+    bool is_split;               /* if not set, the next members are empty */
+    bool depends_on_coordinates; /* set if the pieces depend on the coordinates */
+    int64_t cell_count;          /* number of pieces */
+    uint32_t *parents;           /* for each piece, the caller's cell */
+    unsigned char *ghosts;       /* for each piece, whether its cell is a ghost; NULL: no cell is */
 } session_topology;
 
 /* Separate vertices for each corner of each cell, which are read in place of the vertices that cells share
@@ -166,10 +166,10 @@ typedef struct session_torn {
     bool is_torn; /* if not set, all other members are empty */
     bool is_made; /* set if the coordinates are up to date */
     /* set if cells are split into pieces: then `shared` is the caller's connectivity, whose entries are the corners */
-    bool is_of_entries;
+    bool are_corners_entries;
     int64_t corner_count;
-    grid_array shared;  /* the connectivity whose corners get separate vertices */
-    grid_array corners; /* the corner of each entry of `shared`; the permutation is its own inverse */
+    grid_array shared_connectivity; /* the connectivity whose corners get separate vertices */
+    grid_array corners;             /* the corner of each entry of `shared`; the permutation is its own inverse */
     grid_array coordinates[3];
     int64_t bytes;
 } session_torn;
@@ -211,7 +211,7 @@ typedef struct session_misfit {
 
 /* Numbers of the caller's cells by kind. Shells are cells that are drawn and flat. */
 typedef struct session_counts {
-    int64_t drawn, ghosts, inverted, flat, shells;
+    int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
 } session_counts;
 
 /* Block number of a mesh that is not given as blocks; blocks have numbers from 0 on. */
@@ -278,7 +278,7 @@ typedef struct session_mesh {
 /* The caller's fill function that is running (session_filled.h). */
 typedef struct session_filling {
     const char *mesh, *field; /* mesh and field that it fills; NULL: none is running */
-    base_error refused;       /* error of the first call of the session that the fill function made */
+    base_error refused_error; /* error of the first call of the session that the fill function made */
 } session_filling;
 
 /* All meshes of this rank. */
@@ -463,7 +463,7 @@ void session_exclude_mesh(session_meshes *meshes, session_mesh *mesh);
 void session_restore_excluded(session_meshes *meshes);
 
 /* Refuses a public call made inside a fill function, as it would change data that the step reads. Returns whether it
- * was refused; the error is stored in filling.refused, and the step fails with it. Local. */
+ * was refused; the error is stored in filling.refused_error, and the step fails with it. Local. */
 bool session_refuse_in_fill(session_meshes *meshes, const char *call);
 
 /* Returns whether cells are described by the owners of their faces. */

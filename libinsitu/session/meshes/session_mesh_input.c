@@ -365,7 +365,7 @@ static void store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_
     const bool drops_fields = changed & INSITU_CHANGED_TOPOLOGY;
     const bool had_ids = mesh->given.vertex_ids.data, had_levels = session_has_levels(&mesh->given);
     changed |= find_description_changes(mesh, given);
-    if (changed & INSITU_CHANGED_GEOMETRY && mesh->topology.follows_places) changed |= INSITU_CHANGED_TOPOLOGY;
+    if (changed & INSITU_CHANGED_GEOMETRY && mesh->topology.depends_on_coordinates) changed |= INSITU_CHANGED_TOPOLOGY;
     if (session_conform_mesh(mesh, given, changed, error)) return;
     if (drops_fields) {
         session_drop_fields(mesh);

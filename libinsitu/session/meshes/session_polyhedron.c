@@ -103,8 +103,8 @@ static int64_t least_entry(const grid *g, int64_t from, int64_t to)
 /* Sums of tet volumes over the triangles of a cell's faces. Each triangle makes one tet with the mean of the cell's
  * vertices (signed), and one with a corner of the cell's box, by which flat cells are found. */
 typedef struct volume_sums {
-    int64_t triangles;
-    double from_mean, from_corner;
+    int64_t triangle_count;
+    double volume_from_mean, volume_from_corner;
 } volume_sums;
 
 static void add_fan(const grid *g, int64_t face, const double mean[3], const double origin[3], volume_sums *sums)
@@ -115,10 +115,10 @@ static void add_fan(const grid *g, int64_t face, const double mean[3], const dou
     const int64_t least = least_entry(g, from, to), count = to - from;
     read_relative_corner(g, least, mean, corners[0]);
     read_relative_corner(g, from + (least - from + 1) % count, mean, corners[1]);
-    for (int64_t k = 2; k < count; k++, sums->triangles++) {
+    for (int64_t k = 2; k < count; k++, sums->triangle_count++) {
         read_relative_corner(g, from + (least - from + k) % count, mean, corners[2]);
-        sums->from_mean += tet_volume(corners[0], corners[1], corners[2]);
-        sums->from_corner += tet_volume_from_origin(origin, corners);
+        sums->volume_from_mean += tet_volume(corners[0], corners[1], corners[2]);
+        sums->volume_from_corner += tet_volume_from_origin(origin, corners);
         memcpy(corners[1], corners[2], sizeof corners[2]);
     }
 }
@@ -140,6 +140,6 @@ double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat)
     for (int axis = 0; axis < 3; axis++) origin[axis] = frame.least_vertex[axis] - frame.mean[axis];
     grid_cell_faces(g, cell, &first, &end);
     for (int64_t i = first; i < end; i++) add_fan(g, grid_array_index(&g->connectivity, i), frame.mean, origin, &sums);
-    *is_flat = sums.from_corner <= flat_share * (double)sums.triangles * frame.box_volume;
-    return *is_flat ? 0 : sums.from_mean;
+    *is_flat = sums.volume_from_corner <= flat_share * (double)sums.triangle_count * frame.box_volume;
+    return *is_flat ? 0 : sums.volume_from_mean;
 }

@@ -337,7 +337,8 @@ static insitu_status make_topology(split_work *w, session_mesh *mesh, int thread
     t->cell_type = w->only_type;
     t->cell_count = pieces;
     t->connectivity_count = entries;
-    for (int i = 0; i < w->pattern_count; i++) t->follows_places = t->follows_places || w->patterns[i].polygon_count;
+    for (int i = 0; i < w->pattern_count; i++)
+        t->depends_on_coordinates = t->depends_on_coordinates || w->patterns[i].polygon_count;
     if (!session_make_indices(mesh, "cells' pieces", entries, mesh->given.vertex_count, &t->connectivity, error))
         return error->status;
     if (w->first_entries && !session_make_indices(mesh, "cells' pieces", pieces, entries, &t->offsets, error))
@@ -417,11 +418,11 @@ session_counts session_count_parents(const session_mesh *mesh, bool any_inverted
             is_flat = is_flat && grid_is_flat(g, next);
             if (any_inverted) tally_cell(g, next, &of);
         }
-        out.ghosts += is_ghost;
-        out.drawn += !is_ghost;
-        out.inverted += of.inverted > 0;
-        out.flat += is_flat && !is_ghost;
-        out.shells += is_flat && !is_ghost && grid_is_shell_type(grid_cell_type(g, first));
+        out.ghost_count += is_ghost;
+        out.drawn_count += !is_ghost;
+        out.inverted_count += of.inverted_count > 0;
+        out.flat_count += is_flat && !is_ghost;
+        out.shell_count += is_flat && !is_ghost && grid_is_shell_type(grid_cell_type(g, first));
     }
     return out;
 }

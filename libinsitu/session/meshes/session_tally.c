@@ -18,12 +18,12 @@ void tally_merge(mesh_tally *sum, const mesh_tally *part)
         sum->lower[axis] = fmin(sum->lower[axis], part->lower[axis]);
         sum->upper[axis] = fmax(sum->upper[axis], part->upper[axis]);
     }
-    sum->drawn += part->drawn;
-    sum->ghosts += part->ghosts;
-    sum->shells += part->shells;
-    sum->inverted += part->inverted;
-    sum->flat += part->flat;
-    sum->sizes += part->sizes;
+    sum->drawn_count += part->drawn_count;
+    sum->ghost_count += part->ghost_count;
+    sum->shell_count += part->shell_count;
+    sum->inverted_count += part->inverted_count;
+    sum->flat_count += part->flat_count;
+    sum->size_sum += part->size_sum;
 }
 
 /* ---- volumes and sizes --------------------------------------------------------------------------------------- */
@@ -112,16 +112,16 @@ MMBVH_INLINE double cell_size(double volume)
  * it. */
 MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
 {
-    tally->drawn++;
-    tally->inverted += volume < 0;
-    tally->sizes += cell_size(fabs(volume));
+    tally->drawn_count++;
+    tally->inverted_count += volume < 0;
+    tally->size_sum += cell_size(fabs(volume));
 }
 
 MMBVH_INLINE void tally_shell(mesh_tally *tally)
 {
-    tally->drawn++;
-    tally->flat++;
-    tally->shells++;
+    tally->drawn_count++;
+    tally->flat_count++;
+    tally->shell_count++;
 }
 
 MMBVH_INLINE void tally_point(mesh_tally *tally, const double point[3])
@@ -135,7 +135,7 @@ MMBVH_INLINE void tally_point(mesh_tally *tally, const double point[3])
 void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
 {
     if (grid_is_ghost(g, cell)) {
-        tally->ghosts++;
+        tally->ghost_count++;
         return;
     }
     const int type = grid_cell_type(g, cell);
@@ -160,7 +160,7 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
         is_flat_cell = is_flat_everywhere(type, points);
     }
     tally_volume(tally, is_flat_cell ? 0 : volume);
-    tally->flat += is_flat_cell;
+    tally->flat_count += is_flat_cell;
 }
 
 /* ---- corners with different signs ---------------------------------------------------------------------------- */
@@ -207,7 +207,7 @@ bool tally_is_flat(const grid *g, int64_t cell)
 {
     mesh_tally one = tally_empty();
     tally_cell(g, cell, &one);
-    return one.flat > 0;
+    return one.flat_count > 0;
 }
 
 /* ---- runs ---------------------------------------------------------------------------------------------------- */
@@ -250,7 +250,7 @@ MMBVH_INLINE bool tally_one_cell(const session_mesh *mesh, int64_t cell, mesh_ta
     double points[GRID_MAX_CELL_VERTICES][3];
     if (!read_points(g, fetch_first(g, cell, count, shape), count, is_ghost, points, shape, wide_index, wide_number))
         return false;
-    t->ghosts += is_ghost;
+    t->ghost_count += is_ghost;
     if (is_ghost) return true;
     for (int i = 0; i < count; i++) tally_point(t, points[i]);
     if (shape == FETCH_BY_CELL && grid_is_shell_type(type)) {
@@ -323,7 +323,7 @@ static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least
     if (!run) return 0;
     lane_sums sums;
     const int64_t taken = run(alike, &sums, alone);
-    mesh_tally part = {.drawn = taken, .inverted = sums.inverted, .sizes = sums.sizes};
+    mesh_tally part = {.drawn_count = taken, .inverted_count = sums.inverted_count, .size_sum = sums.size_sum};
     memcpy(part.lower, sums.lower, sizeof part.lower);
     memcpy(part.upper, sums.upper, sizeof part.upper);
     tally_merge(t, &part);
@@ -350,8 +350,8 @@ MMBVH_INLINE bool may_be_flat(const mesh_tally *t, double least)
 
 /* The lengths of the drawn cells along one axis. */
 typedef struct axis_lengths {
-    int64_t positive, negative; /* numbers of positive and of negative lengths; all others are 0 */
-    double sizes;               /* sum of the cube roots of the lengths */
+    int64_t positive_count, negative_count; /* numbers of positive and of negative lengths; all others are 0 */
+    double size_sum;                        /* sum of the cube roots of the lengths */
     double lower, upper;
 } axis_lengths;
 
@@ -362,9 +362,9 @@ static axis_lengths measure_axis(const grid_lattice *l, int axis)
     axis_lengths out = {.lower = at[0], .upper = at[0]};
     for (int64_t n = 0; n < count && l->cells[axis]; n++) {
         const double length = at[n + 1] - at[n];
-        out.positive += length > 0;
-        out.negative += length < 0;
-        out.sizes += cbrt(fabs(length));
+        out.positive_count += length > 0;
+        out.negative_count += length < 0;
+        out.size_sum += cbrt(fabs(length));
         out.lower = fmin(out.lower, at[n + 1]);
         out.upper = fmax(out.upper, at[n + 1]);
     }
@@ -378,22 +378,22 @@ bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
     mesh_tally t = tally_empty();
     /* products over the axes of (positive + negative) and of (positive - negative) */
     int64_t sized = 1, difference = 1;
-    t.drawn = 1;
-    t.sizes = 1;
+    t.drawn_count = 1;
+    t.size_sum = 1;
     for (int axis = 0; axis < 3; axis++) {
         const axis_lengths along = measure_axis(g->lattice, axis);
-        t.drawn *= g->lattice->drawn_end[axis] - g->lattice->drawn_first[axis];
-        sized *= along.positive + along.negative;
-        difference *= along.positive - along.negative;
-        t.sizes *= along.sizes;
+        t.drawn_count *= g->lattice->drawn_end[axis] - g->lattice->drawn_first[axis];
+        sized *= along.positive_count + along.negative_count;
+        difference *= along.positive_count - along.negative_count;
+        t.size_sum *= along.size_sum;
         t.lower[axis] = along.lower;
         t.upper[axis] = along.upper;
     }
-    if (!t.drawn) t = tally_empty();
-    t.ghosts = g->cell_count - t.drawn;
-    t.flat = t.drawn - (t.drawn ? sized : 0);
-    t.inverted = t.drawn ? (sized - difference) / 2 : 0;
-    if (g->cell_type == GRID_QUAD) t.shells = t.drawn;
+    if (!t.drawn_count) t = tally_empty();
+    t.ghost_count = g->cell_count - t.drawn_count;
+    t.flat_count = t.drawn_count - (t.drawn_count ? sized : 0);
+    t.inverted_count = t.drawn_count ? (sized - difference) / 2 : 0;
+    if (g->cell_type == GRID_QUAD) t.shell_count = t.drawn_count;
     tally_merge(tally, &t);
     return true;
 }
@@ -405,7 +405,7 @@ static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int6
     mesh_tally t = tally_empty();
     for (int64_t cell = begin; cell < end; cell++) {
         if (grid_is_ghost(g, cell)) {
-            t.ghosts++;
+            t.ghost_count++;
             continue;
         }
         fetch_box box;
@@ -418,9 +418,9 @@ static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int6
             const double *at = g->lattice->axes[axis].places + grid_index_along(&g->lattice->by_cell, axis, cell);
             volume *= g->lattice->cells[axis] ? at[1] - at[0] : 0;
         }
-        t.flat += volume == 0;
+        t.flat_count += volume == 0;
         if (g->cell_type == GRID_QUAD)
-            t.shells++, t.drawn++;
+            t.shell_count++, t.drawn_count++;
         else
             tally_volume(&t, volume);
     }

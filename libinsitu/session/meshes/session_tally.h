@@ -6,9 +6,10 @@
 
 typedef struct mesh_tally {
     double lower[3], upper[3];
-    int64_t drawn, ghosts, inverted, flat, shells; /* shells are cells that are drawn and flat */
+    int64_t drawn_count, ghost_count, inverted_count, flat_count,
+        shell_count; /* shells are cells that are drawn and flat */
     /* sum of the cube roots of the volumes; added block by block, so that it rounds like a sum of few terms */
-    double sizes;
+    double size_sum;
 } mesh_tally;
 
 mesh_tally tally_empty(void);

@@ -410,10 +410,11 @@ static int recognise_polyhedron(const session_mesh *mesh, int64_t cell, int64_t 
 enum { TYPES = GRID_POLYHEDRON + 1 };
 
 typedef struct recognition {
-    bool is_faulty;                /* set if some cell is invalid */
-    int64_t polyhedra, recognised; /* numbers of original polyhedra, and of those that are read as another type */
-    int64_t type_counts[TYPES];    /* number of cells by their new type */
-    int64_t entry_count;           /* number of entries of all cells, with their new types */
+    bool is_faulty; /* set if some cell is invalid */
+    int64_t polyhedron_count,
+        recognised_count;       /* numbers of original polyhedra, and of those that are read as another type */
+    int64_t type_counts[TYPES]; /* number of cells by their new type */
+    int64_t entry_count;        /* number of entries of all cells, with their new types */
     unsigned char *types;
 } recognition;
 
@@ -444,8 +445,8 @@ static void recognise_cell(const session_mesh *mesh, int64_t cell, recognition *
     const int now = type == GRID_POLYHEDRON ? recognise_polyhedron(mesh, cell, vertices) : type;
     grid_cell_faces(&mesh->cells, cell, &first, &end);
     r->types[cell] = (unsigned char)now;
-    r->polyhedra += type == GRID_POLYHEDRON;
-    r->recognised += now != type;
+    r->polyhedron_count += type == GRID_POLYHEDRON;
+    r->recognised_count += now != type;
     r->type_counts[now]++;
     r->entry_count += now == GRID_POLYHEDRON ? end - first : grid_type_vertices(now);
 }
@@ -462,8 +463,8 @@ static void recognise_cells(const session_mesh *mesh, int threads, recognition *
 #pragma omp critical(session_topology_recognise)
         {
             r->is_faulty = r->is_faulty || mine.is_faulty;
-            r->polyhedra += mine.polyhedra;
-            r->recognised += mine.recognised;
+            r->polyhedron_count += mine.polyhedron_count;
+            r->recognised_count += mine.recognised_count;
             for (int type = 0; type < TYPES; type++) r->type_counts[type] += mine.type_counts[type];
             r->entry_count += mine.entry_count;
         }
@@ -555,13 +556,13 @@ static insitu_status recognise_mesh(session_mesh *mesh, int threads, base_error 
                          mesh->label, (long long)count);
     recognise_cells(mesh, threads, &r);
     insitu_status status = INSITU_OK;
-    if (!r.is_faulty) t->polyhedron_count = r.polyhedra;
-    if (!r.is_faulty && r.recognised) {
-        t->recognised_count = r.recognised;
+    if (!r.is_faulty) t->polyhedron_count = r.polyhedron_count;
+    if (!r.is_faulty && r.recognised_count) {
+        t->recognised_count = r.recognised_count;
         status = write_cells(mesh, &r, threads, error);
     }
     base_free(r.types);
-    if (status || r.is_faulty || r.recognised < r.polyhedra) return status;
+    if (status || r.is_faulty || r.recognised_count < r.polyhedron_count) return status;
     session_drop_array(&t->face_offsets);
     session_drop_array(&t->face_connectivity);
     t->has_own_faces = true;

@@ -24,8 +24,8 @@ enum { BOX_WORDS = sizeof(session_level_box) / sizeof(uint64_t) };
 typedef struct box_bins {
     int64_t count;
     int64_t *boxes; /* indices of the boxes */
-    double (*middles)[3];
-    double widest; /* half of the largest side length of all boxes */
+    double (*centres)[3];
+    double largest_half_width; /* half of the largest side length of all boxes */
     session_bins bins;
 } box_bins;
 
@@ -33,20 +33,20 @@ typedef struct cover_search {
     const session_team *team;
     int64_t count;
     session_level_box *boxes; /* the boxes of this rank, followed by the received ones */
-    box_bins finer;           /* bins of those boxes that may cover cells */
+    box_bins finer_bins;      /* bins of those boxes that may cover cells */
 } cover_search;
 
 static void bins_free(box_bins *bins)
 {
     base_free(bins->boxes);
-    base_free(bins->middles);
+    base_free(bins->centres);
     session_bins_free(&bins->bins);
 }
 
 static void search_free(cover_search *s)
 {
     base_free(s->boxes);
-    bins_free(&s->finer);
+    bins_free(&s->finer_bins);
 }
 
 /* ---- boxes ------------------------------------------------------------------------------------------------------ */
@@ -200,19 +200,19 @@ static insitu_status exchange_boxes(cover_search *s, const session_meshes *meshe
 static bool bin_boxes(const session_level_box *boxes, int64_t count, bool with_coarsest, box_bins *out)
 {
     out->boxes = base_alloc((size_t)(count + 1) * sizeof *out->boxes);
-    out->middles = base_alloc((size_t)(count + 1) * sizeof *out->middles);
-    if (!out->boxes || !out->middles) return false;
+    out->centres = base_alloc((size_t)(count + 1) * sizeof *out->centres);
+    if (!out->boxes || !out->centres) return false;
     for (int64_t i = 0; i < count; i++) {
         double lower[3], upper[3];
         if (!with_coarsest && is_coarsest(&boxes[i])) continue;
         find_box_bounds(&boxes[i], lower, upper);
         for (int axis = 0; axis < 3; axis++) {
-            out->middles[out->count][axis] = 0.5 * (lower[axis] + upper[axis]);
-            out->widest = fmax(out->widest, 0.5 * (upper[axis] - lower[axis]));
+            out->centres[out->count][axis] = 0.5 * (lower[axis] + upper[axis]);
+            out->largest_half_width = fmax(out->largest_half_width, 0.5 * (upper[axis] - lower[axis]));
         }
         out->boxes[out->count++] = i;
     }
-    return session_bins_create(&out->bins, out->middles[0], (int64_t)sizeof *out->middles, out->count);
+    return session_bins_create(&out->bins, out->centres[0], (int64_t)sizeof *out->centres, out->count);
 }
 
 /* Returns a / b, rounded down. */
@@ -267,9 +267,9 @@ static bool find_covered_cells(const cover_search *s, session_mesh *mesh, unsign
     find_box_bounds(&box, lower, upper);
     *out = NULL;
     mesh->misfit = (session_misfit){.exists = false};
-    session_bin_walk walk = session_walk_bins(&s->finer.bins, lower, upper, s->finer.widest);
+    session_bin_walk walk = session_walk_bins(&s->finer_bins.bins, lower, upper, s->finer_bins.largest_half_width);
     while (session_next_binned(&walk, &near)) {
-        const session_level_box *fine = &s->boxes[s->finer.boxes[near]];
+        const session_level_box *fine = &s->boxes[s->finer_bins.boxes[near]];
         int misfit;
         if (fine->mesh != box.mesh || !is_finer(fine, &box) || !find_covered(&box, fine, first, end, &misfit)) continue;
         if (misfit >= 0)
@@ -316,7 +316,7 @@ insitu_status session_update_covers(session_meshes *meshes, const session_team *
     if (!list_own_boxes(meshes, &s))
         session_fail_for_memory(error, meshes->count * (int64_t)sizeof *s.boxes, "boxes of blocks");
     insitu_status status = exchange_boxes(&s, meshes, error);
-    bool is_done = !status && !error->status && bin_boxes(s.boxes, s.count, false, &s.finer);
+    bool is_done = !status && !error->status && bin_boxes(s.boxes, s.count, false, &s.finer_bins);
     for (int i = 0; i < meshes->count && is_done; i++)
         if (is_level_block(meshes->items[i])) is_done = update_block(&s, meshes, meshes->items[i]);
     if (!status && !error->status && !is_done)
@@ -364,7 +364,7 @@ static const session_level_box *find_finest(const session_meshes *meshes, const 
                                             const double at[3])
 {
     const session_level_box *finest = NULL;
-    session_bin_walk walk = session_walk_bins(&bins->bins, at, at, bins->widest);
+    session_bin_walk walk = session_walk_bins(&bins->bins, at, at, bins->largest_half_width);
     int64_t near;
     while (session_next_binned(&walk, &near)) {
         const session_level_box *box = &meshes->level_boxes[bins->boxes[near]];

@@ -55,20 +55,20 @@ typedef struct contact {
 typedef struct hanging_search {
     const session_hanging_basis *basis;
     const session_team *team;
-    unsigned char *states; /* one face_state for each face of the borders */
-    int64_t face_count, own_count, candidate_count, face_room;
+    unsigned char *face_states; /* one face_state for each face of the borders */
+    int64_t face_count, own_count, candidate_count, face_capacity;
     /* this rank's faces that were read first, then the received faces, then further ones of this rank */
     searched_face *faces;
     candidate *candidates;
     double rounding; /* upper bound of the rounding errors of coordinates */
-    int64_t contact_count, contact_room;
+    int64_t contact_count, contact_capacity;
     contact *contacts;
     session_bins bins; /* bins of the candidates */
 } hanging_search;
 
 static void search_free(hanging_search *s)
 {
-    base_free(s->states);
+    base_free(s->face_states);
     base_free(s->faces);
     base_free(s->candidates);
     base_free(s->contacts);
@@ -278,12 +278,12 @@ static bool is_face_needed(const hanging_search *s, int m, const session_face *f
 static bool read_face(hanging_search *s, int m, const session_face *face)
 {
     int64_t vertices[4];
-    if (s->face_count == s->face_room) {
-        const int64_t room = s->face_room * 2 + 64;
+    if (s->face_count == s->face_capacity) {
+        const int64_t room = s->face_capacity * 2 + 64;
         searched_face *faces = base_realloc(s->faces, (size_t)room * sizeof *faces);
         if (!faces) return false;
         s->faces = faces;
-        s->face_room = room;
+        s->face_capacity = room;
     }
     searched_face *f = &s->faces[s->face_count];
     if (!session_read_coarse_face(&s->basis->meshes[m]->cells, face, &f->face, vertices)) return true;
@@ -298,7 +298,7 @@ static bool read_face(hanging_search *s, int m, const session_face *face)
 static bool read_faces(hanging_search *s, bool is_hit)
 {
     const session_border *borders = s->basis->joint->hanging.borders;
-    unsigned char *states = s->states;
+    unsigned char *states = s->face_states;
     bool is_done = true;
     for (int m = 0; m < s->basis->part_count; m++) {
         const session_border *border = &borders[m];
@@ -327,8 +327,8 @@ static bool read_own_faces(hanging_search *s)
 {
     int64_t count = 0;
     for (int m = 0; m < s->basis->part_count; m++) count += s->basis->joint->hanging.borders[m].face_count;
-    s->states = base_calloc((size_t)count + 1, 1);
-    if (!s->states || !read_faces(s, false)) return false;
+    s->face_states = base_calloc((size_t)count + 1, 1);
+    if (!s->face_states || !read_faces(s, false)) return false;
     s->own_count = s->face_count;
     return true;
 }
@@ -378,7 +378,7 @@ static bool receive_faces(hanging_search *s, const session_mail *in)
     searched_face *faces = base_realloc(s->faces, (size_t)(s->own_count + count + 1) * sizeof *faces);
     if (!faces) return false;
     s->faces = faces;
-    s->face_room = s->own_count + count + 1;
+    s->face_capacity = s->own_count + count + 1;
     int64_t at = 0;
     for (int rank = 0; rank < s->team->ranks; rank++)
         for (int64_t number = 0; number < in->counts[rank] / SESSION_FACE_WORDS; number++, at++) {
@@ -396,12 +396,12 @@ static bool receive_faces(hanging_search *s, const session_mail *in)
 /* Adds the face to one of the candidate's lists, whose head is *last. Returns false if memory runs out. */
 static bool add_contact(hanging_search *s, int64_t number, const double weights[4], int64_t *last)
 {
-    if (s->contact_count == s->contact_room) {
-        const int64_t room = s->contact_room * 2 + 256;
+    if (s->contact_count == s->contact_capacity) {
+        const int64_t room = s->contact_capacity * 2 + 256;
         contact *contacts = base_realloc(s->contacts, (size_t)room * sizeof *contacts);
         if (!contacts) return false;
         s->contacts = contacts;
-        s->contact_room = room;
+        s->contact_capacity = room;
     }
     contact *c = &s->contacts[s->contact_count];
     *c = (contact){.face = number, .next_contact = *last};

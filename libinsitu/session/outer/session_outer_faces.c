@@ -35,7 +35,7 @@ typedef struct part_cells {
     int64_t first_vertex; /* number of the part's first vertex among those of all parts */
     uint64_t *hashes;     /* one hash per vertex */
     /* one byte per vertex, nonzero if its sum of hashes is not 0, so that it may be a corner of an outer face */
-    unsigned char *is_open;
+    unsigned char *may_be_outer;
 } part_cells;
 
 /* A face that may be an outer face. */
@@ -58,12 +58,12 @@ typedef struct face_search {
      * one */
     uint64_t *hash_sums;
     uint64_t mask;
-    unsigned char *is_open; /* one byte per vertex of all parts, nonzero if it may be a corner of an outer face */
+    unsigned char *may_be_outer; /* one byte per vertex of all parts, nonzero if it may be a corner of an outer face */
     int64_t count;
     found_face *faces; /* sorted by part and cell */
     session_key *keys;
-    int64_t *groups; /* group of each face; faces with equal keys are in one group */
-    int64_t *sizes;  /* number of faces in each group */
+    int64_t *groups;      /* group of each face; faces with equal keys are in one group */
+    int64_t *group_sizes; /* number of faces in each group */
 } face_search;
 
 static void search_free(face_search *s)
@@ -73,11 +73,11 @@ static void search_free(face_search *s)
     base_free(s->hashes);
     base_free(s->vertex_sums);
     base_free(s->hash_sums);
-    base_free(s->is_open);
+    base_free(s->may_be_outer);
     base_free(s->faces);
     base_free(s->keys);
     base_free(s->groups);
-    base_free(s->sizes);
+    base_free(s->group_sizes);
 }
 
 /* Returns the number of vertices of the part. Vertices of a part without cells do not count: they may lack the ids that
@@ -246,7 +246,7 @@ static void cancel_faces(const face_search *s)
 #pragma omp for schedule(static)
         for (int64_t v = 0; v < s->vertex_count; v++) add_vertex(s, v);
 #pragma omp for schedule(static) nowait
-        for (int64_t v = 0; v < s->vertex_count; v++) s->is_open[v] = s->hash_sums[s->hashes[v] & s->mask] != 0;
+        for (int64_t v = 0; v < s->vertex_count; v++) s->may_be_outer[v] = s->hash_sums[s->hashes[v] & s->mask] != 0;
         region_leave();
     }
 }
@@ -281,7 +281,7 @@ static bool face_list_reserve(face_list *list)
 static bool is_open_face(const part_cells *p, const session_face_loop *loop)
 {
     for (int64_t i = 0; i < loop->size; i++)
-        if (!p->is_open[session_face_vertex(loop, i)]) return false;
+        if (!p->may_be_outer[session_face_vertex(loop, i)]) return false;
     return true;
 }
 
@@ -293,7 +293,7 @@ static bool has_open_vertices(const part_cells *p, int64_t cell)
     int open = 0;
     if (!session_faces_of_type(grid_cell_type(g, cell))->count) return true;
     const int count = grid_cell_vertices(g, cell, vertices);
-    for (int i = 0; i < count; i++) open += p->is_open[vertices[i]];
+    for (int i = 0; i < count; i++) open += p->may_be_outer[vertices[i]];
     return open >= 3;
 }
 
@@ -387,7 +387,7 @@ static void keep_single_faces(face_search *s)
 {
     int64_t kept = 0;
     for (int64_t i = 0; i < s->count; i++) {
-        if (s->sizes[s->groups[i]] != 1 && !is_shell(s, &s->faces[i])) continue;
+        if (s->group_sizes[s->groups[i]] != 1 && !is_shell(s, &s->faces[i])) continue;
         s->faces[kept] = s->faces[i];
         s->keys[kept++] = s->keys[i];
     }
@@ -405,12 +405,12 @@ static bool make_tables(face_search *s)
     s->table_count = s->threads < MOST_TABLES ? s->threads : MOST_TABLES;
     s->vertex_sums = base_calloc((size_t)(s->vertex_count * s->table_count), sizeof *s->vertex_sums);
     s->hash_sums = base_calloc(slots, sizeof *s->hash_sums);
-    s->is_open = base_alloc((size_t)s->vertex_count);
-    if (!s->hashes || !s->vertex_sums || !s->hash_sums || !s->is_open) return false;
+    s->may_be_outer = base_alloc((size_t)s->vertex_count);
+    if (!s->hashes || !s->vertex_sums || !s->hash_sums || !s->may_be_outer) return false;
     for (int part = 0; part < s->part_count; part++) {
         part_cells *p = &s->cells[part];
         p->hashes = s->hashes + p->first_vertex;
-        p->is_open = s->is_open + p->first_vertex;
+        p->may_be_outer = s->may_be_outer + p->first_vertex;
     }
     return true;
 }
@@ -443,7 +443,7 @@ static insitu_status search_own_faces(face_search *s, bool by_id, base_error *er
         hash_vertices(s, by_id);
         cancel_faces(s);
     }
-    is_done = is_done && collect_faces(s) && count_keys(s->keys, s->count, &s->groups, &s->sizes);
+    is_done = is_done && collect_faces(s) && count_keys(s->keys, s->count, &s->groups, &s->group_sizes);
     if (!is_done)
         return session_fail_for_memory(error, s->vertex_count * (9 + 8 * s->table_count) + (int64_t)(s->mask + 1) * 8,
                                        "outer faces");

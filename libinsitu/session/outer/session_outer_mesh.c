@@ -121,9 +121,9 @@ static void find_inside(const grid *g, int64_t cell, double out[3])
 typedef struct face_polygon {
     int count;
     int64_t *vertices;
-    double (*places)[3];
+    double (*positions)[3];
     int (*triangles)[3];
-    void *room;
+    void *work_memory;
     double normal[3]; /* normal that points towards the apexes of the cells made on the face */
 } face_polygon;
 
@@ -181,7 +181,7 @@ static bool polygon_triangle(const face_polygon *p, int i, corner_loop *out, dou
     *out = (corner_loop){.count = 3};
     for (int k = 0; k < 3; k++) {
         out->vertices[k] = p->vertices[p->triangles[i][k]];
-        memcpy(out->positions[k], p->places[p->triangles[i][k]], sizeof out->positions[k]);
+        memcpy(out->positions[k], p->positions[p->triangles[i][k]], sizeof out->positions[k]);
     }
     order_corners(out);
     for (int axis = 0; axis < 3; axis++)
@@ -224,15 +224,15 @@ static void find_polygon_normal(face_polygon *p, const double inside[3])
     double towards[3], middle[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
     for (int i = 0; i + 2 < p->count; i++) {
         double a[3], b[3];
-        subtract(p->places[p->triangles[i][1]], p->places[p->triangles[i][0]], a);
-        subtract(p->places[p->triangles[i][2]], p->places[p->triangles[i][0]], b);
+        subtract(p->positions[p->triangles[i][1]], p->positions[p->triangles[i][0]], a);
+        subtract(p->positions[p->triangles[i][2]], p->positions[p->triangles[i][0]], b);
         for (int axis = 0; axis < 3; axis++) {
             const int next = (axis + 1) % 3, last = (axis + 2) % 3;
             sum[axis] += a[next] * b[last] - a[last] * b[next];
         }
     }
     for (int i = 0; i < p->count; i++)
-        for (int axis = 0; axis < 3; axis++) middle[axis] += p->places[i][axis] / p->count;
+        for (int axis = 0; axis < 3; axis++) middle[axis] += p->positions[i][axis] / p->count;
     subtract(inside, middle, towards);
     const double length = sqrt(vector3_dot(sum, sum)), width = sqrt(length), side = vector3_dot(towards, sum);
     int largest = 0;
@@ -248,7 +248,7 @@ static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
     int64_t *loops = w->out->loops;
     for (int64_t cell = first; cell < w->cell_count; cell++) loops[cell] = w->loop_end;
     loops[w->loop_end++] = p->count;
-    for (int i = 0; i < p->count; i++) loops[w->loop_end++] = add_copied_vertex(w, p->vertices[i], p->places[i]);
+    for (int i = 0; i < p->count; i++) loops[w->loop_end++] = add_copied_vertex(w, p->vertices[i], p->positions[i]);
 }
 
 static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], int64_t origin)
@@ -256,7 +256,7 @@ static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], 
     const int64_t first = w->cell_count;
     double common[3], own[3];
     corner_loop loop;
-    polygon_cut((const double(*)[3])p->places, p->count, p->room, p->triangles);
+    polygon_cut((const double(*)[3])p->positions, p->count, p->work_memory, p->triangles);
     find_polygon_normal(p, inside);
     const bool is_shared = find_common_apex(p, common);
     const int64_t apex = is_shared ? add_vertex(w, common, p->vertices[p->triangles[0][0]], -1) : -1;
@@ -280,11 +280,11 @@ static void read_polygon(const grid *g, const session_face_loop *face, face_poly
     p->count = 0;
     for (int64_t i = 0; i < face->size; i++) {
         p->vertices[p->count] = session_face_vertex(face, i);
-        grid_vertex(g, p->vertices[p->count], p->places[p->count]);
-        if (p->count && compare_places(p->places[p->count], p->places[p->count - 1]) == 0) continue;
+        grid_vertex(g, p->vertices[p->count], p->positions[p->count]);
+        if (p->count && compare_places(p->positions[p->count], p->positions[p->count - 1]) == 0) continue;
         p->count++;
     }
-    while (p->count > 1 && compare_places(p->places[p->count - 1], p->places[0]) == 0) p->count--;
+    while (p->count > 1 && compare_places(p->positions[p->count - 1], p->positions[0]) == 0) p->count--;
 }
 
 static void add_face(outer_work *w, const session_face *face)
@@ -295,20 +295,20 @@ static void add_face(outer_work *w, const session_face *face)
     double inside[3];
     find_inside(w->cells, face->cell, inside);
     read_polygon(w->cells, &of, p);
-    if (p->count > 4 || is_concave(&of, (const double(*)[3])p->places, p->count)) {
+    if (p->count > 4 || is_concave(&of, (const double(*)[3])p->positions, p->count)) {
         add_polygon(w, p, inside, face->cell);
         return;
     }
     corner_loop loop = {0};
-    for (int i = 0; i < p->count; i++) add_corner(&loop, p->vertices[i], p->places[i]);
+    for (int i = 0; i < p->count; i++) add_corner(&loop, p->vertices[i], p->positions[i]);
     add_cell(w, &loop, inside, face->cell);
 }
 
 /* Upper bounds of the sizes that the faces require. */
 typedef struct outer_counts {
-    int64_t cells, entries; /* numbers of cells and of connectivity entries */
-    int64_t loops;          /* number of entries of the polygons' loops */
-    int64_t corners;        /* largest number of corners of one face */
+    int64_t cell_count, entry_count; /* numbers of cells and of connectivity entries */
+    int64_t loop_entry_count;        /* number of entries of the polygons' loops */
+    int64_t largest_corner_count;    /* largest number of corners of one face */
 } outer_counts;
 
 static outer_counts find_count_bounds(const grid *g, const session_outer *outer)
@@ -322,10 +322,10 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer)
         double places[4][3];
         for (int k = 0; k < 4 && k < size; k++) grid_vertex(g, session_face_vertex(&loop, k), places[k]);
         const bool is_polygon = size > 4 || is_concave(&loop, (const double(*)[3])places, (int)size);
-        most.cells += is_polygon ? size - 2 : 1;
-        most.loops += is_polygon ? size + 1 : 0;
-        most.entries += is_polygon ? 4 * (size - 2) : size + 1;
-        most.corners = size > most.corners ? size : most.corners;
+        most.cell_count += is_polygon ? size - 2 : 1;
+        most.loop_entry_count += is_polygon ? size + 1 : 0;
+        most.entry_count += is_polygon ? 4 * (size - 2) : size + 1;
+        most.largest_corner_count = size > most.largest_corner_count ? size : most.largest_corner_count;
     }
     return most;
 }
@@ -334,10 +334,10 @@ static bool make_polygon_room(face_polygon *p, int64_t corners)
 {
     const size_t count = (size_t)corners;
     p->vertices = base_alloc(count * sizeof *p->vertices);
-    p->places = base_alloc(count * sizeof *p->places);
+    p->positions = base_alloc(count * sizeof *p->positions);
     p->triangles = base_alloc(count * sizeof *p->triangles);
-    p->room = base_alloc(polygon_work_bytes((int)corners));
-    return p->vertices && p->places && p->triangles && p->room;
+    p->work_memory = base_alloc(polygon_work_bytes((int)corners));
+    return p->vertices && p->positions && p->triangles && p->work_memory;
 }
 
 static void work_free(outer_work *w)
@@ -345,17 +345,17 @@ static void work_free(outer_work *w)
     base_free(w->vertex_map);
     base_free(w->heights);
     base_free(w->polygon.vertices);
-    base_free(w->polygon.places);
+    base_free(w->polygon.positions);
     base_free(w->polygon.triangles);
-    base_free(w->polygon.room);
+    base_free(w->polygon.work_memory);
 }
 
 static bool work_create(const grid *g, session_outer *out, outer_work *w)
 {
     const outer_counts most = find_count_bounds(g, out);
-    const int64_t cells = most.cells, entries = most.entries, loops = most.loops;
+    const int64_t cells = most.cell_count, entries = most.entry_count, loops = most.loop_entry_count;
     *w = (outer_work){.cells = g, .out = out};
-    if (most.corners > INT32_MAX / 64) return false;
+    if (most.largest_corner_count > INT32_MAX / 64) return false;
     out->bytes = entries * (int64_t)(5 * sizeof(int64_t) + sizeof(float)) + cells * 17;
     if (loops) out->bytes += (cells + loops) * (int64_t)sizeof *out->loops;
     out->bytes += out->face_count * (int64_t)sizeof *out->faces;
@@ -372,7 +372,7 @@ static bool work_create(const grid *g, session_outer *out, outer_work *w)
     w->vertex_map = base_alloc((size_t)g->vertex_count * sizeof *w->vertex_map);
     return out->mesh && out->coordinates && out->connectivity && out->vertex_origins && out->offsets && out->types &&
            (out->loops || !loops) && out->cell_origins && w->heights && w->vertex_map &&
-           make_polygon_room(&w->polygon, most.corners);
+           make_polygon_room(&w->polygon, most.largest_corner_count);
 }
 
 /* Returns the mesh as a grid. If all cells have one type, types and offsets are omitted, so that vectorized code can be

@@ -19,7 +19,7 @@
 
 enum {
     ROUND_HITS = 1 << 18,
-    QUESTION_WORDS = sizeof(render_waiting_hit) / 8,
+    REQUEST_WORDS = sizeof(render_waiting_hit) / 8,
     ANSWER_WORDS = sizeof(render_samples_about) / 8
 };
 
@@ -103,62 +103,63 @@ static bool write_requests(differing *d, session_mail *out)
 {
     int64_t capacity = d->count + 1;
     out->counts = base_calloc((size_t)d->ranks, sizeof *out->counts);
-    out->words = base_alloc((size_t)capacity * QUESTION_WORDS * sizeof *out->words);
+    out->words = base_alloc((size_t)capacity * REQUEST_WORDS * sizeof *out->words);
     d->requested_hits = base_alloc((size_t)capacity * sizeof *d->requested_hits);
     if (!out->counts || !out->words || !d->requested_hits) return false;
-    int64_t questions = 0;
+    int64_t requests = 0;
     for (int n = 0; n < d->near_count; n++)
         for (int64_t i = 0; i < d->count; i++) {
             const render_waiting_hit *hit = &d->list->items[d->first + i];
             if (!render_differences_meet(d->job, hit, &d->boxes[d->near_ranks[n]])) continue;
-            if (questions == capacity) {
+            if (requests == capacity) {
                 capacity += capacity / 2 + 1024;
-                uint64_t *words = base_realloc(out->words, (size_t)capacity * QUESTION_WORDS * sizeof *words);
+                uint64_t *words = base_realloc(out->words, (size_t)capacity * REQUEST_WORDS * sizeof *words);
                 if (words) out->words = words;
                 int64_t *asked = base_realloc(d->requested_hits, (size_t)capacity * sizeof *asked);
                 if (asked) d->requested_hits = asked;
                 if (!words || !asked) return false;
             }
-            memcpy(out->words + questions * QUESTION_WORDS, hit, sizeof *hit);
-            d->requested_hits[questions++] = i;
-            out->counts[d->near_ranks[n]] += QUESTION_WORDS;
+            memcpy(out->words + requests * REQUEST_WORDS, hit, sizeof *hit);
+            d->requested_hits[requests++] = i;
+            out->counts[d->near_ranks[n]] += REQUEST_WORDS;
         }
-    out->total = questions * QUESTION_WORDS;
+    out->total = requests * REQUEST_WORDS;
     return true;
 }
 
 /* Computes the answers to received requests. Their words are suitably aligned. Returns false if memory runs out. */
 static bool write_answers(const differing *d, const session_mail *in, session_mail *out, base_error *error)
 {
-    const int64_t count = in->total / QUESTION_WORDS;
+    const int64_t count = in->total / REQUEST_WORDS;
     out->total = count * ANSWER_WORDS;
     out->counts = base_calloc((size_t)d->ranks, sizeof *out->counts);
     out->words = base_alloc((size_t)(out->total + 1) * sizeof *out->words);
     if (!out->counts || !out->words) return false;
-    for (int r = 0; r < d->ranks; r++) out->counts[r] = in->counts[r] / QUESTION_WORDS * ANSWER_WORDS;
+    for (int r = 0; r < d->ranks; r++) out->counts[r] = in->counts[r] / REQUEST_WORDS * ANSWER_WORDS;
     render_differences_sample(d->job, (const render_waiting_hit *)(const void *)in->words,
                               (render_samples_about *)(void *)out->words, count, error);
     return true;
 }
 
-/* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next message exchange passes it
- * to all ranks. */
+/* Exchanges requests and received_answers with other ranks. If an error occurs on one rank, the next message exchange
+ * passes it to all ranks. */
 static insitu_status exchange_round(differing *d, base_error *error)
 {
-    session_mail asked = {0}, questions = {0}, answered = {0}, answers = {0};
-    if (!write_requests(d, &asked)) session_fail_for_memory(error, d->count * 24, "samples of other ranks");
-    insitu_status status = session_mail_deliver(d->comm, SESSION_MAIL_THERE, &asked, &questions, error);
-    if (!status && !error->status && !write_answers(d, &questions, &answered, error))
-        session_fail_for_memory(error, questions.total * 16, "samples for other ranks");
-    if (!status) status = session_mail_deliver(d->comm, SESSION_MAIL_BACK, &answered, &answers, error);
+    session_mail sent_requests = {0}, received_requests = {0}, sent_answers = {0}, received_answers = {0};
+    if (!write_requests(d, &sent_requests)) session_fail_for_memory(error, d->count * 24, "samples of other ranks");
+    insitu_status status = session_mail_deliver(d->comm, SESSION_MAIL_THERE, &sent_requests, &received_requests, error);
+    if (!status && !error->status && !write_answers(d, &received_requests, &sent_answers, error))
+        session_fail_for_memory(error, received_requests.total * 16, "samples for other ranks");
+    if (!status) status = session_mail_deliver(d->comm, SESSION_MAIL_BACK, &sent_answers, &received_answers, error);
     if (!status && !error->status)
-        for (int64_t i = 0; i < asked.total / QUESTION_WORDS; i++)
-            render_differences_merge(&d->samples[d->requested_hits[i]],
-                                     (const render_samples_about *)(const void *)(answers.words + i * ANSWER_WORDS));
-    session_mail_free(&asked);
-    session_mail_free(&questions);
-    session_mail_free(&answered);
-    session_mail_free(&answers);
+        for (int64_t i = 0; i < sent_requests.total / REQUEST_WORDS; i++)
+            render_differences_merge(
+                &d->samples[d->requested_hits[i]],
+                (const render_samples_about *)(const void *)(received_answers.words + i * ANSWER_WORDS));
+    session_mail_free(&sent_requests);
+    session_mail_free(&received_requests);
+    session_mail_free(&sent_answers);
+    session_mail_free(&received_answers);
     base_free(d->requested_hits);
     d->requested_hits = NULL;
     return status;

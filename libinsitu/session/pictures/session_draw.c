@@ -34,7 +34,7 @@ typedef struct canvas {
     image samples; /* frames and their sums for the pixels at edges, if only these take more than one frame */
     int64_t edge_count, *edges;
     double *edge_sums;
-    double *sum; /* sum of the frames; NULL: there is only one frame */
+    double *frame_sum; /* sum of the frames; NULL: there is only one frame */
     session_channels channels;
     deep_image deep;
     session_decorations *decorations; /* NULL: there are no decorations, and the frame contains its background */
@@ -43,7 +43,7 @@ typedef struct canvas {
 static void canvas_free(canvas *c, session_writer *writer)
 {
     if (c->memory.pixels) session_writer_release(writer, &c->memory);
-    base_free(c->sum);
+    base_free(c->frame_sum);
     base_free(c->samples.rgba);
     base_free(c->edges);
     base_free(c->edge_sums);
@@ -97,22 +97,22 @@ static insitu_status canvas_create(const session_drawing *d, const scene_image *
     if (d->team->rank != 0) return INSITU_OK;
     reserve_frame(d, bytes, out);
     if (needs_depth(d, image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
-    if (is_summed) out->sum = base_calloc(pixels * 4, sizeof *out->sum);
-    if (!out->frame.rgba || (is_summed && !out->sum))
-        return session_fail_for_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->sum : 0)),
+    if (is_summed) out->frame_sum = base_calloc(pixels * 4, sizeof *out->frame_sum);
+    if (!out->frame.rgba || (is_summed && !out->frame_sum))
+        return session_fail_for_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->frame_sum : 0)),
                                        "a picture");
     return session_wants_deep(image) ? session_begin_deep(&out->deep, image, error) : INSITU_OK;
 }
 
 static void canvas_add(canvas *c, int threads)
 {
-    if (!c->sum) return;
+    if (!c->frame_sum) return;
     const int64_t count = (int64_t)c->frame.width * c->frame.height * 4;
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
 #pragma omp for schedule(static) nowait
-        for (int64_t i = 0; i < count; i++) c->sum[i] += (double)c->frame.rgba[i];
+        for (int64_t i = 0; i < count; i++) c->frame_sum[i] += (double)c->frame.rgba[i];
         region_leave();
     }
 }
@@ -164,7 +164,7 @@ static void average_frames(canvas *c, int frames, int threads)
     {
         region_enter();
 #pragma omp for schedule(static) nowait
-        for (int64_t i = 0; i < count; i++) c->frame.rgba[i] = (float)(c->sum[i] / frames);
+        for (int64_t i = 0; i < count; i++) c->frame.rgba[i] = (float)(c->frame_sum[i] / frames);
         region_leave();
     }
 }
@@ -185,7 +185,7 @@ static void scale_depths(canvas *c, const render_space *space, int threads)
 
 static void canvas_finish(canvas *c, int frames, const render_space *space, int threads)
 {
-    if (c->sum) average_frames(c, frames, threads);
+    if (c->frame_sum) average_frames(c, frames, threads);
     average_edges(c, frames, threads);
     if (c->frame.depth) scale_depths(c, space, threads);
     session_finish_deep(&c->deep, space, threads);
@@ -251,8 +251,8 @@ typedef struct frames_basis {
     const session_drawing *drawing;
     session_frame_target target;
     canvas *canvas;
-    int64_t overlaps; /* number of pixels in which cells overlap, the maximum over the frames */
-    deep_image *deep; /* the next frame fills it; NULL: there is no deep picture, or it has been drawn */
+    int64_t overlap_count; /* number of pixels in which cells overlap, the maximum over the frames */
+    deep_image *deep;      /* the next frame fills it; NULL: there is no deep picture, or it has been drawn */
 } frames_basis;
 
 static insitu_status draw_frame(frames_basis *b, const render_job *job, image *out, base_error *error)
@@ -262,7 +262,7 @@ static insitu_status draw_frame(frames_basis *b, const render_job *job, image *o
     const insitu_status status = session_draw_frame(&b->target, job, out, &frame, error);
     out->deep = b->deep = NULL;
     add_frame_to_report(&b->drawing->report->public_report, &frame);
-    if (!status && frame.overlaps > b->overlaps) b->overlaps = frame.overlaps;
+    if (!status && frame.overlaps > b->overlap_count) b->overlap_count = frame.overlaps;
     return status;
 }
 
@@ -336,7 +336,7 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
     render_job job = make_job(d, image, view, layers);
     const insitu_status status = draw_all_frames(&basis, image, &job, error);
     if (status) return status;
-    warn_of_overlaps(d->report, image, basis.overlaps);
+    warn_of_overlaps(d->report, image, basis.overlap_count);
     canvas_finish(canvas, image->frames, &view->space, d->team->threads);
     if (!session_wants_channels(image)) return INSITU_OK;
     session_frame taken;

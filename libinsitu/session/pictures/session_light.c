@@ -3,8 +3,8 @@
  * contains the hit and the set of its unblocked rays, 32 bytes in all, as the other rank computes the rays in the same
  * way. The answer has 8 or 16 bytes, with one bit per ray.
  *
- *     rank A   hits -> own cells -> unblocked rays -> requests to ranks by their boxes ............. all answers ->
- * colours rank B                                          requests -> own cells -> unblocked rays -> answers
+ *     rank A   hits -> own cells -> unblocked rays -> requests to ranks by their boxes ...... all answers -> colours
+ *     rank B                                          requests -> own cells -> unblocked rays -> answers
  *
  * Hits are processed in rounds, so that the memory for messages on each rank is bounded by that for one round. */
 #include "session_light.h"
@@ -37,7 +37,7 @@ typedef struct lighting {
 
 /* Requests in the order in which they are found, with the rank to which each is sent, and their order sorted by
  * rank. */
-typedef struct questions {
+typedef struct request_list {
     int64_t count, capacity;
     int *ranks;
     int64_t *hits;
@@ -47,7 +47,7 @@ typedef struct questions {
     int64_t *first_requests; /* ranks + 1 entries: the first request to each rank */
     int64_t *message_order;  /* request at each position in the message */
     bool has_no_memory;
-} questions;
+} request_list;
 
 static insitu_status share_boxes(lighting *l, base_error *error)
 {
@@ -61,9 +61,9 @@ static insitu_status share_boxes(lighting *l, base_error *error)
                              "MPI_Allgather");
 }
 
-/* ---- questions ----------------------------------------------------------------------------------------------- */
+/* ---- request_list ----------------------------------------------------------------------------------------------- */
 
-static bool reserve_questions(questions *q)
+static bool reserve_requests(request_list *q)
 {
     const int64_t capacity = q->capacity + q->capacity / 2 + 1024;
     int *ranks = base_realloc(q->ranks, (size_t)capacity * sizeof *ranks);
@@ -77,7 +77,7 @@ static bool reserve_questions(questions *q)
     return true;
 }
 
-static void free_questions(questions *q)
+static void free_requests(request_list *q)
 {
     base_free(q->ranks);
     base_free(q->hits);
@@ -86,11 +86,11 @@ static void free_questions(questions *q)
     base_free(q->message_order);
 }
 
-static void add_question(void *state, int rank, const render_hit_rays *rays)
+static void add_request(void *state, int rank, const render_hit_rays *rays)
 {
-    questions *q = state;
+    request_list *q = state;
     if (rank == q->lighting_state->rank || q->has_no_memory) return;
-    if (q->count == q->capacity && !reserve_questions(q)) {
+    if (q->count == q->capacity && !reserve_requests(q)) {
         q->has_no_memory = true;
         return;
     }
@@ -100,7 +100,7 @@ static void add_question(void *state, int rank, const render_hit_rays *rays)
 }
 
 /* Sorts the requests by the rank to which they are sent. */
-static bool sort_questions(questions *q)
+static bool sort_requests(request_list *q)
 {
     const int ranks = q->lighting_state->ranks;
     q->first_requests = base_calloc((size_t)ranks + 1, sizeof *q->first_requests);
@@ -112,7 +112,7 @@ static bool sort_questions(questions *q)
     return true;
 }
 
-static bool write_questions(const lighting *l, const questions *q, session_mail *out)
+static bool write_requests(const lighting *l, const request_list *q, session_mail *out)
 {
     out->total = q->count * ASKED_WORDS;
     out->counts = base_alloc((size_t)l->ranks * sizeof *out->counts);
@@ -128,15 +128,15 @@ static bool write_questions(const lighting *l, const questions *q, session_mail 
     return true;
 }
 
-static insitu_status send_questions(const lighting *l, questions *q, session_mail *in, base_error *error)
+static insitu_status send_requests(const lighting *l, request_list *q, session_mail *in, base_error *error)
 {
     session_mail out = {0};
-    *q = (questions){.lighting_state = l};
+    *q = (request_list){.lighting_state = l};
     for (q->current_hit = 0; q->current_hit < l->count; q->current_hit++)
         if (l->rays[q->current_hit].samples || l->rays[q->current_hit].lights)
             render_rays_to_boxes(l->job, &l->hits[q->current_hit], &l->rays[q->current_hit], l->boxes, l->ranks,
-                                 add_question, q);
-    if (q->has_no_memory || !sort_questions(q) || !write_questions(l, q, &out))
+                                 add_request, q);
+    if (q->has_no_memory || !sort_requests(q) || !write_requests(l, q, &out))
         session_fail_for_memory(error, q->count * ASKED_WORDS * 8, "rays to other ranks");
     insitu_status status = session_agree(l->comm, error);
     if (!status) status = session_mail_exchange(l->comm, &out, in, error);
@@ -147,7 +147,7 @@ static insitu_status send_questions(const lighting *l, questions *q, session_mai
 /* ---- answers ------------------------------------------------------------------------------------------------- */
 
 /* Copies the requests out of the message, whose words are not aligned for these types. */
-static bool read_questions(const session_mail *in, render_hit **hits, render_hit_rays **rays)
+static bool read_requests(const session_mail *in, render_hit **hits, render_hit_rays **rays)
 {
     const int64_t count = in->total / ASKED_WORDS;
     *hits = base_alloc((size_t)count * sizeof **hits);
@@ -162,12 +162,12 @@ static bool read_questions(const session_mail *in, render_hit **hits, render_hit
 }
 
 /* Replaces the requests in *in by the answers to them. */
-static insitu_status answer_questions(const lighting *l, session_mail *in, base_error *error)
+static insitu_status answer_requests(const lighting *l, session_mail *in, base_error *error)
 {
     render_hit *hits = NULL;
     render_hit_rays *rays = NULL;
     const int64_t count = in->total / ASKED_WORDS;
-    if (read_questions(in, &hits, &rays))
+    if (read_requests(in, &hits, &rays))
         render_occlude(l->occluders, hits, rays, count, error);
     else
         session_fail_for_memory(error, in->total * 8, "rays of other ranks");
@@ -179,7 +179,7 @@ static insitu_status answer_questions(const lighting *l, session_mail *in, base_
     return session_agree(l->comm, error);
 }
 
-static void store_answers(lighting *l, const questions *q, const session_mail *answers)
+static void store_answers(lighting *l, const request_list *q, const session_mail *answers)
 {
     for (int64_t i = 0; i < q->count; i++) {
         const int64_t k = q->message_order[i];
@@ -191,17 +191,17 @@ static void store_answers(lighting *l, const questions *q, const session_mail *a
     }
 }
 
-static insitu_status exchange_questions(lighting *l, base_error *error)
+static insitu_status exchange_requests(lighting *l, base_error *error)
 {
-    questions q;
+    request_list q;
     session_mail in = {0}, answers = {0};
-    insitu_status status = send_questions(l, &q, &in, error);
-    if (!status) status = answer_questions(l, &in, error);
+    insitu_status status = send_requests(l, &q, &in, error);
+    if (!status) status = answer_requests(l, &in, error);
     if (!status) status = session_mail_exchange(l->comm, &in, &answers, error);
     if (!status) store_answers(l, &q, &answers);
     session_mail_free(&in);
     session_mail_free(&answers);
-    free_questions(&q);
+    free_requests(&q);
     return status;
 }
 
@@ -247,7 +247,7 @@ static insitu_status light_rounds(lighting *l, fragment_list *fragments, base_er
         at = collect_hits(l, fragments, at);
         render_occlude(l->occluders, l->hits, l->rays, l->count, error);
         status = session_agree(l->comm, error);
-        if (!status && l->ranks > 1) status = exchange_questions(l, error);
+        if (!status && l->ranks > 1) status = exchange_requests(l, error);
         if (!status) shade_hits(l, fragments);
         if (!status) status = reduce_has_more(l, at < fragments->count, &goes_on, error);
     }

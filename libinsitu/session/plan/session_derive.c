@@ -29,7 +29,7 @@ enum { SPACE = 3 };
 typedef struct derive_work {
     const session_derive_basis *basis;
     const scene_derived *derived;
-    int number;
+    int derived_index;
     int recentring_count;
     session_recentring *recentrings;
     int *stale; /* per recentring or mesh: nonzero if its values are out of date */
@@ -41,7 +41,8 @@ typedef struct derive_work {
 static const session_catalogue_field *find_field(const derive_work *w, const session_catalogue_mesh *mesh)
 {
     for (int f = 0; f < mesh->field_count; f++)
-        if (mesh->fields[f].derived == w->number && !mesh->fields[f].fault && !mesh->fault) return &mesh->fields[f];
+        if (mesh->fields[f].derived_index == w->derived_index && !mesh->fields[f].fault && !mesh->fault)
+            return &mesh->fields[f];
     return NULL;
 }
 
@@ -49,9 +50,9 @@ static const session_catalogue_field *find_field(const derive_work *w, const ses
  *     for (part_visit v = visit_parts(w, mesh); next_visited_part(w, &v);) use(v.part, v.index); */
 typedef struct part_visit {
     session_parts parts;
-    int next;
+    int next_index;
     session_mesh *part;
-    int index; /* index of the field in the part's list of fields */
+    int field_index; /* index of the field in the part's list of fields */
 } part_visit;
 
 static part_visit visit_parts(const derive_work *w, const session_catalogue_mesh *mesh)
@@ -63,10 +64,10 @@ static part_visit visit_parts(const derive_work *w, const session_catalogue_mesh
 
 static bool next_visited_part(const derive_work *w, part_visit *v)
 {
-    while (v->next < v->parts.count) {
-        v->part = v->parts.items[v->next++];
-        v->index = v->part->is_given ? session_find_field(v->part, w->derived->name) : -1;
-        if (v->index >= 0) return true;
+    while (v->next_index < v->parts.count) {
+        v->part = v->parts.items[v->next_index++];
+        v->field_index = v->part->is_given ? session_find_field(v->part, w->derived->name) : -1;
+        if (v->field_index >= 0) return true;
     }
     return false;
 }
@@ -182,7 +183,8 @@ static insitu_status find_stale(derive_work *w, base_error *error)
     for (int m = 0; m < count; m++) {
         w->stale[m] = 0;
         for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_visited_part(w, &v);)
-            if (v.part->fields[v.index].inputs_hash != hash_sources(w, &catalogue->meshes[m], v.part)) w->stale[m] = 1;
+            if (v.part->fields[v.field_index].inputs_hash != hash_sources(w, &catalogue->meshes[m], v.part))
+                w->stale[m] = 1;
     }
     w->stale[count] = error->status != INSITU_OK;
     const MPI_Comm comm = w->basis->team->comm;
@@ -272,15 +274,15 @@ static void load_block(const grid_field *field, int64_t first, int count, double
 }
 
 /* The buffers of a thread for one block of points. */
-typedef struct block_room {
+typedef struct block_buffer {
     const double **inputs;
     double *values; /* values of the inputs, followed by the program's stack */
-} block_room;
+} block_buffer;
 
-static bool rooms_create(const scene_derived *derived, int threads, block_room **out)
+static bool rooms_create(const scene_derived *derived, int threads, block_buffer **out)
 {
     const size_t inputs = (size_t)derived->input_count, rows = inputs + (size_t)derived->expression.depth;
-    block_room *rooms = *out = base_calloc((size_t)threads, sizeof *rooms);
+    block_buffer *rooms = *out = base_calloc((size_t)threads, sizeof *rooms);
     for (int t = 0; t < threads && rooms; t++) {
         rooms[t].inputs = base_alloc(inputs * sizeof *rooms[t].inputs);
         rooms[t].values = base_alloc(rows * SCENE_BLOCK * sizeof *rooms[t].values);
@@ -290,7 +292,7 @@ static bool rooms_create(const scene_derived *derived, int threads, block_room *
     return rooms != NULL;
 }
 
-static void rooms_free(block_room *rooms, int threads)
+static void rooms_free(block_buffer *rooms, int threads)
 {
     for (int t = 0; t < threads && rooms; t++) {
         base_free(rooms[t].inputs);
@@ -299,14 +301,14 @@ static void rooms_free(block_room *rooms, int threads)
     base_free(rooms);
 }
 
-static void evaluate(const scene_derived *derived, const grid_field *inputs, const block_room *rooms,
+static void evaluate(const scene_derived *derived, const grid_field *inputs, const block_buffer *rooms,
                      const session_field *field, int64_t count, int threads)
 {
     const int64_t blocks = (count + SCENE_BLOCK - 1) / SCENE_BLOCK;
 #pragma omp parallel num_threads(session_region_threads(threads, count))
     {
         region_enter();
-        const block_room *room = &rooms[omp_get_thread_num()];
+        const block_buffer *room = &rooms[omp_get_thread_num()];
         double *stack = room->values + (int64_t)derived->input_count * SCENE_BLOCK;
 #pragma omp for schedule(dynamic, REGION_ITEMS / SCENE_BLOCK) nowait
         for (int64_t block = 0; block < blocks; block++) {
@@ -325,7 +327,7 @@ static bool make_expression(const derive_work *w, const session_catalogue_mesh *
 {
     const int threads = w->basis->team->threads;
     session_field *field = &part->fields[index];
-    block_room *rooms = NULL;
+    block_buffer *rooms = NULL;
     grid_field *inputs = base_alloc((size_t)w->derived->input_count * sizeof *inputs);
     const bool is_done = inputs && rooms_create(w->derived, threads, &rooms) && allocate_values(w, part, field);
     for (int k = 0; k < w->derived->input_count && is_done; k++) {
@@ -346,8 +348,9 @@ static void make_expressions(const derive_work *w, base_error *error)
     for (int m = 0; m < catalogue->mesh_count; m++) {
         if (!w->stale[m]) continue;
         for (part_visit v = visit_parts(w, &catalogue->meshes[m]); next_visited_part(w, &v) && !error->status;)
-            if (!make_expression(w, &catalogue->meshes[m], v.part, v.index))
-                session_fail_for_memory(error, count_values(v.part, &v.part->fields[v.index]) * 8, "a derived field");
+            if (!make_expression(w, &catalogue->meshes[m], v.part, v.field_index))
+                session_fail_for_memory(error, count_values(v.part, &v.part->fields[v.field_index]) * 8,
+                                        "a derived field");
     }
 }
 
@@ -444,7 +447,7 @@ static insitu_status begin_sums(const derive_work *w, const session_joint *joint
             part->mesh = v.part;
             part->of_shells = joint->meshes[m]->has_shells_alone;
             list_scalars(w, joint->meshes[m], v.part, part->fields);
-            if (!allocate_values(w, v.part, &v.part->fields[v.index]))
+            if (!allocate_values(w, v.part, &v.part->fields[v.field_index]))
                 return session_fail_for_memory(error, v.part->cells.vertex_count * 8, "a derived field");
         }
     return session_key_all_vertices(sums, error);
@@ -460,8 +463,8 @@ static insitu_status derive_joint(const derive_work *w, const session_joint *joi
     int at = 0;
     for (int m = 0; m < joint->count && !status && !error->status; m++)
         for (part_visit v = visit_parts(w, joint->meshes[m]); next_visited_part(w, &v);) {
-            store_gradients(w, &sums, &sums.parts[at++], &v.part->fields[v.index]);
-            mark_values_new(w, joint->meshes[m], v.part, v.index);
+            store_gradients(w, &sums, &sums.parts[at++], &v.part->fields[v.field_index]);
+            mark_values_new(w, joint->meshes[m], v.part, v.field_index);
         }
     session_vertex_sums_free(&sums);
     return status;
@@ -516,7 +519,7 @@ insitu_status session_derive(const session_derive_basis *basis, uint64_t needed,
     insitu_status status = INSITU_OK;
     for (int i = 0; i < basis->scene->derived_count && !status; i++) {
         if (!(needed >> i & 1)) continue;
-        derive_work work = {.basis = basis, .derived = &basis->scene->derived[i], .number = i};
+        derive_work work = {.basis = basis, .derived = &basis->scene->derived[i], .derived_index = i};
         status = derive_field(&work, error);
         base_free(work.recentrings);
         base_free(work.stale);

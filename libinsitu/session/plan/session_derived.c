@@ -58,7 +58,7 @@ uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool image
         if (session_is_statistics_due(&scene->statistics[i], cycle))
             bits |= derived_field_bit(scene, &scene->statistics[i].field);
     for (int i = 0; i < scene->image_count && images; i++)
-        if (scene->images[i].when.is_given) bits |= derived_field_bit(scene, &scene->images[i].when.field);
+        if (scene->images[i].condition.is_given) bits |= derived_field_bit(scene, &scene->images[i].condition.field);
     return add_source_bits(scene, bits);
 }
 
@@ -208,7 +208,7 @@ static bool name_in_catalogue(const scene *scene, const char *scene_path, sessio
 
 static bool is_faultless(const session_catalogue_field *field)
 {
-    return field->derived >= 0 && !field->fault;
+    return field->derived_index >= 0 && !field->fault;
 }
 
 static bool are_fields_named(const session_catalogue_mesh *all, const session_mesh *mesh)

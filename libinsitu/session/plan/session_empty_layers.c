@@ -154,7 +154,7 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
 /* Further data that is part of the reduction. */
 typedef struct layer_news {
     bool has_other_cells; /* set if some rank has cells that are not shown (session_unusable.h) */
-    int telling;          /* maximum of all ranks' session_reporting_word() */
+    int reporting_word;   /* maximum of all ranks' session_reporting_word() */
 } layer_news;
 
 /* Reduces the layers' ranges over all ranks, together with earlier errors and the news; after an error the rest is
@@ -166,7 +166,7 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
     const int last = 2 * batch->count;
     lows[last] = error->status ? -1 : 0;
     lows[last + 1] = news->has_other_cells ? -1 : 0;
-    lows[last + 2] = -news->telling;
+    lows[last + 2] = -news->reporting_word;
     for (int i = 0; i < batch->count && !error->status; i++) {
         planned_layer *layer = &batch->layers[i];
         if (!of_all_cells || layer->is_unreported)
@@ -310,8 +310,8 @@ insitu_status session_check_layers(const session_plan *plan, const session_catal
             status = reduce_ranges(meshes, team, &batch, true, &news, error);
         for (int i = 0; i < batch.count && !status; i++) warn_of_layer(report, &batch.layers[i]);
     }
-    if (!status && news.telling)
-        status = session_share_lines(report, session_reporting_rank(news.telling, team), team, error);
+    if (!status && news.reporting_word)
+        status = session_share_lines(report, session_reporting_rank(news.reporting_word, team), team, error);
     if (!status && news.has_other_cells)
         status = session_warn_of_unusable(plan, catalogue, meshes, team, report, error);
     return status;

@@ -8,7 +8,7 @@
 /* The purpose for which meshes are joined: either a layer's field, or the gradients of a derived field. */
 typedef struct join_wish {
     const scene_field *field; /* field of a layer; NULL if `derived` is set */
-    int derived;
+    int derived_index;
 } join_wish;
 
 static bool is_joint_member(const session_catalogue_mesh *mesh, const join_wish *wish)
@@ -16,7 +16,7 @@ static bool is_joint_member(const session_catalogue_mesh *mesh, const join_wish 
     const scene_field *field = wish->field;
     if (!field) {
         for (int f = 0; f < mesh->field_count; f++)
-            if (mesh->fields[f].derived == wish->derived) return true;
+            if (mesh->fields[f].derived_index == wish->derived_index) return true;
         return false;
     }
     const session_catalogue_field *found =

@@ -323,8 +323,9 @@ session_sound_events session_check_event_fields(const session_plan_basis *basis,
     for (int i = 0; i < scene->image_count && images; i++) {
         const scene_image *image = &scene->images[i];
         base_error own = {.status = INSITU_OK};
-        if (!image->when.is_given || !scene_is_first_variant(image)) continue;
-        if (check_layer_field(basis, &image->when.field, &own)) sound.images &= ~(UINT64_C(1) << image->variant.source);
+        if (!image->condition.is_given || !scene_is_first_variant(image)) continue;
+        if (check_layer_field(basis, &image->condition.field, &own))
+            sound.images &= ~(UINT64_C(1) << image->variant.source);
         if (!error->status) *error = own;
     }
     return sound;
@@ -453,7 +454,7 @@ void session_plan_free(session_plan *plan)
 /* Returns whether an image has no outputs and its pictures are not kept in memory; warns if that is so. */
 static bool is_for_nobody(const session_plan_basis *basis, const scene_image *image, session_report *report)
 {
-    const bool is_for_none = image->output_count == 0 && !basis->are_kept;
+    const bool is_for_none = image->output_count == 0 && !basis->keeps_pictures;
     session_warn(
         report, &(session_warning){WARNING_OUTPUTS, image->name, NULL, 0}, is_for_none,
         "image \"%s\": it has no outputs, and pictures are not kept in memory (insitu_keep_pictures): it is not "
@@ -469,7 +470,7 @@ static void select_images(const session_plan_basis *basis, session_report *repor
     bool is_well = false;
     for (int i = 0; i < basis->scene->image_count; i++) {
         const scene_image *image = &basis->scene->images[i];
-        if (!(basis->let_images >> image->variant.source & 1) || !is_due(image, basis->moment)) continue;
+        if (!(basis->allowed_images >> image->variant.source & 1) || !is_due(image, basis->moment)) continue;
         if (image->variant.view == 0) is_well = can_be_drawn(basis, image, report, &plan->refusal);
         if (!is_well || is_for_nobody(basis, image, report)) continue;
         plan->images[plan->image_count++] = image;

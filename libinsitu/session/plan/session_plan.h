@@ -41,11 +41,11 @@ typedef struct session_plan_basis {
     const scene *scene;
     const char *scene_path; /* path of the scene file, for messages */
     const session_moment *moment;
-    uint64_t let_images; /* one bit per image of the file, set unless the image's condition does not hold */
+    uint64_t allowed_images; /* one bit per image of the file, set unless the image's condition does not hold */
     const session_catalogue *catalogue;
     const session_extent *extent;
-    bool is_filled; /* set if some rank has a field with a fill function */
-    bool are_kept;  /* set if pictures are kept in memory */
+    bool is_filled;      /* set if some rank has a field with a fill function */
+    bool keeps_pictures; /* set if pictures are kept in memory */
 } session_plan_basis;
 
 /* Returns the number of images that are due, without regard to conditions. Local. */

@@ -54,7 +54,7 @@ static int count_layers(const scene_image *image)
 static insitu_status fail_at_file(const session_image_ranges *ranges, const char *what, const file_failure *failure,
                                   base_error *error)
 {
-    return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
+    return base_fail(error, failure->is_out_of_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
                      "image \"%s\": %.300s: cannot be %s: %s", ranges->image, ranges->path, what, failure->reason);
 }
 

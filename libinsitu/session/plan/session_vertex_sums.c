@@ -75,17 +75,17 @@ insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *er
 /* ---- requests to other ranks ----------------------------------------------------------------------------------- */
 
 /* The messages of an exchange of sums. */
-typedef struct sums_mail {
-    double (*places)[3];
-    session_mail questions, received_questions, answers, received_answers;
+typedef struct sums_messages {
+    double (*positions)[3];
+    session_mail requests, received_requests, answers, received_answers;
     int64_t *own_numbers, *asked_numbers;
-} sums_mail;
+} sums_messages;
 
-static void mail_free(sums_mail *mail)
+static void mail_free(sums_messages *mail)
 {
-    base_free(mail->places);
-    session_mail_free(&mail->questions);
-    session_mail_free(&mail->received_questions);
+    base_free(mail->positions);
+    session_mail_free(&mail->requests);
+    session_mail_free(&mail->received_requests);
     session_mail_free(&mail->answers);
     session_mail_free(&mail->received_answers);
     base_free(mail->own_numbers);
@@ -114,8 +114,8 @@ static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3
 
 /* Packs the keys that lie in each other rank's box into messages. *numbers: the index of each key, in the order of the
  * messages. */
-static bool write_questions(const session_vertex_sums *sums, const session_team *team, const session_homes *homes,
-                            const double (*places)[3], session_mail *out, int64_t **numbers)
+static bool write_requests(const session_vertex_sums *sums, const session_team *team, const session_homes *homes,
+                           const double (*places)[3], session_mail *out, int64_t **numbers)
 {
     int64_t total = 0, at = 0;
     out->counts = base_calloc((size_t)team->ranks, sizeof *out->counts);
@@ -153,7 +153,7 @@ static bool extend_keys(session_vertex_sums *sums, int64_t more)
 
 /* Adds the keys that other ranks have requested or, if all vertices already have keys, looks them up. *numbers: the
  * index of each, in the order of the messages; -1: this rank has no such vertex. */
-static bool read_questions(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
+static bool read_requests(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
 {
     const int64_t count = in->total / KEY_WORDS;
     *numbers = base_alloc((size_t)(count ? count : 1) * sizeof **numbers);
@@ -167,28 +167,28 @@ static bool read_questions(const session_mail *in, session_vertex_sums *sums, in
     return sums->keys.count <= INT32_MAX;
 }
 
-static insitu_status send_questions(const session_homes *homes, const session_team *team, session_vertex_sums *sums,
-                                    sums_mail *mail, base_error *error)
+static insitu_status send_requests(const session_homes *homes, const session_team *team, session_vertex_sums *sums,
+                                   sums_messages *mail, base_error *error)
 {
     if (!error->status &&
-        (!find_key_positions(sums, &mail->places) ||
-         !write_questions(sums, team, homes, (const double(*)[3])mail->places, &mail->questions, &mail->own_numbers)))
+        (!find_key_positions(sums, &mail->positions) ||
+         !write_requests(sums, team, homes, (const double(*)[3])mail->positions, &mail->requests, &mail->own_numbers)))
         session_fail_for_memory(error, sums->own_count * 24, "gradients at vertices that ranks share");
     const insitu_status status =
-        session_mail_deliver(team->comm, SESSION_MAIL_THERE, &mail->questions, &mail->received_questions, error);
-    if (!status && !error->status && !read_questions(&mail->received_questions, sums, &mail->asked_numbers))
-        session_fail_for_memory(error, mail->received_questions.total * 24, "gradients at vertices that ranks share");
+        session_mail_deliver(team->comm, SESSION_MAIL_THERE, &mail->requests, &mail->received_requests, error);
+    if (!status && !error->status && !read_requests(&mail->received_requests, sums, &mail->asked_numbers))
+        session_fail_for_memory(error, mail->received_requests.total * 24, "gradients at vertices that ranks share");
     return status;
 }
 
-static bool write_answers(const session_vertex_sums *sums, const sums_mail *mail, int ranks, session_mail *out)
+static bool write_answers(const session_vertex_sums *sums, const sums_messages *mail, int ranks, session_mail *out)
 {
-    const session_mail *questions = &mail->received_questions;
-    const int64_t count = questions->total / KEY_WORDS, words = session_sum_words(sums->field_count);
+    const session_mail *requests = &mail->received_requests;
+    const int64_t count = requests->total / KEY_WORDS, words = session_sum_words(sums->field_count);
     out->counts = base_calloc((size_t)ranks, sizeof *out->counts);
     out->words = base_calloc((size_t)(count ? count : 1), (size_t)words * sizeof *out->words);
     if (!out->counts || !out->words) return false;
-    for (int rank = 0; rank < ranks; rank++) out->counts[rank] = questions->counts[rank] / KEY_WORDS * words;
+    for (int rank = 0; rank < ranks; rank++) out->counts[rank] = requests->counts[rank] / KEY_WORDS * words;
     for (int64_t i = 0; i < count; i++)
         if (mail->asked_numbers[i] >= 0)
             memcpy(out->words + i * words, sums->sums + mail->asked_numbers[i] * words,
@@ -197,7 +197,7 @@ static bool write_answers(const session_vertex_sums *sums, const sums_mail *mail
     return true;
 }
 
-static void add_answers(const sums_mail *mail, session_vertex_sums *sums)
+static void add_answers(const sums_messages *mail, session_vertex_sums *sums)
 {
     const int64_t words = session_sum_words(sums->field_count);
     for (int64_t i = 0; i < mail->received_answers.total / words; i++) {
@@ -210,11 +210,11 @@ static void add_answers(const sums_mail *mail, session_vertex_sums *sums)
     }
 }
 
-static insitu_status send_answers(const session_team *team, session_vertex_sums *sums, sums_mail *mail,
+static insitu_status send_answers(const session_team *team, session_vertex_sums *sums, sums_messages *mail,
                                   base_error *error)
 {
     if (!error->status && !write_answers(sums, mail, team->ranks, &mail->answers))
-        session_fail_for_memory(error, mail->received_questions.total * 24, "gradients at vertices that ranks share");
+        session_fail_for_memory(error, mail->received_requests.total * 24, "gradients at vertices that ranks share");
     const insitu_status status =
         session_mail_deliver(team->comm, SESSION_MAIL_BACK, &mail->answers, &mail->received_answers, error);
     if (!status && !error->status) add_answers(mail, sums);
@@ -330,12 +330,12 @@ insitu_status session_find_sums(const session_homes *homes, const session_team *
                                 session_vertex_sums *sums, base_error *error)
 {
     int exponent = 0;
-    sums_mail mail = {0};
+    sums_messages mail = {0};
     insitu_status status = INSITU_OK;
     session_cell_list *lists = base_calloc((size_t)sums->part_count, sizeof *lists);
     frexp(extent->half_diagonal, &exponent);
     sums->length = ldexp(1, exponent);
-    if (team->ranks > 1) status = send_questions(homes, team, sums, &mail, error);
+    if (team->ranks > 1) status = send_requests(homes, team, sums, &mail, error);
     if (!status) status = make_sums(team, sums, lists, error);
     if (!status && team->ranks > 1) status = send_answers(team, sums, &mail, error);
     for (int i = 0; i < sums->part_count && lists; i++) base_free(lists[i].cells);

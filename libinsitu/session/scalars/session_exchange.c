@@ -19,19 +19,19 @@ void session_mail_free(session_mail *mail)
 /* A received message. Ranks do not know in advance which ranks send to them, so the algorithm of Hoefler et al. (2010)
  * is used: sends are synchronous, so that a rank whose sends are complete knows that they have been received. It then
  * joins a non-blocking reduction; when that is complete, all messages have been received. */
-typedef struct letter {
-    struct letter *next;
+typedef struct message {
+    struct message *next;
     int source_rank; /* rank that sent the message */
     int64_t count;   /* number of words */
     uint64_t words[];
-} letter;
+} message;
 
 typedef struct delivery {
     MPI_Comm comm;
     int tag, rank, ranks;
     int send_count;     /* number of messages that this rank sends */
     MPI_Request *sends; /* one request per message */
-    letter *messages;
+    message *messages;
 } delivery;
 
 static insitu_status start_sends(delivery *d, const session_mail *out, base_error *error)
@@ -60,9 +60,9 @@ static insitu_status start_sends(delivery *d, const session_mail *out, base_erro
     return error->status;
 }
 
-static letter *message_create(delivery *d, int from, int64_t count)
+static message *message_create(delivery *d, int from, int64_t count)
 {
-    letter *l = base_alloc(sizeof *l + (size_t)count * sizeof *l->words);
+    message *l = base_alloc(sizeof *l + (size_t)count * sizeof *l->words);
     if (!l) return NULL;
     l->source_rank = from;
     l->count = count;
@@ -76,7 +76,7 @@ static void receive_message(delivery *d, const MPI_Status *found, base_error *er
 {
     int count = 0;
     MPI_Get_count(found, MPI_UINT64_T, &count);
-    letter *l = error->status ? NULL : message_create(d, found->MPI_SOURCE, count);
+    message *l = error->status ? NULL : message_create(d, found->MPI_SOURCE, count);
     const int code = MPI_Recv(l ? l->words : NULL, l ? count : 0, MPI_UINT64_T, found->MPI_SOURCE, d->tag, d->comm,
                               MPI_STATUS_IGNORE);
     if (l)
@@ -120,7 +120,7 @@ static void copy_own_words(delivery *d, const session_mail *out, base_error *err
     for (int r = 0; r < d->rank; r++) words += out->counts[r];
     const int64_t count = out->counts[d->rank];
     if (!count) return;
-    letter *l = message_create(d, d->rank, count);
+    message *l = message_create(d, d->rank, count);
     if (l)
         memcpy(l->words, words, (size_t)count * sizeof *words);
     else
@@ -132,16 +132,16 @@ static void concatenate_messages(const delivery *d, session_mail *in, base_error
 {
     int64_t *starts = base_calloc((size_t)d->ranks + 1, sizeof *starts);
     in->counts = base_calloc((size_t)d->ranks, sizeof *in->counts);
-    for (const letter *l = d->messages; l && !error->status; l = l->next) in->total += l->count;
+    for (const message *l = d->messages; l && !error->status; l = l->next) in->total += l->count;
     in->words = base_alloc((size_t)(in->total + 1) * sizeof *in->words);
     if (!starts || !in->counts || !in->words) {
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data between ranks",
                   (long long)in->total * 8);
         in->total = 0;
     }
-    for (const letter *l = d->messages; l && !error->status; l = l->next) in->counts[l->source_rank] = l->count;
+    for (const message *l = d->messages; l && !error->status; l = l->next) in->counts[l->source_rank] = l->count;
     for (int r = 0; r < d->ranks && !error->status; r++) starts[r + 1] = starts[r] + in->counts[r];
-    for (const letter *l = d->messages; l && !error->status; l = l->next)
+    for (const message *l = d->messages; l && !error->status; l = l->next)
         memcpy(in->words + starts[l->source_rank], l->words, (size_t)l->count * sizeof *l->words);
     base_free(starts);
 }
@@ -149,7 +149,7 @@ static void concatenate_messages(const delivery *d, session_mail *in, base_error
 static void free_delivery(delivery *d)
 {
     while (d->messages) {
-        letter *next = d->messages->next;
+        message *next = d->messages->next;
         base_free(d->messages);
         d->messages = next;
     }

@@ -19,8 +19,8 @@ static insitu_status call_fill(session_meshes *meshes, const session_mesh *mesh,
     meshes->filling = (session_filling){.mesh = mesh->label, .field = given->name};
     const insitu_status status = given->fill(given->fill_data, out);
     meshes->filling.mesh = NULL;
-    if (meshes->filling.refused.status) {
-        *error = meshes->filling.refused;
+    if (meshes->filling.refused_error.status) {
+        *error = meshes->filling.refused_error;
         return error->status;
     }
     if (status == INSITU_OK) return status;

@@ -22,7 +22,7 @@ static bool is_of_corners(const session_mesh *mesh, const scene_field *field)
 static bool is_in_image(const session_mesh *mesh, const scene_image *image)
 {
     scene_field_walk walk = {.image = image};
-    bool is_in = image->when.is_given && is_of_corners(mesh, &image->when.field);
+    bool is_in = image->condition.is_given && is_of_corners(mesh, &image->condition.field);
     for (const scene_field *field; !is_in && (field = scene_next_field(&walk)) != NULL;)
         is_in = is_of_corners(mesh, field);
     return is_in;
@@ -43,8 +43,9 @@ static bool is_named_in_scene(const session_mesh *mesh, const scene *scene)
 
 static int64_t origin_of(const session_torn *torn, const insitu_mesh *given, int64_t corner)
 {
-    if (torn->is_of_entries) return grid_array_index(&torn->shared, session_entry_place(given, corner));
-    return grid_array_index(&torn->shared, grid_array_index(&torn->corners, corner));
+    if (torn->are_corners_entries)
+        return grid_array_index(&torn->shared_connectivity, session_entry_place(given, corner));
+    return grid_array_index(&torn->shared_connectivity, grid_array_index(&torn->corners, corner));
 }
 
 int64_t session_torn_origin(const session_mesh *mesh, int64_t corner)
@@ -94,10 +95,10 @@ static bool copy_coordinates(const session_mesh *mesh, int threads, session_torn
 /* Makes the connectivity that has corners for vertices. */
 static insitu_status number_corners(const session_mesh *mesh, int threads, session_torn *torn, base_error *error)
 {
-    torn->is_of_entries = mesh->topology.is_split;
-    torn->shared =
-        torn->is_of_entries ? session_index_array(&mesh->given, &mesh->given.connectivity) : mesh->cells.connectivity;
-    if (torn->is_of_entries) {
+    torn->are_corners_entries = mesh->topology.is_split;
+    torn->shared_connectivity = torn->are_corners_entries ? session_index_array(&mesh->given, &mesh->given.connectivity)
+                                                          : mesh->cells.connectivity;
+    if (torn->are_corners_entries) {
         torn->bytes = mesh->topology.connectivity_count * mesh->topology.connectivity.stride;
         return session_split_entries(mesh, threads, &torn->corners, error);
     }

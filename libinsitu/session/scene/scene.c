@@ -109,8 +109,8 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     if (status == INSITU_OK) status = scene_convert_clip(d, clip_path, in->clip, out, &out->clips_of_all);
     if (status == INSITU_OK) status = scene_convert_layers(d, path, in, out);
     if (status == INSITU_OK) status = scene_apply_sweep(d, path, in, out);
-    out->once = in->once && *in->once;
-    if (status == INSITU_OK) status = scene_convert_condition(d, path, in->when, &out->when);
+    out->is_drawn_once = in->once && *in->once;
+    if (status == INSITU_OK) status = scene_convert_condition(d, path, in->when, &out->condition);
     if (status == INSITU_OK) status = convert_sampling(d, path, in->sampling, out);
     if (status == INSITU_OK) status = convert_antialias(d, path, in->antialias, out);
     char decorations_path[SCENE_PATH_SIZE];
@@ -279,7 +279,7 @@ static void free_image(scene_image *image)
     }
     for (int i = 0; i < image->output_count; i++) base_free(image->outputs[i].path);
     scene_free_decorations(&image->decorations);
-    scene_free_field(&image->when.field);
+    scene_free_field(&image->condition.field);
     base_free(image->name);
     base_free(image->swept_field);
     base_free(image->camera.points);

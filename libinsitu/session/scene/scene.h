@@ -263,8 +263,8 @@ typedef struct scene_slice {
 } scene_slice;
 
 typedef struct scene_light {
-    double direction[3]; /* unit vector towards the light; in camera axes (right, up, backward) unless in_world */
-    bool in_world;
+    double direction[3]; /* unit vector towards the light; in camera axes (right, up, backward) unless is_in_world */
+    bool is_in_world;
     float colour[3]; /* linear RGB, multiplied by the light's intensity */
 } scene_light;
 
@@ -357,18 +357,18 @@ typedef struct scene_decorations {
     int words_count;
     scene_words *words;
     bool has_bars; /* set if a bar is drawn for each layer that is coloured by a field */
-    scene_anchor bars_at;
+    scene_anchor bar_anchor;
     int tick_count; /* approximate number of ticks per bar */
     int label_count;
     char **labels; /* labels of the bars, in order; further bars are labelled with the names of their fields */
     int unit_count;
     char **units; /* units of the bars, in order; a single one is used for all bars */
-    scene_number_form numbers;
+    scene_number_form number_form;
     scene_boxes outline;
     bool has_rulers, has_axes;
     bool has_scale_bar;
     char *scale_unit; /* unit of length of the scale bar; NULL: none */
-    scene_anchor scale_at;
+    scene_anchor scale_bar_anchor;
     bool has_colour;
     /* colour of text and lines, linear RGB. Without has_colour it is light on a dark background and dark on a light
      * one. */
@@ -489,10 +489,10 @@ typedef struct scene_image {
     double max_seconds; /* upper bound of the estimated time for samples, in seconds; 3600 by default */
     int output_count;   /* number of output files; 0: the picture is only passed to the caller in memory */
     scene_output *outputs;
-    int cycle_interval;   /* the image is drawn at cycles that are multiples of this; 1 by default */
-    double time_interval; /* if > 0, the image is instead drawn whenever the time passes a multiple of this */
-    scene_condition when; /* condition on a statistic without which the image is not drawn */
-    bool once;            /* whether the image is drawn only in the first step in which it is due */
+    int cycle_interval;        /* the image is drawn at cycles that are multiples of this; 1 by default */
+    double time_interval;      /* if > 0, the image is instead drawn whenever the time passes a multiple of this */
+    scene_condition condition; /* condition on a statistic without which the image is not drawn */
+    bool is_drawn_once;        /* whether the image is drawn only in the first step in which it is due */
 } scene_image;
 
 /* Iterates over the fields that an image's layers use: for each kind of layer, first the fields that are shown, then

@@ -38,11 +38,11 @@ static insitu_status convert_bars(const scene_document *d, const char *path, con
     snprintf(labels_path, sizeof labels_path, "%s.colour_bar.labels", path);
     snprintf(units_path, sizeof units_path, "%s.colour_bar.units", path);
     out->has_bars = in != NULL;
-    out->bars_at = in && in->at ? (scene_anchor)*in->at : SCENE_RIGHT;
+    out->bar_anchor = in && in->at ? (scene_anchor)*in->at : SCENE_RIGHT;
     out->tick_count = in && in->ticks ? *in->ticks : 6;
-    out->numbers.notation = in && in->notation ? (scene_notation)*in->notation : SCENE_SHORTEST;
-    out->numbers.has_digits = in && in->digits;
-    out->numbers.digits = out->numbers.has_digits ? *in->digits : 0;
+    out->number_form.notation = in && in->notation ? (scene_notation)*in->notation : SCENE_SHORTEST;
+    out->number_form.has_digits = in && in->digits;
+    out->number_form.digits = out->number_form.has_digits ? *in->digits : 0;
     const insitu_status status = scene_copy_texts(d, in ? labels_path : NULL, &out->labels, &out->label_count);
     return status ? status : scene_copy_texts(d, in ? units_path : NULL, &out->units, &out->unit_count);
 }
@@ -56,7 +56,7 @@ insitu_status scene_convert_decorations(const scene_document *d, const char *pat
     out->has_axes = in->axes && *in->axes;
     out->has_rulers = in->rulers && *in->rulers;
     out->has_scale_bar = in->scale_bar != NULL;
-    out->scale_at = in->scale_bar && in->scale_bar->at ? (scene_anchor)*in->scale_bar->at : SCENE_BOTTOM_RIGHT;
+    out->scale_bar_anchor = in->scale_bar && in->scale_bar->at ? (scene_anchor)*in->scale_bar->at : SCENE_BOTTOM_RIGHT;
     out->scale_unit = in->scale_bar && in->scale_bar->unit ? base_strdup(in->scale_bar->unit) : NULL;
     if (in->scale_bar && in->scale_bar->unit && !out->scale_unit) return scene_fail_for_memory(d);
     out->has_colour = in->colour != NULL;

@@ -36,8 +36,8 @@ enum { FUNCTIONS = sizeof functions / sizeof *functions };
 typedef struct parser {
     const char *text, *cursor;
     scene_expression *expression;
-    int nested;      /* number of open brackets and signs, which is limited */
-    int stack_count; /* number of stack entries in use at this point of the program */
+    int nesting_depth; /* number of open brackets and signs, which is limited */
+    int stack_count;   /* number of stack entries in use at this point of the program */
     scene_parse_result result;
     char *fault;
 } parser;
@@ -317,9 +317,9 @@ static bool parse_sign(parser *p)
 {
     bool is_negative = false;
     for (; peek_character(p) == '-' || *p->cursor == '+'; p->cursor++) is_negative = is_negative != (*p->cursor == '-');
-    if (++p->nested > MOST_NESTED) return fail(p, "more than %d brackets are open, expected fewer", MOST_NESTED);
+    if (++p->nesting_depth > MOST_NESTED) return fail(p, "more than %d brackets are open, expected fewer", MOST_NESTED);
     if (!parse_power(p)) return false;
-    p->nested--;
+    p->nesting_depth--;
     return !is_negative || add_instruction(p, SCENE_OP_NEGATE, 0, 0);
 }
 

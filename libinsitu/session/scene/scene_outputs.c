@@ -25,7 +25,7 @@ typedef struct placeholder {
     /* minimum number of digits of a whole number, or number of digits of another number; -1: as few as needed */
     int digits;
     char conversion; /* format of a number that is not whole: 'f', 'e' or 'g' */
-    size_t size;     /* number of bytes in the pattern */
+    size_t length;   /* number of bytes in the pattern */
 } placeholder;
 
 static const placeholder no_placeholder = {PLACEHOLDER_NONE, 0, 0, 1};
@@ -111,7 +111,7 @@ static size_t expand_pattern(const char *pattern, const scene_moment *moment, ch
         else if (out)
             *at = *pattern;
         length += (size_t)written;
-        pattern += p.size;
+        pattern += p.length;
     }
     if (out) out[length] = '\0';
     return length;
@@ -265,14 +265,14 @@ scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double tim
 /* The path of an output's file, with the output's index among all outputs. */
 typedef struct written_file {
     char *path;
-    int image, output, number;
+    int image, output, output_index;
 } written_file;
 
 static int compare_files(const void *a, const void *b)
 {
     const written_file *first = a, *second = b;
     const int order = strcmp(first->path, second->path);
-    return order ? order : first->number - second->number;
+    return order ? order : first->output_index - second->output_index;
 }
 
 /* Returns a placeholder that would give two pictures of one image different names. */
@@ -311,7 +311,7 @@ static insitu_status check_files(const scene_document *d, const scene *s, const 
     for (int i = 1; i < count; i++) {
         if (strcmp(files[i - 1].path, files[i].path) != 0) continue;
         if (find_output(s, &files[i - 1])->montage >= 0 && find_output(s, &files[i])->montage >= 0) continue;
-        if (found < 0 || files[i].number < files[found].number) found = i;
+        if (found < 0 || files[i].output_index < files[found].output_index) found = i;
     }
     return found < 0 ? INSITU_OK : refuse_file(d, s, &files[found - 1], &files[found]);
 }

@@ -116,7 +116,7 @@ static insitu_status convert_light(const scene_document *d, const char *path, co
 {
     const double intensity = in->intensity ? *in->intensity : 1;
     copy_vector(out->direction, in->direction);
-    out->in_world = in->in && *in->in == SCENE_FRAME_WORLD;
+    out->is_in_world = in->in && *in->in == SCENE_FRAME_WORLD;
     for (int i = 0; i < 3; i++) {
         const float linear = in->colour ? colour_linear_from_srgb((float)in->colour[i]) : 1;
         out->colour[i] = (float)intensity * linear;

@@ -16,7 +16,7 @@ bool session_has_events(const scene *scene, int64_t cycle, bool images)
     for (int i = 0; i < scene->statistics_count; i++)
         if (session_is_statistics_due(&scene->statistics[i], cycle)) return true;
     for (int i = 0; i < scene->image_count && images; i++)
-        if (scene->images[i].when.is_given) return true;
+        if (scene->images[i].condition.is_given) return true;
     return false;
 }
 
@@ -50,9 +50,9 @@ static bool work_create(const scene *scene, int64_t cycle, const session_sound_e
         w->wish_origins[w->count++] = i;
     }
     for (int i = 0; i < scene->image_count; i++) {
-        if (!scene->images[i].when.is_given || !scene_is_first_variant(&scene->images[i])) continue;
+        if (!scene->images[i].condition.is_given || !scene_is_first_variant(&scene->images[i])) continue;
         if (!(sound->images >> scene->images[i].variant.source & 1)) continue;
-        w->wishes[w->count] = (session_statistics_wish){&scene->images[i].when.field, 0, 0, -1};
+        w->wishes[w->count] = (session_statistics_wish){&scene->images[i].condition.field, 0, 0, -1};
         w->wish_origins[w->count++] = scene->statistics_count + i;
     }
     return true;
@@ -61,7 +61,7 @@ static bool work_create(const scene *scene, int64_t cycle, const session_sound_e
 /* Returns whether the condition holds. It does not hold if there are no values. */
 static bool condition_holds(const scene_condition *c, const session_statistics *s)
 {
-    const double value = c->statistic == SCENE_MEAN ? s->mean : c->statistic == SCENE_MINIMUM ? s->least : s->most;
+    const double value = c->statistic == SCENE_MEAN ? s->mean : c->statistic == SCENE_MINIMUM ? s->minimum : s->maximum;
     return s->cell_count > 0 && value > c->above && value < c->below;
 }
 
@@ -85,7 +85,7 @@ static void store_conditions(session_events *events, const scene *scene, const e
     events->held_conditions = 0;
     for (int i = 0; i < w->count; i++) {
         const int image = w->wish_origins[i] - scene->statistics_count;
-        if (image >= 0 && condition_holds(&scene->images[image].when, &w->results[i]))
+        if (image >= 0 && condition_holds(&scene->images[image].condition, &w->results[i]))
             events->held_conditions |= (uint64_t)1 << scene->images[image].variant.source;
     }
 }
@@ -117,8 +117,8 @@ uint64_t session_let_images(const session_events *events, const scene *scene)
     uint64_t let = 0;
     for (int i = 0; i < scene->image_count; i++) {
         const uint64_t bit = (uint64_t)1 << scene->images[i].variant.source;
-        const bool is_let = !scene->images[i].when.is_given || events->held_conditions & bit;
-        if (is_let && !(scene->images[i].once && events->drawn_images & bit)) let |= bit;
+        const bool is_let = !scene->images[i].condition.is_given || events->held_conditions & bit;
+        if (is_let && !(scene->images[i].is_drawn_once && events->drawn_images & bit)) let |= bit;
     }
     return let;
 }

@@ -17,12 +17,12 @@
 /* ---- one cell ------------------------------------------------------------------------------------------------ */
 
 typedef struct cell_value {
-    bool is_counted, is_shell; /* set if the cell is drawn and all its values are finite; set if it is a shell */
-    double least, most, mean;  /* of the value of the cell, or of the values at its vertices */
-    double volume;             /* volume, or area of a shell */
+    bool is_counted, is_shell;     /* set if the cell is drawn and all its values are finite; set if it is a shell */
+    double minimum, maximum, mean; /* of the value of the cell, or of the values at its vertices */
+    double volume;                 /* volume, or area of a shell */
 } cell_value;
 
-static cell_value read_cell_value(const grid *g, const grid_field *field, int64_t cell, volume_room *room)
+static cell_value read_cell_value(const grid *g, const grid_field *field, int64_t cell, volume_buffer *room)
 {
     cell_value out = {grid_is_seen(g, cell), grid_is_shell(g, cell), INFINITY, -INFINITY, 0, 0};
     if (!out.is_counted) return out;
@@ -31,8 +31,8 @@ static cell_value read_cell_value(const grid *g, const grid_field *field, int64_
     for (int i = 0; i < count; i++) {
         const double value = grid_field_value(field, field->is_cell_centred ? cell : room->vertices[i]);
         out.is_counted = out.is_counted && isfinite(value);
-        out.least = fmin(out.least, value);
-        out.most = fmax(out.most, value);
+        out.minimum = fmin(out.minimum, value);
+        out.maximum = fmax(out.maximum, value);
         out.mean += value;
     }
     out.mean /= count;
@@ -82,7 +82,7 @@ static void add_cell(const sum_basis *b, const cell_value *cell, int64_t *sums)
 {
     const session_statistics *s = b->first_pass;
     const double volume = b->largest > 0 ? cell->volume / b->largest : 0;
-    const double place = share_of_range(cell->mean, s->least, s->most) - b->approximate_mean;
+    const double place = share_of_range(cell->mean, s->minimum, s->maximum) - b->approximate_mean;
     if (b->is_second) {
         add_fixed_point(sums, volume * place * place);
         return;
@@ -99,7 +99,7 @@ typedef struct statistics_pass {
     const grid *g;
     grid_field field;
     const session_team *team;
-    volume_room *rooms; /* one buffer per thread */
+    volume_buffer *buffers; /* one buffer per thread */
 } statistics_pass;
 
 static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
@@ -109,7 +109,7 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
         region_enter();
 #pragma omp for schedule(static) reduction(+ : sums[:count]) nowait
         for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
-            const cell_value value = read_cell_value(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
+            const cell_value value = read_cell_value(p->g, &p->field, cell, &p->buffers[omp_get_thread_num()]);
             if (value.is_counted && value.is_shell == b->is_of_shells) add_cell(b, &value, sums);
         }
         region_leave();
@@ -127,11 +127,11 @@ static void find_extremes(const statistics_pass *p, double ends[KINDS * ENDS])
         region_enter();
 #pragma omp for schedule(static) reduction(min : ends[:KINDS * ENDS]) nowait
         for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
-            const cell_value value = read_cell_value(p->g, &p->field, cell, &p->rooms[omp_get_thread_num()]);
+            const cell_value value = read_cell_value(p->g, &p->field, cell, &p->buffers[omp_get_thread_num()]);
             if (!value.is_counted) continue;
             double *of = ends + (value.is_shell ? ENDS : 0);
-            of[0] = fmin(of[0], value.least);
-            of[1] = fmin(of[1], -value.most);
+            of[0] = fmin(of[0], value.minimum);
+            of[1] = fmin(of[1], -value.maximum);
             of[2] = fmin(of[2], -value.volume);
         }
         region_leave();
@@ -147,11 +147,11 @@ typedef struct statistics_work {
     int count;
     /* KINDS * ENDS entries for each requested statistics, then one entry that is -1 if memory ran out on a rank, and
      * otherwise 0 */
-    double *ends;
+    double *extremes;
     int64_t *sums; /* MAX_SUMS entries for each requested statistics, then two more */
     /* one buffer per thread; they are large enough after the first pass, since each thread always processes the same
      * cells */
-    volume_room *rooms;
+    volume_buffer *buffers;
 } statistics_work;
 
 /* Sets up a pass over the field of the requested statistics on a mesh of this rank. Returns false if the mesh does not
@@ -159,48 +159,48 @@ typedef struct statistics_work {
 static bool set_up_pass(const statistics_work *w, int wish, int mesh, statistics_pass *pass)
 {
     const session_mesh *of = w->meshes->items[mesh];
-    *pass = (statistics_pass){.g = &of->cells, .team = w->team, .rooms = w->rooms};
+    *pass = (statistics_pass){.g = &of->cells, .team = w->team, .buffers = w->buffers};
     return of->is_given && session_find_values(of, w->wishes[wish].field, &pass->field);
 }
 
 /* Stores an error if a thread's buffer could not be allocated on any rank. */
 static insitu_status check_buffers(const statistics_work *w, base_error *error)
 {
-    if (w->ends[KINDS * ENDS * w->count] == 0) return INSITU_OK;
+    if (w->extremes[KINDS * ENDS * w->count] == 0) return INSITU_OK;
     for (int thread = 0; thread < w->team->threads; thread++)
-        if (w->rooms[thread].is_out_of_memory)
-            session_fail_for_memory(error, (int64_t)w->rooms[thread].requested_size, "a polyhedron");
+        if (w->buffers[thread].is_out_of_memory)
+            session_fail_for_memory(error, (int64_t)w->buffers[thread].requested_size, "a polyhedron");
     return session_agree(w->team->comm, error);
 }
 
 /* Returns whether only shells are counted, which is the case if there are shells and no cell has a volume. */
 static bool is_of_shells(const statistics_work *w, int wish)
 {
-    const double *ends = w->ends + KINDS * ENDS * wish;
+    const double *ends = w->extremes + KINDS * ENDS * wish;
     return !(ends[0] <= -ends[1]) && ends[ENDS] <= -ends[ENDS + 1];
 }
 
 static const double *find_wish_ends(const statistics_work *w, int wish)
 {
-    return w->ends + KINDS * ENDS * wish + (is_of_shells(w, wish) ? ENDS : 0);
+    return w->extremes + KINDS * ENDS * wish + (is_of_shells(w, wish) ? ENDS : 0);
 }
 
 static insitu_status reduce_ends(const statistics_work *w, base_error *error)
 {
     const int size = KINDS * ENDS * w->count;
     for (int i = 0; i < w->count; i++) {
-        double *ends = w->ends + KINDS * ENDS * i;
+        double *ends = w->extremes + KINDS * ENDS * i;
         for (int k = 0; k < KINDS * ENDS; k++) ends[k] = k % ENDS == 2 ? 0 : INFINITY;
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
             if (set_up_pass(w, i, m, &pass)) find_extremes(&pass, ends);
         }
     }
-    w->ends[size] = 0;
+    w->extremes[size] = 0;
     for (int thread = 0; thread < w->team->threads; thread++)
-        if (w->rooms[thread].is_out_of_memory) w->ends[size] = -1;
+        if (w->buffers[thread].is_out_of_memory) w->extremes[size] = -1;
     const insitu_status status = session_check_mpi(
-        error, MPI_Allreduce(MPI_IN_PLACE, w->ends, size + 1, MPI_DOUBLE, MPI_MIN, w->team->comm), "MPI_Allreduce");
+        error, MPI_Allreduce(MPI_IN_PLACE, w->extremes, size + 1, MPI_DOUBLE, MPI_MIN, w->team->comm), "MPI_Allreduce");
     return status ? status : check_buffers(w, error);
 }
 
@@ -210,8 +210,9 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
     const int size = is_second ? 2 : MAX_SUMS;
     memset(w->sums, 0, (size_t)(size * w->count) * sizeof *w->sums);
     for (int i = 0; i < w->count; i++) {
-        const double range = known[i].most - known[i].least;
-        const double about = is_second && range > 0 ? share_of_range(known[i].mean, known[i].least, known[i].most) : 0;
+        const double range = known[i].maximum - known[i].minimum;
+        const double about =
+            is_second && range > 0 ? share_of_range(known[i].mean, known[i].minimum, known[i].maximum) : 0;
         const sum_basis basis = {&known[i], -find_wish_ends(w, i)[2], about, is_second, known[i].is_of_shells};
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
@@ -229,9 +230,9 @@ static void begin_statistics(const statistics_work *w, int wish, session_statist
     const double *ends = find_wish_ends(w, wish);
     const bool has_range = of->low <= of->high;
     *out = (session_statistics){
-        .is_of_shells = is_of_shells(w, wish), .least = ends[0], .most = -ends[1], .bin_count = of->bin_count};
-    out->low = has_range ? of->low : out->least;
-    out->high = has_range ? of->high : out->most;
+        .is_of_shells = is_of_shells(w, wish), .minimum = ends[0], .maximum = -ends[1], .bin_count = of->bin_count};
+    out->low = has_range ? of->low : out->minimum;
+    out->high = has_range ? of->high : out->maximum;
 }
 
 static void convert_sums(const statistics_work *w, int wish, session_statistics *out)
@@ -241,7 +242,7 @@ static void convert_sums(const statistics_work *w, int wish, session_statistics 
     const double place = volume > 0 ? sum_from_fixed_point(sums + MOMENT) / volume : 0;
     out->cell_count = sums[0];
     out->volume = volume * largest;
-    out->mean = (1 - place) * out->least + place * out->most;
+    out->mean = (1 - place) * out->minimum + place * out->maximum;
     for (int bin = 0; bin < out->bin_count; bin++)
         out->bin_fractions[bin] = volume > 0 ? sum_from_fixed_point(sums + BINS + 2 * bin) / volume : 0;
 }
@@ -254,7 +255,7 @@ static insitu_status find_all_statistics(const statistics_work *w, session_stati
     for (int i = 0; i < w->count && !status; i++) convert_sums(w, i, &out[i]);
     if (!status) status = reduce_sums(w, out, true, error);
     for (int i = 0; i < w->count && !status; i++) {
-        const double volume = out[i].volume / -find_wish_ends(w, i)[2], range = out[i].most - out[i].least;
+        const double volume = out[i].volume / -find_wish_ends(w, i)[2], range = out[i].maximum - out[i].minimum;
         out[i].deviation = volume > 0 ? range * sqrt(sum_from_fixed_point(w->sums + 2 * i) / volume) : 0;
     }
     return status;
@@ -266,16 +267,16 @@ insitu_status session_find_statistics(const session_meshes *meshes, const sessio
 {
     statistics_work work = {.meshes = meshes, .team = team, .wishes = wishes, .count = count};
     if (count == 0) return INSITU_OK;
-    work.ends = base_alloc(((size_t)count * KINDS * ENDS + 1) * sizeof *work.ends);
+    work.extremes = base_alloc(((size_t)count * KINDS * ENDS + 1) * sizeof *work.extremes);
     work.sums = base_alloc((size_t)count * MAX_SUMS * sizeof *work.sums);
-    work.rooms = base_calloc((size_t)team->threads, sizeof *work.rooms);
-    if (!work.ends || !work.sums || !work.rooms)
+    work.buffers = base_calloc((size_t)team->threads, sizeof *work.buffers);
+    if (!work.extremes || !work.sums || !work.buffers)
         session_fail_for_memory(error, count * MAX_SUMS * (int64_t)sizeof *work.sums, "statistics of fields");
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = find_all_statistics(&work, out, error);
-    for (int thread = 0; work.rooms && thread < team->threads; thread++) session_volume_free(&work.rooms[thread]);
-    base_free(work.ends);
+    for (int thread = 0; work.buffers && thread < team->threads; thread++) session_volume_free(&work.buffers[thread]);
+    base_free(work.extremes);
     base_free(work.sums);
-    base_free(work.rooms);
+    base_free(work.buffers);
     return status;
 }

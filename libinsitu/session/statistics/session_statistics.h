@@ -21,8 +21,8 @@ typedef struct session_statistics {
     int64_t cell_count; /* number of counted cells */
     bool is_of_shells;  /* set if shells are counted, so that areas replace volumes */
     double volume;      /* total volume of the cells */
-    /* range of the values, for a vertex field of those at vertices; least > most: there are no values */
-    double least, most;
+    /* range of the values, for a vertex field of those at vertices; minimum > maximum: there are no values */
+    double minimum, maximum;
     double mean, deviation; /* mean and standard deviation of the cells' values, weighted by volume */
     int bin_count;
     double low, high; /* lower bound of the first bin and upper bound of the last one */

@@ -26,8 +26,8 @@ static char *make_header(int bin_count, bool is_of_shells)
 
 /* The new content of the file. */
 typedef struct new_lines {
-    char *old; /* the lines of the old file that are kept */
-    size_t old_size;
+    char *kept_text; /* the lines of the old file that are kept */
+    size_t kept_bytes;
     const char *header; /* line of column names; NULL: the file already has one */
     int64_t cycle;
     double time;
@@ -46,9 +46,9 @@ static int count_needed_digits(double low, double high)
 static void write_line(FILE *file, const new_lines *n)
 {
     const session_statistics *v = n->values;
-    const int digits = count_needed_digits(v->least, v->most), of_bins = count_needed_digits(v->low, v->high);
+    const int digits = count_needed_digits(v->minimum, v->maximum), of_bins = count_needed_digits(v->low, v->high);
     fprintf(file, "%lld,%.9g,%lld,%.9g,%.*g,%.*g,%.*g,%.9g", (long long)n->cycle, n->time, (long long)v->cell_count,
-            v->volume, digits, v->least, digits, v->most, digits, v->mean, v->deviation);
+            v->volume, digits, v->minimum, digits, v->maximum, digits, v->mean, v->deviation);
     if (v->bin_count) fprintf(file, ",%.*g,%.*g", of_bins, v->low, of_bins, v->high);
     for (int bin = 0; bin < v->bin_count; bin++) fprintf(file, ",%.9g", v->bin_fractions[bin]);
     fputc('\n', file);
@@ -58,14 +58,14 @@ static void write_lines(FILE *file, const void *what)
 {
     const new_lines *n = what;
     fprintf(file, "%s\n", n->header);
-    if (n->old_size) fwrite(n->old, 1, n->old_size, file);
+    if (n->kept_bytes) fwrite(n->kept_text, 1, n->kept_bytes, file);
     write_line(file, n);
 }
 
 /* Stores an error for the file and returns its status. what is "read" or "written". */
 static insitu_status fail_at_file(const char *path, const char *what, const file_failure *failure, base_error *error)
 {
-    return base_fail(error, failure->is_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
+    return base_fail(error, failure->is_out_of_memory ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
                      "statistics: %.300s: cannot be %s: %s", path, what, failure->reason);
 }
 
@@ -78,8 +78,8 @@ static insitu_status select_kept_lines(const char *path, file_content *old, new_
                          "statistics: %.300s: exists with other columns, expected \"%.200s\" (move or delete "
                          "it to begin anew)",
                          path, lines->header);
-    lines->old = old->text + header + 1;
-    lines->old_size = text_keep_below(lines->old, lines->cycle);
+    lines->kept_text = old->text + header + 1;
+    lines->kept_bytes = text_keep_below(lines->kept_text, lines->cycle);
     return INSITU_OK;
 }
 

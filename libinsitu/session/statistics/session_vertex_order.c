@@ -71,11 +71,11 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
     for (int i = 0; i < parts.count; i++) {
         const session_mesh *part = parts.items[i];
         if (!part->is_given) continue;
-        sums[DRAWN] += part->given_counts.drawn - part->given_counts.shells;
-        sums[FLAT] += part->given_counts.flat - part->given_counts.shells;
+        sums[DRAWN] += part->given_counts.drawn_count - part->given_counts.shell_count;
+        sums[FLAT] += part->given_counts.flat_count - part->given_counts.shell_count;
         /* the axes of a lattice may have either direction, so that left-handed cells are not counted */
-        sums[INVERTED] += part->cells.lattice ? 0 : part->given_counts.inverted;
-        sums[SHELLS] += part->given_counts.shells;
+        sums[INVERTED] += part->cells.lattice ? 0 : part->given_counts.inverted_count;
+        sums[SHELLS] += part->given_counts.shell_count;
         if (!part->topology.is_split) sum_orders(part, parts.count, sums); /* pieces are in VTK's order */
     }
 }

@@ -60,13 +60,13 @@ static double hex_volume(double (*p)[3], const signed char *corner)
 
 /* ---- polyhedra ------------------------------------------------------------------------------------------------ */
 
-void session_volume_free(volume_room *room)
+void session_volume_free(volume_buffer *room)
 {
     base_free(room->bytes);
-    *room = (volume_room){0};
+    *room = (volume_buffer){0};
 }
 
-static bool reserve_bytes(volume_room *room, size_t size)
+static bool reserve_bytes(volume_buffer *room, size_t size)
 {
     if (size <= room->size) return true;
     base_free(room->bytes);
@@ -95,7 +95,7 @@ static double patch_cone_volume(const double (*p)[3], const int v[4])
     return (determinant(a, b, c) + determinant(a, c, d) + determinant(a, b, d) + determinant(b, c, d)) / 2;
 }
 
-static double polyhedron_volume(const grid *g, int64_t cell, volume_room *room)
+static double polyhedron_volume(const grid *g, int64_t cell, volume_buffer *room)
 {
     static const double origin[3] = {0, 0, 0};
     closed_faces c = {0};
@@ -124,7 +124,7 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_room *room)
 /* ---- shells ---------------------------------------------------------------------------------------------------- */
 
 /* Lists the vertices of the shell in the buffer. Returns false if memory runs out. */
-static bool read_vertices(const grid *g, int64_t cell, volume_room *room)
+static bool read_vertices(const grid *g, int64_t cell, volume_buffer *room)
 {
     grid_walk walk = grid_walk_cell(g, cell);
     const int64_t count = walk.end - walk.next;
@@ -139,7 +139,7 @@ static bool read_vertices(const grid *g, int64_t cell, volume_room *room)
     return true;
 }
 
-static double shell_area(const grid *g, int64_t cell, volume_room *room)
+static double shell_area(const grid *g, int64_t cell, volume_buffer *room)
 {
     double first[3], last[3], next[3], sum[3] = {0, 0, 0};
     if (!read_vertices(g, cell, room)) return NAN;
@@ -157,7 +157,7 @@ static double shell_area(const grid *g, int64_t cell, volume_room *room)
     return 0.5 * hypot(hypot(sum[0], sum[1]), sum[2]);
 }
 
-double session_cell_volume(const grid *g, int64_t cell, volume_room *room)
+double session_cell_volume(const grid *g, int64_t cell, volume_buffer *room)
 {
     double points[GRID_MAX_CELL_VERTICES][3];
     const int type = grid_cell_type(g, cell);

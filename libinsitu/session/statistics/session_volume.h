@@ -7,21 +7,21 @@
 #include "grid.h"
 
 /* Buffers of a thread. They must be initialized with {0}. */
-typedef struct volume_room {
+typedef struct volume_buffer {
     const int64_t *vertices; /* vertices of the last cell, each listed once */
     int vertex_count;
     int64_t corners[GRID_MAX_CELL_VERTICES]; /* memory for the vertices of cells of a fixed size */
     char *bytes;                             /* memory for polyhedra and polygons */
     size_t size, requested_size;             /* size of the memory and the size that was requested last, in bytes */
     bool is_out_of_memory; /* set if the requested memory was not available, so that a volume could not be computed */
-} volume_room;
+} volume_buffer;
 
-void session_volume_free(volume_room *room);
+void session_volume_free(volume_buffer *room);
 
 /* Returns the unsigned volume of a valid cell of any shape. Quads are bilinear patches; other faces of polyhedra, and
  * their concave quads, are divided into triangles. For a shell, returns the area projected along the mean normal, which
  * for a flat shell is its whole area, whether it is convex or not. Returns NaN if memory runs out, which is possible
  * only for a polyhedron or polygon that is larger than all before. */
-double session_cell_volume(const grid *g, int64_t cell, volume_room *room);
+double session_cell_volume(const grid *g, int64_t cell, volume_buffer *room);
 
 #endif

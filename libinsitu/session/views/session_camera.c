@@ -128,8 +128,8 @@ static camera_frame find_free_frame(const scene_image *image, double most)
     const double top =
         (d->title ? title_room : 0) + find_lines_height(image, SCENE_TOP, SCENE_TOP_LEFT, SCENE_TOP_RIGHT);
     const double foot = find_lines_height(image, SCENE_BOTTOM, SCENE_BOTTOM_LEFT, SCENE_BOTTOM_RIGHT);
-    const double right = rulers + (d->bars_at == SCENE_RIGHT ? bars : 0);
-    const double left = rulers + (d->bars_at == SCENE_LEFT ? bars : 0);
+    const double right = rulers + (d->bar_anchor == SCENE_RIGHT ? bars : 0);
+    const double left = rulers + (d->bar_anchor == SCENE_LEFT ? bars : 0);
     return (camera_frame){.right = reduce_fraction(most, right * size, image->width),
                           .left = reduce_fraction(most, left * size, image->width),
                           .up = reduce_fraction(most, top * size, image->height),

@@ -146,14 +146,14 @@ typedef struct clip_basis {
     const scene_image *image;
     const render_clip *clips;
     session_report *report;
-    bool has_nothing; /* set if nothing remains of all layers together */
+    bool is_empty; /* set if nothing remains of all layers together */
 } clip_basis;
 
 static void warn_of_layer(const clip_basis *b, const char *layer, const char *field, int number, uint32_t set)
 {
     const session_extent *e = b->extent;
     const session_warning warning = {WARNING_CLIP, b->image->name, layer, number};
-    const bool holds = !b->has_nothing && do_clips_remove_all(e, b->clips, b->image->clip_count, set);
+    const bool holds = !b->is_empty && do_clips_remove_all(e, b->clips, b->image->clip_count, set);
     session_warn(b->report, &warning, holds,
                  "image \"%s\": clip leaves nothing of %s%s%s%s: the cells lie between (%g, %g, %g) and (%g, %g, %g)",
                  b->image->name, layer, field ? " of \"" : "", field ? field : "", field ? "\"" : "", e->lower[0],
@@ -166,7 +166,7 @@ void session_warn_of_clips(const session_extent *extent, const scene_image *imag
     clip_basis basis = {extent, image, clips, report, extent->cell_count == 0};
     if (image->variant.view > 0 || image->clip_count == 0) return;
     warn_of_layer(&basis, "the picture", NULL, 0, image->clips_of_all);
-    basis.has_nothing = basis.has_nothing || do_clips_remove_all(extent, clips, image->clip_count, image->clips_of_all);
+    basis.is_empty = basis.is_empty || do_clips_remove_all(extent, clips, image->clip_count, image->clips_of_all);
     for (int i = 0; i < image->isosurface_count; i++)
         warn_of_layer(&basis, "the isosurface", image->isosurfaces[i].field.name, i, image->isosurfaces[i].clips);
     for (int i = 0; i < image->volume_count; i++)

@@ -44,12 +44,12 @@ static bool allocate_layers(const session_layer_basis *basis, const scene_image 
     if (out->transfers) out->transfer_count = (int)(surfaces + volumes);
     out->fields = base_calloc(fields, sizeof *out->fields);
     out->field_count = (int64_t)fields;
-    out->gathered = base_calloc(fields, sizeof *out->gathered);
+    out->gathered_values = base_calloc(fields, sizeof *out->gathered_values);
     out->gradients = base_calloc((size_t)out->part_count * (size_t)image->isosurface_count, sizeof *out->gradients);
     out->distances = base_calloc(surfaces, sizeof *out->distances);
     out->contours = base_calloc(surfaces, sizeof *out->contours);
     out->ranges = base_calloc(fields, sizeof *out->ranges);
-    return out->parts && out->surfaces && out->volumes && out->transfers && out->fields && out->gathered &&
+    return out->parts && out->surfaces && out->volumes && out->transfers && out->fields && out->gathered_values &&
            out->gradients && out->distances && out->contours && out->ranges;
 }
 
@@ -61,8 +61,8 @@ void session_layers_free(session_layers *layers)
     base_free(layers->volumes);
     base_free(layers->transfers);
     base_free(layers->fields);
-    for (int64_t i = 0; i < layers->field_count && layers->gathered; i++) base_free(layers->gathered[i]);
-    base_free(layers->gathered);
+    for (int64_t i = 0; i < layers->field_count && layers->gathered_values; i++) base_free(layers->gathered_values[i]);
+    base_free(layers->gathered_values);
     base_free(layers->gradients);
     base_free(layers->distances);
     base_free(layers->contours);
@@ -283,7 +283,7 @@ static bool set_gathered_field(const session_meshes *meshes, session_layers *lay
         if (!is_part(walk.part)) continue;
         const session_scalar *scalar = is_shown(&walk, layer) ? session_find_scalar(walk.whole, field) : NULL;
         layers->fields[at] = make_absent_field();
-        if (scalar && !gather_values(walk.whole, walk.outer, scalar, &layers->gathered[at], &layers->fields[at]))
+        if (scalar && !gather_values(walk.whole, walk.outer, scalar, &layers->gathered_values[at], &layers->fields[at]))
             return false;
         at++;
     }

@@ -28,7 +28,7 @@ typedef struct session_layers {
     int64_t field_count;
     render_vertex_gradients *gradients; /* part_count entries per isosurface */
     /* values gathered at outer faces, in the same order as fields; NULL for other fields */
-    double **gathered;
+    double **gathered_values;
     mmbvh_ranges *ranges; /* ranges of the fields, in the same order */
 } session_layers;
 

@@ -25,9 +25,9 @@ static void make_lights(const scene_image *image, const render_camera *camera, r
         const double *d = light->direction;
         for (int axis = 0; axis < 3; axis++) {
             lights[i].colour[axis] = light->colour[axis];
-            lights[i].direction[axis] =
-                light->in_world ? d[axis]
-                                : d[0] * camera->right[axis] + d[1] * camera->up[axis] - d[2] * camera->forward[axis];
+            lights[i].direction[axis] = light->is_in_world ? d[axis]
+                                                           : d[0] * camera->right[axis] + d[1] * camera->up[axis] -
+                                                                 d[2] * camera->forward[axis];
         }
     }
 }
@@ -128,8 +128,8 @@ typedef struct corner_bounds {
     /* bounds of those corners that are in front of the eye, in coordinates in which the borders of the picture are at
      * -1 and 1 */
     double low[2], high[2];
-    int behind;     /* number of corners behind the eye */
-    bool is_beside; /* set if all corners are beyond one border */
+    int behind_count; /* number of corners behind the eye */
+    bool is_beside;   /* set if all corners are beyond one border */
 } corner_bounds;
 
 static corner_bounds project_bounds(const session_extent *e, const render_camera *c)
@@ -142,7 +142,7 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
         for (int a = 0; a < 3; a++) offset[a] = (corner >> a & 1 ? e->upper[a] : e->lower[a]) - c->eye[a];
         const double z = vector3_dot(offset, c->forward);
         const double place[2] = {vector3_dot(offset, c->right), vector3_dot(offset, c->up)};
-        b.behind += z <= 0;
+        b.behind_count += z <= 0;
         for (int a = 0; a < 2; a++) {
             const double border = half[a] * (c->is_orthographic ? 1 : z);
             beyond[2 * a] += place[a] < -border;
@@ -159,10 +159,10 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
 static const char *find_unseen_reason(const session_extent *e, const render_camera *c)
 {
     const corner_bounds b = project_bounds(e, c);
-    if (b.behind == 8) return "they are behind it";
+    if (b.behind_count == 8) return "they are behind it";
     if (b.is_beside) return "they are beside the picture";
     const bool is_small =
-        b.behind == 0 && (b.high[0] - b.low[0]) * c->width < 2 && (b.high[1] - b.low[1]) * c->height < 2;
+        b.behind_count == 0 && (b.high[0] - b.low[0]) * c->width < 2 && (b.high[1] - b.low[1]) * c->height < 2;
     return is_small ? "together they are smaller than a pixel" : NULL;
 }
 
