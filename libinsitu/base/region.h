@@ -21,7 +21,8 @@
  * 10 µs. */
 enum { REGION_ITEMS = 8192 };
 
-/* Gives a worker the default floating-point environment, and moves it off the core of the region's first thread. */
+/* Sets a worker's floating-point environment to the default, and moves the worker off the core of the region's first
+ * thread. */
 void region_enter(void);
 
 /* Restores a worker's own floating-point environment. */

@@ -51,7 +51,7 @@ typedef enum face_fault {
 
 typedef struct face_place {
     int64_t count; /* number of the cell's faces */
-    int64_t face;  /* index as stored in the connectivity */
+    int64_t face;  /* number of the faulty face, as stored in the connectivity */
     int64_t first, end;
     int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
     int sharing;           /* number of faces that have the edge */
@@ -204,7 +204,7 @@ typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORD
 typedef struct fault_place {
     int type;
     int64_t first, end; /* begin and end offset of the cell */
-    int64_t vertex;     /* index as stored in the connectivity */
+    int64_t vertex;     /* number of the faulty vertex, as stored in the connectivity */
     double position[3];
     face_fault fault_of_faces;
     face_place faces;

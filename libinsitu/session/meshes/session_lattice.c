@@ -148,7 +148,7 @@ static insitu_status check_interior(const insitu_lattice *l, base_error *error)
 /* Some integers above this are not representable as doubles. */
 static const int64_t largest_first = (int64_t)1 << 53;
 
-/* Keeps products of indices and refinements within 2^62. */
+/* Limits that keep products of indices and refinements within 2^62. */
 static const int64_t largest_refined_first = (int64_t)1 << 40, largest_refinement = (int64_t)1 << 20;
 
 static insitu_status check_refinement(const insitu_lattice *l, base_error *error)

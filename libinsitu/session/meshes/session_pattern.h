@@ -10,13 +10,13 @@ enum { PATTERN_MOST_LOOSE = 24, PATTERN_MOST_POLYGONS = 16 };
 typedef struct pattern_polygon {
     int count;
     int corner;   /* the corner that it cuts off, or -1 if it lies on a face of the cell */
-    int nodes[4]; /* positions in the row */
+    int nodes[4]; /* positions of the vertices in the cell's row of nodes */
 } pattern_polygon;
 
 /* The pieces of one type and order of cell. For complete cells they are listed here; those of serendipity cells depend
  * on the coordinates of the nodes (session_cut_serendipity()). */
 typedef struct session_pattern {
-    int type; /* the caller's type */
+    int type; /* type of the cells as the caller gives it */
     session_nodes nodes;
     int piece_count, piece_size; /* number of listed pieces, and of entries of `piece_positions` */
     unsigned char *types;

@@ -23,7 +23,7 @@ enum { BOX_WORDS = sizeof(session_level_box) / sizeof(uint64_t) };
 /* Boxes sorted into bins by their centres, in units of cells of the coarsest level. */
 typedef struct box_bins {
     int64_t count;
-    int64_t *boxes; /* indices of the boxes */
+    int64_t *boxes; /* for each sorted box, its index in the array that was sorted */
     double (*centres)[3];
     double largest_half_width; /* half of the largest side length of all boxes */
     session_bins bins;

@@ -33,7 +33,7 @@ typedef struct part_cells {
     unsigned char *is_hidden;
     int64_t first_cell;   /* number of the part's first cell among those of all parts */
     int64_t first_vertex; /* number of the part's first vertex among those of all parts */
-    uint64_t *hashes;     /* one hash per vertex */
+    uint64_t *hashes;     /* hash of each vertex's position or global id */
     /* one byte per vertex, nonzero if its sum of hashes is not 0, so that it may be a corner of an outer face */
     unsigned char *may_be_outer;
 } part_cells;
@@ -48,9 +48,9 @@ typedef struct face_search {
     const session_face_part *parts;
     int part_count;
     int threads;
-    part_cells *cells;                /* one entry per part */
+    part_cells *cells;                /* the cells of each part, with the search's data about them */
     int64_t cell_count, vertex_count; /* total numbers over all parts */
-    uint64_t *hashes;                 /* one hash per vertex */
+    uint64_t *hashes;                 /* hash of each vertex's position or global id, part by part */
     /* number of tables in vertex_sums; if there are more threads, they share tables */
     int table_count;
     uint64_t *vertex_sums; /* exclusive or of the hashes of each vertex's faces, in table_count tables */

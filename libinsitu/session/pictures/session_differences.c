@@ -141,7 +141,7 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
     return true;
 }
 
-/* Exchanges requests and received_answers with other ranks. If an error occurs on one rank, the next message exchange
+/* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next message exchange
  * passes it to all ranks. */
 static insitu_status exchange_round(differing *d, base_error *error)
 {

@@ -28,7 +28,7 @@ enum { overlap_fragments = 1 << 21 };
  * size. */
 typedef struct canvas {
     image frame;
-    /* memory of the frame; when the picture is passed to the writer, the writer becomes its owner */
+    /* block that holds the pixels of `frame`; the writer becomes its owner when the picture is passed to it */
     session_picture memory;
     float *depth;  /* depth of the frame, saved here while further frames are drawn without depth */
     image samples; /* frames and their sums for the pixels at edges, if only these take more than one frame */

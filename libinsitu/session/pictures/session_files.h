@@ -27,7 +27,7 @@ typedef struct session_files {
     scene_image image; /* a copy whose camera is that of the step, and whose lists belong to the scene */
     scene_moment moment;
     image frame;
-    session_picture memory; /* memory of the frame */
+    session_picture memory; /* block that holds the pixels of `frame`; owned by this struct */
     session_channels channels;
     deep_image deep;                  /* samples for deep pictures; the member `counts` is NULL if there are none */
     session_decorations *decorations; /* NULL: there are no decorations, and the frame contains its background */

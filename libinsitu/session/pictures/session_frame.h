@@ -22,7 +22,7 @@ typedef struct session_frame {
 typedef struct session_frame_target {
     MPI_Comm comm;
     comp_group compositing;
-    const float *background; /* 4 components; not owned */
+    const float *background; /* background colour, linear premultiplied RGBA; borrowed */
     /* Maximum number of fragments that the busiest rank may store at once for pixels in which cells overlap. If there
      * are more, these pixels are drawn in several turns. The same on every rank. */
     int64_t fragment_limit;

@@ -42,7 +42,7 @@ typedef struct request_list {
     int *ranks;
     int64_t *hits;
     render_hit_rays *rays;
-    int64_t current_hit; /* index of the current hit */
+    int64_t current_hit; /* index of the hit to which added requests belong */
     const lighting *lighting_state;
     int64_t *first_requests; /* ranks + 1 entries: the first request to each rank */
     int64_t *message_order;  /* request at each position in the message */
@@ -61,7 +61,7 @@ static insitu_status share_boxes(lighting *l, base_error *error)
                              "MPI_Allgather");
 }
 
-/* ---- request_list ----------------------------------------------------------------------------------------------- */
+/* ---- requests ---------------------------------------------------------------------------------------------------- */
 
 static bool reserve_requests(request_list *q)
 {

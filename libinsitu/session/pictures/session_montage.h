@@ -1,8 +1,8 @@
 /* Montages, which are several pictures side by side in one file (outputs with a grid).
  *
  * The writing thread receives a step's pictures one after the other. It draws the decorations of each and copies it
- * into its cell. After the last picture of the step, the whole picture is written. A cell whose picture is not due, or
- * could not be drawn, remains transparent. */
+ * into its panel. After the last picture of the step, the whole picture is written. A panel whose picture is not due,
+ * or could not be drawn, remains transparent. */
 #ifndef SESSION_MONTAGE_H
 #define SESSION_MONTAGE_H
 
@@ -21,11 +21,11 @@ typedef struct session_montages {
     session_montage *items; /* one for each montage of the scene; NULL before the first picture */
 } session_montages;
 
-/* Draws the picture into its cell. path is the path of the file; the montage takes ownership of it. Local. */
+/* Draws the picture into its panel. path is the path of the file; the montage takes ownership of it. Local. */
 insitu_status session_add_panel(session_montages *montages, const scene *scene, const scene_image *image,
                                 const scene_output *output, const insitu_image *picture, char *path, base_error *error);
 
-/* Writes the montages that have cells of this step, even if some fail. The first error is returned. Local. */
+/* Writes the montages that have panels of this step, even if some fail. The first error is returned. Local. */
 insitu_status session_write_montages(session_montages *montages, const scene *scene, base_error *error);
 
 void session_montages_free(session_montages *montages);

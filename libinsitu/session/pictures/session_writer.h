@@ -58,7 +58,7 @@ void session_writer_record_error(session_writer *writer, int64_t cycle, const ba
  * NULL if memory runs out even after everything in the queue has been written. Local. */
 session_picture session_writer_reserve(session_writer *writer, size_t bytes);
 
-/* Gives memory that is no longer used back to the writer. Local. */
+/* Returns memory that is no longer used to the writer. Local. */
 void session_writer_release(session_writer *writer, session_picture *memory);
 
 /* Passes files to the writer, which becomes their owner. They are written by the thread or, if there is none,

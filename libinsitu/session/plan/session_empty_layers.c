@@ -106,7 +106,7 @@ static void widen_range(double low, double high, field_range *range)
     range->negated_high = fmin(range->negated_high, -high);
 }
 
-/* Takes the range at the root of the tree, which contains all visible values. */
+/* Widens the range by that of the tree's root, which contains all visible values. */
 static void add_root_range(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
 {
     if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;

@@ -51,7 +51,7 @@ typedef struct mesh_part {
 typedef struct recentring {
     session_joint *joint;
     session_joint_parts list;
-    mesh_part *parts; /* one entry per part in the list */
+    mesh_part *parts; /* for each part in the list, its field and the scalar that gets the means */
     /* begin of each group's values if faces of the boundary have values; otherwise those in joint->groups are used */
     int64_t *starts;
     value_groups values; /* values of joint->groups */

@@ -13,7 +13,7 @@ typedef struct session_transfer {
     double low, high;
     bool is_constant; /* set if all values are equal; the value is then in the middle of low and high */
     double constant;
-    float *table; /* a table of its own; NULL: the map's table is used */
+    float *table; /* table of colours that this struct owns; NULL: the map's table is used */
 } session_transfer;
 
 /* Computes the transfer function of a colour map over [low, high] (low > high: there are no values), with the opacity

@@ -9,7 +9,7 @@
  * is visited once. */
 typedef struct field_walk {
     const session_plan *plan;
-    int image; /* number of the next image */
+    int image; /* index of the image whose fields are visited next */
     scene_field_walk fields;
 } field_walk;
 

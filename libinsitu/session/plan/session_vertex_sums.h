@@ -31,7 +31,7 @@ typedef struct session_vertex_sums {
     int64_t *sums; /* the sums, session_sum_words() words per key */
 } session_vertex_sums;
 
-/* Gives a key to every vertex of a cell that is not a ghost. Local. */
+/* Assigns a key to every vertex of a cell that is not a ghost. Local. */
 insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error);
 
 /* Computes the sums of this rank's keys over all ranks. Keys and entries must be set. A rank that has failed before

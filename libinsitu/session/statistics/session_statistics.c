@@ -99,7 +99,7 @@ typedef struct statistics_pass {
     const grid *g;
     grid_field field;
     const session_team *team;
-    volume_buffer *buffers; /* one buffer per thread */
+    volume_buffer *buffers; /* one per thread, for computing the volumes of cells */
 } statistics_pass;
 
 static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)

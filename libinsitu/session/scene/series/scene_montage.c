@@ -1,4 +1,4 @@
-/* Converts outputs with a grid, and finds which pictures are cells of one file. Cells are numbered in the order in
+/* Converts outputs with a grid, and finds which pictures are panels of one file. Panels are numbered in the order in
  * which pictures are drawn: images in the order of the scene, each image's sweep in its order, and for each of these
  * the views of its orbit. */
 #include <stdio.h>
