@@ -133,8 +133,8 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
 
 /* ---- forwarding ------------------------------------------------------------------------------------------------- */
 
-/* Forwards the parcels for owners with this digit in this round. Of the digits of earlier rounds, these owners share
- * those of this place, because the other parcels were sent in the earlier rounds. */
+/* Forwards the parcels whose owners have this digit in this round. In the digits of earlier rounds these owners equal
+ * this rank's place, because all other parcels were sent in those rounds. */
 static bool forward_to(const comp_messages *in, const comp_route *route, int round, int place, int digit,
                        comp_writer *writer)
 {

@@ -17,7 +17,8 @@ bool session_has_axes(const insitu_mesh *mesh);
  * INSITU_CHANGED_ALL means that their shapes differ. */
 unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *b);
 
-/* Keeps a copy of given.lattice in the mesh, if there is one, and makes given.lattice point to it. Local. */
+/* Copies the lattice of the description, if it has one, into the mesh, and makes given.lattice point to the copy.
+ * Local. */
 void session_take_lattice(session_mesh *mesh);
 
 /* Completes the grid of a mesh that has a lattice: the cell type, the indices and, unless they are given by vertex, the

@@ -19,7 +19,7 @@ typedef struct session_gradient_basis {
     int threads;
 } session_gradient_basis;
 
-/* Returns the number of numbers in a sum. A sum over the cells around a vertex consists of integer words, so that
+/* Returns how many numbers a sum consists of. A sum over the cells around a vertex consists of integer words, so that
  * adding two sums word by word is exact and does not depend on the order. These are first the high words of the three
  * components for each scalar, of the weights, and of padding, and then their low words. */
 static inline int session_sum_numbers(int field_count)
