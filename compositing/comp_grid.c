@@ -92,15 +92,15 @@ static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *
  * rank takes a block for the same reason; if there is no such rank, a rank takes it that exceeds its share afterwards
  * by an eighth of the block more, and so on; finally any rank that has less than its share. Such a rank exists as long
  * as another has more. As no rank gives its last block away, each owner appears among the blocks. */
-typedef struct taker_search {
+typedef struct owner_search {
     const comp_claim *claims;
-    uint32_t blocks, next;
+    uint32_t blocks, next;   /* number of blocks, and index of the claim whose rank is tried next */
     uint64_t allowed_excess; /* allowed excess over the equal share, in eighths of a block's fragments */
-    const uint64_t *loads;
-    uint64_t share;
-} taker_search;
+    const uint64_t *loads;   /* number of fragments that each rank owns so far */
+    uint64_t equal_share;    /* number of fragments per owner if all own the same number, rounded up */
+} owner_search;
 
-static int find_taker(taker_search *t, uint64_t fragments)
+static int find_new_owner(owner_search *t, uint64_t fragments)
 {
     for (;; t->next++) {
         if (t->next == t->blocks) {
@@ -111,21 +111,21 @@ static int find_taker(taker_search *t, uint64_t fragments)
         if (!priority) continue;
         const int rank = comp_priority_rank(priority);
         const uint64_t load = t->loads[rank];
-        if (load < t->share && 8 * load + (8 - t->allowed_excess) * fragments <= 8 * t->share) return rank;
+        if (load < t->equal_share && 8 * load + (8 - t->allowed_excess) * fragments <= 8 * t->equal_share) return rank;
     }
 }
 
 void comp_claims_balance(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
-    taker_search t = {claims, blocks, 0, 4, loads, find_share(claims, blocks, loads, ranks)};
+    owner_search t = {claims, blocks, 0, 4, loads, find_share(claims, blocks, loads, ranks)};
     for (uint32_t b = 0; b < blocks; b++) {
         if (!claims[b].priority) continue;
         const uint64_t fragments = claims[b].fragments;
         uint64_t *const load = &loads[comp_priority_rank(claims[b].priority)];
-        if (2 * *load < 2 * t.share + fragments || *load == fragments) continue;
-        const int taker = find_taker(&t, fragments);
+        if (2 * *load < 2 * t.equal_share + fragments || *load == fragments) continue;
+        const int new_owner = find_new_owner(&t, fragments);
         *load -= fragments;
-        loads[taker] += fragments;
-        claims[b].priority = comp_priority_with_rank(claims[b].priority, taker);
+        loads[new_owner] += fragments;
+        claims[b].priority = comp_priority_with_rank(claims[b].priority, new_owner);
     }
 }

@@ -14,13 +14,13 @@ typedef struct check_state {
     const grid *g;
     const grid_field *field;
     unsigned char *visited; /* bit set of the cells visited so far */
-    int64_t visited_count;  /* number of cells of the grid, or of meshes in a parent tree */
-    int64_t next_pair;
+    int64_t cell_limit;     /* number of cells of the grid, or of meshes in a parent tree */
+    int64_t next_pair;      /* index of the pair of nodes that must be reached next */
     int64_t next_entry;
-    int64_t unusable;
-    int64_t leaves;
-    int depth;
-    double overlap;
+    int64_t unusable; /* number of drawn cells with a value that is not finite */
+    int64_t leaves;   /* number of leaves visited so far */
+    int depth;        /* largest depth of a node visited so far */
+    double overlap;   /* sum of the overlaps of siblings */
     base_error *error;
 } check_state;
 
@@ -101,7 +101,7 @@ static insitu_status check_cell_range(check_state *w, int64_t index, int64_t cel
 
 static insitu_status check_cell(check_state *w, int64_t index, int64_t cell)
 {
-    if (cell >= w->visited_count) return VIOLATION(w, "leaf %" PRId64 ": there is no cell %" PRId64, index, cell);
+    if (cell >= w->cell_limit) return VIOLATION(w, "leaf %" PRId64 ": there is no cell %" PRId64, index, cell);
     unsigned char *byte = &w->visited[cell / 8];
     const unsigned bit = 1u << (cell % 8);
     if (*byte & bit) return VIOLATION(w, "leaf %" PRId64 ": cell %" PRId64 " is in the tree twice", index, cell);
@@ -213,7 +213,7 @@ static insitu_status check_complete(const check_state *w)
         return VIOLATION(w, "%" PRId64 " of %" PRId64 " cell entries are in leaves", w->next_entry,
                          w->tree->cell_count);
     }
-    for (int64_t cell = 0; cell < w->visited_count; cell++) {
+    for (int64_t cell = 0; cell < w->cell_limit; cell++) {
         const bool seen = w->visited[cell / 8] >> (cell % 8) & 1;
         if (!seen && !(w->g && !grid_is_drawn(w->g, cell))) return VIOLATION(w, "cell %" PRId64 " is in no leaf", cell);
     }
@@ -239,8 +239,8 @@ insitu_status mmbvh_check(const mmbvh *tree, const grid *g, const grid_field *fi
 {
     if (!tree) return base_fail(error, INSITU_ERROR_ARGUMENT, "no tree to check");
     check_state w = {.tree = tree, .g = g, .field = g ? field : NULL, .next_pair = 1, .error = error};
-    w.visited_count = g ? g->cell_count : tree->cell_count;
-    w.visited = base_calloc((size_t)w.visited_count / 8 + 1, 1);
+    w.cell_limit = g ? g->cell_count : tree->cell_count;
+    w.visited = base_calloc((size_t)w.cell_limit / 8 + 1, 1);
     if (!w.visited) return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: checking a tree");
     insitu_status status = tree->node_count > 0 ? check_nodes(&w) : INSITU_OK;
     if (!status) status = check_complete(&w);

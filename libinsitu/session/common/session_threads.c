@@ -92,7 +92,7 @@ typedef struct trial {
     pthread_mutex_t gate; /* locked until the threads may end */
     pthread_t *threads;
     int count;
-    void *thread_storage;
+    void *spare_memory; /* SPARE_BYTES that are allocated during the trial, so that they are free after it */
 } trial;
 
 static void *wait_at_gate(void *gate)
@@ -138,10 +138,10 @@ static void start_trial_threads(trial *t, int wanted)
 {
     pthread_attr_t attributes;
     sigset_t all, old;
-    *t = (trial){.threads = base_calloc((size_t)wanted, sizeof *t->threads), .thread_storage = base_alloc(SPARE_BYTES)};
+    *t = (trial){.threads = base_calloc((size_t)wanted, sizeof *t->threads), .spare_memory = base_alloc(SPARE_BYTES)};
     pthread_mutex_init(&t->gate, NULL);
     pthread_mutex_lock(&t->gate);
-    if (!t->threads || !t->thread_storage || pthread_attr_init(&attributes) != 0) return;
+    if (!t->threads || !t->spare_memory || pthread_attr_init(&attributes) != 0) return;
     const size_t stack = stack_of_environment();
     /* a size that is refused here is not used by OpenMP either */
     if (stack) pthread_attr_setstacksize(&attributes, stack);
@@ -160,7 +160,7 @@ static void join_trial_threads(trial *t)
     for (int i = 0; i < t->count; i++) pthread_join(t->threads[i], NULL);
     pthread_mutex_destroy(&t->gate);
     base_free(t->threads);
-    base_free(t->thread_storage);
+    base_free(t->spare_memory);
 }
 
 /* Tries to start threads before a rank's first parallel region, if any rank needs more than it has. All ranks try at
