@@ -130,7 +130,7 @@ static void copy_own_samples(deep_image *out, const comp_deep_list *lists, int c
 /* The numbers of pixels and samples that each rank sends. Only rank 0 uses it. */
 typedef struct deep_inbox {
     int ranks;
-    int64_t (*counts)[2];
+    int64_t (*counts)[2];    /* for each rank, the numbers of pixels and of samples that it sends */
     comp_deep_pixel *pixels; /* receive buffer, large enough for any other rank's pixels */
 } deep_inbox;
 

@@ -90,10 +90,10 @@ static int64_t count_coincident_samples(const fragment *sorted, int64_t count)
  * has one sample at its cell's end and another at its cell's begin, the cells are neighbours, and rounding has given
  * their common face two positions: one of the two samples is left out. */
 typedef struct sample_pass {
-    uint32_t layer;
+    uint32_t layer; /* the volume whose samples are counted */
     /* number of samples at their cell's begin that no sample at a cell's end has matched yet */
     int64_t unmatched_begins;
-    int64_t counted;
+    int64_t counted; /* number of samples counted so far */
 } sample_pass;
 
 static bool is_counted(sample_pass *pass, const fragment *sample)

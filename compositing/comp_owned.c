@@ -14,7 +14,8 @@
 
 /* The work space of a thread; its lists are kept from strip to strip. */
 typedef struct merge_scratch {
-    comp_sheet joined, other, pixels;
+    comp_sheet joined, other,
+        pixels; /* sheet with all fragments merged so far, the sheet that is merged next, and the finished pixels */
     fragment_list remaining,
         listed;                /* fragments that do not fit in the sheet; their .pixel is the index in the strip */
     uint16_t mixed[COMP_ROWS]; /* bit mask per row: pixels that have fragments in the list `remaining` */

@@ -31,7 +31,7 @@ struct selector {
 
 /* The result for one cell: whether its values are finite, and whether their range intersects an interval. */
 typedef struct match_result {
-    bool is_finite, intersects;
+    bool is_finite, intersects; /* set if all values are finite; set if their range intersects an interval */
 } match_result;
 
 MMBVH_INLINE match_result match_range(const selector *s, const fetch_range e)

@@ -33,7 +33,7 @@ int comp_gather_children(const comp_route *route, int place)
 typedef struct parent_link {
     comp_transport *transport;
     int parent; /* rank of the parent in the gather tree */
-    int code;
+    int code;   /* first error code of an MPI call; MPI_SUCCESS: none has failed */
 } parent_link;
 
 static void send_to_parent(parent_link *link, const unsigned char *message, int bytes)

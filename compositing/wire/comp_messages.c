@@ -123,9 +123,9 @@ typedef struct round {
     comp_transport *transport;
     int tag;
     bool is_sparse;
-    int open_partners; /* number of partners that have not sent their last message; 0 in a sparse round */
-    comp_messages *in;
-    MPI_Request *requests;
+    int open_partners;     /* number of partners that have not sent their last message; 0 in a sparse round */
+    comp_messages *in;     /* list to which received messages are appended */
+    MPI_Request *requests; /* requests of this rank's sends */
     int request_count;
     insitu_status status;
     base_error *error;

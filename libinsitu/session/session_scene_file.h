@@ -8,12 +8,12 @@
 #include "session_team.h"
 
 typedef struct session_scene_file {
-    char *path;     /* path of the file, the same on every rank; SESSION_SCENE_TEXT if the scene was given as text */
-    bool is_text;   /* set on rank 0 if the scene was given as text, so that no file can be edited */
-    scene scene;    /* the parsed scene, the same on every rank */
-    char *warning;  /* reason why the last edit of the file was refused; NULL if it was not */
-    bool has_stamp; /* set on rank 0 if the file's time of modification is known */
-    struct stat stamp;
+    char *path;        /* path of the file, the same on every rank; SESSION_SCENE_TEXT if the scene was given as text */
+    bool is_text;      /* set on rank 0 if the scene was given as text, so that no file can be edited */
+    scene scene;       /* the parsed scene, the same on every rank */
+    char *warning;     /* reason why the last edit of the file was refused; NULL if it was not */
+    bool has_stamp;    /* set on rank 0 if the file's time of modification is known */
+    struct stat stamp; /* state of the file when it was last read; valid if has_stamp */
 } session_scene_file;
 
 /* Replaces a file's path in messages if the scene was given as text. */

@@ -34,13 +34,13 @@ typedef struct node_split {
     int64_t chunk_size;
     int chunk_count;
     int64_t left_counts[CHUNKS_MAX]; /* number of left items in each chunk */
-    int64_t left_count;
+    int64_t left_count;              /* number of items of the left child */
     branch_node node;
     bin_mapping mapping;
     int64_t stride; /* one item in this many is binned (bins_stride()) */
     bin_split split;
-    bins all_bins;
-    item_set sides[2];
+    bins all_bins;     /* bins of all chunks together */
+    item_set sides[2]; /* bounds of the items of the left and of the right child */
 } node_split;
 
 static void choose_chunks(node_split *s)

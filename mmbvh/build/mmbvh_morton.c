@@ -97,7 +97,8 @@ static inline uint64_t morton_code(const bounds_source *source, const morton_cod
 
 /* Maps the midpoint of a box of floats, in the source's coordinates, to steps of the code. */
 typedef struct sum_mapping {
-    vec4 origin, factor, last_step;
+    vec4 origin, factor,
+        last_step; /* code step of a centre = (centre - origin) * factor, limited to last_step, along each axis */
 } sum_mapping;
 
 static sum_mapping sum_mapping_make(const bounds_source *source, const morton_coder *coder)
@@ -178,13 +179,13 @@ void morton_make_keys(const bounds_source *source, const morton_coder *coder, ui
 /* Keys are sorted by their highest digit first. Neighbouring cells mostly have neighbouring indices, so consecutive
  * keys go to few output streams; the keys of one digit then fit in a core's cache, where they are sorted completely. */
 typedef struct digit_counts {
-    int64_t chunk_digits[SORT_CHUNKS_MAX][DIGITS];
+    int64_t chunk_digits[SORT_CHUNKS_MAX][DIGITS]; /* number of keys of each chunk with each value of the digit */
 } digit_counts;
 
 typedef struct sorting {
     int64_t large; /* parts with more keys than this are sorted by all threads together */
     int chunks, threads;
-    digit_counts *counts;
+    digit_counts *counts; /* numbers of keys by digit */
 } sorting;
 
 static inline int extract_digit(uint64_t key, int shift)

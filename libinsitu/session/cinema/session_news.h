@@ -24,7 +24,7 @@ typedef struct session_news {
     int64_t count; /* number of warnings so far; the last SESSION_NEWS_LINES are kept */
     /* warning i is stored at i % SESSION_NEWS_LINES; NULL: there was no memory for it */
     char *lines[SESSION_NEWS_LINES];
-    int64_t cycles[SESSION_NEWS_LINES];
+    int64_t cycles[SESSION_NEWS_LINES]; /* cycle in which each of these warnings was added */
     base_error error; /* error of the last step that failed or has drawn pictures; empty if it has drawn them */
 } session_news;
 

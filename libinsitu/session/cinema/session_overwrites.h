@@ -15,8 +15,8 @@ typedef struct session_written {
 } session_written;
 
 typedef struct session_overwrites {
-    int count; /* number of outputs of the scene, over all views, isovalues and fields */
-    session_written *last_files;
+    int count;                   /* number of outputs of the scene, over all views, isovalues and fields */
+    session_written *last_files; /* for each output, the last picture that it has written */
 } session_overwrites;
 
 /* Records the files that the image with this index has written at this cycle and time. If a path was already used for

@@ -6,8 +6,8 @@
 #include <fenv.h>
 
 typedef struct session_guard {
-    fenv_t caller_environment;
-    int is_dynamic;
+    fenv_t caller_environment; /* floating-point environment of the caller, which is restored at the end of the call */
+    int is_dynamic;            /* result of omp_get_dynamic() at the begin of the call */
 } session_guard;
 
 /* Saves the calling thread's settings, then sets the default floating-point environment and fixed team sizes. */

@@ -18,13 +18,13 @@ enum { SESSION_RULER_STROKES = 3 * SESSION_MAX_TICKS, SESSION_RULER_LABELS = 3 *
 typedef struct session_decorations {
     insitu_decorations decorations; /* all decorations; its pointers refer to this struct and to the layers */
     insitu_decorations background;  /* decorations that contain only the background, for files without decorations */
-    insitu_words words[SESSION_MAX_WORDS];
-    insitu_colour_bar bars[SESSION_MAX_BARS];
+    insitu_words words[SESSION_MAX_WORDS];    /* the texts */
+    insitu_colour_bar bars[SESSION_MAX_BARS]; /* the colour bars */
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
-    char labels[SESSION_MAX_BARS][300];
-    const scene_field *fields[SESSION_MAX_BARS]; /* the fields that the colour bars show */
-    insitu_stroke *strokes;                      /* buffer for the boxes of the outline and for the rulers */
-    insitu_label ruler_labels[SESSION_RULER_LABELS];
+    char labels[SESSION_MAX_BARS][300];              /* label of each colour bar */
+    const scene_field *fields[SESSION_MAX_BARS];     /* the fields that the colour bars show */
+    insitu_stroke *strokes;                          /* buffer for the boxes of the outline and for the rulers */
+    insitu_label ruler_labels[SESSION_RULER_LABELS]; /* numbers and names along the rulers */
 } session_decorations;
 
 /* Input for computing decorations. */

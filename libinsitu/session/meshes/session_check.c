@@ -28,7 +28,8 @@
  * from a vertex to itself bounds nothing and is skipped. */
 
 typedef struct face_edge {
-    int64_t low, high, face;
+    int64_t low, high,
+        face; /* smaller and larger vertex of the edge, and a face that has it, as stored in the connectivity */
 } face_edge;
 
 /* A buffer of one thread that grows as needed. It must be zero initially. */
@@ -50,12 +51,12 @@ typedef enum face_fault {
 } face_fault;
 
 typedef struct face_place {
-    int64_t count; /* number of the cell's faces */
-    int64_t face;  /* number of the faulty face, as stored in the connectivity */
-    int64_t first, end;
+    int64_t count;         /* number of the cell's faces */
+    int64_t face;          /* number of the faulty face, as stored in the connectivity */
+    int64_t first, end;    /* begin and end of the face in the list of faces' vertices */
     int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
     int sharing;           /* number of faces that have the edge */
-    double position[3];
+    double position[3];    /* coordinates of the faulty vertex */
 } face_place;
 
 static void free_edge_buffer(edge_buffer *room)

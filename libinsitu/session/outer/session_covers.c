@@ -23,15 +23,15 @@ enum { BOX_WORDS = sizeof(session_level_box) / sizeof(uint64_t) };
 /* Boxes sorted into bins by their centres, in units of cells of the coarsest level. */
 typedef struct box_bins {
     int64_t count;
-    int64_t *boxes; /* for each sorted box, its index in the array that was sorted */
-    double (*centres)[3];
+    int64_t *boxes;            /* for each sorted box, its index in the array that was sorted */
+    double (*centres)[3];      /* centre of each box */
     double largest_half_width; /* half of the largest side length of all boxes */
     session_bins bins;
 } box_bins;
 
 typedef struct cover_search {
     const session_team *team;
-    int64_t count;
+    int64_t count;            /* number of boxes */
     session_level_box *boxes; /* the boxes of this rank, followed by the received ones */
     box_bins finer_bins;      /* bins of those boxes that may cover cells */
 } cover_search;

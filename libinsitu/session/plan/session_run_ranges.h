@@ -15,15 +15,15 @@
 
 /* The range of a layer over the run; it points into the scene. */
 typedef struct session_run_range {
-    const char *kind;
-    int number; /* number of the layer among those of its kind */
+    const char *kind; /* kind of the layer, as written in the file of ranges */
+    int number;       /* number of the layer among those of its kind */
     const scene_field *field;
     const scene_colour_map *map;
     double low, high; /* ends of the range, the same on all ranks; low > high: there is none yet */
 } session_run_range;
 
 typedef struct session_image_ranges {
-    char *image, *path;
+    char *image, *path; /* name of the image, and path of the file that keeps its ranges */
     /* index of the combination of the image's sweep to which the ranges belong (scene_variant.layers); 0 without a
      * sweep */
     int layers;

@@ -6,9 +6,9 @@
 #include "scene.h"
 
 typedef struct session_transfer {
-    render_transfer transfer; /* the transfer function; it points into this struct */
-    double opacity_values[RENDER_MAX_OPACITY_POINTS];
-    float opacities[RENDER_MAX_OPACITY_POINTS];
+    render_transfer transfer;                         /* the transfer function; it points into this struct */
+    double opacity_values[RENDER_MAX_OPACITY_POINTS]; /* value of the field at each point of the opacity curve */
+    float opacities[RENDER_MAX_OPACITY_POINTS];       /* opacity at each of these values */
     /* values at the ends of the colour map; the transfer function's range is larger if a volume shows values outside */
     double low, high;
     bool is_constant; /* set if all values are equal; the value is then in the middle of low and high */

@@ -26,8 +26,8 @@ static char *make_header(int bin_count, bool is_of_shells)
 
 /* The new content of the file. */
 typedef struct new_lines {
-    char *kept_text; /* the lines of the old file that are kept */
-    size_t kept_bytes;
+    char *kept_text;    /* the lines of the old file that are kept */
+    size_t kept_bytes;  /* size of kept_text in bytes */
     const char *header; /* line of column names; NULL: the file already has one */
     int64_t cycle;
     double time;

@@ -9,9 +9,9 @@
 #include "session_team.h"
 
 typedef struct session_contours {
-    render_lines lines; /* count is 0 if there are no lines, because the field has no range */
-    double values[RENDER_MAX_LINES];
-    float colours[3 * RENDER_MAX_LINES];
+    render_lines lines;                  /* count is 0 if there are no lines, because the field has no range */
+    double values[RENDER_MAX_LINES];     /* value of each line */
+    float colours[3 * RENDER_MAX_LINES]; /* colour of each line, linear RGB */
 } session_contours;
 
 /* Computes the contour lines except for their fields. If the scene gives no values, the lines divide a range into equal
