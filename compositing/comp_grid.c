@@ -87,11 +87,11 @@ static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *
     return owners ? (all + owners - 1) / owners : 0;
 }
 
-/* The state of a pass over the blocks in their order. The candidates who take blocks are found in the same order, so
- * that most blocks stay near their neighbours. A rank gives a block away if it is closer to its share afterwards. A
- * rank takes a block for the same reason; if there is no such rank, a rank takes it that exceeds its share afterwards
- * by an eighth of the block more, and so on; finally any rank that has less than its share. Such a rank exists as long
- * as another has more. As no rank gives its last block away, each owner appears among the blocks. */
+/* The state of a pass that moves blocks to other owners. Blocks and the ranks that receive them are visited in the same
+ * order, so that most blocks stay near their neighbours. A rank loses a block if its load is then closer to the equal
+ * share, and receives one under the same condition. If no rank fulfils it, a rank may exceed the share by an eighth of
+ * the block, then by two eighths, and so on; finally any rank below the share receives the block. Such a rank exists as
+ * long as another is above the share. No rank loses its last block, so each owner appears among the blocks. */
 typedef struct owner_search {
     const comp_claim *claims;
     uint32_t blocks, next;   /* number of blocks, and index of the claim whose rank is tried next */
