@@ -50,7 +50,7 @@ static void free_drawn(drawn *d)
 
 static drawn take_drawn(void)
 {
-    drawn out = {.count = own_rank == 0 ? caught_count : 0};
+    drawn out = {.count = caught_count};
     for (int i = 0; i < out.count; i++) out.pictures[i] = caught[i];
     caught_count = 0;
     return out;

@@ -416,8 +416,10 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     for (int i = 0; i < image->isosurface_count && !status; i++)
         status = fill_surface(basis, &image->isosurfaces[i], i, &layers, error);
     for (int i = image->isosurface_count; i < layers.first_outer && !status; i++) {
-        const scene_surface shells = session_shells_of(&image->isosurfaces[i - image->isosurface_count], image->height);
+        const scene_isosurface *isosurface = &image->isosurfaces[i - image->isosurface_count];
+        const scene_surface shells = session_shells_of(isosurface, image->height);
         status = fill_outer(basis, &shells, i, &layers, error);
+        layers.surfaces[i].colours = isosurface->colours; /* `shells` is gone when the layer is drawn */
     }
     for (int i = 0; i < image->surface_count && !status; i++)
         status = fill_outer(basis, &image->surfaces[i], layers.first_outer + i, &layers, error);
