@@ -135,10 +135,13 @@ program test_fortran
 contains
 
     subroutine take_prefix()
-        integer :: length
+        integer :: length, ranks
         call get_command_argument(1, length=length)
         allocate (character(length) :: prefix)
         call get_command_argument(1, prefix)
+        ! Runs of other numbers of ranks, which may be at work at the same time, have files of their own.
+        call MPI_Comm_size(MPI_COMM_WORLD, ranks)
+        prefix = prefix//'np'//achar(iachar('0') + ranks)//'_'
     end subroutine take_prefix
 
     ! A block of hexes for each rank, side by side along x; sums of few bits, so that float32 holds all of it.
