@@ -50,9 +50,9 @@ static insitu_type read_type(const conform_array *of, bool has_map, bool *is_cop
 {
     const insitu_type type = of->array->type;
     const bool is_float = type == INSITU_FLOAT32 || type == INSITU_FLOAT64;
-    insitu_type as = type;
+    insitu_type as = is_float ? type : INSITU_FLOAT64;
     switch (of->role) {
-    case OF_PLACES: as = is_float ? type : INSITU_FLOAT64; break;
+    case OF_PLACES: break;
     case OF_INDICES: as = index_type(type, of->index_limit); break;
     case OF_TYPES: as = session_type_size(type) == 1 || has_map ? INSITU_UINT8 : index_type(type, 0); break;
     case OF_FLAGS:

@@ -32,7 +32,7 @@ static bool allocate_layers(const session_layer_basis *basis, const scene_image 
 {
     const session_meshes *meshes = basis->meshes;
     const int shells = basis->has_shells ? image->isosurface_count : 0;
-    const size_t surfaces = (size_t)(count_surfaces(image) + shells), volumes = (size_t)image->volume_count;
+    const size_t surfaces = (size_t)count_surfaces(image) + (size_t)shells, volumes = (size_t)image->volume_count;
     for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) out->part_count += is_part(walk.part);
     const size_t fields = (size_t)out->part_count * (3 * surfaces + volumes);
     out->surface_count = (int)surfaces;
