@@ -44,8 +44,7 @@ static const char *scene(void)
     return write_scene(text);
 }
 
-/* ---- the whole ----------------------------------------------------------------------------------------------------
- */
+/* ---- the whole --------------------------------------------------------------------------------------------------- */
 
 static double place_of(int axis, int index)
 {
@@ -156,8 +155,7 @@ static bool set_list(insitu_session *session, const cell_arrays *a)
     return insitu_set_mesh(session, "m", &mesh) == INSITU_OK && set_fields(session, 0, a, set_whole_field);
 }
 
-/* ---- blocks -------------------------------------------------------------------------------------------------------
- */
+/* ---- blocks ------------------------------------------------------------------------------------------------------ */
 
 typedef struct block {
     int number, first[3], cells[3]; /* with a ghost layer, within the whole */
@@ -262,8 +260,7 @@ static int owner_of(int number)
     return rank_count < 3 ? number % rank_count : (7 * number + 3) % 11 % (rank_count - 1);
 }
 
-/* ---- tests --------------------------------------------------------------------------------------------------------
- */
+/* ---- tests ------------------------------------------------------------------------------------------------------- */
 
 static block blocks[BLOCKS];
 static caught_picture truth[IMAGES];
@@ -393,8 +390,7 @@ static void whole_and_blocks_replace_each_other(void **state)
     insitu_destroy(&session);
 }
 
-/* ---- errors -------------------------------------------------------------------------------------------------------
- */
+/* ---- errors ------------------------------------------------------------------------------------------------------ */
 
 static void set_all(insitu_session *session)
 {

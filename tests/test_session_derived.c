@@ -361,8 +361,7 @@ static void partitions_do_not_show(void **state)
         }
 }
 
-/* ---- several meshes -----------------------------------------------------------------------------------------------
- */
+/* ---- several meshes ---------------------------------------------------------------------------------------------- */
 
 /* Blocks of one mesh, on any ranks, are as the mesh whole: their border has the gradients of both sides. */
 static void blocks_show_no_seam(void **state)
@@ -402,8 +401,7 @@ static void blocks_show_no_seam(void **state)
     }
 }
 
-/* ---- shells, cells and corners ------------------------------------------------------------------------------------
- */
+/* ---- shells, cells and corners ----------------------------------------------------------------------------------- */
 
 enum { SHEET = 4 };
 
@@ -509,8 +507,7 @@ static void velocities_of_cells_and_corners_are_taken(void **state)
     }
 }
 
-/* ---- what changes
- * ---------------------------------------------------------------------------------------------------- */
+/* ---- what changes ------------------------------------------------------------------------------------------------ */
 
 static int64_t version_of(const insitu_session *session, const char *name)
 {
@@ -578,8 +575,7 @@ static void an_edited_scene_has_its_own(void **state)
     input_free(&in);
 }
 
-/* ---- what is wrong
- * --------------------------------------------------------------------------------------------------- */
+/* ---- what is wrong ----------------------------------------------------------------------------------------------- */
 
 typedef struct wrong_case {
     const char *fields, *words[3];

@@ -19,8 +19,7 @@ static const char scene_text[] =
     "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2}\n    layers:\n"
     "      - isosurface: {field: f, values: [0.72]}\n    outputs: [{path: a.exr}]\n";
 
-/* ---- the levels ---------------------------------------------------------------------------------------------------
- */
+/* ---- the levels -------------------------------------------------------------------------------------------------- */
 
 /* A block, in cells of the coarsest level. */
 typedef struct box {
@@ -82,8 +81,7 @@ static int owner_of(const levels *l, int block)
     return (int)(test_uniform((uint64_t)(block + 100 * l->grid), 8) * l->ranks);
 }
 
-/* ---- brute force, on the lattice of the finest level's cells -------------------------------------------------------
- */
+/* ---- brute force, on the lattice of the finest level's cells ----------------------------------------------------- */
 
 static int finest(const levels *l)
 {
@@ -192,8 +190,7 @@ static double error_at(const levels *l, const int vertex[3])
     return l->is_of_cells || hangs(l, vertex, &width, lower) ? 1e-13 : 0;
 }
 
-/* ---- blocks -------------------------------------------------------------------------------------------------------
- */
+/* ---- blocks ------------------------------------------------------------------------------------------------------ */
 
 typedef struct block {
     insitu_lattice lattice;
@@ -327,8 +324,7 @@ static bool hand_levels(insitu_session *session, const levels *l, const block bl
     return is_set;
 }
 
-/* ---- what is drawn ------------------------------------------------------------------------------------------------
- */
+/* ---- what is drawn ----------------------------------------------------------------------------------------------- */
 
 /* Compares the values that are drawn with brute force. */
 static bool are_values_true(const insitu_session *session, const levels *l)

@@ -159,8 +159,7 @@ static void planes_have_no_gap(void **state)
     }
 }
 
-/* ---- the order of the error ---------------------------------------------------------------------------------------
- */
+/* ---- the order of the error -------------------------------------------------------------------------------------- */
 
 static double sphere(const double p[3])
 {
@@ -283,8 +282,7 @@ static void hexes_are_those_between_their_nodes(void **state)
     }
 }
 
-/* ---- the caller's cells -------------------------------------------------------------------------------------------
- */
+/* ---- the caller's cells ------------------------------------------------------------------------------------------ */
 
 /* Cells with values of 0 and 1 in turn; a threshold on them draws what the mesh of those with 1 alone does, and so do
  * ghosts in place of the others. */
@@ -344,8 +342,7 @@ static void thresholds_show_whole_cells(void **state)
     }
 }
 
-/* ---- corners ------------------------------------------------------------------------------------------------------
- */
+/* ---- corners ----------------------------------------------------------------------------------------------------- */
 
 /* A field with a value at each node of each cell draws what vertices of each cell's own do. */
 static void corner_fields_are_the_cells_own(void **state)
@@ -375,8 +372,7 @@ static void corner_fields_are_the_cells_own(void **state)
         }
 }
 
-/* ---- nodes that move ----------------------------------------------------------------------------------------------
- */
+/* ---- nodes that move --------------------------------------------------------------------------------------------- */
 
 /* Turned by about a radian, which changes all orders of coordinates. */
 static void turn_nodes(order_mesh *mesh)

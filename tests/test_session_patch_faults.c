@@ -20,8 +20,7 @@ static int64_t inner, outer; /* a face of either kind, counted from index_base *
 static int64_t inner_quad[4], outer_quad[4], no_quad[4] = {0, 2, 5, 7}, twice[8], numbers[MOST];
 static insitu_patch patches[2];
 
-/* ---- meshes -------------------------------------------------------------------------------------------------------
- */
+/* ---- meshes ------------------------------------------------------------------------------------------------------ */
 
 /* One face of the hexes and one between two of them, by their vertices. */
 static void find_quads(void)
@@ -92,8 +91,7 @@ static void by_vertices(const int64_t *vertices, int64_t count)
     input.field.patch_count = 2;
 }
 
-/* ---- faults ---------------------------------------------------------------------------------------------------------
- */
+/* ---- faults ------------------------------------------------------------------------------------------------------ */
 
 static void number_large(void)
 {

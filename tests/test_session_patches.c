@@ -240,8 +240,7 @@ static void part_free(part_input *in)
     if (in->faces.owner) free_owned(&in->faces);
 }
 
-/* ---- and what does ------------------------------------------------------------------------------------------------
- */
+/* ---- and what does ----------------------------------------------------------------------------------------------- */
 
 static const session_scalar *means_of(const session_mesh *mesh)
 {
@@ -438,8 +437,7 @@ static void means_follow_values_on_the_boundary(void **state)
     free_whole();
 }
 
-/* ---- a linear field ------------------------------------------------------------------------------------------------
- */
+/* ---- a linear field ---------------------------------------------------------------------------------------------- */
 
 /* The mean of a linear function is that of the mean place of its faces' centres: the vertex itself amid a wall; at an
  * edge h / 4 from both walls, at a corner h / 3 from all three. Four values of size 2 and their sum are off by a few

@@ -2,8 +2,7 @@
 
 #include <stdbool.h>
 
-/* ---- the binary tree of an interval
- * ------------------------------------------------------------------------------- */
+/* ---- the binary tree of an interval ------------------------------------------------------------------------------ */
 
 static void blend_behind(fragment *front, const fragment *behind)
 {

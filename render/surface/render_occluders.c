@@ -298,8 +298,7 @@ static void add_slab(subject *s, const kernel_cell *c, double isovalue)
     out->cell = (kernel_occluder){s->surface, s->value, s->part, s->index, record};
 }
 
-/* ---- collecting
- * --------------------------------------------------------------------------------------------------- */
+/* ---- collecting -------------------------------------------------------------------------------------------------- */
 
 /* Lists the vertices of a cell that is not a polyhedron, in the canonical order that kernels use. */
 static bool take_vertices(subject *s, kernel_cell *c, const grid *g)
@@ -427,8 +426,7 @@ static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees,
     return is_well;
 }
 
-/* ---- building the trees
- * ------------------------------------------------------------------------------------------- */
+/* ---- building the trees ------------------------------------------------------------------------------------------ */
 
 static insitu_status build_trees(const finds *f, int threads, kernel_occluders *out, base_error *error)
 {

@@ -45,15 +45,7 @@ static polygon_work divide_work(int count, char *room, int (*triangles)[3])
     return w;
 }
 
-/* ---- the order of corners
- * ----------------------------------------------------------------------------------------- */
-
-static int compare_positions(const double a[3], const double b[3])
-{
-    for (int axis = 0; axis < 3; axis++)
-        if (a[axis] != b[axis]) return a[axis] < b[axis] ? -1 : 1;
-    return 0;
-}
+/* ---- the order of corners ---------------------------------------------------------------------------------------- */
 
 static int cyclic_index(int start, int step, int i, int count)
 {
@@ -64,7 +56,7 @@ static bool is_less(const double (*p)[3], int count, const int one[2], const int
 {
     for (int i = 0; i < count; i++) {
         const int sign =
-            compare_positions(p[cyclic_index(one[0], one[1], i, count)], p[cyclic_index(other[0], other[1], i, count)]);
+            vector3_compare(p[cyclic_index(one[0], one[1], i, count)], p[cyclic_index(other[0], other[1], i, count)]);
         if (sign) return sign < 0;
     }
     return false;
@@ -74,7 +66,7 @@ static void find_order(polygon_work *w, const double (*p)[3])
 {
     int best[2] = {0, 1};
     for (int i = 0; i < w->count; i++) {
-        if (compare_positions(p[i], p[best[0]]) > 0) continue;
+        if (vector3_compare(p[i], p[best[0]]) > 0) continue;
         for (int step = 1; step >= -1; step -= 2)
             if (is_less(p, w->count, (const int[2]){i, step}, best)) best[0] = i, best[1] = step;
     }

@@ -238,7 +238,7 @@ static insitu_status check_lagrange_order(const insitu_mesh *mesh, base_error *e
         return base_fail(error, INSITU_ERROR_MESH,
                          "order is %d and %s are given: order is of cells of one Lagrange type without offsets",
                          mesh->order, other);
-    if (type >= INSITU_LAGRANGE_TRIANGLE && type <= INSITU_LAGRANGE_PYRAMID) return INSITU_OK;
+    if (session_is_lagrange(type)) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MESH, "order is %d, and cell_type is %d: order is for types 69 to 74",
                      mesh->order, type);
 }

@@ -21,7 +21,7 @@ enum { QUADRATIC_TYPES = sizeof quadratic_types / sizeof quadratic_types[0] };
 
 static const int lagrange_types[] = {GRID_TRIANGLE, GRID_QUAD, GRID_TET, GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
 
-static bool is_lagrange(int type)
+bool session_is_lagrange(int type)
 {
     return type >= INSITU_LAGRANGE_TRIANGLE && type <= INSITU_LAGRANGE_PYRAMID;
 }
@@ -30,7 +30,7 @@ int session_corner_type(int type)
 {
     for (int i = 0; i < QUADRATIC_TYPES; i++)
         if (quadratic_types[i].type == type) return quadratic_types[i].corners;
-    return is_lagrange(type) ? lagrange_types[type - INSITU_LAGRANGE_TRIANGLE] : GRID_NO_TYPE;
+    return session_is_lagrange(type) ? lagrange_types[type - INSITU_LAGRANGE_TRIANGLE] : GRID_NO_TYPE;
 }
 
 static int64_t count_complete_nodes(int corner_type, int64_t p)
@@ -50,7 +50,7 @@ int64_t session_node_count(int type, int order)
 {
     for (int i = 0; i < QUADRATIC_TYPES; i++)
         if (quadratic_types[i].type == type) return order == 0 || order == 2 ? quadratic_types[i].count : 0;
-    if (!is_lagrange(type) || order < 1 || order > NODES_MOST_ORDER) return 0;
+    if (!session_is_lagrange(type) || order < 1 || order > NODES_MOST_ORDER) return 0;
     return count_complete_nodes(session_corner_type(type), order);
 }
 
@@ -58,10 +58,10 @@ bool session_nodes_of(int type, int64_t count, session_nodes *out)
 {
     const int corners = session_corner_type(type);
     if (corners == GRID_NO_TYPE) return false;
-    for (int order = is_lagrange(type) ? 1 : 2; order <= NODES_MOST_ORDER; order++) {
+    for (int order = session_is_lagrange(type) ? 1 : 2; order <= NODES_MOST_ORDER; order++) {
         if (session_node_count(type, order) != count) continue;
         *out = (session_nodes){corners, order, (int)count, count_complete_nodes(corners, order) == count,
-                               is_lagrange(type)};
+                               session_is_lagrange(type)};
         return true;
     }
     return false;
@@ -71,7 +71,7 @@ int64_t session_cell_nodes(const insitu_mesh *mesh)
 {
     const int type = (int)mesh->cell_type;
     if (session_corner_type(type) == GRID_NO_TYPE) return grid_type_vertices(type);
-    if (!is_lagrange(type)) return session_node_count(type, 0);
+    if (!session_is_lagrange(type)) return session_node_count(type, 0);
     if (mesh->order) return session_node_count(type, mesh->order);
     if (mesh->connectivity_row) return mesh->connectivity_row;
     return mesh->cell_count ? mesh->connectivity_count / mesh->cell_count : 0;

@@ -20,6 +20,9 @@ typedef struct session_nodes {
 /* Returns the linear type with the same corners, or GRID_NO_TYPE if the caller's type is not of higher order. */
 int session_corner_type(int type);
 
+/* Returns whether the caller's type is one of INSITU_LAGRANGE_*. */
+bool session_is_lagrange(int type);
+
 /* Returns whether cells of the type, which must not be linear, can have `count` nodes, and stores their description. */
 bool session_nodes_of(int type, int64_t count, session_nodes *out);
 

@@ -6,18 +6,13 @@
 
 #include <string.h>
 
+#include "vector3.h"
+
 typedef struct cell_frame {
     double mean[3];         /* mean of the vertices, each weighted by the number of its faces */
     double least_vertex[3]; /* position of the first vertex in the order of coordinates */
     double box_volume;      /* volume of the bounding box */
 } cell_frame;
-
-static bool comes_before(const double a[3], const double b[3])
-{
-    for (int axis = 0; axis < 3; axis++)
-        if (a[axis] != b[axis]) return a[axis] < b[axis];
-    return false;
-}
 
 typedef struct frame_sums {
     double sum[3], lower[3], upper[3];
@@ -36,7 +31,7 @@ static void add_face(const grid *g, int64_t face, frame_sums *sums, double least
         if (vertex == before) continue;
         before = vertex;
         grid_vertex(g, vertex, p);
-        if (comes_before(p, least)) memcpy(least, p, sizeof p);
+        if (vector3_compare(p, least) < 0) memcpy(least, p, sizeof p);
         for (int axis = 0; axis < 3; axis++) {
             sums->sum[axis] += p[axis];
             sums->lower[axis] = p[axis] < sums->lower[axis] ? p[axis] : sums->lower[axis];
@@ -93,7 +88,7 @@ static int64_t least_entry(const grid *g, int64_t from, int64_t to)
     grid_vertex(g, grid_array_index(&g->face_connectivity, from), position);
     for (int64_t i = from + 1; i < to; i++) {
         grid_vertex(g, grid_array_index(&g->face_connectivity, i), p);
-        if (!comes_before(p, position)) continue;
+        if (vector3_compare(p, position) >= 0) continue;
         memcpy(position, p, sizeof p);
         least = i;
     }

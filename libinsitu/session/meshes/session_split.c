@@ -12,6 +12,7 @@
 #include "session_pattern.h"
 #include "session_region.h"
 #include "session_tally.h"
+#include "vector3.h"
 
 enum { MOST_PATTERNS = 64, LINEAR_TYPES = GRID_POLYHEDRON + 1 };
 
@@ -200,13 +201,6 @@ static insitu_status check_indices(const split_work *w, int threads, base_error 
 
 /* ---- pieces ---------------------------------------------------------------------------------------------------- */
 
-static bool comes_before(const double a[3], const double b[3])
-{
-    for (int axis = 0; axis < 3; axis++)
-        if (a[axis] != b[axis]) return a[axis] < b[axis];
-    return false;
-}
-
 /* Stores the rank of each midpoint of a serendipity cell in the order of coordinates; equal points have equal ranks. */
 static void rank_midpoints(const split_work *w, const session_pattern *of, int64_t first, int ranks[27])
 {
@@ -218,7 +212,7 @@ static void rank_midpoints(const split_work *w, const session_pattern *of, int64
         }
     for (int n = 0; n < of->midpoint_count; n++) {
         int rank = 0;
-        for (int m = 0; m < of->midpoint_count; m++) rank += comes_before(at[m], at[n]);
+        for (int m = 0; m < of->midpoint_count; m++) rank += vector3_compare(at[m], at[n]) < 0;
         ranks[of->midpoints[n]] = rank;
     }
 }
@@ -242,7 +236,7 @@ static void count_pieces(const split_work *w, int64_t cell)
 
 static void accumulate_counts(int64_t *counts, int64_t cells)
 {
-    for (int64_t cell = 0; cells && cell < cells; cell++) counts[cell + 1] += counts[cell];
+    for (int64_t cell = 0; cell < cells; cell++) counts[cell + 1] += counts[cell];
 }
 
 static insitu_status count_all_pieces(split_work *w, int threads, base_error *error)

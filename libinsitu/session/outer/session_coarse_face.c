@@ -13,13 +13,6 @@ enum { PARTS = 96 };
 
 /* ---- faces ---------------------------------------------------------------------------------------------------- */
 
-int session_compare_positions(const double a[3], const double b[3])
-{
-    for (int axis = 0; axis < 3; axis++)
-        if (a[axis] != b[axis]) return a[axis] < b[axis] ? -1 : 1;
-    return 0;
-}
-
 double session_position_rounding(const session_mesh *mesh)
 {
     double rounding = 0;
@@ -30,7 +23,7 @@ double session_position_rounding(const session_mesh *mesh)
     return rounding;
 }
 
-double session_distance_to_face(const double a[3], const double b[3])
+double session_point_distance(const double a[3], const double b[3])
 {
     const double off[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
     return sqrt(vector3_dot(off, off));
@@ -96,7 +89,7 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
         grid_vertex(g, out->vertices[i], out->corner_positions[i]);
     }
     out->box = find_bounding_box((const double(*)[3])out->corner_positions, out->count);
-    out->diameter = session_distance_to_face(out->box.lower, out->box.upper);
+    out->diameter = session_point_distance(out->box.lower, out->box.upper);
     return true;
 }
 
@@ -137,11 +130,11 @@ bool session_read_coarse_face(const grid *g, const session_face *face, session_c
     const double(*places)[3] = (const double(*)[3])outline.corner_positions;
     for (int i = 0; i < count; i++) {
         for (int k = 0; k < i; k++)
-            if (session_compare_positions(places[k], places[i]) == 0) return false;
-        if (session_compare_positions(places[i], places[least]) < 0) least = i;
+            if (vector3_compare(places[k], places[i]) == 0) return false;
+        if (vector3_compare(places[i], places[least]) < 0) least = i;
     }
     const int step =
-        session_compare_positions(places[(least + count - 1) % count], places[(least + 1) % count]) < 0 ? count - 1 : 1;
+        vector3_compare(places[(least + count - 1) % count], places[(least + 1) % count]) < 0 ? count - 1 : 1;
     out->count = count;
     for (int i = 0; i < 4; i++) {
         const int from = (least + step * (i < count ? i : count - 1)) % count;
@@ -175,7 +168,7 @@ bool session_is_larger_face(const session_coarse_face *a, const session_coarse_f
 {
     if (a->area != b->area) return a->area > b->area;
     for (int i = 0; i < 4; i++) {
-        const int sign = session_compare_positions(a->corner_positions[i], b->corner_positions[i]);
+        const int sign = vector3_compare(a->corner_positions[i], b->corner_positions[i]);
         if (sign) return sign < 0;
     }
     return false;
@@ -186,7 +179,7 @@ bool session_is_larger_face(const session_coarse_face *a, const session_coarse_f
 bool session_is_at_corner(const session_coarse_face *face, const double place[3], double slack)
 {
     for (int i = 0; i < face->count; i++)
-        if (session_distance_to_face(face->corner_positions[i], place) <= slack) return true;
+        if (session_point_distance(face->corner_positions[i], place) <= slack) return true;
     return false;
 }
 
@@ -239,7 +232,7 @@ bool session_find_weights(const session_coarse_face *f, const double place[3], d
     for (int k = 0; k < 2; k++) at[k] = round_coordinate(at[k]);
     const double u = at[0], w = at[1];
     evaluate_face(f, at, on, slopes);
-    if (!(u >= 0 && u <= 1 && w >= 0 && w <= 1 && session_distance_to_face(on, place) <= slack)) return false;
+    if (!(u >= 0 && u <= 1 && w >= 0 && w <= 1 && session_point_distance(on, place) <= slack)) return false;
     if (f->count == 4) {
         const double bilinear[4] = {(1 - u) * (1 - w), u * (1 - w), u * w, (1 - u) * w};
         memcpy(weights, bilinear, sizeof bilinear);

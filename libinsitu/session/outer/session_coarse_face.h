@@ -51,10 +51,10 @@ bool session_find_weights(const session_coarse_face *face, const double place[3]
 /* Returns an upper bound of the rounding errors of the mesh's coordinates; 0 if mesh is NULL. */
 double session_position_rounding(const session_mesh *mesh);
 
-double session_distance_to_face(const double a[3], const double b[3]);
+/* Returns the distance between two points. */
+double session_point_distance(const double a[3], const double b[3]);
 
-/* Defines an order of positions, and an order of faces by area and then by positions. */
-int session_compare_positions(const double a[3], const double b[3]);
+/* Defines an order of faces by area and then by the positions of their corners. */
 bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b);
 
 #endif

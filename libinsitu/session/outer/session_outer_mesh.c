@@ -20,17 +20,10 @@ typedef struct corner_loop {
     double positions[4][3];
 } corner_loop;
 
-static int compare_places(const double a[3], const double b[3])
-{
-    for (int axis = 0; axis < 3; axis++)
-        if (a[axis] != b[axis]) return a[axis] < b[axis] ? -1 : 1;
-    return 0;
-}
-
 static void add_corner(corner_loop *loop, int64_t vertex, const double place[3])
 {
     for (int i = 0; i < loop->count; i++)
-        if (compare_places(loop->positions[i], place) == 0) return;
+        if (vector3_compare(loop->positions[i], place) == 0) return;
     memcpy(loop->positions[loop->count], place, 3 * sizeof *place);
     loop->vertices[loop->count++] = vertex;
 }
@@ -41,9 +34,9 @@ static void order_corners(corner_loop *loop)
     const int count = in.count;
     int least = 0;
     for (int i = 1; i < count; i++)
-        if (compare_places(in.positions[i], in.positions[least]) < 0) least = i;
+        if (vector3_compare(in.positions[i], in.positions[least]) < 0) least = i;
     const bool is_turned =
-        compare_places(in.positions[(least + count - 1) % count], in.positions[(least + 1) % count]) < 0;
+        vector3_compare(in.positions[(least + count - 1) % count], in.positions[(least + 1) % count]) < 0;
     for (int i = 0; i < count; i++) {
         const int from = (least + (is_turned ? count - i : i)) % count;
         loop->vertices[i] = in.vertices[from];
@@ -281,10 +274,10 @@ static void read_polygon(const grid *g, const session_face_loop *face, face_poly
     for (int64_t i = 0; i < face->size; i++) {
         p->vertices[p->count] = session_face_vertex(face, i);
         grid_vertex(g, p->vertices[p->count], p->positions[p->count]);
-        if (p->count && compare_places(p->positions[p->count], p->positions[p->count - 1]) == 0) continue;
+        if (p->count && vector3_compare(p->positions[p->count], p->positions[p->count - 1]) == 0) continue;
         p->count++;
     }
-    while (p->count > 1 && compare_places(p->positions[p->count - 1], p->positions[0]) == 0) p->count--;
+    while (p->count > 1 && vector3_compare(p->positions[p->count - 1], p->positions[0]) == 0) p->count--;
 }
 
 static void add_face(outer_work *w, const session_face *face)

@@ -141,8 +141,7 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
     return INSITU_OK;
 }
 
-/* ---- the cells behind them, by owner and neighbour ----------------------------------------------------------------
- */
+/* ---- the cells behind them, by owner and neighbour --------------------------------------------------------------- */
 
 static insitu_status check_owner(patch_faces *p, int patch, int64_t i, int64_t f, unsigned char *is_taken,
                                  base_error *error)
@@ -298,8 +297,7 @@ static insitu_status check_faces_by_cells(patch_faces *p, base_error *error)
     return status;
 }
 
-/* ---- values -------------------------------------------------------------------------------------------------------
- */
+/* ---- values ------------------------------------------------------------------------------------------------------ */
 
 static grid_field find_patch_field(const patch_faces *p, int patch, int component)
 {

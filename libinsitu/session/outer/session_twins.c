@@ -9,6 +9,7 @@
 #include "session_coarse_face.h"
 #include "session_cell_faces.h"
 #include "session_exchange.h"
+#include "vector3.h"
 
 enum { CORNER_WORDS = 4 };
 
@@ -46,7 +47,7 @@ static void measure_edges(const grid *g, const session_face *face, double *edges
         double a[3], b[3];
         grid_vertex(g, from, a);
         grid_vertex(g, to, b);
-        const double length = session_distance_to_face(a, b);
+        const double length = session_point_distance(a, b);
         if (!(length > 0)) continue;
         edges[from] = fmin(edges[from], length);
         edges[to] = fmin(edges[to], length);
@@ -139,8 +140,8 @@ static void find_least_corners(twin_search *s)
         int64_t near;
         while (session_next_binned(&walk, &near)) {
             border_vertex *v = &s->vertices[near];
-            if (session_distance_to_face(v->position, c->position) <= c->slack &&
-                session_compare_positions(c->position, v->least_position) < 0)
+            if (session_point_distance(v->position, c->position) <= c->slack &&
+                vector3_compare(c->position, v->least_position) < 0)
                 memcpy(v->least_position, c->position, sizeof v->least_position);
         }
     }
@@ -150,14 +151,14 @@ static bool store_twins(const border_vertex *vertices, session_border *border)
 {
     int64_t count = 0;
     for (int64_t i = 0; i < border->vertex_count; i++)
-        count += session_compare_positions(vertices[i].least_position, vertices[i].position) != 0;
+        count += vector3_compare(vertices[i].least_position, vertices[i].position) != 0;
     session_twin *twins = base_alloc((size_t)(count + 1) * sizeof *twins);
     if (!twins) return false;
     base_free(border->twins);
     border->twins = twins;
     border->twin_count = 0;
     for (int64_t i = 0; i < border->vertex_count; i++) {
-        if (session_compare_positions(vertices[i].least_position, vertices[i].position) == 0) continue;
+        if (vector3_compare(vertices[i].least_position, vertices[i].position) == 0) continue;
         session_twin *twin = &twins[border->twin_count++];
         twin->vertex = border->vertices[i];
         memcpy(twin->position, vertices[i].least_position, sizeof twin->position);

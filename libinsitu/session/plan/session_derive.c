@@ -255,8 +255,7 @@ static void mark_values_new(const derive_work *w, const session_catalogue_mesh *
             part->scalars[i].original_values = session_given_field(part, index, part->scalars[i].component);
 }
 
-/* ---- expressions --------------------------------------------------------------------------------------------------
- */
+/* ---- expressions ------------------------------------------------------------------------------------------------- */
 
 static void load_block(const grid_field *field, int64_t first, int count, double *restrict out)
 {
@@ -354,8 +353,7 @@ static void make_expressions(const derive_work *w, base_error *error)
     }
 }
 
-/* ---- gradients -----------------------------------------------------------------------------------------------------
- */
+/* ---- gradients --------------------------------------------------------------------------------------------------- */
 
 static int keep_component(int component, const double vector[3], double *out)
 {
@@ -494,8 +492,7 @@ static insitu_status derive_joints(const derive_work *w, base_error *error)
     return status;
 }
 
-/* ---- one derived field ---------------------------------------------------------------------------------------------
- */
+/* ---- one derived field ------------------------------------------------------------------------------------------- */
 
 static insitu_status derive_field(derive_work *w, base_error *error)
 {

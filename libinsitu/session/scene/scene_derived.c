@@ -169,8 +169,7 @@ static insitu_status convert_derived(const scene_document *d, const char *path, 
     return read_references(d, key_path, out);
 }
 
-/* ---- dependencies between derived fields
- * --------------------------------------------------------------------------- */
+/* ---- dependencies between derived fields ------------------------------------------------------------------------- */
 
 static int find_derived(const scene *s, const char *name)
 {

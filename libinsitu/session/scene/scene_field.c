@@ -80,8 +80,7 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
     return status ? status : scene_convert_field(d, path, colour_by_path, in->field, in->component, out);
 }
 
-/* ---- iteration over fields
- * ----------------------------------------------------------------------------------------- */
+/* ---- iteration over fields --------------------------------------------------------------------------------------- */
 
 /* Returns the layer's contour lines; NULL for a volume, which has none. */
 static scene_lines *find_layer_lines(const scene_image *image, scene_layer_kind kind, int layer)

@@ -248,8 +248,7 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
     return status;
 }
 
-/* ---- no two outputs may be the same file
- * --------------------------------------------------------------------------- */
+/* ---- no two outputs may be the same file ------------------------------------------------------------------------- */
 
 /* A cycle with many digits, for which names are expanded and compared, so that {cycle} and {cycle:03} count as
  * equal. */

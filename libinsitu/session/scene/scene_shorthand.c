@@ -242,8 +242,7 @@ static void expand_fields(rewrite *r, int *value)
     *value = list;
 }
 
-/* ---- whole documents
- * ----------------------------------------------------------------------------------------------- */
+/* ---- whole documents --------------------------------------------------------------------------------------------- */
 
 static const char axis_words[] = "x, y or z, or -x, -y or -z", switch_words[] = "true or false";
 
@@ -358,8 +357,7 @@ bool scene_expand_shorthand(yaml_document_t *document)
     return r.has_memory;
 }
 
-/* ---- words that are nearly correct
- * --------------------------------------------------------------------------------- */
+/* ---- words that are nearly correct ------------------------------------------------------------------------------- */
 
 enum { LONGEST_WORD = 63 };
 

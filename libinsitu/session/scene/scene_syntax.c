@@ -75,8 +75,7 @@ static int quoted_length(size_t length)
     return (int)(length < longest_quote ? length : longest_quote);
 }
 
-/* ---- rules: each writes a message about one kind of mistake and returns true, or returns false
- * -------------------- */
+/* ---- rules: each writes a message about one kind of mistake and returns true, or returns false ------------------- */
 
 static bool is_tab_indent(const fault *f, text_line l)
 {

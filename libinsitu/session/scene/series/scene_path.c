@@ -11,8 +11,7 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-/* ---- interpolation
- * ------------------------------------------------------------------------------------------------- */
+/* ---- interpolation ----------------------------------------------------------------------------------------------- */
 
 /* Number of values that are interpolated; a point's values are stored in one list. */
 enum { NUMBERS_OF_POINT = 10 };
@@ -95,8 +94,7 @@ scene_camera scene_camera_at(const scene_camera *camera, int64_t cycle, double t
     return out;
 }
 
-/* ---- reading the points
- * -------------------------------------------------------------------------------------------- */
+/* ---- reading the points ------------------------------------------------------------------------------------------ */
 
 static insitu_status convert_time(const scene_document *d, const char *path, const scene_file_point *in,
                                   const scene_camera *camera, scene_camera_point *out)

@@ -105,8 +105,7 @@ insitu_status scene_count_pictures(const scene_document *d, const scene_file *in
     return INSITU_OK;
 }
 
-/* ---- reducing the layers to one variant
- * ---------------------------------------------------------------------------- */
+/* ---- reducing the layers to one variant -------------------------------------------------------------------------- */
 
 static bool replace_field(scene_field *field, const char *name, int line)
 {
