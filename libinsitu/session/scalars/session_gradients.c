@@ -464,10 +464,10 @@ static void claim_sums(const target *to, int64_t cell)
 /* Adds the contributions of all cells. Both loops distribute the cells among the threads in the same way. */
 static bool add_all_cells(const target *like, const session_cell_list *list, session_gradient_bounds *bounds)
 {
-    const int threads = session_region_threads(like->basis->threads, list->count);
     double rise = 0, sharpness = 0;
     bool is_out_of_memory = false;
-#pragma omp parallel num_threads(threads) reduction(max : rise, sharpness) reduction(|| : is_out_of_memory)
+#pragma omp parallel num_threads(session_region_threads(like->basis->threads, list->count)) \
+    reduction(max : rise, sharpness) reduction(|| : is_out_of_memory)
     {
         region_enter();
         target to = *like;
