@@ -1,9 +1,17 @@
-# Tests start MPI programs with more ranks than cores, which yield as they wait, with one thread a rank, and in a
+# Tests start MPI programs with more ranks than cores, which yield while they wait, with one thread per rank, and in a
 # container as root too.
 set(INSITU_TEST_ENVIRONMENT
   OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMP_NUM_THREADS=1
   OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none
   OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_base_warn_component_unused=0)
+
+# Ranks that wait sleep (sleeping_yield.c). LD_PRELOAD cannot name a path with a blank or a colon, and AddressSanitizer wants
+# to be the first library: its programs have the function within them (cmake/asan.cmake).
+if(NOT CMAKE_PROJECT_INCLUDE AND NOT PROJECT_BINARY_DIR MATCHES "[ :]")
+  add_library(sleeping_yield MODULE ${CMAKE_CURRENT_SOURCE_DIR}/sleeping_yield.c)
+  set_target_properties(sleeping_yield PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
+  list(APPEND INSITU_TEST_ENVIRONMENT LD_PRELOAD=$<TARGET_FILE:sleeping_yield>)
+endif()
 
 # Ranks that all MPI tests run on, instead of their own.
 set(INSITU_TEST_RANKS "" CACHE STRING "Ranks to run each MPI test on, instead of those that it names")
