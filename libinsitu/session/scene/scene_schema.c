@@ -23,117 +23,119 @@ static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"w
 
 #define LIGHT_KEYS(X)                                                                                                  \
     X(CYAML_FIELD_SEQUENCE_FIXED("direction", CYAML_FLAG_POINTER, scene_file_light, direction, &number, 3),            \
-      .help = "From the scene towards the light. Any length but 0.")                                                   \
+      .help = "From the scene towards the light. Any length except 0.")                                                \
     X(NUMBERS("colour", scene_file_light, colour, 3), .help = "Colour, sRGB.", .default_text = "`[1, 1, 1]`",          \
       .low = 0, .high = 1)                                                                                             \
     X(CYAML_FIELD_FLOAT_PTR("intensity", OPTIONAL, scene_file_light, intensity),                                       \
       .help = "Factor on the colour, in linear light.", .default_text = "`1`", .low = 0, .high = 100)                  \
     X(CHOICE("in", scene_file_light, in, frame_words),                                                                 \
-      .help = "The axes of `direction`: `camera` (right, up, towards the eye), so that the light goes with the eye, "  \
-              "or `world`.",                                                                                           \
+      .help = "The axes of `direction`. With `camera` (right, up, towards the eye) the light moves with the eye. "     \
+              "With `world` it does not.",                                                                             \
       .default_text = "`camera`")                                                                                      \
     X(CYAML_FIELD_BOOL_PTR("shadows", OPTIONAL, scene_file_light, shadows),                                            \
-      .help = "With the image's `shadows`: whether this light casts any.", .default_text = "`true`")
+      .help = "If the image has `shadows`: whether this light casts shadows.", .default_text = "`true`")
 DEFINE_MAPPING(light, "lights", LIGHT_KEYS);
 #define OCCLUSION_KEYS(X)                                                                                              \
     X(CYAML_FIELD_INT_PTR("samples", OPTIONAL, scene_file_occlusion, samples),                                         \
-      .help = "Rays a pixel and frame. Their error falls as the number; with `antialias` each frame has others.",      \
+      .help = "Rays per pixel and frame. Their error is inversely proportional to this number. With `antialias`, "     \
+              "each frame has other rays.",                                                                            \
       .default_text = "`16`", .low = 1, .high = 64)                                                                    \
     X(CYAML_FIELD_FLOAT_PTR("radius", OPTIONAL, scene_file_occlusion, radius),                                         \
-      .help = "The largest distance at which something darkens a place, in scene units.",                              \
+      .help = "The largest distance at which something darkens a hit, in scene units.",                                \
       .default_text = "a tenth of the diagonal of the bounds of all the data", .low = 0, .is_low_excluded = true,      \
       .high = 1e30)
 DEFINE_MAPPING(occlusion, "ambient_occlusion", OCCLUSION_KEYS);
 #define SAMPLING_KEYS(X)                                                                                               \
     X(CHOICE("method", scene_file_sampling, method, method_words),                                                     \
-      .help = "How a volume is integrated: by samples, or by segments, exact on tetrahedra and of second order in "    \
-              "the step elsewhere (of first on rays that graze a step of the opacity). Segments of several volumes "   \
-              "are mixed pixel by pixel, slower than samples.",                                                        \
-      .default_text = "`segments` of one volume, or with `max_error`; `samples` of several, or with any other key of " \
-                      "`sampling`")                                                                                    \
+      .help = "How a volume is integrated: by samples or by segments. Segments are exact on tetrahedra. On other "     \
+              "cells they are of second order in the step (of first order on rays that graze a step of the opacity). " \
+              "Segments of several volumes are mixed pixel by pixel, which is slower than samples.",                   \
+      .default_text = "`segments` for one volume, or with `max_error`; `samples` for several volumes, or with any "    \
+                      "other key of `sampling`")                                                                       \
     X(CYAML_FIELD_FLOAT_PTR("max_error", OPTIONAL, scene_file_sampling, max_error),                                    \
-      .help = "No channel of a pixel is off by more, in linear light: cells are cut, and integrals taken, as "         \
-              "finely as that takes, where the medium is of less than 1000 optical depths across the scene: of "       \
-              "a denser one single precision's places of faces may cost more. Steps of `opacity` and ramps as narrow " \
-              "as a millionth of the range are kept to it; but polyhedra, mixed volumes and cells that overlap "       \
-              "have values in single precision, which in a ramp narrower than 0.01 of the range may cost more: for "   \
-              "each unit distance in it 4e-7 times its rise / (its share of the range times the least 1 - opacity "    \
-              "in it). On "                                                                                            \
-              "tetrahedra, and with tables of many colours, `1e-2` takes a fraction of the time of "                   \
-              "`method: segments`. Not with `step`, "                                                                  \
-              "`step_cells`, nor `method: samples`.",                                                                  \
-      .default_text = "`0.01` of one volume where no other key of `sampling` is given; else by the step", .low = 1e-4, \
-      .high = 1)                                                                                                       \
+      .help = "The largest error of each channel of a pixel, in linear light. Cells are divided, and integrals "       \
+              "computed, as finely as necessary. The bound also holds for steps of `opacity` and for ramps as narrow " \
+              "as a millionth of the range. There are two exceptions. First, if the medium has 1000 optical depths "   \
+              "or more across the scene, the positions of faces in single precision may cause a larger error. "        \
+              "Second, polyhedra, mixed volumes and overlapping cells have values in single precision, which may add " \
+              "an error in a ramp narrower than 0.01 of the range. For each unit distance in the ramp, this error is " \
+              "4e-7 times the ramp's rise, divided by (the ramp's share of the range times the least 1 - opacity in "  \
+              "it). On tetrahedra, and with tables of many colours, `1e-2` takes a fraction of the time of `method: "  \
+              "segments`. Not allowed with `step`, `step_cells` or `method: samples`.",                                \
+      .default_text = "`0.01` for one volume if no other key of `sampling` is given; otherwise the step decides",      \
+      .low = 1e-4, .high = 1)                                                                                          \
     X(CYAML_FIELD_FLOAT_PTR("step", OPTIONAL, scene_file_sampling, step),                                              \
-      .help = "Distance between samples, in scene units. Not with `step_cells`.", .default_text = "by `step_cells`",   \
-      .low = 0, .is_low_excluded = true, .high = 1e30)                                                                 \
+      .help = "Distance between samples, in scene units. Not allowed with `step_cells`.",                              \
+      .default_text = "by `step_cells`", .low = 0, .is_low_excluded = true, .high = 1e30)                              \
     X(CYAML_FIELD_FLOAT_PTR("step_cells", OPTIONAL, scene_file_sampling, step_cells),                                  \
-      .help =                                                                                                          \
-          "Distance between samples in mean cell sizes (a cell's size is the cube root of its volume; the mean is "    \
-          "rounded by up to 1.6e-4, so that no partition shows in it). Smaller is finer and slower.",                  \
+      .help = "Distance between samples, in mean cell sizes. A smaller distance is more accurate and slower. The "     \
+              "size of a cell is the cube root of its volume. The mean is rounded by up to 1.6e-4, so that it is the " \
+              "same on any partition.",                                                                                \
       .default_text = "`0.5`", .low = 0, .is_low_excluded = true, .high = 1000)                                        \
     X(CYAML_FIELD_BOOL_PTR("jitter", OPTIONAL, scene_file_sampling, jitter),                                           \
-      .help = "Shift each pixel's samples by a part of a step of its own: fine noise instead of rings.",               \
+      .help =                                                                                                          \
+          "Shifts the samples of each pixel by a different part of a step. This gives fine noise instead of rings.",   \
       .default_text = "`true`")                                                                                        \
     X(CYAML_FIELD_INT_PTR("frames", OPTIONAL, scene_file_sampling, frames),                                            \
-      .help = "Frames of different jitter that are averaged into the image.", .default_text = "`1`", .low = 1,         \
-      .high = 4096)                                                                                                    \
+      .help = "Number of frames with different jitter that are averaged into the image.", .default_text = "`1`",       \
+      .low = 1, .high = 4096)                                                                                          \
     X(CYAML_FIELD_BOOL_PTR("reproducible", OPTIONAL, scene_file_sampling, reproducible),                               \
-      .help =                                                                                                          \
-          "Volumes are the same to the last bit on any number of ranks and any partition, where no cells overlap; "    \
-          "else to 1e-6. A volume takes 1.1 to 1.6 times the time on one rank, and twice on eight, where five "        \
-          "fragments go "                                                                                              \
-          "from rank to rank in the place of one; several volumes are drawn sample by sample or segment by segment, "  \
-          "slower by far.",                                                                                            \
+      .help = "If true, volumes are the same to the last bit on any number of ranks and any partition, if no cells "   \
+              "overlap. Otherwise they are the same to 1e-6. A volume takes 1.1 to 1.6 times the time on one rank. "   \
+              "It takes twice the time on eight ranks, where five fragments are sent from rank to rank instead of "    \
+              "one. Several volumes are drawn sample by sample or segment by segment, which is much slower.",          \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_FLOAT_PTR("max_seconds", OPTIONAL, scene_file_sampling, max_seconds),                                \
-      .help = "An image whose samples would take longer, as estimated before it is drawn, is refused with the "        \
-              "estimate: a step that is a thousand times too small keeps no run waiting for days.",                    \
+      .help = "The longest time that the samples of an image may take, in seconds. The time is estimated before the "  \
+              "image is drawn. If it is longer, the image is refused with the estimate. So a step that is a thousand " \
+              "times too small does not make a run wait for days.",                                                    \
       .default_text = "`3600`", .low = 1, .high = 1e9)
 DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
 
 #define PLACEHOLDERS                                                                                                   \
-    "`{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, `{time}` the time, `{time:.3f}` the " \
-    "time as C's printf writes it (`f`, `e` or `g`), `{name}` the image's "                                            \
-    "name, `{view}` and `{view:03}` the number of an orbit's view, from 0, `{isovalue}` (formats as of the time), "    \
-    "`{plane}` (its number from 0, as `{view}`) and `{field}` those of a `sweep`."
+    "These placeholders are replaced: `{cycle}` by the cycle, `{cycle:06}` by the cycle with zeros to 6 digits, "      \
+    "`{time}` by the time, `{time:.3f}` by the time as C's printf writes it (`f`, `e` or `g`), `{name}` by the "       \
+    "image's name, `{view}` and `{view:03}` by the number of an orbit's view, from 0. Those of a `sweep` are "         \
+    "`{isovalue}` (with formats as for the time), `{plane}` (its number from 0, with formats as for `{view}`) and "    \
+    "`{field}`."
 
 #define WORDS_KEYS(X)                                                                                                  \
     X(TEXT("text", REQUIRED, scene_file_words, text, 255), .help = "One line of text. " PLACEHOLDERS)                  \
-    X(CHOICE("at", scene_file_words, at, anchor_words), .help = "Where it stands.", .default_text = "`top_left`")
+    X(CHOICE("at", scene_file_words, at, anchor_words), .help = "The position in the picture.",                        \
+      .default_text = "`top_left`")
 DEFINE_MAPPING(words, "text", WORDS_KEYS);
 
 static const cyaml_strval_t notation_words[] = {
     {"auto", SCENE_SHORTEST}, {"fixed", SCENE_FIXED}, {"scientific", SCENE_SCIENTIFIC}};
 
 #define COLOUR_BAR_KEYS(X)                                                                                             \
-    X(CHOICE("at", scene_file_colour_bar, at, side_words), .help = "The side of the picture.",                         \
+    X(CHOICE("at", scene_file_colour_bar, at, side_words), .help = "The side of the picture on which the bar is.",     \
       .default_text = "`right`")                                                                                       \
     X(NAMES("labels"),                                                                                                 \
-      .help = "The words above a bar; a list of them where there are several bars, in the order of the layers: "       \
+      .help = "The words above a bar. If there are several bars, give a list of them in the order of the layers: "     \
               "isosurfaces, surfaces, slices, volumes.",                                                               \
-      .default_text = "the names of the fields, with their components: `v x`; `|v|` of a magnitude")                   \
+      .default_text = "the names of the fields, with their components: `v x`; `|v|` for a magnitude")                  \
     X(CYAML_FIELD_INT_PTR("ticks", OPTIONAL, scene_file_colour_bar, ticks),                                            \
-      .help = "At most so many ticks, at round numbers.", .default_text = "`6`", .low = 2, .high = 12)                 \
+      .help = "The largest number of ticks, which are at round numbers.", .default_text = "`6`", .low = 2, .high = 12) \
     X(NAMES("units"),                                                                                                  \
-      .help = "The unit of a bar's numbers, which is written behind its words as `[m/s]`; a list of them where there " \
-              "are several bars, in the order of `labels`. One alone is that of all bars.",                            \
+      .help = "The unit of a bar's numbers, which is written after its words as `[m/s]`. If there are several bars, "  \
+              "give a list of units in the order of `labels`. A single unit applies to all bars.",                     \
       .default_text = "none")                                                                                          \
     X(CHOICE("notation", scene_file_colour_bar, notation, notation_words),                                             \
-      .help =                                                                                                          \
-          "How numbers are written: `fixed` as 0.25, `scientific` as 2.5e-1; a number that has no room as `fixed`, "   \
-          "of more than 30 characters, is written as `scientific`.",                                                   \
-      .default_text = "`auto`: `fixed` where that is short")                                                           \
-    X(CYAML_FIELD_INT_PTR("digits", OPTIONAL, scene_file_colour_bar, digits), .help = "Digits behind the point.",      \
-      .default_text = "as many as tell neighbours apart", .low = 0, .high = 12)
+      .help = "How numbers are written: `fixed` as 0.25, `scientific` as 2.5e-1. If a number has more than 30 "        \
+              "characters as `fixed`, it is written as `scientific`.",                                                 \
+      .default_text = "`auto`: `fixed` if that is short")                                                              \
+    X(CYAML_FIELD_INT_PTR("digits", OPTIONAL, scene_file_colour_bar, digits),                                          \
+      .help = "Number of digits after the decimal point.",                                                             \
+      .default_text = "as many as are needed to distinguish neighbouring numbers", .low = 0, .high = 12)
 DEFINE_MAPPING(colour_bar, "colour_bar", COLOUR_BAR_KEYS);
 
 static const cyaml_schema_value_t words = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_words, words_fields)};
 
 #define SCALE_BAR_KEYS(X)                                                                                              \
     X(TEXT("unit", OPTIONAL, scene_file_scale_bar, unit, 63),                                                          \
-      .help = "The unit of the coordinates, behind the number.", .default_text = "none")                               \
-    X(CHOICE("at", scene_file_scale_bar, at, anchor_words), .help = "Where it stands.",                                \
+      .help = "The unit of the coordinates, which is written after the number.", .default_text = "none")               \
+    X(CHOICE("at", scene_file_scale_bar, at, anchor_words), .help = "The position in the picture.",                    \
       .default_text = "`bottom_right`")
 DEFINE_MAPPING(scale_bar, "scale_bar", SCALE_BAR_KEYS);
 
@@ -143,83 +145,81 @@ static const cyaml_strval_t outline_words[] = {{"false", SCENE_NO_BOX},
                                                {"ranks", SCENE_BOXES_OF_RANKS}};
 #define DECORATIONS_KEYS(X)                                                                                            \
     X(TEXT("title", OPTIONAL, scene_file_decorations, title, 255),                                                     \
-      .help = "One line in the middle at the top, larger than other text, with the same placeholders.",                \
+      .help = "One line in the middle at the top, larger than other text, with the same placeholders as `text`.",      \
       .default_text = "none")                                                                                          \
     X(CYAML_FIELD_SEQUENCE("text", POINTER, scene_file_decorations, text, &words, 1, 16),                              \
-      .help = "Lines of text. Those of one place stack.", .default_text = "none", .child = &words_mapping)             \
+      .help = "Lines of text. Lines at the same place are stacked.", .default_text = "none", .child = &words_mapping)  \
     X(CYAML_FIELD_MAPPING_PTR("colour_bar", OPTIONAL, scene_file_decorations, colour_bar, colour_bar_fields),          \
-      .help = "A bar of colours with its numbers for each layer that is coloured by a field: isosurfaces and "         \
-              "surfaces with `colour_by`, slices and volumes. `{}` takes all its defaults.",                           \
+      .help = "A colour bar with numbers for each layer that is coloured by a field: isosurfaces and surfaces with "   \
+              "`colour_by`, slices and volumes. `{}` uses all defaults.",                                              \
       .default_text = "none", .child = &colour_bar_mapping)                                                            \
     X(CHOICE("outline", scene_file_decorations, outline, outline_words),                                               \
-      .help = "The edges of the box around all data; or of those around each of the `meshes`, or around what each of " \
-              "the `ranks` holds. What is drawn hides edges at the back of a box.",                                    \
+      .help = "Draws the edges of a box: the box around all data (`true`), a box around each of the `meshes`, or a "   \
+              "box around the data of each of the `ranks`. Edges at the back of a box are hidden by what is drawn.",   \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_BOOL_PTR("rulers", OPTIONAL, scene_file_decorations, rulers),                                        \
-      .help = "Round numbers along three edges of the box around all data. With `fit: box` they have room; else a "    \
-              "`zoom` below 1 leaves some.",                                                                           \
+      .help = "Round numbers along three edges of the box around all data. With `fit: box` the image leaves room for " \
+              "them. Otherwise set `zoom` below 1 to leave room.",                                                     \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_MAPPING_PTR("scale_bar", OPTIONAL, scene_file_decorations, scale_bar, scale_bar_fields),             \
-      .help =                                                                                                          \
-          "A bar of a round length; by a perspective camera that of things as far away as the middle of the data.",    \
+      .help = "A bar whose length is a round number. With a perspective camera it is the scale at the distance of "    \
+              "the middle of the data.",                                                                               \
       .default_text = "none", .child = &scale_bar_mapping)                                                             \
     X(CYAML_FIELD_BOOL_PTR("axes", OPTIONAL, scene_file_decorations, axes),                                            \
       .help = "The directions of x, y and z, in the lower left corner.", .default_text = "`false`")                    \
     X(NUMBERS("colour", scene_file_decorations, colour, 3), .help = "Colour of words and lines, sRGB.",                \
-      .default_text = "light where the background is dark, dark where it is light or transparent", .low = 0,           \
-      .high = 1)                                                                                                       \
+      .default_text = "light if the background is dark, and dark if it is light or transparent", .low = 0, .high = 1)  \
     X(CYAML_FIELD_FLOAT_PTR("size", OPTIONAL, scene_file_decorations, size),                                           \
-      .help = "Height of words as a share of the picture's height.", .default_text = "`0.03`", .low = 0.005,           \
+      .help = "Height of the words, as a share of the picture's height.", .default_text = "`0.03`", .low = 0.005,      \
       .high = 0.2)
 DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
 
 #define OUTPUT_KEYS(X)                                                                                                 \
     X(TEXT("path", OPTIONAL, scene_file_output, path, 1023),                                                           \
-      .help =                                                                                                          \
-          "File to write, ending in `.png` or `.exr`; relative to the working directory of rank 0; missing "           \
-          "folders are made. " PLACEHOLDERS                                                                            \
-          " At most 1023 bytes. The channel Z of an EXR is the depth of the nearest surface in the pixel: how far "    \
-          "from the eye it is along the camera's axis, in scene units (not along the pixel's ray). Surfaces of any "   \
-          "opacity count, 0 as well, and no volume hides them; it is infinite where there is none: volumes and the "   \
-          "background have no depth. With `cinema`: a PNG in the database's folder.",                                  \
+      .help = "File to write, ending in `.png` or `.exr`. The path is relative to the working directory of rank 0. "   \
+              "Missing folders are made. " PLACEHOLDERS                                                                \
+              " The path has at most 1023 bytes. With `cinema` the file is a PNG in the database's folder. The "       \
+              "channel Z of an EXR file is the depth of the nearest surface in the pixel. This is the distance from "  \
+              "the eye along the camera's axis, in scene units (not along the pixel's ray). Surfaces of any opacity "  \
+              "count, also those with opacity 0, and no volume hides them. Volumes and the background have no depth: " \
+              "without a surface the depth is infinite.",                                                              \
       .default_text =                                                                                                  \
-          "required without `cinema`; with it `{name}_{cycle:06}.png`, and before the ending `_{view:03}`, "           \
-          "`_{isovalue}`, `_{plane:02}` and `_{field}` as far as the image has them")                                  \
+          "required without `cinema`. With it, the default is `{name}_{cycle:06}.png`, with `_{view:03}`, "            \
+          "`_{isovalue}`, `_{plane:02}` and `_{field}` before the ending if the image has them")                       \
     X(TEXT("cinema", OPTIONAL, scene_file_output, cinema, 511),                                                        \
-      .help =                                                                                                          \
-          "Folder of a Cinema database of Spec D, ending in `.cdb`, into which the pictures go: `data.csv` has a "     \
-          "line for each, and `index.html` shows them in a browser, without a server. Several images may go into "     \
-          "one. A run that begins in a folder which has one drops the lines of its first cycle and of later ones, "    \
-          "and goes on.",                                                                                              \
+      .help = "Folder of a Cinema database of Spec D, ending in `.cdb`. The pictures are written into it. `data.csv` " \
+              "has a line for each picture, and `index.html` shows them in a browser, without a server. Several "      \
+              "images may use the same database. If a run begins in a folder that already has a database, the lines "  \
+              "of its first cycle and of later cycles are removed, and the run continues the database.",               \
       .default_text = "none")                                                                                          \
     X(CYAML_FIELD_SEQUENCE_FIXED("grid", POINTER, scene_file_output, grid, &whole_number, 2),                          \
-      .help =                                                                                                          \
-          "Columns and rows of a PNG in which pictures stand side by side: all those of a step whose outputs have "    \
-          "the same file, row by row, in the order of the images, of each its sweep's pictures, and of these the "     \
-          "views of its orbit. They have one size, each with its own decorations, and all say the same `grid`. A "     \
-          "cell whose picture is not due, or could not be drawn, stays transparent. Not with `cinema`. 16 bytes a "    \
-          "pixel of the whole are held on rank 0 while a step's pictures are written.",                                \
+      .help = "Columns and rows of a PNG in which several pictures are placed side by side. These are all pictures "   \
+              "of a step whose outputs have the same file. They are placed row by row: first in the order of the "     \
+              "images, for each image in the order of its sweep, and for each of these in the order of the views of "  \
+              "its orbit. All pictures must have the same size and the same `grid`. Each has its own decorations. A "  \
+              "place whose picture is not due, or could not be drawn, stays transparent. Rank 0 holds 16 bytes per "   \
+              "pixel of the whole file while a step's pictures are written. Not allowed with `cinema`.",               \
       .default_text = "none", .low = 1, .high = 16)                                                                    \
     X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
-      .help =                                                                                                          \
-          "Bits a channel of a PNG: 8 or 16. EXR always holds 32-bit floats: R, G, B (linear, times A), A, and the "   \
-          "depth, Z.",                                                                                                 \
+      .help = "Bits per channel of a PNG: 8 or 16. EXR always has 32-bit floats: R, G, B (linear, times A), A, and "   \
+              "the depth, Z.",                                                                                         \
       .default_text = "`8`", .low = 8, .high = 16)                                                                     \
     X(CYAML_FIELD_BOOL_PTR("decorations", OPTIONAL, scene_file_output, decorations),                                   \
-      .help = "Draw the image's decorations into this file.", .default_text = "`true` for PNG, `false` for EXR")       \
+      .help = "Draws the image's decorations into this file.", .default_text = "`true` for PNG, `false` for EXR")      \
     X(CYAML_FIELD_BOOL_PTR("data", OPTIONAL, scene_file_output, data),                                                 \
-      .help = "An EXR also gets numbers of the nearest surface in the pixel, of any opacity, through the pixel's "     \
-              "centre. N.X, N.Y and N.Z are its unit normal towards the eye, in the scene's axes; value is that of "   \
-              "the field that colours it, or its isovalue; layer is the number of its layer in the list, from 0, and " \
-              "surface that of its isovalue or plane in the layer. 0, NaN and -1 where there is no surface. Two "      \
-              "frames of surfaces more are drawn.",                                                                    \
+      .help = "Adds data of the nearest surface of any opacity, at the pixel's centre, to an EXR file. N.X, N.Y and "  \
+              "N.Z are the unit normal towards the eye, in the scene's axes. `value` is the value of the field that "  \
+              "colours the surface, or its isovalue. `layer` is the number of its layer in the list, from 0. "         \
+              "`surface` is the number of its isovalue or plane in the layer. If there is no surface, the normal is "  \
+              "0, the value NaN, and the numbers -1. Two more frames of surfaces are drawn for this.",                 \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_BOOL_PTR("deep", OPTIONAL, scene_file_output, deep),                                                 \
-      .help = "A deep EXR: of every pixel all that lies behind each other, as R, G, B (linear, times A), A, Z and "    \
-              "ZBack, from what is nearest on. A surface is a sample with Z and ZBack the same, of volumes each is a " \
-              "stretch; none overlaps another, and nothing stands for the background. `oiiotool --flatten` makes the " \
-              "picture of it. Through the pixel's centre, whatever `antialias` and `frames` are; with neither "        \
-              "`decorations` nor `data`. 24 bytes a sample and 12 a pixel are held on rank 0 until it is written.",    \
+      .help = "Writes a deep EXR file. Each pixel has samples of everything along its ray, from the nearest to the "   \
+              "farthest, as R, G, B (linear, times A), A, Z and ZBack. A surface is a sample whose Z and ZBack are "   \
+              "equal. A volume gives one sample for each continuous part. No samples overlap, and none stands for "    \
+              "the background. `oiiotool --flatten` makes the picture from them. The samples are those at the "        \
+              "pixel's centre, whatever `antialias` and `frames` are. Rank 0 holds 24 bytes per sample and 12 per "    \
+              "pixel until the file is written. Not allowed with `decorations` or `data`.",                            \
       .default_text = "`false`")
 DEFINE_MAPPING(output, "outputs", OUTPUT_KEYS);
 
@@ -229,8 +229,9 @@ static const cyaml_schema_value_t layer = {
 static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_output, output_fields)};
 
 #define STATISTICS_MESH_HELP                                                                                           \
-    "The mesh whose cells count, or a list of meshes, by the names that the simulation gives them, as at a layer."
-#define STATISTICS_FIELD_HELP "Name of the field; at most 255 bytes. It is taken as it is, at cells or vertices."
+    "The mesh whose cells count, or a list of meshes, by the names that the simulation gives them, as for a layer."
+#define STATISTICS_FIELD_HELP                                                                                          \
+    "Name of the field; at most 255 bytes. Its values are used as they are, at cells or vertices."
 
 #define CONDITION_KEYS(X)                                                                                              \
     X(TEXT("field", REQUIRED, scene_file_condition, field, 255), .help = STATISTICS_FIELD_HELP)                        \
@@ -238,19 +239,18 @@ static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAU
       .default_text = COMPONENT_DEFAULT)                                                                               \
     X(NAMES("mesh"), .help = STATISTICS_MESH_HELP, .default_text = "all meshes that have the field")                   \
     X(CHOICE("of", scene_file_condition, of, statistic_words),                                                         \
-      .help = "Which number of the field is looked at; the mean is weighted by the cells' volumes.",                   \
-      .default_text = "`maximum`")                                                                                     \
-    X(CYAML_FIELD_FLOAT_PTR("above", OPTIONAL, scene_file_condition, above), .help = "It is to be greater than this.", \
-      .default_text = "no bound")                                                                                      \
-    X(CYAML_FIELD_FLOAT_PTR("below", OPTIONAL, scene_file_condition, below), .help = "It is to be less than this.",    \
-      .default_text = "no bound")
+      .help = "The number that is compared. The mean is weighted by the cells' volumes.", .default_text = "`maximum`") \
+    X(CYAML_FIELD_FLOAT_PTR("above", OPTIONAL, scene_file_condition, above),                                           \
+      .help = "The number must be greater than this.", .default_text = "no bound")                                     \
+    X(CYAML_FIELD_FLOAT_PTR("below", OPTIONAL, scene_file_condition, below),                                           \
+      .help = "The number must be less than this.", .default_text = "no bound")
 DEFINE_MAPPING(condition, "when", CONDITION_KEYS);
 
 #define HISTOGRAM_KEYS(X)                                                                                              \
     X(CYAML_FIELD_INT_PTR("bins", OPTIONAL, scene_file_histogram, bins),                                               \
       .help = "The number of bins, which have equal widths.", .default_text = "`32`", .low = 1, .high = 256)           \
     X(NUMBERS("range", scene_file_histogram, range, 2),                                                                \
-      .help = "The values `[low, high]` that the bins cover, low < high. Cells beyond are in no bin.",                 \
+      .help = "The values `[low, high]` that the bins cover, low < high. Cells with values outside are in no bin.",    \
       .default_text = "the least and the greatest value of each step")
 DEFINE_MAPPING(histogram, "histogram", HISTOGRAM_KEYS);
 
@@ -260,14 +260,14 @@ DEFINE_MAPPING(histogram, "histogram", HISTOGRAM_KEYS);
       .default_text = COMPONENT_DEFAULT)                                                                               \
     X(NAMES("mesh"), .help = STATISTICS_MESH_HELP, .default_text = "all meshes that have the field")                   \
     X(TEXT("path", REQUIRED, scene_file_statistics, path, 1023),                                                       \
-      .help = "File to write, ending in `.csv`; relative to the working directory of rank 0; missing folders are "     \
-              "made. A run that begins in a folder which has the file drops the lines of its first cycle and of "      \
-              "later ones, and goes on.")                                                                              \
+      .help = "File to write, ending in `.csv`. The path is relative to the working directory of rank 0. Missing "     \
+              "folders are made. If a run begins in a folder that already has the file, the lines of its first cycle " \
+              "and of later cycles are removed, and the run continues the file.")                                      \
     X(CYAML_FIELD_INT_PTR("every", OPTIONAL, scene_file_statistics, every),                                            \
       .help = "Write at the cycles that are multiples of this.", .default_text = "`1`", .low = 1, .high = 1000000000)  \
     X(CYAML_FIELD_MAPPING_PTR("histogram", OPTIONAL, scene_file_statistics, histogram, histogram_fields),              \
-      .help = "The share of the volume whose cells' values lie in each of some bins.", .default_text = "none",         \
-      .child = &histogram_mapping)
+      .help = "The share of the volume that has values in each bin. Each cell counts with its value.",                 \
+      .default_text = "none", .child = &histogram_mapping)
 DEFINE_MAPPING(statistics, "statistics", STATISTICS_KEYS);
 
 static const cyaml_schema_value_t statistics = {
@@ -275,123 +275,123 @@ static const cyaml_schema_value_t statistics = {
 
 #define IMAGE_KEYS(X)                                                                                                  \
     X(TEXT("name", REQUIRED, scene_file_image, name, 64),                                                              \
-      .help = "Name of the image, its own among the images; at most 64 bytes, no `/`.")                                \
+      .help = "Name of the image, unique among the images; at most 64 bytes, without `/`.")                            \
     X(CYAML_FIELD_SEQUENCE_FIXED("size", POINTER, scene_file_image, size, &whole_number, 2),                           \
       .help = "Width and height in pixels.", .default_text = "`[1280, 720]`", .low = 1, .high = 32768)                 \
     X(CYAML_FIELD_INT_PTR("every", OPTIONAL, scene_file_image, every),                                                 \
       .help = "Draw at the cycles that are multiples of this.", .default_text = "`1`", .low = 1, .high = 1000000000)   \
     X(CYAML_FIELD_FLOAT_PTR("every_time", OPTIONAL, scene_file_image, every_time),                                     \
-      .help =                                                                                                          \
-          "Draw at the first step, and whenever the time has passed a multiple of this since the step before. Not "    \
-          "with `every`.",                                                                                             \
+      .help = "Draw at the first step, and whenever the time has passed a multiple of this number since the previous " \
+              "step. Not allowed with `every`.",                                                                       \
       .default_text = "by `every`", .low = 0, .is_low_excluded = true, .high = 1e30)                                   \
     X(CYAML_FIELD_MAPPING_PTR("when", OPTIONAL, scene_file_image, when, condition_fields),                             \
-      .help = "Draw only in those steps of `every` or `every_time` in which this holds.", .default_text = "always",    \
-      .child = &condition_mapping)                                                                                     \
+      .help = "Draw only in those steps of `every` or `every_time` in which this condition holds.",                    \
+      .default_text = "always", .child = &condition_mapping)                                                           \
     X(CYAML_FIELD_BOOL_PTR("once", OPTIONAL, scene_file_image, once),                                                  \
-      .help = "Draw only at the first of the steps in which the image is due. An edited scene begins anew.",           \
+      .help =                                                                                                          \
+          "Draw only in the first of the steps in which the image is due. If the scene is edited, this begins anew.",  \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_MAPPING_PTR("camera", OPTIONAL, scene_file_image, camera, scene_camera_fields),                      \
-      .help = "Where the image is seen from.", .default_text = "automatic", .child = &scene_camera_mapping)            \
+      .help = "The viewpoint of the image.", .default_text = "automatic", .child = &scene_camera_mapping)              \
     X(CYAML_FIELD_MAPPING_PTR("sweep", OPTIONAL, scene_file_image, sweep, scene_sweep_fields),                         \
-      .help = "Draw the image once for each of several values and fields: a picture each.", .default_text = "none",    \
-      .child = &scene_sweep_mapping)                                                                                   \
+      .help = "Draw the image once for each of several values and fields. Each gives a picture of its own.",           \
+      .default_text = "none", .child = &scene_sweep_mapping)                                                           \
     X(CYAML_FIELD_SEQUENCE("background", POINTER, scene_file_image, background, &number, 3, 4),                        \
-      .help = "Colour where nothing is, sRGB, and optionally its opacity.", .default_text = "`[0.08, 0.09, 0.11, 1]`", \
-      .low = 0, .high = 1)                                                                                             \
+      .help = "Colour of pixels that show nothing, sRGB, and optionally its opacity.",                                 \
+      .default_text = "`[0.08, 0.09, 0.11, 1]`", .low = 0, .high = 1)                                                  \
     X(CYAML_FIELD_SEQUENCE("lights", POINTER, scene_file_image, lights, &light, 1, 8),                                 \
       .help = "The lights, in place of the default ones.",                                                             \
-      .default_text = "a light from the upper right of the camera and a weaker one from its left",                     \
+      .default_text = "one light from the upper right of the camera and a weaker one from its left",                   \
       .child = &light_mapping)                                                                                         \
     X(CYAML_FIELD_BOOL_PTR("shadows", OPTIONAL, scene_file_image, shadows),                                            \
-      .help =                                                                                                          \
-          "The opaque isosurfaces, slices and surfaces of all ranks cast shadows on each other, and on transparent "   \
-          "ones, by every light that does not say otherwise; the same picture on any partition. Transparent layers "   \
-          "and volumes cast none, and volumes have none. A layer that takes no light, as slices by default, has "      \
-          "none either. What `clip` cuts away casts none, what the camera does not see casts its own. Of "             \
-          "isosurfaces, "                                                                                              \
-          "what is nearer to a hit than a fifth of the size of its cell casts none.",                                  \
+      .help = "The opaque isosurfaces, slices and surfaces of all ranks cast shadows on each other and on "            \
+              "transparent surfaces. Every light casts shadows unless its own `shadows` is false. The picture is the " \
+              "same on any partition. Transparent layers and volumes cast no shadows, and volumes receive none. A "    \
+              "layer that is not lit, such as a slice by default, receives none either. What `clip` cuts away casts "  \
+              "no shadow. What lies outside the camera's view casts its shadow. A part of an isosurface casts no "     \
+              "shadow on a hit that is closer than a fifth of the size of that part's cell.",                          \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_MAPPING_PTR("ambient_occlusion", OPTIONAL, scene_file_image, ambient_occlusion, occlusion_fields),   \
-      .help =                                                                                                          \
-          "Darken what is hidden from the open sky, in corners and hollows: of rays from each hit into the "           \
-          "hemisphere above it, spread as the cosine, the share that meets no opaque layer within `radius` is a "      \
-          "factor on its ambient and diffuse light. By what casts shadows, on what has them. Which rays a pixel has "  \
-          "does not change from step to step. Of isosurfaces, what is nearer to a hit than a fifth of its "            \
-          "cell's size hides nothing: `radius` is to be several cells. A core asks some 7 million rays a second in "   \
-          "tetrahedra, 4 "                                                                                             \
-          "million in hexahedra. `{}` takes all its defaults.",                                                        \
+      .help = "Darkens corners and hollows. From each hit, rays are sent into the hemisphere above it, distributed "   \
+              "as the cosine. The share of rays that meet no opaque layer within `radius` is a factor on the ambient " \
+              "and diffuse light of the hit. The same layers hide and are darkened as with `shadows`. The rays of a "  \
+              "pixel do not change from step to step. A part of an isosurface does not hide a hit that is closer "     \
+              "than a fifth of the size of that part's cell, so `radius` should be several cells. One core traces "    \
+              "some 7 million rays a second in tetrahedra and 4 million in hexahedra. `{}` uses all defaults.",        \
       .default_text = "none", .child = &occlusion_mapping)                                                             \
     X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, scene_file_image, clip, scene_clip_fields),                            \
-      .help = "Cuts parts of all layers away, exactly, and through the cells; volumes keep their `max_error`.",        \
+      .help = "Cuts away parts of all layers, exactly, also through cells. Volumes keep their `max_error`.",           \
       .default_text = "nothing is cut away", .child = &scene_clip_mapping)                                             \
     X(CYAML_FIELD_SEQUENCE("layers", CYAML_FLAG_POINTER, scene_file_image, layers, &layer, 1, 20),                     \
-      .help = "The layers to draw. Each entry holds one of the keys of a layer.", .child = &scene_layer_mapping)       \
+      .help = "The layers to draw. Each entry has one of the keys of a layer.", .child = &scene_layer_mapping)         \
     X(CYAML_FIELD_MAPPING_PTR("sampling", OPTIONAL, scene_file_image, sampling, sampling_fields),                      \
       .help = "How volumes are integrated, and how finely.",                                                           \
-      .default_text = "one volume to a `max_error` of 0.01; several by samples, half a cell apart, jittered, to no "   \
-                      "known error, of which a warning tells",                                                         \
+      .default_text = "one volume with a `max_error` of 0.01; several volumes by jittered samples half a cell apart, " \
+                      "whose error is not known, with a warning",                                                      \
       .child = &sampling_mapping)                                                                                      \
     X(CYAML_FIELD_INT_PTR("antialias", OPTIONAL, scene_file_image, antialias),                                         \
-      .help =                                                                                                          \
-          "Samples a pixel, at fixed places in it: 1, 2, 4, 8 or 16, averaged in linear light. Images without "        \
-          "volumes take them where a pixel differs from a neighbour of the picture at one sample a pixel, by some 6 "  \
-          "of 255 codes, and so miss what is thinner than a pixel and not met by that; those with volumes take them "  \
-          "everywhere, each with a jitter of its own (`frames`, rounded up to a multiple of this, if those are "       \
-          "more). Depth in an EXR is that of the pixel's centre.",                                                     \
+      .help = "Samples per pixel, at fixed places in it: 1, 2, 4, 8 or 16, averaged in linear light. Images without "  \
+              "volumes take the additional samples only at pixels that differ from a neighbour, by some 6 of 255 "     \
+              "codes, in the picture with one sample per pixel. So they miss things that are thinner than a pixel "    \
+              "and that this picture does not show. Images with volumes take all samples at every pixel, each with a " \
+              "jitter of its own (`frames`, rounded up to a multiple of this number, if that is more). The depth in "  \
+              "an EXR file is that of the pixel's centre.",                                                            \
       .default_text = "`1`", .low = 1, .high = 16)                                                                     \
     X(CYAML_FIELD_MAPPING_PTR("decorations", OPTIONAL, scene_file_image, decorations, decorations_fields),             \
       .help =                                                                                                          \
-          "Words, bars and lines beside the data. None of them lies over another, and all of them grow with "          \
-          "the picture. What is too large is wrapped or made smaller, bars may stand in several columns, and what "    \
-          "has no room at all is left out and named by the report. Words need a font: DejaVuSans, or another common "  \
-          "one, in the folders that OPENIMAGEIO_FONTS names in rank 0's environment, or else in the system's. The "    \
-          "report warns if there is none, or none in the folders named. Words are UTF-8; a character that the font "   \
-          "lacks is a box, and the report names it.",                                                                  \
+          "Words, bars and lines in addition to the data. None of them lies over another, and all of them grow with "  \
+          "the picture. What is too large is wrapped or made smaller, and bars may be placed in several columns. "     \
+          "What has no room at all is left out and named by the report. Words need a font: DejaVuSans, or another "    \
+          "common one. It is looked for in the folders that OPENIMAGEIO_FONTS names in rank 0's environment, and "     \
+          "otherwise in the system's folders. The report warns if there is no font, or none in the folders named. "    \
+          "Words are UTF-8; a character that the font lacks is a box, and the report names it.",                       \
       .default_text = "none", .child = &decorations_mapping)                                                           \
     X(CYAML_FIELD_SEQUENCE("outputs", POINTER, scene_file_image, outputs, &output, 1, 16),                             \
-      .help = "Files that the image is written to. No two files of a scene may have the same name. An image without "  \
-              "outputs is drawn where the code keeps pictures in memory (`insitu_keep_pictures`), and else not, of "   \
-              "which a warning tells.",                                                                                \
+      .help = "Files to which the image is written. No two files of a scene may have the same name. An image without " \
+              "outputs is drawn only if the code keeps pictures in memory (`insitu_keep_pictures`). If it does not, "  \
+              "the image is not drawn, and a warning says so.",                                                        \
       .default_text = "none", .child = &output_mapping)
 DEFINE_MAPPING(image, "images", IMAGE_KEYS);
 
 static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_image, image_fields)};
 
-#define OF_VELOCITY "The field has 2 or 3 components; `[u, v, w]` names 2 or 3 scalars in its place. "
+#define OF_VELOCITY "The field must have 2 or 3 components. `[u, v, w]` can name 2 or 3 scalars instead. "
 #define DERIVED_KEYS(X)                                                                                                \
     X(TEXT("name", REQUIRED, scene_file_derived, name, 255),                                                           \
-      .help = "The name by which layers, statistics and other derived fields use it: no field of the simulation's. "   \
-              "Without `.`, `[`, `]` and quotes.")                                                                     \
+      .help = "The name that layers, statistics and other derived fields use. It must not be the name of a field of "  \
+              "the simulation, and must not contain `.`, `[`, `]` or quotes.")                                         \
     X(TEXT("expression", OPTIONAL, scene_file_derived, expression, 1000),                                              \
-      .help = "Of numbers, fields of one component, `u.x`, `u.y`, `u.z`, `u.0` ... of others, `+ - * / ^`, brackets, " \
-              "and `sqrt abs exp log log10 sin cos tan min max pow`, `mag(u)`. A name that holds other signs than "    \
-              "letters, digits and `_` stands in quotes.",                                                             \
+      .help = "An expression of numbers, fields with one component, components of other fields (`u.x`, `u.y`, `u.z`, " \
+              "`u.0` ...), `+ - * / ^`, brackets, `mag(u)`, and the functions `sqrt abs exp log log10 sin cos tan "    \
+              "min max pow`. A name with characters other than letters, digits and `_` must be in quotes.",            \
       .default_text = "none")                                                                                          \
-    X(NAMES("field"), .help = "A scalar of a field, by `component`, as a layer shows it.", .default_text = "none")     \
+    X(NAMES("field"), .help = "One scalar of a field, selected by `component` as in a layer.", .default_text = "none") \
     X(NAMES("magnitude"), .help = "The magnitude of a field.", .default_text = "none")                                 \
     X(NAMES("gradient"),                                                                                               \
-      .help = "The gradient of a field of one component, or of a component as `u.x`: 3 components, or by `component` " \
-              "one, or its magnitude.",                                                                                \
+      .help = "The gradient of a field with one component, or of a component such as `u.x`. It has 3 components. "     \
+              "With `component` it is one of them, or their magnitude.",                                               \
       .default_text = "none")                                                                                          \
     X(NAMES("divergence"), .help = "The divergence of a vector field. " OF_VELOCITY, .default_text = "none")           \
     X(NAMES("vorticity"),                                                                                              \
-      .help = "The curl of a vector field: 3 components, or by `component` one, or its magnitude. " OF_VELOCITY,       \
+      .help = "The curl of a vector field. It has 3 components. With `component` it is one of them, or their "         \
+              "magnitude. " OF_VELOCITY,                                                                               \
       .default_text = "none")                                                                                          \
     X(NAMES("q_criterion"),                                                                                            \
-      .help =                                                                                                          \
-          "Half of the square of the rotation rate less that of the strain rate: above 0 in vortices. " OF_VELOCITY,   \
+      .help = "Half of the difference between the square of the rotation rate and the square of the strain rate. It "  \
+              "is above 0 in vortices. " OF_VELOCITY,                                                                  \
       .default_text = "none")                                                                                          \
     X(NAMES("lambda2"),                                                                                                \
-      .help = "The middle eigenvalue of the sum of the squares of the tensors of strain rate and rotation: below 0 "   \
-              "in vortices. " OF_VELOCITY,                                                                             \
+      .help = "The middle eigenvalue of the sum of the squares of the tensors of strain rate and rotation. It is "     \
+              "below 0 in vortices. " OF_VELOCITY,                                                                     \
       .default_text = "none")                                                                                          \
     X(NAMES("strain_rate"),                                                                                            \
-      .help = "The size of the strain rate, sqrt(2 S:S): the shear rate of a simple shear. " OF_VELOCITY,              \
+      .help =                                                                                                          \
+          "The magnitude of the strain rate, sqrt(2 S:S). In a simple shear flow it is the shear rate. " OF_VELOCITY,  \
       .default_text = "none")                                                                                          \
     X(TEXT("component", OPTIONAL, scene_file_derived, component, 16),                                                  \
-      .help = "Beside `field`, `gradient` and `vorticity`: `magnitude`, `x`, `y`, `z`, or a component's number.",      \
-      .default_text = "`0` of a `field` of one component, else `magnitude`; of a gradient or vorticity, all three")
+      .help = "With `field`, `gradient` and `vorticity`: `magnitude`, `x`, `y`, `z`, or a component's number.",        \
+      .default_text = "`0` for a `field` with one component, otherwise `magnitude`; for a gradient or vorticity, all " \
+                      "three components")
 DEFINE_MAPPING(derived, "fields", DERIVED_KEYS);
 
 static const cyaml_schema_value_t derived = {
@@ -401,53 +401,50 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
 
 #define TOP_KEYS(X)                                                                                                    \
     X(CYAML_FIELD_INT_PTR("threads", OPTIONAL, scene_file, threads),                                                   \
-      .help =                                                                                                          \
-          "Threads of each rank, as far as there are cores and they can be started; the report warns where there are " \
-          "fewer. 0: the cores of the node, shared among its ranks.",                                                  \
+      .help = "Number of threads of each rank. Fewer are used if there are fewer cores, or if some threads cannot be " \
+              "started; the report then warns. 0: the cores of the node, shared among its ranks.",                     \
       .default_text = "`0`", .low = 0, .high = 4096)                                                                   \
     X(CHOICE("tree", scene_file, tree, tree_words),                                                                    \
-      .help = "Trees are built over all cells (`full`), over those that the images can show (`partial`), or over "     \
-              "whichever has cost less so far (`auto`). Changes the speed, not the images.",                           \
+      .help = "The cells over which trees are built: all cells (`full`), only those that the images can show "         \
+              "(`partial`), or whichever of these has cost less so far (`auto`). Changes the speed, not the images.",  \
       .default_text = "`auto`")                                                                                        \
     X(CHOICE("schedule", scene_file, schedule, schedule_words),                                                        \
-      .help =                                                                                                          \
-          "By which ranks what they have traced goes to those that blend it: at once (`direct`), within nodes "        \
-          "first (`nodes`), within nodes and then in rounds of at most 8 (`radix`), in rounds of two (`binary`), or "  \
-          "what a model of the network finds cheapest (`auto`). Changes the speed, not the images; the report tells "  \
-          "which.",                                                                                                    \
+      .help = "The route by which traced fragments are sent to the ranks that blend them: directly (`direct`), "       \
+              "within nodes first (`nodes`), within nodes and then in rounds of at most 8 ranks (`radix`), in rounds " \
+              "of two ranks (`binary`), or the route that is cheapest according to a model of the network (`auto`). "  \
+              "Changes the speed, not the images; the report tells which.",                                            \
       .default_text = "`auto`")                                                                                        \
     X(CHOICE("writing", scene_file, writing, writing_words),                                                           \
-      .help =                                                                                                          \
-          "When pictures are written: by a thread of rank 0 while the simulation goes on (`background`), or "          \
-          "before `insitu_step` returns (`step`). In the background at most 128 MiB of pictures wait, or one, and "    \
-          "a picture that cannot be written is an error of the next step, or of `insitu_destroy`, which waits "        \
-          "for all.",                                                                                                  \
+      .help = "When pictures are written: by a thread of rank 0 while the simulation goes on (`background`), or "      \
+              "before `insitu_step` returns (`step`). In the background, at most 128 MiB of pictures wait, or one "    \
+              "picture if it is larger. A picture that cannot be written is then an error of the next step, or of "    \
+              "`insitu_destroy`, which waits for all pictures.",                                                       \
       .default_text = "`background`")                                                                                  \
     X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, SCENE_MAX_IMAGES),             \
-      .help =                                                                                                          \
-          "The images to draw. Three frames or more of a step that show the same isosurface, opaque, in one colour a " \
-          "value, normals by gradient, share the work of finding its cells, where these are tets or hexes in arrays "  \
-          "of float32 and the images have most of a rank's mesh in view: 64 bytes a crossed tet and 128 a "            \
-          "hex, at most 64 MiB a rank, are held while the step is drawn.",                                             \
+      .help = "The images to draw. If three or more frames of a step show the same isosurface, they can share the "    \
+              "search for its cells. The isosurface must be opaque, with one colour per value and normals by "         \
+              "gradient. Its cells must be tets or hexes in arrays of float32, and the images must show most of a "    \
+              "rank's mesh. The shared data take 64 bytes per crossed tet and 128 per hex, at most 64 MiB per rank, "  \
+              "while the step is drawn.",                                                                              \
       .child = &image_mapping)                                                                                         \
     X(CYAML_FIELD_SEQUENCE("statistics", POINTER, scene_file, statistics, &statistics, 0, 64),                         \
-      .help =                                                                                                          \
-          "Numbers of fields, a file each and a line a step: cycle, time, how many cells, their volume, the least "    \
-          "and the greatest value, mean and standard deviation, the last two of cells' values (their own, or the "     \
-          "mean of their vertices') weighted by volume; then the histogram. Ghost cells, cells of no volume and "      \
-          "those with values that are not finite do not count. A field on triangles, quads and polygons alone has "    \
-          "their area in the place of the volume; beside cells with a volume they do not count. The same on any "      \
-          "partition. Without any cell no line is written.",                                                           \
+      .help = "Statistics of fields. Each entry writes one file with one line per step: the cycle, the time, the "     \
+              "number of cells, their volume, the least and the greatest value, the mean and the standard deviation, " \
+              "and then the histogram. Mean and standard deviation are those of the cells' values (their own, or the " \
+              "mean of their vertices' values), weighted by volume. Ghost cells, cells without volume and cells with " \
+              "values that are not finite do not count. If the field is only on triangles, quads and polygons, their " \
+              "area takes the place of the volume. Beside cells with a volume they do not count. The numbers are the " \
+              "same on any partition. No line is written if there are no cells.",                                      \
       .default_text = "none", .child = &statistics_mapping)                                                            \
     X(CYAML_FIELD_SEQUENCE("fields", POINTER, scene_file, fields, &derived, 1, SCENE_MAX_DERIVED),                     \
-      .help = "Fields that are made of the simulation's, or of each other: a mapping from their names to what they "   \
-              "are, as in [Derived fields](#derived-fields).",                                                         \
+      .help = "Fields that are computed from the simulation's fields, or from each other. This is a mapping from "     \
+              "their names to their definitions: see [Derived fields](#derived-fields).",                              \
       .default_text = "none", .child = &derived_mapping, .is_named = true)                                             \
     X(CYAML_FIELD_IGNORE("parameters", OPTIONAL),                                                                      \
       .help = "Numbers for the simulation, which reads them by `insitu_parameter()`: `parameters: {inflow: 2.5}`. An " \
-              "edit of the scene changes them from the step on that reads it, on all ranks at once. A name is a "      \
-              "letter or `_` and then letters, digits, `_` or `-`, 63 at most. From the second step on, a parameter "  \
-              "that rank 0 has never asked for is a warning.",                                                         \
+              "edit of the scene changes them from the step on that reads it, on all ranks at once. A name begins "    \
+              "with a letter or `_`, followed by letters, digits, `_` or `-`; it has at most 63 characters. If rank "  \
+              "0 has never read a parameter, a warning says so from the second step on.",                              \
       .default_text = "none", .named = &parameter_form)
 static const cyaml_schema_field_t top_fields[] = {TOP_KEYS(AS_FIELD) CYAML_FIELD_END};
 static const scene_key top_keys[] = {TOP_KEYS(AS_KEY)};

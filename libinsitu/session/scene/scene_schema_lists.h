@@ -40,8 +40,9 @@ SHARED whole_number = {CYAML_VALUE_INT(CYAML_FLAG_DEFAULT, int)};
 SHARED colour = {CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 3)};
 #undef SHARED
 
-#define COMPONENT_HELP "Which scalar of the field: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
-#define COMPONENT_DEFAULT "`0` of a field of one component, else `magnitude`"
+#define COMPONENT_HELP                                                                                                 \
+    "The scalar of the field that is used: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
+#define COMPONENT_DEFAULT "`0` for a field with one component, otherwise `magnitude`"
 
 /* Defined in scene_schema_layers.c. */
 extern const cyaml_schema_field_t scene_layer_fields[], scene_clip_fields[];
