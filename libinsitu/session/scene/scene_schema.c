@@ -93,11 +93,10 @@ DEFINE_MAPPING(occlusion, "ambient_occlusion", OCCLUSION_KEYS);
 DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
 
 #define PLACEHOLDERS                                                                                                   \
-    "These placeholders are replaced: `{cycle}` by the cycle, `{cycle:06}` by the cycle with zeros to 6 digits, "      \
-    "`{time}` by the time, `{time:.3f}` by the time as C's printf writes it (`f`, `e` or `g`), `{name}` by the "       \
-    "image's name, `{view}` and `{view:03}` by the number of an orbit's view, from 0. Those of a `sweep` are "         \
-    "`{isovalue}` (with formats as for the time), `{plane}` (its number from 0, with formats as for `{view}`) and "    \
-    "`{field}`."
+    "These placeholders are replaced. `{cycle}`: the cycle. `{cycle:06}`: the cycle with zeros to 6 digits. "          \
+    "`{time}`: the time. `{time:.3f}`: the time as C's printf writes it (`f`, `e` or `g`). `{name}`: the image's "     \
+    "name. `{view}` and `{view:03}`: the number of an orbit's view, from 0. A `sweep` has `{isovalue}` (with formats " \
+    "as for the time), `{plane}` (its number from 0, with formats as for `{view}`) and `{field}`."
 
 #define WORDS_KEYS(X)                                                                                                  \
     X(TEXT("text", REQUIRED, scene_file_words, text, 255), .help = "One line of text. " PLACEHOLDERS)                  \
@@ -289,7 +288,7 @@ static const cyaml_schema_value_t statistics = {
       .default_text = "always", .child = &condition_mapping)                                                           \
     X(CYAML_FIELD_BOOL_PTR("once", OPTIONAL, scene_file_image, once),                                                  \
       .help =                                                                                                          \
-          "Draw only in the first of the steps in which the image is due. If the scene is edited, this begins anew.",  \
+          "Draw only in the first of the steps in which the image is due. An edit of the scene starts this again.",    \
       .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_MAPPING_PTR("camera", OPTIONAL, scene_file_image, camera, scene_camera_fields),                      \
       .help = "The viewpoint of the image.", .default_text = "automatic", .child = &scene_camera_mapping)              \
@@ -409,10 +408,10 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
               "(`partial`), or whichever of these has cost less so far (`auto`). Changes the speed, not the images.",  \
       .default_text = "`auto`")                                                                                        \
     X(CHOICE("schedule", scene_file, schedule, schedule_words),                                                        \
-      .help = "The route by which traced fragments are sent to the ranks that blend them: directly (`direct`), "       \
-              "within nodes first (`nodes`), within nodes and then in rounds of at most 8 ranks (`radix`), in rounds " \
-              "of two ranks (`binary`), or the route that is cheapest according to a model of the network (`auto`). "  \
-              "Changes the speed, not the images; the report tells which.",                                            \
+      .help = "The route by which traced fragments are sent to the ranks that blend them. `direct`: without other "    \
+              "ranks in between. `nodes`: within nodes first. `radix`: within nodes, and then in rounds of at most 8 " \
+              "ranks. `binary`: in rounds of two ranks. `auto`: the route that is cheapest according to a model of "   \
+              "the network. Changes the speed, not the images; the report tells which.",                               \
       .default_text = "`auto`")                                                                                        \
     X(CHOICE("writing", scene_file, writing, writing_words),                                                           \
       .help = "When pictures are written: by a thread of rank 0 while the simulation goes on (`background`), or "      \
@@ -428,13 +427,13 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
               "while the step is drawn.",                                                                              \
       .child = &image_mapping)                                                                                         \
     X(CYAML_FIELD_SEQUENCE("statistics", POINTER, scene_file, statistics, &statistics, 0, 64),                         \
-      .help = "Statistics of fields. Each entry writes one file with one line per step: the cycle, the time, the "     \
-              "number of cells, their volume, the least and the greatest value, the mean and the standard deviation, " \
-              "and then the histogram. Mean and standard deviation are those of the cells' values (their own, or the " \
-              "mean of their vertices' values), weighted by volume. Ghost cells, cells without volume and cells with " \
-              "values that are not finite do not count. If the field is only on triangles, quads and polygons, their " \
-              "area takes the place of the volume. Beside cells with a volume they do not count. The numbers are the " \
-              "same on any partition. No line is written if there are no cells.",                                      \
+      .help = "Statistics of fields. Each entry writes one file with one line per step. A line has the cycle, the "    \
+              "time, the number of cells, their volume, the least and the greatest value, the mean and the standard "  \
+              "deviation, and then the histogram. Mean and standard deviation are those of the cells' values (their "  \
+              "own, or the mean of their vertices' values), weighted by volume. Ghost cells, cells without volume "    \
+              "and cells with values that are not finite do not count. If the field is only on triangles, quads and "  \
+              "polygons, their area is used instead of the volume. If it is also on cells with a volume, only those "  \
+              "cells count. The numbers are the same on any partition. No line is written if there are no cells.",     \
       .default_text = "none", .child = &statistics_mapping)                                                            \
     X(CYAML_FIELD_SEQUENCE("fields", POINTER, scene_file, fields, &derived, 1, SCENE_MAX_DERIVED),                     \
       .help = "Fields that are computed from the simulation's fields, or from each other. This is a mapping from "     \

@@ -98,8 +98,8 @@ static const scene_form range_forms[] = {
     X(CHOICE("scale", type, colours.scale, scale_words),                                                               \
       .help = "The spacing of values along the map. `linear`: as the values are. `log`: by their logarithm; values "   \
               "of 0 and less are below the range. `symlog`: linear up to the `threshold` on both sides of 0, and "     \
-              "logarithmic beyond. There the place along the map is s = value / threshold up to the threshold and 1 "  \
-              "+ ln(value / threshold) beyond, and the same with the opposite sign for negative values.",              \
+              "logarithmic beyond. If t is value / threshold, the position of a positive value is t up to t = 1, and " \
+              "1 + ln(t) beyond. Negative values are mirrored.",                                                       \
       .default_text = "`linear`")                                                                                      \
     X(CYAML_FIELD_FLOAT_PTR("threshold", OPTIONAL, type, colours.threshold),                                           \
       .help = "The magnitude up to which values are linear with `symlog`. It is required then.",                       \
@@ -114,8 +114,8 @@ static const scene_form range_forms[] = {
               "layer, over all ranks, at each drawn step. `data`: from the least to the greatest value (with `scale: " \
               "log` from the least value above 0). `symmetric`: the same, but equally wide on both sides of 0. "       \
               "`run`: the widest range of all steps drawn so far. It is kept in the file NAME.ranges beside the "      \
-              "first output's pictures (for the other pictures of a sweep in NAME.1.ranges and so on), so that a run " \
-              "that is started again goes on with it; delete the file to begin anew. A mapping gives percentiles.",    \
+              "first output's pictures (for the other pictures of a sweep in NAME.1.ranges and so on). So a run that " \
+              "is started again goes on with it. Delete the file to begin anew. A mapping gives percentiles.",         \
       .default_text = RANGE_DEFAULT, TAKES(range_forms))
 #define CLIP_PLANE_KEYS(X)                                                                                             \
     X(CYAML_FIELD_SEQUENCE_FIXED("normal", CYAML_FLAG_POINTER, scene_file_plane, normal, &number, 3),                  \
@@ -282,7 +282,8 @@ DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
               "of a layer of thickness `unit_distance`. With a `scale`, the lines are straight along the scale.",      \
       .default_text = "`[[0, 0], [1, 0.9]]`", .low = 0, .high = 1)                                                     \
     X(CYAML_FIELD_FLOAT_PTR("unit_distance", OPTIONAL, scene_file_volume, unit_distance),                              \
-      .help = "The length, in scene units, after which the share 1 - opacity of the light is left.",                   \
+      .help = "The distance to which the `opacity` refers, in scene units. Over this distance, the share 1 - opacity " \
+              "of the light passes.",                                                                                  \
       .default_text = "a twentieth of the diagonal of the bounds", .low = 0, .is_low_excluded = true, .high = 1e30)    \
     CLIP_KEY(X, scene_file_volume, " All volumes of an image must have the same `clip`.")
 DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
