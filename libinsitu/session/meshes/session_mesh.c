@@ -165,6 +165,7 @@ void session_drop_topology(session_topology *topology)
     session_drop_array(&topology->connectivity);
     base_free(topology->cell_types);
     base_free(topology->parents);
+    base_free(topology->first_pieces);
     base_free(topology->ghosts);
     session_drop_array(&topology->face_offsets);
     session_drop_array(&topology->face_connectivity);

@@ -94,7 +94,8 @@ typedef struct session_scalar {
     bool has_own_ranges;      /* set if ranges are stored in node_ranges, and not in the tree's nodes */
     float *node_ranges;       /* minimum and maximum of the values in each node of the tree; NULL: not computed yet */
     bool are_ranges_stale;    /* set if the ranges in the tree were computed for other values */
-    int64_t unusable_count;   /* number of drawn cells with a value that is not finite */
+    /* number of drawn cells with a value that is not finite; cells may be pieces (session_count_unusable()) */
+    int64_t unusable_count;
     session_extremes extremes[SESSION_EXTENTS];
 } session_scalar;
 
@@ -156,6 +157,7 @@ typedef struct session_topology {
     bool depends_on_coordinates; /* set if the pieces depend on the coordinates */
     int64_t cell_count;          /* number of pieces */
     uint32_t *parents;           /* for each piece, the caller's cell */
+    int64_t *first_pieces;       /* for each of the caller's cells its first piece, and at the end cell_count */
     unsigned char *ghosts;       /* for each piece, whether its cell is a ghost; NULL: no cell is */
 } session_topology;
 
@@ -438,6 +440,20 @@ static inline int64_t session_cell_count(const session_mesh *mesh)
 static inline int64_t session_given_cell(const session_mesh *mesh, int64_t cell)
 {
     return mesh->topology.is_split ? (int64_t)mesh->topology.parents[cell] : cell;
+}
+
+/* Returns the first of the consecutive cells of `cells` that belong to the caller's cell. They end where those of the
+ * next one begin. */
+static inline int64_t session_first_piece(const session_mesh *mesh, int64_t cell)
+{
+    return mesh->topology.is_split ? mesh->topology.first_pieces[cell] : cell;
+}
+
+/* Returns the number of cells of which each has its own pieces: those of the caller if they are split, otherwise those
+ * of `cells`. */
+static inline int64_t session_whole_count(const session_mesh *mesh)
+{
+    return mesh->topology.is_split ? mesh->given.cell_count : mesh->cells.cell_count;
 }
 
 /* Returns the number of vertices at which scalars have values. */

@@ -11,20 +11,19 @@
 #include "memory.h"
 #include "session_pattern.h"
 #include "session_region.h"
+#include "session_rows.h"
 #include "session_tally.h"
 #include "vector3.h"
 
-enum { MOST_PATTERNS = 64, LINEAR_TYPES = GRID_POLYHEDRON + 1 };
+enum { LINEAR_TYPES = GRID_POLYHEDRON + 1 };
 
 /* The caller's cells while they are split. */
 typedef struct split_work {
     const session_mesh *mesh;
-    grid caller_cells;                  /* the caller's cells; without connectivity, entry i is vertex i */
-    int64_t nodes_per_cell, row_stride; /* without offsets: nodes per cell, and distance in entries from cell to cell */
-    int pattern_count;
-    session_pattern patterns[MOST_PATTERNS];
-    bool is_of_type[LINEAR_TYPES]; /* set for the types that pieces have */
-    int only_type;                 /* the type of all pieces; 0 if they differ */
+    session_rows rows;
+    session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of each kind of row */
+    bool is_of_type[LINEAR_TYPES];             /* set for the types that pieces have */
+    int only_type;                             /* the type of all pieces; 0 if they differ */
     /* index of the first piece and of its first entry, for each cell, and the totals; first_entries is NULL if pieces
      * have one type */
     int64_t *first_pieces, *first_entries;
@@ -50,33 +49,9 @@ int64_t session_entry_place(const insitu_mesh *given, int64_t entry)
     return !row || given->offsets.data || row == used ? entry : entry / used * row + entry % used;
 }
 
-static int64_t first_cell_entry(const split_work *w, int64_t cell)
-{
-    return w->caller_cells.offsets.data ? grid_array_index(&w->caller_cells.offsets, cell) : cell * w->row_stride;
-}
-
-static int64_t count_cell_entries(const split_work *w, int64_t cell)
-{
-    if (!w->caller_cells.offsets.data) return w->nodes_per_cell;
-    return (int64_t)((uint64_t)grid_offset_end(&w->caller_cells.offsets, cell) -
-                     (uint64_t)grid_array_index(&w->caller_cells.offsets, cell));
-}
-
-static int64_t read_vertex(const split_work *w, int64_t entry)
-{
-    return w->caller_cells.connectivity.data ? grid_array_index(&w->caller_cells.connectivity, entry) : entry;
-}
-
-static const session_pattern *find_pattern(const split_work *w, int type, int64_t count)
-{
-    for (int i = 0; i < w->pattern_count; i++)
-        if (w->patterns[i].type == type && w->patterns[i].nodes.count == count) return &w->patterns[i];
-    return NULL;
-}
-
 static const session_pattern *find_cell_pattern(const split_work *w, int64_t cell)
 {
-    return find_pattern(w, grid_cell_type(&w->caller_cells, cell), count_cell_entries(w, cell));
+    return &w->patterns[session_kind_of(&w->rows, cell)];
 }
 
 /* ---- patterns and checks ---------------------------------------------------------------------------------------- */
@@ -107,10 +82,11 @@ static insitu_status add_pattern(split_work *w, int64_t cell, int type, int64_t 
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld of type %d and order %d: vertex_order is %d: %s", w->mesh->label,
                          (long long)cell, type, nodes.order, (int)order, why);
-    if (w->pattern_count == MOST_PATTERNS)
+    if (w->rows.kind_count == ROWS_MOST_KINDS)
         return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": cell %lld: more than %d types and orders of cells",
-                         w->mesh->label, (long long)cell, MOST_PATTERNS);
-    session_pattern *made = &w->patterns[w->pattern_count++];
+                         w->mesh->label, (long long)cell, ROWS_MOST_KINDS);
+    session_pattern *made = &w->patterns[w->rows.kind_count];
+    w->rows.kinds[w->rows.kind_count++] = (session_row_kind){type, nodes};
     if (!session_make_pattern(type, &nodes, order, made))
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for the pieces of a cell", w->mesh->label);
     for (int i = 0; i < made->piece_count; i++) w->is_of_type[made->types[i]] = true;
@@ -121,10 +97,10 @@ static insitu_status add_pattern(split_work *w, int64_t cell, int type, int64_t 
 static insitu_status check_offsets(const split_work *w, int64_t cell, base_error *error)
 {
     const insitu_mesh *given = &w->mesh->given;
-    const long long base = given->index_base, first = first_cell_entry(w, cell) + base,
-                    next = first + count_cell_entries(w, cell);
+    const long long base = given->index_base, first = session_row_first(&w->rows, cell) + base,
+                    next = first + session_row_size(&w->rows, cell);
     const long long last = given->connectivity_count + base;
-    if (!w->caller_cells.offsets.data || (first >= base && next >= first && next <= last)) return INSITU_OK;
+    if (!w->rows.cells.offsets.data || (first >= base && next >= first && next <= last)) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MESH,
                      "mesh \"%s\": cell %lld: offsets %lld and %lld do not rise or are outside %lld..%lld",
                      w->mesh->label, (long long)cell, first, next, base, last);
@@ -144,20 +120,21 @@ static void choose_type(split_work *w)
 static insitu_status find_patterns(split_work *w, base_error *error)
 {
     const insitu_mesh *given = &w->mesh->given;
-    const int64_t cells = w->caller_cells.offsets.data ? given->cell_count : 1;
+    const int64_t cells = w->rows.cells.offsets.data ? given->cell_count : 1;
     int last_type = -1;
     int64_t last_size = -1;
     for (int64_t cell = 0; cell < cells; cell++) {
         if (check_offsets(w, cell, error)) return error->status;
-        const int type = grid_cell_type(&w->caller_cells, cell);
-        const int64_t size = count_cell_entries(w, cell);
+        const int type = grid_cell_type(&w->rows.cells, cell);
+        const int64_t size = session_row_size(&w->rows, cell);
         if (type == last_type && size == last_size) continue;
-        if (!find_pattern(w, type, size) && add_pattern(w, cell, type, size, error)) return error->status;
+        if (session_find_kind(&w->rows, type, size) < 0 && add_pattern(w, cell, type, size, error))
+            return error->status;
         last_type = type;
         last_size = size;
     }
     const int64_t end =
-        w->caller_cells.offsets.data ? grid_offset_end(&w->caller_cells.offsets, cells - 1) : given->connectivity_count;
+        w->rows.cells.offsets.data ? grid_offset_end(&w->rows.cells.offsets, cells - 1) : given->connectivity_count;
     if (end != given->connectivity_count)
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": the last offset is %lld, not connectivity_count%s, %lld", w->mesh->label,
@@ -170,13 +147,15 @@ static insitu_status find_patterns(split_work *w, base_error *error)
 static insitu_status describe_index(const split_work *w, int64_t cell, base_error *error)
 {
     const long long base = w->mesh->given.index_base, last = w->mesh->given.vertex_count - 1 + base;
-    const int64_t first = first_cell_entry(w, cell);
+    const int64_t first = session_row_first(&w->rows, cell);
     int64_t n = 0;
-    while (read_vertex(w, first + n) >= 0 && read_vertex(w, first + n) < w->mesh->given.vertex_count) n++;
+    while (session_row_vertex(&w->rows, first + n) >= 0 &&
+           session_row_vertex(&w->rows, first + n) < w->mesh->given.vertex_count)
+        n++;
     return base_fail(error, INSITU_ERROR_MESH,
                      "mesh \"%s\": cell %lld: index %lld of its node %lld is outside %lld..%lld (index_base is %lld)",
-                     w->mesh->label, (long long)cell, (long long)read_vertex(w, first + n) + base, (long long)n, base,
-                     last, base);
+                     w->mesh->label, (long long)cell, (long long)session_row_vertex(&w->rows, first + n) + base,
+                     (long long)n, base, last, base);
 }
 
 static insitu_status check_indices(const split_work *w, int threads, base_error *error)
@@ -188,9 +167,9 @@ static insitu_status check_indices(const split_work *w, int threads, base_error 
         region_enter();
 #pragma omp for schedule(static) reduction(min : bad) nowait
         for (int64_t cell = 0; cell < cells; cell++) {
-            const int64_t first = first_cell_entry(w, cell), size = count_cell_entries(w, cell);
+            const int64_t first = session_row_first(&w->rows, cell), size = session_row_size(&w->rows, cell);
             for (int64_t n = 0; n < size && cell < bad; n++) {
-                const int64_t vertex = read_vertex(w, first + n);
+                const int64_t vertex = session_row_vertex(&w->rows, first + n);
                 if (vertex < 0 || vertex >= vertices) bad = cell;
             }
         }
@@ -207,8 +186,8 @@ static void rank_midpoints(const split_work *w, const session_pattern *of, int64
     double at[12][3];
     for (int n = 0; n < of->midpoint_count; n++)
         for (int axis = 0; axis < 3; axis++) {
-            const int64_t vertex = read_vertex(w, first + of->midpoints[n]);
-            at[n][axis] = grid_array_number(&w->caller_cells.coordinates[axis], vertex);
+            const int64_t vertex = session_row_vertex(&w->rows, first + of->midpoints[n]);
+            at[n][axis] = grid_array_number(&w->rows.cells.coordinates[axis], vertex);
         }
     for (int n = 0; n < of->midpoint_count; n++) {
         int rank = 0;
@@ -220,7 +199,7 @@ static void rank_midpoints(const split_work *w, const session_pattern *of, int64
 static int cut_cell(const split_work *w, const session_pattern *of, int64_t cell, int places[PATTERN_MOST_LOOSE][4])
 {
     int ranks[27] = {0};
-    rank_midpoints(w, of, first_cell_entry(w, cell), ranks);
+    rank_midpoints(w, of, session_row_first(&w->rows, cell), ranks);
     return session_cut_serendipity(of, ranks, places);
 }
 
@@ -271,9 +250,10 @@ static int64_t entry_count(const split_work *w)
 /* Stores the corner at the given position of the cell's row, as its entry or as its vertex. */
 static void store_corner(const split_work *w, int64_t cell, int64_t at, int place)
 {
-    const int64_t first = first_cell_entry(w, cell);
-    const int64_t corner = w->caller_cells.offsets.data ? first + place : cell * w->nodes_per_cell + place;
-    session_store_index(&w->piece_entries, at, w->gives_entries ? corner : read_vertex(w, first + place));
+    const int64_t first = session_row_first(&w->rows, cell);
+    session_store_index(&w->piece_entries, at,
+                        w->gives_entries ? session_row_entry(&w->rows, cell, place)
+                                         : session_row_vertex(&w->rows, first + place));
 }
 
 static void store_cell(const split_work *w, int64_t cell)
@@ -313,7 +293,7 @@ static void store_parents(const split_work *w, session_topology *t)
             const int loose = of->nodes.type == GRID_QUAD ? GRID_TRIANGLE : GRID_TET;
             const int type = of->polygon_count ? loose : of->types[i - w->first_pieces[cell]];
             t->parents[i] = (uint32_t)cell;
-            if (t->ghosts) t->ghosts[i] = grid_is_ghost(&w->caller_cells, cell);
+            if (t->ghosts) t->ghosts[i] = grid_is_ghost(&w->rows.cells, cell);
             if (!w->first_entries) continue;
             t->cell_types[i] = (unsigned char)type;
             session_store_index(&t->offsets, i, at);
@@ -331,7 +311,7 @@ static insitu_status make_topology(split_work *w, session_mesh *mesh, int thread
     t->cell_type = w->only_type;
     t->cell_count = pieces;
     t->connectivity_count = entries;
-    for (int i = 0; i < w->pattern_count; i++)
+    for (int i = 0; i < w->rows.kind_count; i++)
         t->depends_on_coordinates = t->depends_on_coordinates || w->patterns[i].polygon_count;
     if (!session_make_indices(mesh, "cells' pieces", entries, mesh->given.vertex_count, &t->connectivity, error))
         return error->status;
@@ -349,30 +329,22 @@ static insitu_status make_topology(split_work *w, session_mesh *mesh, int thread
     t->cell_bytes = (entries + 1) * t->connectivity.stride + pieces * (int64_t)sizeof *t->parents;
     if (w->first_entries) t->cell_bytes += (pieces + 1) * t->offsets.stride + pieces;
     if (t->ghosts) t->cell_bytes += pieces;
+    t->first_pieces = w->first_pieces;
+    t->cell_bytes += (mesh->given.cell_count + 1) * (int64_t)sizeof *t->first_pieces;
+    w->first_pieces = NULL;
     return INSITU_OK;
-}
-
-static split_work begin_split(const session_mesh *mesh)
-{
-    const insitu_mesh *given = &mesh->given;
-    const grid g = session_given_grid(given);
-    const int64_t nodes = session_cell_nodes(given);
-    return (split_work){.mesh = mesh,
-                        .caller_cells = g,
-                        .nodes_per_cell = nodes,
-                        .row_stride = given->connectivity_row ? given->connectivity_row : nodes};
 }
 
 static void end_split(split_work *w)
 {
-    for (int i = 0; i < w->pattern_count; i++) session_drop_pattern(&w->patterns[i]);
+    for (int i = 0; i < w->rows.kind_count; i++) session_drop_pattern(&w->patterns[i]);
     base_free(w->first_pieces);
     base_free(w->first_entries);
 }
 
 insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error)
 {
-    split_work w = begin_split(mesh);
+    split_work w = {.mesh = mesh, .rows = session_rows_of(mesh)};
     insitu_status status = find_patterns(&w, error);
     if (!status) status = check_indices(&w, threads, error);
     if (!status) status = count_all_pieces(&w, threads, error);
@@ -383,10 +355,10 @@ insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *e
 
 insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error)
 {
-    split_work w = begin_split(mesh);
+    split_work w = {.mesh = mesh, .rows = session_rows_of(mesh)};
     insitu_status status = find_patterns(&w, error);
     const int64_t nodes = session_cell_nodes(&mesh->given), cells = mesh->given.cell_count;
-    const int64_t largest = w.caller_cells.offsets.data ? mesh->given.connectivity_count : cells * nodes;
+    const int64_t largest = w.rows.cells.offsets.data ? mesh->given.connectivity_count : cells * nodes;
     w.gives_entries = true;
     if (!status) status = count_all_pieces(&w, threads, error);
     if (!status && !session_make_indices(mesh, "cells' corners", entry_count(&w), largest, out, error))
@@ -402,15 +374,15 @@ insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_
 session_counts session_count_parents(const session_mesh *mesh, bool any_inverted)
 {
     const grid *g = &mesh->cells;
-    const uint32_t *parents = mesh->topology.parents;
     session_counts out = {0};
-    for (int64_t first = 0, next = 0; first < g->cell_count; first = next) {
+    for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) {
+        const int64_t first = session_first_piece(mesh, cell), end = session_first_piece(mesh, cell + 1);
         const bool is_ghost = grid_is_ghost(g, first);
         bool is_flat = true;
         mesh_tally of = tally_empty();
-        for (next = first; next < g->cell_count && parents[next] == parents[first]; next++) {
-            is_flat = is_flat && grid_is_flat(g, next);
-            if (any_inverted) tally_cell(g, next, &of);
+        for (int64_t piece = first; piece < end; piece++) {
+            is_flat = is_flat && grid_is_flat(g, piece);
+            if (any_inverted) tally_cell(g, piece, &of);
         }
         out.ghost_count += is_ghost;
         out.drawn_count += !is_ghost;
@@ -419,4 +391,19 @@ session_counts session_count_parents(const session_mesh *mesh, bool any_inverted
         out.shell_count += is_flat && !is_ghost && grid_is_shell_type(grid_cell_type(g, first));
     }
     return out;
+}
+
+int64_t session_count_parents_of(const session_mesh *mesh, const uint32_t *pieces, int64_t count)
+{
+    uint64_t *bits = base_calloc((size_t)(mesh->given.cell_count + 63) / 64, sizeof *bits);
+    int64_t parents = 0;
+    if (!bits) return mesh->given_counts.drawn_count;
+    for (int64_t i = 0; i < count; i++) {
+        const uint32_t cell = mesh->topology.parents[pieces[i]];
+        const uint64_t bit = (uint64_t)1 << cell % 64;
+        parents += !(bits[cell / 64] & bit);
+        bits[cell / 64] |= bit;
+    }
+    base_free(bits);
+    return parents;
 }

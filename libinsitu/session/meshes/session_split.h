@@ -22,4 +22,8 @@ int64_t session_entry_place(const insitu_mesh *given, int64_t entry);
  * tested only if any_inverted is set, and flat if all its pieces are. Local. */
 session_counts session_count_parents(const session_mesh *mesh, bool any_inverted);
 
+/* Returns of how many of the caller's cells the list has a piece. If memory runs out, returns the number of all that
+ * are drawn. Local. */
+int64_t session_count_parents_of(const session_mesh *mesh, const uint32_t *pieces, int64_t count);
+
 #endif

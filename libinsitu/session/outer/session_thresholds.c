@@ -95,12 +95,11 @@ void session_set_outer_fresh(const session_mesh *mesh, session_outer *outer)
  */
 static void hide_whole_cells(const session_mesh *mesh, unsigned char *is_hidden)
 {
-    const uint32_t *parents = mesh->topology.parents;
-    for (int64_t first = 0, next = 0; first < mesh->cells.cell_count; first = next) {
+    for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) {
+        const int64_t first = session_first_piece(mesh, cell), end = session_first_piece(mesh, cell + 1);
         unsigned char is_any = 0;
-        for (next = first; next < mesh->cells.cell_count && parents[next] == parents[first]; next++)
-            is_any |= is_hidden[next];
-        memset(is_hidden + first, is_any, (size_t)(next - first));
+        for (int64_t piece = first; piece < end; piece++) is_any |= is_hidden[piece];
+        memset(is_hidden + first, is_any, (size_t)(end - first));
     }
 }
 

@@ -1,0 +1,34 @@
+#include "session_rows.h"
+
+session_rows session_rows_of(const session_mesh *mesh)
+{
+    const int64_t nodes = session_cell_nodes(&mesh->given), row = mesh->given.connectivity_row;
+    return (session_rows){.cells = session_given_grid(&mesh->given),
+                          .nodes_per_cell = nodes,
+                          .row_stride = row ? row : nodes,
+                          .is_torn = mesh->torn.is_torn};
+}
+
+int session_find_kind(const session_rows *rows, int type, int64_t count)
+{
+    for (int i = 0; i < rows->kind_count; i++)
+        if (rows->kinds[i].type == type && rows->kinds[i].nodes.count == count) return i;
+    return -1;
+}
+
+void session_list_kinds(const session_mesh *mesh, session_rows *rows)
+{
+    const int64_t cells = rows->cells.offsets.data ? mesh->given.cell_count : 1;
+    int last_type = -1;
+    int64_t last_size = -1;
+    for (int64_t cell = 0; cell < cells && rows->kind_count < ROWS_MOST_KINDS; cell++) {
+        const int type = grid_cell_type(&rows->cells, cell);
+        const int64_t size = session_row_size(rows, cell);
+        if ((type == last_type && size == last_size) || session_find_kind(rows, type, size) >= 0) continue;
+        session_row_kind *kind = &rows->kinds[rows->kind_count++];
+        *kind = (session_row_kind){type, {type, 1, (int)size, true, false}};
+        session_nodes_of(type, size, &kind->nodes); /* changes nothing if the type is linear */
+        last_type = type;
+        last_size = size;
+    }
+}

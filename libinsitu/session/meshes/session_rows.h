@@ -1,0 +1,69 @@
+/* The caller's cells of a mesh whose cells are split into pieces, each as a row of nodes. */
+#ifndef SESSION_ROWS_H
+#define SESSION_ROWS_H
+
+#include "session_mesh.h"
+#include "session_nodes.h"
+
+enum { ROWS_MOST_KINDS = 64 };
+
+/* A type of cell with a number of nodes. */
+typedef struct session_row_kind {
+    int type; /* type of the cells as the caller gives it */
+    session_nodes nodes;
+} session_row_kind;
+
+typedef struct session_rows {
+    grid cells;                         /* the caller's cells; without connectivity, entry i is vertex i */
+    int64_t nodes_per_cell, row_stride; /* without offsets: nodes per cell, and distance in entries from cell to cell */
+    /* set if the mesh is torn (session_torn), so that each node has a vertex of its own */
+    bool is_torn;
+    int kind_count;
+    session_row_kind kinds[ROWS_MOST_KINDS];
+} session_rows;
+
+/* Describes the rows of a mesh whose description is valid. There are no kinds yet. */
+session_rows session_rows_of(const session_mesh *mesh);
+
+static inline int64_t session_row_first(const session_rows *rows, int64_t cell)
+{
+    return rows->cells.offsets.data ? grid_array_index(&rows->cells.offsets, cell) : cell * rows->row_stride;
+}
+
+static inline int64_t session_row_size(const session_rows *rows, int64_t cell)
+{
+    if (!rows->cells.offsets.data) return rows->nodes_per_cell;
+    return (int64_t)((uint64_t)grid_offset_end(&rows->cells.offsets, cell) -
+                     (uint64_t)grid_array_index(&rows->cells.offsets, cell));
+}
+
+/* Returns the caller's vertex that an entry of connectivity names. */
+static inline int64_t session_row_vertex(const session_rows *rows, int64_t entry)
+{
+    return rows->cells.connectivity.data ? grid_array_index(&rows->cells.connectivity, entry) : entry;
+}
+
+/* Returns the number of an entry of connectivity, counted without the unused ends of rows. */
+static inline int64_t session_row_entry(const session_rows *rows, int64_t cell, int node)
+{
+    return rows->cells.offsets.data ? session_row_first(rows, cell) + node : cell * rows->nodes_per_cell + node;
+}
+
+/* Returns the vertex of session_mesh.cells at the given position of the cell's row. */
+static inline int64_t session_row_node(const session_rows *rows, int64_t cell, int node)
+{
+    return rows->is_torn ? session_row_entry(rows, cell, node)
+                         : session_row_vertex(rows, session_row_first(rows, cell) + node);
+}
+
+/* Returns the index of the kind of cells of this type with so many nodes, or -1 if it is not listed. */
+int session_find_kind(const session_rows *rows, int type, int64_t count);
+static inline int session_kind_of(const session_rows *rows, int64_t cell)
+{
+    return session_find_kind(rows, grid_cell_type(&rows->cells, cell), session_row_size(rows, cell));
+}
+
+/* Lists the kinds of all cells. They must have been split before, so that their types are valid. */
+void session_list_kinds(const session_mesh *mesh, session_rows *rows);
+
+#endif
