@@ -246,8 +246,9 @@ typedef struct render_part {
     const grid *cells;
     const mmbvh *tree; /* min-max tree over the cells, in the coordinates of the job's space */
     /* Vertex loops of polygons, for layers with edge lines. If loops[cell] is 0, every edge between vertices in the
-     * surface is drawn. Otherwise the cell is one triangle of a polygon: loops[loops[cell]] is the polygon's number of
-     * corners, and its corners follow. NULL: the mesh has no polygons. */
+     * surface is drawn. Otherwise the cell stands on a part of a polygon: from loops[loops[cell]] on are the number of
+     * vertices around the polygon, the number of segments of which each of its edges consists, and the vertices, of
+     * which the first is a corner. NULL: the mesh has no polygons. */
     const int64_t *loops;
 } render_part;
 

@@ -166,11 +166,11 @@ typedef struct maker {
     double bend;
 } maker;
 
-static double moved(const maker *m, const double point[3], int axis)
+double order_mesh_moved(double bend, const double point[3], int axis)
 {
     const double *p = point;
     const int next = (axis + 1) % 3, last = (axis + 2) % 3;
-    return p[axis] + m->bend * sin(2.3 * p[next] + 0.7 * axis) * cos(1.9 * p[last]) * (1 - p[axis] * p[axis]);
+    return p[axis] + bend * sin(2.3 * p[next] + 0.7 * axis) * cos(1.9 * p[last]) * (1 - p[axis] * p[axis]);
 }
 
 static int64_t number_of(maker *m, const int64_t place[3])
@@ -180,7 +180,8 @@ static int64_t number_of(maker *m, const int64_t place[3])
     double point[3];
     for (int axis = 0; axis < 3; axis++) point[axis] = -1 + 2 * (double)place[axis] / (m->across - 1);
     *number = m->out->vertex_count++;
-    for (int axis = 0; axis < 3; axis++) m->out->coordinates[3 * *number + axis] = moved(m, point, axis);
+    for (int axis = 0; axis < 3; axis++)
+        m->out->coordinates[3 * *number + axis] = order_mesh_moved(m->bend, point, axis);
     return *number;
 }
 

@@ -35,6 +35,9 @@ typedef double order_function(const double point[3]);
  * vertices inside and on the faces of the cube are moved. */
 void order_mesh_create(const order_kind *kind, int side, double bend, order_function *value, int rank, int ranks,
                        order_mesh *out);
+
+/* Returns the coordinate of a point of the cube after the vertices have been moved. */
+double order_mesh_moved(double bend, const double point[3], int axis);
 void order_mesh_free(order_mesh *mesh);
 
 #endif

@@ -8,6 +8,7 @@
 #include "render.h"
 #include "session_field_input.h"
 #include "session_scalars.h"
+#include "session_split.h"
 
 static int64_t array_bytes(const insitu_array *array, int64_t count)
 {
@@ -188,8 +189,9 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *scalar = &mesh->scalars[i];
         report_scalar(out, copied, mesh, scalar);
-        if (scalar->is_used && scalar->needs_ranges && scalar->unusable_count > unusable)
-            unusable = scalar->unusable_count;
+        if (!scalar->is_used || !scalar->needs_ranges) continue;
+        const int64_t count = session_count_unusable(mesh, scalar);
+        unusable = count > unusable ? count : unusable;
     }
     report->cells_unusable += unusable;
     report_outer(out, copied, mesh);
@@ -202,6 +204,13 @@ static bool is_shown(const session_mesh *mesh)
     return is_any;
 }
 
+/* Returns the number of the caller's cells in the mesh's tree. */
+static int64_t count_tree_cells(const session_mesh *mesh)
+{
+    return mesh->topology.is_split ? session_count_parents_of(mesh, mesh->tree.cells, mesh->tree.cell_count)
+                                   : mesh->tree.cell_count;
+}
+
 /* Reports fields that are left out. Blocks of a mesh have the same fields, so each is reported once. */
 static void report_left_out(session_report *out, const session_parts *parts)
 {
@@ -212,8 +221,8 @@ static void report_left_out(session_report *out, const session_parts *parts)
         given += part->is_given;
         shown += part->is_given && is_shown(part);
         if (!part->is_given || !part->is_needed) continue;
-        drawn += part->drawn_count;
-        if (part->is_partial) partial += part->drawn_count - part->tree.cell_count;
+        drawn += part->given_counts.drawn_count;
+        if (part->is_partial) partial += part->given_counts.drawn_count - count_tree_cells(part);
     }
     if (!given || !out->public_report.images) return;
     for (int i = 0; i < first->field_count; i++)

@@ -4,6 +4,8 @@
 #ifndef RENDER_KERNEL_EDGES_H
 #define RENDER_KERNEL_EDGES_H
 
+#include <string.h>
+
 #include "grid.h"
 #include "kernel_cell.h"
 #include "kernel_packet.h"
@@ -11,17 +13,22 @@
 #include "render.h"
 #include "simd.h"
 
-/* Returns the squared distance from each ray to the edge between vertices a and b, which are given in the ray's plane.
- * Raises *length to the edge's squared length. */
-SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2], vf *length)
+/* Returns the squared distance between points a and b, which are given in each ray's plane. */
+SIMD_INLINE vf kernel_square_between(const vf a[2], const vf b[2])
+{
+    const vf x = b[0] - a[0], y = b[1] - a[1];
+    return x * x + y * y;
+}
+
+/* Returns the squared distance from each ray to the edge between vertices a and b, which are given in the ray's
+ * plane. */
+SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2])
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    const vf ex = b[0] - a[0], ey = b[1] - a[1];
-    const vf square = ex * ex + ey * ey;
+    const vf ex = b[0] - a[0], ey = b[1] - a[1], square = kernel_square_between(a, b);
     const vf along = -(a[0] * ex + a[1] * ey) / vf_select(vf_lt(zero, square), square, one);
     const vf s = vf_clamp(along, zero, one);
     const vf x = a[0] + s * ex, y = a[1] + s * ey;
-    *length = vf_max(*length, square);
     return x * x + y * y;
 }
 
@@ -32,20 +39,22 @@ SIMD_INLINE void kernel_edge_place(const kernel_packet *p, float x, float y, flo
     out[1] = y - (p->origin_y + p->slope_y * z);
 }
 
-/* Returns the squared distance from each ray to the nearest edge of a polygon. loop: the polygon's number of corners,
- * then its corners. */
+/* Returns the squared distance from each ray to the nearest edge of a polygon, and raises *length to the squared length
+ * of its longest edge. loop: as in render_part.loops. */
 SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, const int64_t *loop, vf *length)
 {
-    vf last[2], next[2], nearest = vf_set(INFINITY);
-    for (int64_t i = 0; i <= loop[0]; i++) {
+    const int64_t count = loop[0], step = loop[1], *corners = loop + 2;
+    vf last[2], next[2], begin[2], nearest = vf_set(INFINITY);
+    for (int64_t i = 0; i <= count; i++) {
         double world[3];
         float x, y, z;
-        grid_vertex(g, loop[1 + i % loop[0]], world);
+        grid_vertex(g, corners[i % count], world);
         kernel_place_in(p->frame, p->tile, world, &x, &y, &z);
         kernel_edge_place(p, x, y, z, next);
-        if (i > 0) nearest = vf_min(nearest, kernel_edge_distance(last, next, length));
-        last[0] = next[0];
-        last[1] = next[1];
+        if (i > 0) nearest = vf_min(nearest, kernel_edge_distance(last, next));
+        if (i > 0 && i % step == 0) *length = vf_max(*length, kernel_square_between(begin, next));
+        memcpy(last, next, sizeof last);
+        if (i % step == 0) memcpy(begin, next, sizeof begin);
     }
     return nearest;
 }
@@ -62,8 +71,10 @@ SIMD_INLINE vf kernel_nearest_edge(const kernel_packet *p, const kernel_cell *c,
         return kernel_nearest_of_loop(p, part->cells, part->loops + part->loops[c->index], length);
     for (int i = 0; i < c->count && count < 4; i++)
         if (c->f[i] == 0) kernel_edge_place(p, c->x[i], c->y[i], c->z[i], places[count++]);
-    for (int i = 0; i < count; i++)
-        nearest = vf_min(nearest, kernel_edge_distance(places[i], places[(i + 1) % count], length));
+    for (int i = 0; i < count; i++) {
+        nearest = vf_min(nearest, kernel_edge_distance(places[i], places[(i + 1) % count]));
+        *length = vf_max(*length, kernel_square_between(places[i], places[(i + 1) % count]));
+    }
     return nearest;
 }
 

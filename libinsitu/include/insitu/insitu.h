@@ -89,7 +89,8 @@ typedef enum insitu_cell_type {
     /* Cells of higher order. Their vertices, at corners and between them, are called nodes here. Each cell is drawn as
      * linear pieces between its own nodes, wherever the nodes are: the error falls with the square of the distance
      * between nodes (docs/high_order.md). Nodes and values at nodes are not copied; the list of pieces is made once per
-     * topology. Numbers of cells, ghost flags, cell values and thresholds refer to the caller's cells. */
+     * topology. Numbers of cells, ghost flags, cell values, thresholds and lines along edges refer to the caller's
+     * cells. */
     INSITU_QUADRATIC_TRIANGLE = 22, /* 6 nodes */
     INSITU_QUADRATIC_QUAD = 23,     /* 8 nodes */
     INSITU_QUADRATIC_TET = 24,      /* 10 nodes */
@@ -434,7 +435,8 @@ typedef struct insitu_report {
     int turns;
     int64_t cells;       /* number of cells, including ghosts */
     int64_t cells_ghost; /* number of cells that are not drawn because they are flagged as ghosts */
-    /* number of cells that are not drawn because their own field value or that of a vertex is not finite */
+    /* number of cells that are not drawn because their own field value or that of a vertex is not finite; of cells of
+     * higher order some pieces are not drawn */
     int64_t cells_unusable;
     /* number of left-handed cells, by the sign of the sum of the corner volumes; they are drawn correctly
      * nevertheless */

@@ -265,3 +265,16 @@ int session_node_index(const session_nodes *of, insitu_vertex_order order, int i
     const bool is_old = order == INSITU_ORDER_VTK_BEFORE_9_1 && of->is_lagrange;
     return session_quadratic_index(of, order, number_vtk_node(of, is_old, i, j, k));
 }
+
+bool session_is_node(const session_nodes *of, int i, int j, int k)
+{
+    const int p = of->order;
+    switch (of->type) {
+    case GRID_TRIANGLE: return i + j <= p && k == 0;
+    case GRID_QUAD: return k == 0;
+    case GRID_TET: return i + j + k <= p;
+    case GRID_WEDGE: return i + j <= p;
+    case GRID_PYRAMID: return i + k <= p && j + k <= p;
+    default: return true;
+    }
+}

@@ -33,9 +33,13 @@ int64_t session_node_count(int type, int order);
 /* Returns NULL, or the reason why this vertex order is not defined for the cell. */
 const char *session_order_refused(const session_nodes *of, insitu_vertex_order order);
 
-/* Returns the position in the row of a complete cell's node i, j, k of its lattice, whose axes are the edges at the
- * first corner. Each layer k of a pyramid has one node less along i and j than the layer below. */
+/* Returns the position in the row of the cell's node i, j, k of its lattice, whose axes are the edges at the first
+ * corner. Each layer k of a pyramid has one node less along i and j than the layer below. For a node that a serendipity
+ * cell lacks, the result is at least session_nodes.count. */
 int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
+
+/* Returns whether i, j, k, which are from 0 to the order, are a node of the lattice of the cell's order. */
+bool session_is_node(const session_nodes *of, int i, int j, int k);
 
 /* Returns the position in the row of the node with number n in VTK's order, for cells of order 2. */
 int session_quadratic_index(const session_nodes *of, insitu_vertex_order order, int n);

@@ -7,6 +7,7 @@
 #include "polygon.h"
 #include "session_agree.h"
 #include "session_cell_faces.h"
+#include "session_rims.h"
 #include "session_scalars.h"
 #include "vector3.h"
 
@@ -128,7 +129,13 @@ typedef struct outer_work {
     float *heights;      /* for each new vertex, -1 if it is an apex, 0 if it lies on a face */
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
     face_polygon polygon; /* buffer with space for the largest polygon */
-    int64_t loop_end;     /* number of entries stored in the polygons' loops */
+    int64_t loop_end;     /* number of entries stored in the loops */
+    /* If cells are split into pieces, the loop of a face is the rim of the caller's face of which it is a part;
+     * `rim_loops` has the loop of each face of the current cell, or 0 if it is not stored yet. */
+    bool has_rims;
+    session_rims rims;
+    const uint32_t *parents; /* same as session_topology.parents */
+    int64_t rim_loops[RIMS_MOST_FACES];
 } outer_work;
 
 static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, float height)
@@ -241,7 +248,34 @@ static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
     int64_t *loops = w->out->loops;
     for (int64_t cell = first; cell < w->cell_count; cell++) loops[cell] = w->loop_end;
     loops[w->loop_end++] = p->count;
+    loops[w->loop_end++] = 1;
     for (int i = 0; i < p->count; i++) loops[w->loop_end++] = add_copied_vertex(w, p->vertices[i], p->positions[i]);
+}
+
+static int64_t add_rim(outer_work *w, int64_t cell, int face)
+{
+    const session_rim_kind *of = session_rims_of(&w->rims, cell);
+    const int64_t loop = w->loop_end;
+    w->out->loops[w->loop_end++] = of->counts[face];
+    w->out->loops[w->loop_end++] = w->rims.rows.kinds[session_kind_of(&w->rims.rows, cell)].nodes.order;
+    for (int i = 0; i < of->counts[face]; i++) {
+        const int64_t vertex = session_row_node(&w->rims.rows, cell, of->nodes[face][i]);
+        double place[3];
+        grid_vertex(w->cells, vertex, place);
+        w->out->loops[w->loop_end++] = add_copied_vertex(w, vertex, place);
+    }
+    return loop;
+}
+
+/* Sets the rim of the caller's face as the loop of the cells from number `first` on, which stand on a piece's face. */
+static void set_rim(outer_work *w, int64_t piece, const face_polygon *p, int64_t first)
+{
+    const int64_t cell = w->parents[piece];
+    if (cell != w->rims.cell) memset(w->rim_loops, 0, sizeof w->rim_loops);
+    const int face = session_find_rim(&w->rims, cell, p->vertices, p->count);
+    if (face < 0) return;
+    if (!w->rim_loops[face]) w->rim_loops[face] = add_rim(w, cell, face);
+    for (int64_t i = first; i < w->cell_count; i++) w->out->loops[i] = w->rim_loops[face];
 }
 
 static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], int64_t origin)
@@ -285,22 +319,24 @@ static void add_face(outer_work *w, const session_face *face)
     const session_cell_faces faces = session_faces_of_cell(w->cells, face->cell);
     const session_face_loop of = session_face_of(&faces, face->face);
     face_polygon *p = &w->polygon;
+    const int64_t first = w->cell_count;
     double inside[3];
     find_inside(w->cells, face->cell, inside);
     read_polygon(w->cells, &of, p);
     if (p->count > 4 || is_concave(&of, (const double(*)[3])p->positions, p->count)) {
         add_polygon(w, p, inside, face->cell);
-        return;
+    } else {
+        corner_loop loop = {0};
+        for (int i = 0; i < p->count; i++) add_corner(&loop, p->vertices[i], p->positions[i]);
+        add_cell(w, &loop, inside, face->cell);
     }
-    corner_loop loop = {0};
-    for (int i = 0; i < p->count; i++) add_corner(&loop, p->vertices[i], p->positions[i]);
-    add_cell(w, &loop, inside, face->cell);
+    if (w->has_rims) set_rim(w, face->cell, p, first);
 }
 
 /* Upper bounds of the sizes that the faces require. */
 typedef struct outer_counts {
     int64_t cell_count, entry_count; /* numbers of cells and of connectivity entries */
-    int64_t loop_entry_count;        /* number of entries of the polygons' loops */
+    int64_t loop_entry_count;        /* number of entries of the loops */
     int64_t largest_corner_count;    /* largest number of corners of one face */
 } outer_counts;
 
@@ -316,11 +352,25 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer)
         for (int k = 0; k < 4 && k < size; k++) grid_vertex(g, session_face_vertex(&loop, k), places[k]);
         const bool is_polygon = size > 4 || is_concave(&loop, (const double(*)[3])places, (int)size);
         most.cell_count += is_polygon ? size - 2 : 1;
-        most.loop_entry_count += is_polygon ? size + 1 : 0;
+        most.loop_entry_count += is_polygon ? size + 2 : 0;
         most.entry_count += is_polygon ? 4 * (size - 2) : size + 1;
         most.largest_corner_count = size > most.largest_corner_count ? size : most.largest_corner_count;
     }
     return most;
+}
+
+/* Adds what the rims of the caller's cells require that have outer faces. A node of a rim may be on no outer face. */
+static void add_rim_bounds(const outer_work *w, const session_outer *outer, outer_counts *most)
+{
+    int64_t last = -1;
+    for (int64_t i = 0; i < outer->face_count; i++) {
+        const int64_t cell = w->parents[outer->faces[i].cell];
+        if (cell == last) continue;
+        const int64_t nodes = session_count_rim_nodes(&w->rims, cell);
+        most->entry_count += nodes;
+        most->loop_entry_count += nodes + 2 * RIMS_MOST_FACES;
+        last = cell;
+    }
 }
 
 static bool make_polygon_room(face_polygon *p, int64_t corners)
@@ -341,13 +391,17 @@ static void work_free(outer_work *w)
     base_free(w->polygon.positions);
     base_free(w->polygon.triangles);
     base_free(w->polygon.work_memory);
+    session_rims_free(&w->rims);
 }
 
-static bool work_create(const grid *g, session_outer *out, outer_work *w)
+static bool work_create(const session_mesh *whole, session_outer *out, outer_work *w)
 {
-    const outer_counts most = find_count_bounds(g, out);
+    const grid *g = &whole->cells;
+    outer_counts most = find_count_bounds(g, out);
+    *w = (outer_work){.cells = g, .out = out, .has_rims = whole->topology.is_split, .parents = whole->topology.parents};
+    if (w->has_rims && !session_rims_create(whole, &w->rims)) return false;
+    if (w->has_rims) add_rim_bounds(w, out, &most);
     const int64_t cells = most.cell_count, entries = most.entry_count, loops = most.loop_entry_count;
-    *w = (outer_work){.cells = g, .out = out};
     if (most.largest_corner_count > INT32_MAX / 64) return false;
     out->bytes = entries * (int64_t)(5 * sizeof(int64_t) + sizeof(float)) + cells * 17;
     if (loops) out->bytes += (cells + loops) * (int64_t)sizeof *out->loops;
@@ -412,7 +466,7 @@ insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *
 {
     outer_work work;
     if (outer->mesh) return INSITU_OK;
-    bool is_made = work_create(&whole->cells, outer, &work);
+    bool is_made = work_create(whole, outer, &work);
     if (is_made) {
         for (int64_t v = 0; v < whole->cells.vertex_count; v++) work.vertex_map[v] = -1;
         for (int64_t i = 0; i < outer->face_count; i++) add_face(&work, &outer->faces[i]);

@@ -1,7 +1,7 @@
-/* Recentring: the value at a vertex is the mean over its cells (or, for values at corners, over the corners there; for
- * values at vertices of refined blocks, over the vertices there) on all ranks, with the same bits for any partition. If
- * the field has values on faces of the boundary, a vertex of such faces gets the mean over these instead, even if all
- * of them are on other ranks than its cells.
+/* Recentring: the value at a vertex is the mean over the caller's cells there (or, for values at corners, over the
+ * corners there; for values at vertices of refined blocks, over the vertices there) on all ranks, with the same bits
+ * for any partition. If the field has values on faces of the boundary, a vertex of such faces gets the mean over these
+ * instead, even if all of them are on other ranks than its cells.
  *
  * Sums depend on their order, so sums of ranks' partial sums would depend on the partition. Instead all ranks' single
  * values are gathered, and summed so that their order does not matter (sum_values()).
@@ -17,6 +17,7 @@
 #include "session_recentre.h"
 
 #include <omp.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "memory.h"
@@ -129,17 +130,15 @@ static void groups_average(value_groups *groups, int threads)
 
 /* ---- this rank's values ---------------------------------------------------------------------------------------- */
 
-/* The groups of a cell's vertices, each listed once. */
+/* The groups of a cell's vertices, or the vertices, each listed once. */
 typedef struct cell_groups {
     int64_t count, capacity;
     int64_t *groups;
     bool is_out_of_memory; /* set if memory ran out */
 } cell_groups;
 
-static void add_group(cell_groups *list, int64_t group)
+static void append_group(cell_groups *list, int64_t group)
 {
-    for (int64_t i = 0; i < list->count; i++)
-        if (list->groups[i] == group) return;
     if (list->count == list->capacity) {
         int64_t *more = base_realloc(list->groups, (size_t)(list->capacity * 2 + 64) * sizeof *more);
         list->is_out_of_memory = list->is_out_of_memory || !more;
@@ -148,6 +147,28 @@ static void add_group(cell_groups *list, int64_t group)
         list->capacity = list->capacity * 2 + 64;
     }
     list->groups[list->count++] = group;
+}
+
+static void add_group(cell_groups *list, int64_t group)
+{
+    for (int64_t i = 0; i < list->count; i++)
+        if (list->groups[i] == group) return;
+    append_group(list, group);
+}
+
+static int compare_groups(const void *a, const void *b)
+{
+    const int64_t *x = a, *y = b;
+    return (*x > *y) - (*x < *y);
+}
+
+static void drop_duplicates(cell_groups *list)
+{
+    int64_t count = 0;
+    if (list->count) qsort(list->groups, (size_t)list->count, sizeof *list->groups, compare_groups);
+    for (int64_t i = 0; i < list->count; i++)
+        if (i == 0 || list->groups[i] != list->groups[count - 1]) list->groups[count++] = list->groups[i];
+    list->count = count;
 }
 
 /* Adds a value to a group, unless the group has values of faces. is_shared: several threads may do so at once. */
@@ -185,6 +206,29 @@ static void add_cell_values(recentring *r, int part, int64_t cell, cell_groups *
     for (int64_t i = 0; i < list->count; i++) add_value(&r->values, list->groups[i], value, is_shared);
 }
 
+/* As above, for a caller's cell that is split into pieces. Pieces share vertices. */
+static void add_split_cell_values(recentring *r, int part, int64_t cell, cell_groups *list, bool is_shared)
+{
+    const session_mesh *mesh = r->list.items[part];
+    const grid_field *field = &r->parts[part].field;
+    const int64_t *of_vertex = r->joint->groups.group_of_vertex + r->joint->groups.first_vertices[part];
+    const int64_t first = session_first_piece(mesh, cell);
+    double value = field->is_cell_centred ? grid_field_value(field, first) : 0;
+    if (!isfinite(value)) return;
+    list->count = 0;
+    for (int64_t piece = first; piece < session_first_piece(mesh, cell + 1); piece++) {
+        grid_walk walk = grid_walk_cell(&mesh->cells, piece);
+        int64_t vertex;
+        while (grid_walk_next(&walk, &vertex)) append_group(list, field->is_cell_centred ? of_vertex[vertex] : vertex);
+    }
+    drop_duplicates(list);
+    for (int64_t i = 0; i < list->count; i++) {
+        const int64_t at = list->groups[i];
+        if (!field->is_cell_centred) value = grid_field_value(field, at);
+        if (isfinite(value)) add_value(&r->values, field->is_cell_centred ? at : of_vertex[at], value, is_shared);
+    }
+}
+
 /* Adds the finite values at the vertices of drawn cells to their groups, each vertex once. */
 static void add_vertex_values(recentring *r, int part)
 {
@@ -199,20 +243,28 @@ static void add_vertex_values(recentring *r, int part)
 /* Adds the values of a part's cells to the groups. Returns false if memory ran out. */
 static bool add_part_values(recentring *r, int part, int threads)
 {
-    const grid *g = &r->list.items[part]->cells;
+    const session_mesh *mesh = r->list.items[part];
+    const grid *g = &mesh->cells;
+    const int64_t count = session_whole_count(mesh);
+    const bool is_split = mesh->topology.is_split;
     bool is_lost = false;
     if (r->parts[part].is_of_vertices) {
         add_vertex_values(r, part);
         return true;
     }
-#pragma omp parallel num_threads(session_region_threads(threads, g->cell_count)) reduction(|| : is_lost)
+#pragma omp parallel num_threads(session_region_threads(threads, count)) reduction(|| : is_lost)
     {
         region_enter();
         cell_groups list = {0};
         const bool is_shared = omp_get_num_threads() > 1;
 #pragma omp for schedule(static) nowait
-        for (int64_t cell = 0; cell < g->cell_count; cell++)
-            if (!grid_is_ghost(g, cell)) add_cell_values(r, part, cell, &list, is_shared);
+        for (int64_t cell = 0; cell < count; cell++) {
+            if (grid_is_ghost(g, session_first_piece(mesh, cell))) continue;
+            if (is_split)
+                add_split_cell_values(r, part, cell, &list, is_shared);
+            else
+                add_cell_values(r, part, cell, &list, is_shared);
+        }
         is_lost = list.is_out_of_memory;
         base_free(list.groups);
         region_leave();

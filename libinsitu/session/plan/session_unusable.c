@@ -28,7 +28,7 @@ static const scene_field *next_field(field_walk *walk)
 static int64_t count_unusable(const session_mesh *mesh, const scene_field *field)
 {
     const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
-    return scalar ? scalar->unusable_count : 0;
+    return scalar ? session_count_unusable(mesh, scalar) : 0;
 }
 
 static int64_t unusable_of_parts(const session_meshes *meshes, const char *name, const scene_field *field)
@@ -46,8 +46,8 @@ uint64_t session_unusable_key(const session_plan *plan, const session_meshes *me
     for (const scene_field *field; (field = next_field(&walk)) != NULL;)
         for (int m = 0; m < meshes->count; m++) {
             const session_mesh *mesh = meshes->items[m];
-            const int64_t count = count_unusable(mesh, field);
-            if (!count) continue;
+            const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
+            if (!scalar || !scalar->unusable_count) continue;
             if (!key) key = SESSION_HASH_BEGIN;
             session_hash_text(&key, mesh->name);
             session_hash_text(&key, field->name);

@@ -165,6 +165,21 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
     return true;
 }
 
+int64_t session_count_unusable(const session_mesh *mesh, const session_scalar *scalar)
+{
+    const grid *g = &mesh->cells;
+    int64_t count = 0;
+    if (!mesh->topology.is_split || !scalar->unusable_count) return scalar->unusable_count;
+    const grid_field field = session_scalar_field(mesh, scalar);
+    for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) {
+        bool is_any = false;
+        for (int64_t piece = session_first_piece(mesh, cell); piece < session_first_piece(mesh, cell + 1); piece++)
+            is_any = is_any || (grid_is_drawn(g, piece) && !fetch_any_cell_range(g, &field, piece).is_finite);
+        count += is_any;
+    }
+    return count;
+}
+
 /* ---- ranges and extents -------------------------------------------------------------------------------------- */
 
 mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar)

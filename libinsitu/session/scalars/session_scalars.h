@@ -52,6 +52,9 @@ const char *session_scalar_name(const session_mesh *mesh, const session_scalar *
 /* Returns the values of a scalar. */
 grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar);
 
+/* Returns the number of the caller's drawn cells that have a value which is not finite. Local. */
+int64_t session_count_unusable(const session_mesh *mesh, const session_scalar *scalar);
+
 /* Returns the ranges, in the nodes of the tree, of a scalar that is in use. */
 mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar);
 

@@ -87,7 +87,6 @@ static void add_cell(const sum_basis *b, const cell_value *cell, int64_t *sums)
         add_fixed_point(sums, volume * place * place);
         return;
     }
-    sums[0]++;
     add_fixed_point(sums + VOLUME, volume);
     add_fixed_point(sums + MOMENT, volume * place);
     const int bin = s->bin_count ? find_bin(s, cell->mean) : -1;
@@ -96,22 +95,35 @@ static void add_cell(const sum_basis *b, const cell_value *cell, int64_t *sums)
 
 /* Data of a pass over one mesh. */
 typedef struct statistics_pass {
-    const grid *g;
+    const session_mesh *mesh;
+    const grid *g; /* the mesh's cells */
     grid_field field;
     const session_team *team;
     volume_buffer *buffers; /* one per thread, for computing the volumes of cells */
 } statistics_pass;
 
+/* Adds one of the caller's cells, or all of its pieces; it counts as one cell. */
+static void add_whole_cell(const statistics_pass *p, const sum_basis *b, int64_t cell, int64_t *sums)
+{
+    const int64_t end = session_first_piece(p->mesh, cell + 1);
+    bool is_counted = false;
+    for (int64_t piece = session_first_piece(p->mesh, cell); piece < end; piece++) {
+        const cell_value value = read_cell_value(p->g, &p->field, piece, &p->buffers[omp_get_thread_num()]);
+        if (!value.is_counted || value.is_shell != b->is_of_shells) continue;
+        add_cell(b, &value, sums);
+        is_counted = true;
+    }
+    if (!b->is_second) sums[0] += is_counted;
+}
+
 static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
 {
-#pragma omp parallel num_threads(session_region_threads(p->team->threads, p->g->cell_count))
+    const int64_t cells = session_whole_count(p->mesh);
+#pragma omp parallel num_threads(session_region_threads(p->team->threads, cells))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(+ : sums[:count]) nowait
-        for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
-            const cell_value value = read_cell_value(p->g, &p->field, cell, &p->buffers[omp_get_thread_num()]);
-            if (value.is_counted && value.is_shell == b->is_of_shells) add_cell(b, &value, sums);
-        }
+        for (int64_t cell = 0; cell < cells; cell++) add_whole_cell(p, b, cell, sums);
         region_leave();
     }
 }
@@ -120,20 +132,27 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
  * then for shells. */
 enum { ENDS = 3, KINDS = 2 };
 
+static void find_cell_extremes(const statistics_pass *p, int64_t cell, double ends[KINDS * ENDS])
+{
+    const int64_t end = session_first_piece(p->mesh, cell + 1);
+    for (int64_t piece = session_first_piece(p->mesh, cell); piece < end; piece++) {
+        const cell_value value = read_cell_value(p->g, &p->field, piece, &p->buffers[omp_get_thread_num()]);
+        if (!value.is_counted) continue;
+        double *of = ends + (value.is_shell ? ENDS : 0);
+        of[0] = fmin(of[0], value.minimum);
+        of[1] = fmin(of[1], -value.maximum);
+        of[2] = fmin(of[2], -value.volume);
+    }
+}
+
 static void find_extremes(const statistics_pass *p, double ends[KINDS * ENDS])
 {
-#pragma omp parallel num_threads(session_region_threads(p->team->threads, p->g->cell_count))
+    const int64_t cells = session_whole_count(p->mesh);
+#pragma omp parallel num_threads(session_region_threads(p->team->threads, cells))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : ends[:KINDS * ENDS]) nowait
-        for (int64_t cell = 0; cell < p->g->cell_count; cell++) {
-            const cell_value value = read_cell_value(p->g, &p->field, cell, &p->buffers[omp_get_thread_num()]);
-            if (!value.is_counted) continue;
-            double *of = ends + (value.is_shell ? ENDS : 0);
-            of[0] = fmin(of[0], value.minimum);
-            of[1] = fmin(of[1], -value.maximum);
-            of[2] = fmin(of[2], -value.volume);
-        }
+        for (int64_t cell = 0; cell < cells; cell++) find_cell_extremes(p, cell, ends);
         region_leave();
     }
 }
@@ -159,7 +178,7 @@ typedef struct statistics_work {
 static bool set_up_pass(const statistics_work *w, int wish, int mesh, statistics_pass *pass)
 {
     const session_mesh *of = w->meshes->items[mesh];
-    *pass = (statistics_pass){.g = &of->cells, .team = w->team, .buffers = w->buffers};
+    *pass = (statistics_pass){.mesh = of, .g = &of->cells, .team = w->team, .buffers = w->buffers};
     return of->is_given && session_find_values(of, w->wishes[wish].field, &pass->field);
 }
 

@@ -1,0 +1,129 @@
+#include "session_rims.h"
+
+#include "memory.h"
+#include "session_cell_faces.h"
+
+/* ---- one kind -------------------------------------------------------------------------------------------------- */
+
+/* The corners of cells as nodes of the lattice of order 1 (session_node_index()). */
+static const signed char boxes[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                        {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+static const signed char prisms[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+static const signed char pyramids[5][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}};
+
+static const signed char *corner_of(int type, int corner)
+{
+    switch (type) {
+    case GRID_TRIANGLE:
+    case GRID_TET: /* its first four corners are those of a prism */
+    case GRID_WEDGE: return prisms[corner];
+    case GRID_PYRAMID: return pyramids[corner];
+    default: return boxes[corner];
+    }
+}
+
+static const session_face_table *faces_of(int type)
+{
+    static const session_face_table triangle = {1, {{0, 1, 2, -1}}}, quad = {1, {{0, 1, 2, 3}}};
+    return type == GRID_TRIANGLE ? &triangle : type == GRID_QUAD ? &quad : session_faces_of_type(type);
+}
+
+/* Returns whether a node of the lattice lies in the plane of the face. */
+static bool is_on_face(const session_nodes *of, const signed char face[4], const int node[3])
+{
+    int a[3], b[3], c[3];
+    for (int axis = 0; axis < 3; axis++) {
+        const int begin = corner_of(of->type, face[0])[axis];
+        a[axis] = corner_of(of->type, face[1])[axis] - begin;
+        b[axis] = corner_of(of->type, face[2])[axis] - begin;
+        c[axis] = node[axis] - begin * of->order;
+    }
+    return (a[1] * b[2] - a[2] * b[1]) * c[0] + (a[2] * b[0] - a[0] * b[2]) * c[1] +
+               (a[0] * b[1] - a[1] * b[0]) * c[2] ==
+           0;
+}
+
+static void list_rim(const session_nodes *of, insitu_vertex_order order, const signed char face[4], int *count,
+                     int *nodes)
+{
+    const int corners = face[3] < 0 ? 3 : 4;
+    *count = 0;
+    for (int n = 0; n < corners; n++) {
+        const signed char *from = corner_of(of->type, face[n]), *to = corner_of(of->type, face[(n + 1) % corners]);
+        int at[3];
+        for (int step = 0; step < of->order; step++) {
+            for (int axis = 0; axis < 3; axis++) at[axis] = from[axis] * of->order + (to[axis] - from[axis]) * step;
+            nodes[(*count)++] = session_node_index(of, order, at[0], at[1], at[2]);
+        }
+    }
+}
+
+static bool make_kind(const session_nodes *of, insitu_vertex_order order, session_rim_kind *out)
+{
+    const session_face_table *faces = faces_of(of->type);
+    out->faces_of_node = base_calloc((size_t)of->count, 1);
+    if (!out->faces_of_node) return false;
+    for (int f = 0; f < faces->count; f++) list_rim(of, order, faces->vertices[f], &out->counts[f], out->nodes[f]);
+    for (int k = 0; k <= of->order; k++)
+        for (int j = 0; j <= of->order; j++)
+            for (int i = 0; i <= of->order; i++) {
+                if (!session_is_node(of, i, j, k)) continue;
+                const int at = session_node_index(of, order, i, j, k);
+                for (int f = 0; f < faces->count && at < of->count; f++)
+                    if (is_on_face(of, faces->vertices[f], (const int[]){i, j, k}))
+                        out->faces_of_node[at] |= (unsigned char)(1 << f);
+            }
+    return true;
+}
+
+/* ---- all kinds ------------------------------------------------------------------------------------------------- */
+
+bool session_rims_create(const session_mesh *mesh, session_rims *out)
+{
+    *out = (session_rims){.rows = session_rows_of(mesh), .cell = -1};
+    session_list_kinds(mesh, &out->rows);
+    out->kinds = base_calloc((size_t)out->rows.kind_count, sizeof *out->kinds);
+    out->faces_of_vertex = base_calloc((size_t)mesh->cells.vertex_count + 1, 1);
+    bool is_made = out->kinds && out->faces_of_vertex;
+    for (int i = 0; i < out->rows.kind_count && is_made; i++)
+        is_made = make_kind(&out->rows.kinds[i].nodes, mesh->given.vertex_order, &out->kinds[i]);
+    return is_made;
+}
+
+void session_rims_free(session_rims *rims)
+{
+    for (int i = 0; i < rims->rows.kind_count && rims->kinds; i++) base_free(rims->kinds[i].faces_of_node);
+    base_free(rims->kinds);
+    base_free(rims->faces_of_vertex);
+    *rims = (session_rims){0};
+}
+
+int64_t session_count_rim_nodes(const session_rims *rims, int64_t cell)
+{
+    const session_rim_kind *kind = session_rims_of(rims, cell);
+    int64_t count = 0;
+    for (int f = 0; f < RIMS_MOST_FACES; f++) count += kind->counts[f];
+    return count;
+}
+
+/* Sets the faces of the cell's vertices, or removes them. A vertex may have several positions in the row. */
+static void set_faces(session_rims *rims, int64_t cell, bool are_set)
+{
+    const int kind = session_kind_of(&rims->rows, cell);
+    for (int n = 0; n < rims->rows.kinds[kind].nodes.count; n++) {
+        unsigned char *faces = &rims->faces_of_vertex[session_row_node(&rims->rows, cell, n)];
+        *faces = are_set ? *faces | rims->kinds[kind].faces_of_node[n] : 0;
+    }
+}
+
+int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count)
+{
+    unsigned faces = (1U << RIMS_MOST_FACES) - 1;
+    if (rims->cell != cell) {
+        if (rims->cell >= 0) set_faces(rims, rims->cell, false);
+        set_faces(rims, cell, true);
+        rims->cell = cell;
+    }
+    for (int64_t i = 0; i < count; i++) faces &= rims->faces_of_vertex[vertices[i]];
+    return faces ? __builtin_ctz(faces) : -1;
+}

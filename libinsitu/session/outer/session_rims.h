@@ -1,0 +1,41 @@
+/* The faces of the caller's cells of higher order, and their rims, the nodes along their edges. Pieces of a cell have
+ * faces that are parts of these. */
+#ifndef SESSION_RIMS_H
+#define SESSION_RIMS_H
+
+#include "session_rows.h"
+
+enum { RIMS_MOST_FACES = 6, RIMS_MOST_NODES = 4 * NODES_MOST_ORDER };
+
+/* The faces of a kind of cell. Nodes are given by their positions in the cell's row. */
+typedef struct session_rim_kind {
+    int counts[RIMS_MOST_FACES]; /* number of nodes of each rim; 0: the cell has fewer faces */
+    int nodes[RIMS_MOST_FACES][RIMS_MOST_NODES];
+    unsigned char *faces_of_node; /* for each node, one bit per face on which it lies */
+} session_rim_kind;
+
+typedef struct session_rims {
+    session_rows rows;
+    session_rim_kind *kinds;
+    int64_t cell;                   /* the caller's cell whose faces are set in faces_of_vertex; -1: there is none */
+    unsigned char *faces_of_vertex; /* for each vertex of session_mesh.cells, one bit per face of the cell */
+} session_rims;
+
+/* Finds the rims of all kinds of cells of a mesh whose cells are split. Returns false if memory runs out; the caller
+ * must free *out in any case. Local. */
+bool session_rims_create(const session_mesh *mesh, session_rims *out);
+void session_rims_free(session_rims *rims);
+
+/* Returns the number of nodes of all rims of one of the caller's cells. */
+int64_t session_count_rim_nodes(const session_rims *rims, int64_t cell);
+
+/* Returns the number of the face of the caller's cell on which all of the vertices lie, or -1 if there is none. */
+int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count);
+
+/* Returns the rims of the cell's kind. */
+static inline const session_rim_kind *session_rims_of(const session_rims *rims, int64_t cell)
+{
+    return &rims->kinds[session_kind_of(&rims->rows, cell)];
+}
+
+#endif
