@@ -246,6 +246,25 @@ void order_mesh_create(const order_kind *kind, int side, double bend, order_func
     free(nodes);
 }
 
+order_mesh order_mesh_linear_hexes(const order_mesh *of, int p)
+{
+    order_mesh out = *of;
+    const int n = p + 1;
+    int64_t *at = out.connectivity = malloc((size_t)(of->cell_count * p * p * p * 8) * sizeof *at);
+    for (int64_t cell = 0; cell < of->cell_count; cell++)
+        for (int i = 0; i < p * p * p; i++)
+            for (int c = 0; c < 8; c++) {
+                const int x = i % p + (c % 4 == 1 || c % 4 == 2), y = i / p % p + (c % 4 > 1), z = i / p / p + c / 4;
+                *at++ = of->connectivity[cell * of->nodes + x + n * (y + n * z)];
+            }
+    out.mesh.cell_type = INSITU_HEX;
+    out.mesh.vertex_order = INSITU_ORDER_VTK;
+    out.mesh.cell_count = of->cell_count * p * p * p;
+    out.mesh.connectivity = (insitu_array){out.connectivity, INSITU_INT64, 0};
+    out.mesh.connectivity_count = out.mesh.cell_count * 8;
+    return out;
+}
+
 void order_mesh_free(order_mesh *mesh)
 {
     free(mesh->coordinates);

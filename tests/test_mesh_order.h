@@ -38,6 +38,10 @@ void order_mesh_create(const order_kind *kind, int side, double bend, order_func
 
 /* Returns the coordinate of a point of the cube after the vertices have been moved. */
 double order_mesh_moved(double bend, const double point[3], int axis);
+
+/* Returns the linear hexes between the nodes of lexicographic hexes of order p, with connectivity of its own, which the
+ * caller frees; the rest is the mesh's. */
+order_mesh order_mesh_linear_hexes(const order_mesh *of, int p);
 void order_mesh_free(order_mesh *mesh);
 
 #endif

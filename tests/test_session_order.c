@@ -26,10 +26,14 @@ static const char plane_scene[] = "images:\n" IMAGE("a", "isosurface: {field: f,
     IMAGE("b", "slice: {field: f, planes: [{normal: [0.3, 0.2, 1], point: [0, 0, 0.1]}]}")
         IMAGE("c", "surface: {colour_by: {field: f, map: grey, range: [-3, 3]}}");
 static const char sphere_scene[] = "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.5]}");
-static const char all_scene[] = "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.1, 0.4], opacity: 0.6}")
-    IMAGE("b", "slice: {field: f, planes: [{normal: [1, 2, 3]}]}")
-        IMAGE("c", "surface: {threshold: {field: f, from: -0.9}, colour_by: {field: f}}")
-            IMAGE("d", "volume: {field: f}");
+#define ALL(normals)                                                                                                   \
+    "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.1, 0.4], opacity: 0.6, normals: " normals "}")           \
+        IMAGE("b", "slice: {field: f, planes: [{normal: [1, 2, 3]}]}")                                                 \
+            IMAGE("c", "surface: {threshold: {field: f, from: -0.9}, colour_by: {field: f}}")                          \
+                IMAGE("d", "volume: {field: f}")
+static const char all_scene[] = ALL("gradient");
+/* Normals by which cells of higher order are drawn as the linear ones between their nodes. */
+static const char linear_scene[] = ALL("differences");
 static const char cell_scene[] =
     "images:\n" IMAGE("a", "surface: {threshold: {field: c, from: 0.5}, colour_by: {field: c}}")
         IMAGE("b", "volume: {field: c}") IMAGE("c", "isosurface: {field: f, values: [0.1]}");
@@ -214,26 +218,6 @@ static double wavy(const double p[3])
     return sin(2 * p[0]) * cos(1.5 * p[1]) + 0.5 * p[2];
 }
 
-/* The linear hexes of a mesh of lexicographic hexes of order p. */
-static order_mesh linear_hexes(const order_mesh *of, int p)
-{
-    order_mesh out = *of;
-    const int n = p + 1;
-    int64_t *at = out.connectivity = malloc((size_t)(of->cell_count * p * p * p * 8) * sizeof *at);
-    for (int64_t cell = 0; cell < of->cell_count; cell++)
-        for (int i = 0; i < p * p * p; i++)
-            for (int c = 0; c < 8; c++) {
-                const int x = i % p + (c % 4 == 1 || c % 4 == 2), y = i / p % p + (c % 4 > 1), z = i / p / p + c / 4;
-                *at++ = of->connectivity[cell * of->nodes + x + n * (y + n * z)];
-            }
-    out.mesh.cell_type = INSITU_HEX;
-    out.mesh.vertex_order = INSITU_ORDER_VTK;
-    out.mesh.cell_count = of->cell_count * p * p * p;
-    out.mesh.connectivity = (insitu_array){out.connectivity, INSITU_INT64, 0};
-    out.mesh.connectivity_count = out.mesh.cell_count * 8;
-    return out;
-}
-
 /* Vertices of each cell's own, without connectivity. */
 static order_mesh own_nodes(const order_mesh *of, int p)
 {
@@ -262,16 +246,18 @@ static void hexes_are_those_between_their_nodes(void **state)
         const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
         order_mesh mesh;
         order_mesh_create(&kind, 2, 0.1, wavy, own_rank, rank_count, &mesh);
-        order_mesh cut = linear_hexes(&mesh, p), own = own_nodes(&mesh, p);
+        order_mesh cut = order_mesh_linear_hexes(&mesh, p), own = own_nodes(&mesh, p);
         /* The threshold of picture 2 shows whole cells, which linear ones do not know. */
-        drawn high = draw(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
-        drawn low = draw(MPI_COMM_WORLD, all_scene, &cut, NULL, NULL);
+        drawn high = draw(MPI_COMM_WORLD, linear_scene, &mesh, NULL, NULL);
+        drawn low = draw(MPI_COMM_WORLD, linear_scene, &cut, NULL, NULL);
+        drawn listed = draw(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
         drawn implied = draw(MPI_COMM_WORLD, all_scene, &own, NULL, NULL);
         bool is_same = true;
         for (int i = 0; own_rank == 0 && i < high.count; i++)
             is_same = is_same && (i == 2 || same_pictures(&high.pictures[i], &low.pictures[i]));
         everywhere(is_same);
-        everywhere(same_drawn(&high, &implied));
+        everywhere(same_drawn(&listed, &implied));
+        free_drawn(&listed);
         free_drawn(&high);
         free_drawn(&low);
         free_drawn(&implied);

@@ -361,6 +361,42 @@ static void cell_values_count_once(void **state)
     }
 }
 
+/* Normals of surfaces of means come from the pieces, as the means are not values of the cells' polynomial: the picture
+ * is that of linear hexes between the nodes, of the means as values of vertices. */
+static void normals_of_means_are_those_of_pieces(void **state)
+{
+    (void)state;
+    for (int p = 2; p <= 3; p++) {
+        const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
+        order_mesh part, whole;
+        order_mesh_create(&kind, 2, 0.05, wavy, own_rank, rank_count, &part);
+        order_mesh_create(&kind, 2, 0.05, wavy, 0, 1, &whole);
+        order_mesh cut = order_mesh_linear_hexes(&part, p);
+        double *means = mean_values(&whole), *at_vertices = own_means(&part, &whole, means);
+        double *of_cells = malloc((size_t)(part.cell_count + 1) * sizeof *of_cells);
+        for (int64_t cell = 0; cell < part.cell_count; cell++)
+            of_cells[cell] = value_of_cell(cell * rank_count + own_rank);
+        const insitu_field v = cell_field("v", INSITU_VERTEX, at_vertices, part.vertex_count);
+        const insitu_field c = cell_field("c", INSITU_CELL, of_cells, part.cell_count);
+        static const char *const scenes[2][2] = {
+            {IMAGE("isosurface: {field: v, values: [0.1]}"), IMAGE("isosurface: {field: c, values: [0.1]}")},
+            {IMAGE("isosurface: {field: v, values: [0.1], normals: vertex}"),
+             IMAGE("isosurface: {field: c, values: [0.1], normals: vertex}")}};
+        for (int i = 0; i < 2; i++) {
+            caught_picture truth = draw_picture(scenes[i][0], &cut, &v), cells = draw_picture(scenes[i][1], &part, &c);
+            everywhere(own_rank || same_pictures(&truth, &cells));
+            free_caught(&truth);
+            free_caught(&cells);
+        }
+        free(cut.connectivity);
+        free(means);
+        free(at_vertices);
+        free(of_cells);
+        order_mesh_free(&part);
+        order_mesh_free(&whole);
+    }
+}
+
 static int begin_tests(void **state)
 {
     (void)state;
@@ -373,6 +409,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(edges_are_those_of_the_callers_cells),  cmocka_unit_test(shells_have_edges_of_their_own),
         cmocka_unit_test(cells_that_cannot_be_shown_count_once), cmocka_unit_test(cells_that_show_nothing_count_once),
         cmocka_unit_test(statistics_count_cells_once),           cmocka_unit_test(cell_values_count_once),
+        cmocka_unit_test(normals_of_means_are_those_of_pieces),
     };
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -205,7 +205,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status) status = make_plan(s, &basis, refused, &plan, error);
     const session_derive_basis derived = derive_basis(s);
     if (!status) status = session_derive(&derived, session_derived_of_plan(basis.scene, &plan), error);
-    if (!status && (plan.recentring_count || plan.surface_count || session_is_smooth(&plan)))
+    if (!status && (plan.recentring_count || plan.surface_count || session_is_smooth(&plan, &s->catalogue)))
         status = session_update_homes(&s->catalogue, &s->meshes, extent->half_diagonal, team, error);
     if (!status)
         status = session_recentre(plan.recentrings, plan.recentring_count, plan.stale, &s->meshes, team, error);

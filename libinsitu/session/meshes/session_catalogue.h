@@ -86,6 +86,8 @@ typedef struct session_catalogue_mesh {
     bool is_refined; /* set if some block, on any rank, has a level of refinement */
     /* set if all drawn cells, over all ranks, are shells; computed by session_check_vertex_order() */
     bool has_shells_alone;
+    /* set if cells, on any rank, are of higher order; computed by session_check_vertex_order() */
+    bool has_higher_order;
     /* error of the mesh; NULL: there is none. The step then ignores the mesh, but its fields' names are kept */
     base_error *fault;
     int field_count;

@@ -440,6 +440,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
 {
     const session_extent *extent = &d->space->extent;
     session_layer_basis basis = {.meshes = d->meshes,
+                                 .catalogue = d->catalogue,
                                  .team = d->team,
                                  .half_diagonal = extent->half_diagonal,
                                  .is_flat = session_flat_axis(extent) >= 0,

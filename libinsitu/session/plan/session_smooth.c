@@ -51,10 +51,23 @@ static smooth_item *find_item(smooth_items *items, const smooth_item *like)
     return &more[items->count++];
 }
 
+bool session_has_smooth_normals(const scene_isosurface *layer, const session_catalogue *catalogue)
+{
+    bool has_polynomials = false;
+    for (int m = 0; m < catalogue->mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &catalogue->meshes[m];
+        if (!mesh->has_higher_order || !scene_field_is_on(&layer->field, mesh->name)) continue;
+        const session_catalogue_field *field = session_catalogue_find(mesh, layer->field.name);
+        has_polynomials = has_polynomials || (field && field->centring != INSITU_CELL);
+    }
+    return layer->normals == SCENE_VERTEX || (layer->normals == SCENE_GRADIENT && has_polynomials);
+}
+
+/* Adds a mesh of a layer with smooth normals. */
 static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, const scene_isosurface *layer)
 {
     const session_catalogue_field *field = session_catalogue_find(mesh, layer->field.name);
-    if (layer->normals != SCENE_VERTEX || !field || !scene_field_is_on(&layer->field, mesh->name)) return true;
+    if (!field || !scene_field_is_on(&layer->field, mesh->name)) return true;
     const int component = session_resolve_component(&layer->field, field->component_count);
     const bool is_recentred = session_is_recentred(&layer->field, field->centring, mesh->is_refined);
     const uint64_t joined = is_recentred ? session_joint_name(mesh, layer->field.joint_name) : 0;
@@ -78,7 +91,8 @@ static bool list_items(const session_plan *plan, const session_catalogue *catalo
             const scene_image *image = plan->images[i];
             if (image->variant.view > 0) continue; /* the layers of other views are those of view 0 */
             for (int n = 0; n < image->isosurface_count && is_listed; n++)
-                is_listed = add_layer(out, &catalogue->meshes[m], &image->isosurfaces[n]);
+                is_listed = !session_has_smooth_normals(&image->isosurfaces[n], catalogue) ||
+                            add_layer(out, &catalogue->meshes[m], &image->isosurfaces[n]);
         }
     return is_listed;
 }
@@ -89,11 +103,11 @@ static void items_free(smooth_items *items)
     base_free(items->items);
 }
 
-bool session_is_smooth(const session_plan *plan)
+bool session_is_smooth(const session_plan *plan, const session_catalogue *catalogue)
 {
     for (int i = 0; i < plan->image_count; i++)
         for (int n = 0; n < plan->images[i]->isosurface_count; n++)
-            if (plan->images[i]->isosurfaces[n].normals == SCENE_VERTEX) return true;
+            if (session_has_smooth_normals(&plan->images[i]->isosurfaces[n], catalogue)) return true;
     return false;
 }
 
@@ -243,7 +257,7 @@ insitu_status session_smooth(const session_plan *plan, const session_catalogue *
                              const session_team *team, const session_extent *extent, base_error *error)
 {
     smooth_items items = {0};
-    if (!session_is_smooth(plan)) return INSITU_OK;
+    if (!session_is_smooth(plan, catalogue)) return INSITU_OK;
     if (!list_items(plan, catalogue, &items)) session_fail_for_memory(error, 64, "the plan of gradients at vertices");
     insitu_status status = session_agree(team->comm, error);
     for (int i = 0; i < items.count && !status; i++)

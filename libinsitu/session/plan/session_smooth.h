@@ -14,6 +14,11 @@ insitu_status session_smooth(const session_plan *plan, const session_catalogue *
                              const session_team *team, const session_extent *extent, base_error *error);
 
 /* Returns whether an isosurface of the plan has smooth normals. */
-bool session_is_smooth(const session_plan *plan);
+bool session_is_smooth(const session_plan *plan, const session_catalogue *catalogue);
+
+/* Returns whether the normals of the isosurface are smooth: if the scene asks for them, or if it asks for gradients and
+ * one of the layer's meshes has cells of higher order with values at nodes. The gradient in a piece of such a cell is
+ * not that of its polynomial; gradients at nodes are. The same on all ranks. */
+bool session_has_smooth_normals(const scene_isosurface *layer, const session_catalogue *catalogue);
 
 #endif

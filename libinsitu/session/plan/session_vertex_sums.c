@@ -272,8 +272,25 @@ static bool find_all_entries(const session_vertex_sums *sums, int threads)
 static session_gradient_basis make_gradient_basis(const session_vertex_sums *sums, const session_sum_part *part,
                                                   int threads)
 {
-    return (session_gradient_basis){
-        &part->mesh->cells, part->fields, sums->field_count, part->of_shells, part->key_indices, sums->length, threads};
+    return (session_gradient_basis){.cells = &part->mesh->cells,
+                                    .fields = part->fields,
+                                    .field_count = sums->field_count,
+                                    .of_shells = part->of_shells,
+                                    .sum_indices = part->key_indices,
+                                    .length = sums->length,
+                                    .threads = threads,
+                                    .polynomials = part->polynomials};
+}
+
+/* Finds the polynomials of a part whose cells are split, unless a field is recentred from cells: the means at nodes are
+ * not values of a polynomial. */
+static bool make_polynomials(const session_vertex_sums *sums, session_sum_part *part)
+{
+    bool is_polynomial = part->mesh->topology.is_split;
+    for (int f = 0; f < sums->field_count; f++) is_polynomial = is_polynomial && !part->fields[f].own;
+    if (!is_polynomial) return true;
+    part->polynomials = base_calloc(1, sizeof *part->polynomials);
+    return part->polynomials && session_polynomials_create(part->mesh, part->polynomials);
 }
 
 /* Lists the cells of each part that contribute to sums, and computes this rank's bounds of their contributions. */
@@ -284,7 +301,8 @@ static bool begin_sums(session_vertex_sums *sums, session_cell_list *lists, int 
     if (!sums->sums || (!sums->has_all_vertices && sums->keys.count && !find_all_entries(sums, threads))) return false;
     for (int i = 0; i < sums->part_count && sums->keys.count; i++) {
         session_gradient_bounds own;
-        const session_sum_part *part = &sums->parts[i];
+        session_sum_part *part = &sums->parts[i];
+        if (!make_polynomials(sums, part)) return false;
         const session_gradient_basis basis = make_gradient_basis(sums, part, threads);
         if (!session_list_cells(&basis, &lists[i]) || !session_bound_gradients(&basis, &lists[i], &own)) return false;
         sums->bounds.largest_difference = fmax(sums->bounds.largest_difference, own.largest_difference);
@@ -346,7 +364,11 @@ insitu_status session_find_sums(const session_homes *homes, const session_team *
 
 void session_vertex_sums_free(session_vertex_sums *sums)
 {
-    for (int i = 0; i < sums->part_count && sums->parts; i++) base_free(sums->parts[i].key_indices);
+    for (int i = 0; i < sums->part_count && sums->parts; i++) {
+        base_free(sums->parts[i].key_indices);
+        if (sums->parts[i].polynomials) session_polynomials_free(sums->parts[i].polynomials);
+        base_free(sums->parts[i].polynomials);
+    }
     base_free(sums->parts);
     base_free(sums->sums);
     session_keys_free(&sums->keys);

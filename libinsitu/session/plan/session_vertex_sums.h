@@ -13,6 +13,9 @@ typedef struct session_sum_part {
     bool of_shells;
     grid_field fields[SESSION_GRADIENTS];
     int32_t *key_indices; /* index of each vertex's key, or -1 */
+    /* the cells' polynomials, computed by session_find_sums(); NULL: cells are linear, or the values at their nodes are
+     * means of values of cells */
+    session_polynomials *polynomials;
 } session_sum_part;
 
 /* The data of this rank for the sums of the same scalars on one or several meshes. part_count is 0 if this rank has

@@ -5,6 +5,9 @@
  * gradient is computed from its two edges and the normal, along which the field is assumed to be constant. So a linear
  * field has its exact gradient everywhere, and vertices on a boundary obtain theirs from the cells on one side.
  *
+ * A cell of higher order contributes at each of its nodes the gradient of its polynomial there: the edges are then the
+ * derivatives of the position along the axes of the reference cell, and the differences those of the field.
+ *
  * The weight of a corner is its determinant divided by the fourth power of the length l = sqrt(|a|² + |b|² + |c|²) of
  * its edges. The ratio of the determinant to l³ distinguishes a well-shaped corner from a sliver, whose weight is
  * almost 0. The factor 1 / l gives small cells more weight, since their gradients belong to nearer positions: in a mesh
@@ -195,8 +198,14 @@ static inline __attribute__((always_inline)) void add_corner(target *to, const n
                       field_count);
 }
 
-/* Adds the contribution of a corner of a shell. The third edge is the normal, with the length of the other edges and
- * with either sign. */
+/* Sets the third edge at a corner of a shell: the normal, with the length of the other edges and with either sign. */
+static void set_normal_edge(double edge[3][3])
+{
+    vector3_cross(edge[0], edge[1], edge[2]);
+    const double area = sqrt(vector3_dot(edge[2], edge[2])), scale = 1 / sqrt(area);
+    for (int a = 0; a < 3; a++) edge[2][a] *= scale;
+}
+
 static void add_shell_corner(target *to, const node *corner, const node *p, const node *q)
 {
     const int field_count = to->basis->field_count;
@@ -207,9 +216,7 @@ static void add_shell_corner(target *to, const node *corner, const node *p, cons
         for (int f = 0; f < field_count; f++) rise[i][f] = ends[i]->values[f] - corner->values[f];
         for (int a = 0; a < 3; a++) edge[i][a] = ends[i]->position[a] - corner->position[a];
     }
-    vector3_cross(edge[0], edge[1], edge[2]);
-    const double area = sqrt(vector3_dot(edge[2], edge[2])), scale = 1 / sqrt(area);
-    for (int a = 0; a < 3; a++) edge[2][a] *= scale;
+    set_normal_edge(edge);
     add_edge_gradient(to, corner->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise,
                       field_count);
 }
@@ -372,11 +379,30 @@ static bool has_own_values(const session_gradient_basis *basis, int64_t cell)
     return true;
 }
 
+/* Returns whether the cell is one of those over which sums are computed. */
+static bool is_summed(const session_gradient_basis *basis, int64_t cell)
+{
+    return basis->of_shells ? !grid_is_ghost(basis->cells, cell) && grid_is_shell(basis->cells, cell)
+                            : grid_is_drawn(basis->cells, cell);
+}
+
+/* As has_entry(), for one of the caller's cells with a polynomial. */
+static bool has_row_entry(const session_gradient_basis *basis, int64_t cell)
+{
+    const session_polynomials *p = basis->polynomials;
+    const int64_t size = session_row_size(&p->rows, cell);
+    int64_t piece = p->first_pieces[cell];
+    while (piece < p->first_pieces[cell + 1] && !is_summed(basis, piece)) piece++;
+    if (piece == p->first_pieces[cell + 1]) return false;
+    for (int n = 0; n < size; n++)
+        if (basis->sum_indices[session_row_node(&p->rows, cell, n)] >= 0) return true;
+    return false;
+}
+
 static bool has_entry(const session_gradient_basis *basis, int64_t cell)
 {
-    if (basis->of_shells ? grid_is_ghost(basis->cells, cell) || !grid_is_shell(basis->cells, cell)
-                         : !grid_is_drawn(basis->cells, cell))
-        return false;
+    if (basis->polynomials) return has_row_entry(basis, cell);
+    if (!is_summed(basis, cell)) return false;
     grid_walk walk = grid_walk_cell(basis->cells, cell);
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex))
@@ -389,7 +415,8 @@ static bool has_entry(const session_gradient_basis *basis, int64_t cell)
 bool session_list_cells(const session_gradient_basis *basis, session_cell_list *out)
 {
     enum { BLOCK = 4096 };
-    const int64_t cells = basis->cells->cell_count, blocks = (cells + BLOCK - 1) / BLOCK;
+    const int64_t cells = basis->polynomials ? basis->polynomials->cell_count : basis->cells->cell_count;
+    const int64_t blocks = (cells + BLOCK - 1) / BLOCK;
     int64_t *starts = base_calloc((size_t)blocks + 1, sizeof *starts);
     uint64_t *bits = base_calloc((size_t)blocks * (BLOCK / 64) + 1, sizeof *bits);
     *out = (session_cell_list){0};
@@ -430,7 +457,7 @@ done:
 
 /* ---- all cells of a grid --------------------------------------------------------------------------------------- */
 
-static void add_cell(target *to, int64_t cell, node_list *room)
+static void add_linear_cell(target *to, int64_t cell, node_list *room)
 {
     const int type = grid_cell_type(to->basis->cells, cell);
     if (type == GRID_POLYHEDRON)
@@ -441,24 +468,83 @@ static void add_cell(target *to, int64_t cell, node_list *room)
         add_solid_cell(to, cell, type);
 }
 
+/* Adds the contribution of the polynomial at a node of the row. */
+static void add_row_node(target *to, const session_derivatives *d, const node_list *row, int n)
+{
+    const int field_count = to->basis->field_count;
+    const node *at = &row->nodes[n];
+    double edge[3][3] = {{0}}, rise[3][SESSION_GRADIENTS] = {{0}}, sum = 0;
+    if (to->basis->sum_indices[at->vertex] < 0) return;
+    for (int axis = 0; axis < d->axis_count; axis++) {
+        const int *starts = d->starts + d->axis_count * n + axis;
+        for (int t = starts[0]; t < starts[1]; t++) {
+            const node *of = &row->nodes[d->nodes[t]];
+            const double weight = d->weights[t];
+            for (int a = 0; a < 3; a++) edge[axis][a] += weight * (of->position[a] - at->position[a]);
+            for (int f = 0; f < field_count; f++) rise[axis][f] += weight * (of->values[f] - at->values[f]);
+        }
+        for (int f = 0; f < field_count; f++) sum += rise[axis][f];
+    }
+    if (d->axis_count == 2) set_normal_edge(edge);
+    if (isfinite(sum))
+        add_edge_gradient(to, at->vertex, (const double(*)[3])edge, (const double(*)[SESSION_GRADIENTS])rise,
+                          field_count);
+}
+
+/* Adds the contributions of one of the caller's cells. If its derivatives are not known, or a value is not finite, its
+ * pieces contribute as linear cells. */
+static void add_row(target *to, int64_t cell, node_list *row)
+{
+    const session_polynomials *p = to->basis->polynomials;
+    const int64_t size = session_row_size(&p->rows, cell);
+    bool is_finite = true;
+    row->count = 0;
+    for (int n = 0; n < size; n++)
+        is_finite = add_node(row, to, session_row_node(&p->rows, cell, n)) && is_finite && !row->is_out_of_memory;
+    if (row->is_out_of_memory) return;
+    const session_derivatives *d =
+        session_derivatives_of(p, cell, row->nodes->position, (int)(sizeof *row->nodes / sizeof(double)));
+    if (is_finite && d->axis_count) {
+        for (int n = 0; n < size; n++) add_row_node(to, d, row, n);
+        return;
+    }
+    for (int64_t piece = p->first_pieces[cell]; piece < p->first_pieces[cell + 1]; piece++)
+        if (is_summed(to->basis, piece)) add_linear_cell(to, piece, row);
+}
+
+static void add_cell(target *to, int64_t cell, node_list *room)
+{
+    if (to->basis->polynomials)
+        add_row(to, cell, room);
+    else
+        add_linear_cell(to, cell, room);
+}
+
 enum { NO_OWNER = 254, SHARED = 255 };
 
-/* Records that this thread adds to the sums of the cell's vertices. If no other thread adds to a sum, the additions
- * need not be atomic. */
-static void claim_sums(const target *to, int64_t cell)
+/* Records that this thread adds to the sum of the vertex, if it has one. If no other thread adds to a sum, the
+ * additions need not be atomic. */
+static void claim_sum(const target *to, int64_t vertex)
 {
     const session_gradient_basis *basis = to->basis;
-    grid_walk walk = grid_walk_cell(basis->cells, cell);
+    unsigned char before = NO_OWNER;
+    if (basis->sum_indices[vertex] < 0) return;
+    unsigned char *owner = &to->owners[basis->sum_indices[vertex]];
+    if (__atomic_load_n(owner, __ATOMIC_RELAXED) == to->owner ||
+        __atomic_compare_exchange_n(owner, &before, to->owner, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED))
+        return;
+    if (before != to->owner) __atomic_store_n(owner, SHARED, __ATOMIC_RELAXED);
+}
+
+static void claim_sums(const target *to, int64_t cell)
+{
+    const session_polynomials *p = to->basis->polynomials;
+    const int64_t size = p ? session_row_size(&p->rows, cell) : 0;
+    for (int n = 0; n < size; n++) claim_sum(to, session_row_node(&p->rows, cell, n));
+    if (p) return;
+    grid_walk walk = grid_walk_cell(to->basis->cells, cell);
     int64_t vertex;
-    while (grid_walk_next(&walk, &vertex)) {
-        unsigned char before = NO_OWNER;
-        if (basis->sum_indices[vertex] < 0) continue;
-        unsigned char *owner = &to->owners[basis->sum_indices[vertex]];
-        if (__atomic_load_n(owner, __ATOMIC_RELAXED) == to->owner ||
-            __atomic_compare_exchange_n(owner, &before, to->owner, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED))
-            continue;
-        if (before != to->owner) __atomic_store_n(owner, SHARED, __ATOMIC_RELAXED);
-    }
+    while (grid_walk_next(&walk, &vertex)) claim_sum(to, vertex);
 }
 
 /* Adds the contributions of all cells. Both loops distribute the cells among the threads in the same way. */
@@ -466,8 +552,10 @@ static bool add_all_cells(const target *like, const session_cell_list *list, ses
 {
     double rise = 0, sharpness = 0;
     bool is_out_of_memory = false;
-#pragma omp parallel num_threads(session_region_threads(like->basis->threads, list->count)) \
-    reduction(max : rise, sharpness) reduction(|| : is_out_of_memory)
+#pragma omp parallel num_threads(session_region_threads(like->basis->threads, list->count))                            \
+    reduction(max                                                                                                      \
+              : rise, sharpness) reduction(||                                                                          \
+                                           : is_out_of_memory)
     {
         region_enter();
         target to = *like;

@@ -4,6 +4,7 @@
 #define SESSION_GRADIENTS_H
 
 #include "grid.h"
+#include "session_derivatives.h"
 
 enum { SESSION_GRADIENTS = 3 /* maximum number of scalars whose gradients one pass sums */ };
 
@@ -17,6 +18,9 @@ typedef struct session_gradient_basis {
     const int32_t *sum_indices; /* for each vertex, the index of its sum; -1: it has none */
     double length;              /* a power of two near the size of the scene, the same on all ranks */
     int threads;
+    /* polynomials of the caller's cells, which contribute instead of their pieces; NULL: the cells contribute as linear
+     * ones */
+    const session_polynomials *polynomials;
 } session_gradient_basis;
 
 /* Returns how many numbers a sum consists of. A sum over the cells around a vertex consists of integer words, so that
@@ -40,7 +44,7 @@ typedef struct session_gradient_bounds {
     double largest_inverse_square;
 } session_gradient_bounds;
 
-/* List, in any order, of the cells that have a vertex with a sum. */
+/* List, in any order, of the cells that have a vertex with a sum; with polynomials, of the caller's cells. */
 typedef struct session_cell_list {
     int64_t count;
     int64_t *cells;

@@ -259,7 +259,9 @@ DEFINE_MAPPING(lines, "lines", LINES_KEYS);
       .help = "The normals used for lighting. `gradient` is the gradient within the cell that is hit, which changes "  \
               "from cell to cell. The other two are smooth. `vertex` interpolates gradients at the vertices, which "   \
               "are averaged over the cells of the mesh on all ranks; the light may have a seam where two meshes "      \
-              "meet. `differences` takes central differences at the hit, in the cells of all ranks, and is slower.",   \
+              "meet. `differences` takes central differences at the hit, in the cells of all ranks, and is slower. "   \
+              "In layers on cells of higher order, `gradient` and `vertex` both interpolate gradients of the cells' "  \
+              "polynomials at the nodes.",                                                                             \
       .default_text = "`gradient`")                                                                                    \
     X(CYAML_FIELD_FLOAT_PTR("difference", OPTIONAL, scene_file_isosurface, difference),                                \
       .help = "Distance between the two samples of a central difference, in sizes of the cell that is hit.",           \

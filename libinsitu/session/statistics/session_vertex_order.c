@@ -20,7 +20,7 @@ static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD
 /* Counts of the cells of one type. */
 enum type_sum { LOOKED_AT, BOTH_SIGNS, FIT, TYPE_SUMS = FIT + ORDERS };
 
-enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
+enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
 /* Returns whether all corners of the cell have the same sign if its vertices are assumed to be stored in `order`
  * instead of the order in which they are read. */
@@ -76,6 +76,7 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
         /* the axes of a lattice may have either direction, so that left-handed cells are not counted */
         sums[INVERTED] += part->cells.lattice ? 0 : part->given_counts.inverted_count;
         sums[SHELLS] += part->given_counts.shell_count;
+        sums[SPLIT] += part->topology.is_split;
         if (!part->topology.is_split) sum_orders(part, parts.count, sums); /* pieces are in VTK's order */
     }
 }
@@ -168,6 +169,7 @@ insitu_status session_check_vertex_order(const session_meshes *meshes, session_c
         const session_parts parts = session_find_parts(meshes, catalogue->meshes[m].name);
         const bool has_shells_alone = of_mesh[DRAWN] == 0 && of_mesh[SHELLS] > 0;
         catalogue->meshes[m].has_shells_alone = has_shells_alone;
+        catalogue->meshes[m].has_higher_order = of_mesh[SPLIT] > 0;
         for (int i = 0; i < parts.count; i++) parts.items[i]->has_shells_alone = has_shells_alone;
         warn_of_order(report, catalogue->meshes[m].name, of_mesh);
     }

@@ -14,6 +14,7 @@
 #include "session_ranges.h"
 #include "session_scalars.h"
 #include "session_shells.h"
+#include "session_smooth.h"
 #include "session_thresholds.h"
 
 static bool is_part(const session_mesh *mesh)
@@ -209,8 +210,7 @@ static insitu_status set_lines(const session_layer_basis *basis, const scene_lin
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
                                   session_layers *layers, base_error *error)
 {
-    static const render_normal normals[] = {
-        [SCENE_GRADIENT] = RENDER_GRADIENT, [SCENE_DIFFERENCES] = RENDER_DIFFERENCES, [SCENE_VERTEX] = RENDER_VERTEX};
+    const bool is_smooth = session_has_smooth_normals(layer, basis->catalogue);
     render_surface_layer *out = &layers->surfaces[index];
     const scene_material *m = &layer->material;
     *out = (render_surface_layer){.field = set_layer_field(basis->meshes, layers, 2 * index, &layer->field, NULL, true),
@@ -219,11 +219,13 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
                                   .colours = layer->colours,
                                   .opacity = layer->opacity,
                                   .material = {m->ambient, m->diffuse, m->specular, m->shininess},
-                                  .normal = normals[layer->normals],
+                                  .normal = is_smooth                             ? RENDER_VERTEX
+                                            : layer->normals == SCENE_DIFFERENCES ? RENDER_DIFFERENCES
+                                                                                  : RENDER_GRADIENT,
                                   .difference = layer->difference,
                                   .contact = CONTACT,
                                   .clips = layer->clips};
-    if (layer->normals == SCENE_VERTEX) out->gradients = set_gradients(basis->meshes, layers, index, &layer->field);
+    if (is_smooth) out->gradients = set_gradients(basis->meshes, layers, index, &layer->field);
     insitu_status status = INSITU_OK;
     if (layer->has_colour_by) {
         out->colour_field = set_layer_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, NULL, false);

@@ -4,6 +4,7 @@
 
 #include "render.h"
 #include "scene.h"
+#include "session_catalogue.h"
 #include "session_contours.h"
 #include "session_mesh.h"
 #include "session_report.h"
@@ -35,6 +36,7 @@ typedef struct session_layers {
 /* Input for computing layers. */
 typedef struct session_layer_basis {
     const session_meshes *meshes;
+    const session_catalogue *catalogue;
     const session_team *team;
     double half_diagonal; /* half the diagonal of the global bounds */
     bool is_flat;         /* set if session_flat_axis() has found an axis */

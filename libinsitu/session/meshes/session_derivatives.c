@@ -1,0 +1,326 @@
+/* Along a line of a hex's lattice the polynomial is that through the values on the line. In a tet or triangle with
+ * equispaced nodes, the function that is 1 at node (i, j, k, l) of order p = i + j + k + l and 0 at the others is
+ *
+ *     B_i(p a) B_j(p b) B_k(p c) B_l(p d),   B_n(t) = t (t - 1) ... (t - n + 1) / n!
+ *
+ * at the barycentric coordinates a, b, c, d (Silvester 1969). A wedge's polynomial is the product of a triangle's and
+ * a line's.
+ *
+ * The polynomials of serendipity cells are those of complete cells of order 2 whose values at the missing nodes follow
+ * from the others: at the middle of a face half the sum of the midpoints around it, less a quarter of that of the
+ * corners; at the middle of a hex a quarter of the sum of all midpoints, less a quarter of that of the corners. */
+#include "session_derivatives.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+
+enum { MOST_NODES_OF_LINE = NODES_MOST_ORDER + 1 };
+
+/* Terms in the making. They are counted while out->nodes is NULL, and then stored. */
+typedef struct term_list {
+    session_derivatives *out;
+    const session_nodes *of;
+    insitu_vertex_order order;
+    int count;
+    double lines[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE]; /* derivative at the first node of the second's function */
+    double values[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE],
+        slopes[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE]; /* of B_n(t) */
+} term_list;
+
+/* ---- one dimension --------------------------------------------------------------------------------------------- */
+
+/* Computes the derivative of Legendre's polynomial of degree p at x, and its second derivative. */
+static double legendre_slope(int p, double x, double *curvature)
+{
+    double last = 1, value = x;
+    for (int n = 2; n <= p; n++) {
+        const double next = ((2 * n - 1) * x * value - (n - 1) * last) / n;
+        last = value;
+        value = next;
+    }
+    const double slope = p * (last - x * value) / (1 - x * x);
+    *curvature = (2 * x * slope - p * (p + 1) * value) / (1 - x * x);
+    return slope;
+}
+
+/* Computes the positions of the p + 1 nodes between 0 and 1. Gauss-Lobatto points are the ends and the roots of the
+ * derivative of Legendre's polynomial, found by Newton's method from Chebyshev's points. */
+static void place_nodes(int p, bool is_lobatto, double out[MOST_NODES_OF_LINE])
+{
+    for (int i = 0; i <= p; i++) {
+        double x = -cos(acos(-1) * i / p), curvature;
+        for (int turn = 0; turn < 20 && i > 0 && i < p; turn++) {
+            const double slope = legendre_slope(p, x, &curvature);
+            x -= slope / curvature;
+        }
+        out[i] = is_lobatto ? 0.5 + 0.5 * x : (double)i / p;
+    }
+}
+
+static void derive_lines(term_list *list, bool is_lobatto)
+{
+    const int p = list->of->order;
+    double x[MOST_NODES_OF_LINE] = {0}, products[MOST_NODES_OF_LINE] = {0};
+    place_nodes(p, is_lobatto, x);
+    list->out->first_segment = x[1];
+    for (int i = 0; i <= p; i++) {
+        products[i] = 1;
+        for (int m = 0; m <= p; m++) products[i] *= m == i ? 1 : x[i] - x[m];
+    }
+    for (int i = 0; i <= p; i++) {
+        list->lines[i][i] = 0;
+        for (int m = 0; m <= p; m++)
+            if (m != i) {
+                list->lines[i][m] = products[i] / products[m] / (x[i] - x[m]);
+                list->lines[i][i] += 1 / (x[i] - x[m]);
+            }
+    }
+}
+
+/* Computes B_n and its derivative at whole numbers t. */
+static void derive_products(term_list *list)
+{
+    const int p = list->of->order;
+    for (int n = 0; n <= p; n++)
+        for (int t = 0; t <= p; t++) {
+            double value = 1, slope = 0;
+            for (int m = 0; m < n; m++) {
+                slope = (slope * (t - m) + value) / (m + 1);
+                value *= (double)(t - m) / (m + 1);
+            }
+            list->values[n][t] = value;
+            list->slopes[n][t] = slope;
+        }
+}
+
+/* ---- terms ----------------------------------------------------------------------------------------------------- */
+
+/* Finds the directions from a missing node to the nodes around it. Returns their number. */
+static int find_directions(int type, const int at[3], int directions[3][3])
+{
+    int count = 0;
+    memset(directions, 0, 9 * sizeof directions[0][0]);
+    if (type == GRID_WEDGE) {
+        directions[0][0] = at[0];
+        directions[0][1] = at[0] && at[1] ? -1 : at[1];
+        directions[1][2] = 1;
+        return 2;
+    }
+    for (int axis = 0; axis < 3; axis++)
+        if (at[axis] == 1) directions[count++][axis] = 1;
+    return count;
+}
+
+static void store_term(term_list *list, int position, double weight)
+{
+    if (list->out->nodes) {
+        list->out->nodes[list->count] = position;
+        list->out->weights[list->count] = weight;
+    }
+    list->count++;
+}
+
+/* Adds the terms of the nodes around a node that a serendipity cell lacks. */
+static void add_missing_term(term_list *list, const int at[3], double weight)
+{
+    int directions[3][3], step[3];
+    const int count = find_directions(list->of->type, at, directions);
+    for (int n = 0; n < (count == 3 ? 27 : 9); n++) {
+        int zeros = 0, node[3] = {at[0], at[1], at[2]};
+        for (int d = 0, rest = n; d < count; d++, rest /= 3) {
+            step[d] = rest % 3 - 1;
+            zeros += step[d] == 0;
+            for (int axis = 0; axis < 3; axis++) node[axis] += step[d] * directions[d][axis];
+        }
+        const double share = zeros == 0 ? -0.25 : count == 3 ? 0.25 : 0.5;
+        if (zeros < 2)
+            store_term(list, session_node_index(list->of, list->order, node[0], node[1], node[2]), share * weight);
+    }
+}
+
+static void add_term(term_list *list, int i, int j, int k, double weight)
+{
+    const int position = session_node_index(list->of, list->order, i, j, k);
+    if (weight == 0) return;
+    if (position < list->of->count)
+        store_term(list, position, weight);
+    else
+        add_missing_term(list, (const int[]){i, j, k}, weight);
+}
+
+/* Adds the derivative along an axis of the lattice by the values on the line through the node. */
+static void add_line(term_list *list, const int at[3], int axis)
+{
+    int node[3] = {at[0], at[1], at[2]};
+    for (int m = 0; m <= list->of->order; m++) {
+        node[axis] = m;
+        add_term(list, node[0], node[1], node[2], list->lines[at[axis]][m]);
+    }
+}
+
+/* Adds the derivative with respect to a barycentric coordinate of a tet or, in layer k of a wedge, of a triangle, times
+ * sign. b: the barycentric coordinates of the node times the order; b[2] is 0 in triangles. */
+static void add_barycentric(term_list *list, const int b[4], int coordinate, int k, double sign)
+{
+    const int p = list->of->order, others[3] = {(coordinate + 1) % 4, (coordinate + 2) % 4, (coordinate + 3) % 4};
+    int n[4];
+    for (n[others[0]] = 0; n[others[0]] <= b[others[0]]; n[others[0]]++)
+        for (n[others[1]] = 0; n[others[1]] <= b[others[1]]; n[others[1]]++)
+            for (n[others[2]] = 0; n[others[2]] <= b[others[2]]; n[others[2]]++) {
+                double weight = sign * p;
+                n[coordinate] = p;
+                for (int m = 0; m < 3; m++) {
+                    n[coordinate] -= n[others[m]];
+                    weight *= list->values[n[others[m]]][b[others[m]]];
+                }
+                weight *= list->slopes[n[coordinate]][b[coordinate]];
+                add_term(list, n[0], n[1], list->of->type == GRID_TET ? n[2] : k, weight);
+            }
+}
+
+static void add_derivative(term_list *list, const int at[3], int axis)
+{
+    const int p = list->of->order, type = list->of->type;
+    const bool is_box = type == GRID_HEX || type == GRID_QUAD;
+    if (is_box || (type == GRID_WEDGE && axis == 2)) {
+        add_line(list, at, axis);
+        return;
+    }
+    const int depth = type == GRID_TET ? at[2] : 0, b[4] = {at[0], at[1], depth, p - at[0] - at[1] - depth};
+    add_barycentric(list, b, axis, at[2], 1);
+    add_barycentric(list, b, 3, at[2], -1);
+}
+
+/* ---- kinds ----------------------------------------------------------------------------------------------------- */
+
+/* Lists the derivatives at all nodes. `nodes_at` has the place in the lattice of each position of the row. */
+static void list_terms(term_list *list, const int (*nodes_at)[3])
+{
+    session_derivatives *out = list->out;
+    list->count = 0;
+    for (int n = 0; n < list->of->count; n++)
+        for (int axis = 0; axis < out->axis_count; axis++) {
+            out->starts[out->axis_count * n + axis] = list->count;
+            add_derivative(list, nodes_at[n], axis);
+        }
+    out->starts[out->axis_count * list->of->count] = list->count;
+}
+
+static void find_nodes(const session_nodes *of, insitu_vertex_order order, int (*nodes_at)[3])
+{
+    for (int k = 0; k <= of->order; k++)
+        for (int j = 0; j <= of->order; j++)
+            for (int i = 0; i <= of->order; i++) {
+                const int n = session_is_node(of, i, j, k) ? session_node_index(of, order, i, j, k) : of->count;
+                if (n < of->count) memcpy(nodes_at[n], (const int[]){i, j, k}, sizeof nodes_at[n]);
+            }
+}
+
+bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order, bool is_lobatto,
+                              session_derivatives *out)
+{
+    *out = (session_derivatives){0};
+    if (of->type == GRID_PYRAMID) return true;
+    out->axis_count = of->type == GRID_TRIANGLE || of->type == GRID_QUAD ? 2 : 3;
+    out->starts = base_alloc(((size_t)of->count * 3 + 1) * sizeof *out->starts);
+    int(*nodes_at)[3] = base_alloc((size_t)of->count * sizeof *nodes_at);
+    term_list *list = base_calloc(1, sizeof *list);
+    bool is_made = out->starts && nodes_at && list;
+    if (is_made) {
+        *list = (term_list){.out = out, .of = of, .order = order};
+        find_nodes(of, order, nodes_at);
+        derive_lines(list, is_lobatto);
+        derive_products(list);
+        list_terms(list, (const int(*)[3])nodes_at);
+        out->weights = base_alloc((size_t)list->count * sizeof *out->weights);
+        out->nodes = base_alloc((size_t)list->count * sizeof *out->nodes);
+        is_made = out->weights && out->nodes;
+        if (is_made) list_terms(list, (const int(*)[3])nodes_at);
+    }
+    base_free(nodes_at);
+    base_free(list);
+    return is_made;
+}
+
+void session_drop_derivatives(session_derivatives *derivatives)
+{
+    base_free(derivatives->starts);
+    base_free(derivatives->nodes);
+    base_free(derivatives->weights);
+    *derivatives = (session_derivatives){0};
+}
+
+/* ---- all cells ------------------------------------------------------------------------------------------------- */
+
+/* Returns whether both spacings must be distinguished. */
+static bool has_two_spacings(const session_nodes *of)
+{
+    return of->order > 2 && (of->type == GRID_HEX || of->type == GRID_QUAD);
+}
+
+bool session_polynomials_create(const session_mesh *mesh, session_polynomials *out)
+{
+    *out = (session_polynomials){.rows = session_rows_of(mesh),
+                                 .first_pieces = mesh->topology.first_pieces,
+                                 .cell_count = mesh->given.cell_count,
+                                 .order = mesh->given.vertex_order};
+    session_list_kinds(mesh, &out->rows);
+    out->kinds = base_calloc((size_t)out->rows.kind_count * 2, sizeof *out->kinds);
+    bool is_made = out->kinds != NULL;
+    for (int i = 0; i < out->rows.kind_count && is_made; i++) {
+        const session_nodes *of = &out->rows.kinds[i].nodes;
+        is_made = session_make_derivatives(of, out->order, false, &out->kinds[2 * i]);
+        if (is_made && has_two_spacings(of))
+            is_made = session_make_derivatives(of, out->order, true, &out->kinds[2 * i + 1]);
+    }
+    return is_made;
+}
+
+void session_polynomials_free(session_polynomials *polynomials)
+{
+    for (int i = 0; i < 2 * polynomials->rows.kind_count && polynomials->kinds; i++)
+        session_drop_derivatives(&polynomials->kinds[i]);
+    base_free(polynomials->kinds);
+    *polynomials = (session_polynomials){0};
+}
+
+static double distance_between(const double *a, const double *b)
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+/* Returns the mean length of the first and the last of the segments into which nodes divide the cell's edges, as a
+ * fraction of the length of the edges. */
+static double mean_end_segment(const session_nodes *of, insitu_vertex_order order, const double *positions, int stride)
+{
+    const int p = of->order, axes = of->type == GRID_HEX ? 3 : 2;
+    double ends = 0, total = 0;
+    for (int axis = 0; axis < axes; axis++)
+        for (int edge = 0; edge < (axes == 3 ? 4 : 2); edge++) {
+            int node[3] = {0, 0, 0}, last = 0;
+            node[(axis + 1) % axes] = edge % 2 ? p : 0;
+            if (axes == 3) node[(axis + 2) % 3] = edge / 2 ? p : 0;
+            for (int m = 0; m <= p; m++) {
+                node[axis] = m;
+                const int next = session_node_index(of, order, node[0], node[1], node[2]);
+                const double length = distance_between(positions + stride * next, positions + stride * last);
+                if (m > 0) total += length;
+                if (m == 1 || m == p) ends += 0.5 * length;
+                last = next;
+            }
+        }
+    return ends / total;
+}
+
+const session_derivatives *session_derivatives_of(const session_polynomials *polynomials, int64_t cell,
+                                                  const double *positions, int stride)
+{
+    const int kind = session_kind_of(&polynomials->rows, cell);
+    const session_nodes *of = &polynomials->rows.kinds[kind].nodes;
+    const session_derivatives *equispaced = &polynomials->kinds[2 * kind], *lobatto = equispaced + 1;
+    if (!has_two_spacings(of)) return equispaced;
+    const double between = 0.5 * (equispaced->first_segment + lobatto->first_segment);
+    return mean_end_segment(of, polynomials->order, positions, stride) < between ? lobatto : equispaced;
+}

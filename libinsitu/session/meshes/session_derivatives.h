@@ -1,0 +1,42 @@
+/* Derivatives of the polynomials of cells of higher order at the cells' own nodes. A derivative along an axis of the
+ * reference cell is a weighted sum of the values at nodes. */
+#ifndef SESSION_DERIVATIVES_H
+#define SESSION_DERIVATIVES_H
+
+#include "session_rows.h"
+
+/* The derivatives of one kind of cell. Those of node n along axis a are the terms from starts[axis_count * n + a] on,
+ * up to the next start. */
+typedef struct session_derivatives {
+    int axis_count;       /* 3; 2 for triangles and quads; 0 for pyramids, whose derivatives are not known */
+    double first_segment; /* distance between the first two nodes of an edge of length 1 */
+    int *starts;
+    int *nodes;      /* for each term, the position of its node in the row */
+    double *weights; /* for each term, the weight of the value at its node; weights of a derivative sum to 0 */
+} session_derivatives;
+
+/* Finds the derivatives of a kind of cell. is_lobatto: nodes along edges are Gauss-Lobatto points, otherwise they are
+ * equispaced. Returns false if memory runs out; the caller must drop *out in any case. */
+bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order, bool is_lobatto,
+                              session_derivatives *out);
+void session_drop_derivatives(session_derivatives *derivatives);
+
+/* The polynomials of all cells of a mesh whose cells are split. */
+typedef struct session_polynomials {
+    session_rows rows;
+    const int64_t *first_pieces; /* same as session_topology.first_pieces */
+    int64_t cell_count;          /* number of the caller's cells */
+    insitu_vertex_order order;
+    session_derivatives *kinds; /* for each kind, the derivatives for equispaced nodes, then those for Gauss-Lobatto */
+} session_polynomials;
+
+/* Returns false if memory runs out; the caller must free *out in any case. Local. */
+bool session_polynomials_create(const session_mesh *mesh, session_polynomials *out);
+void session_polynomials_free(session_polynomials *polynomials);
+
+/* Returns the derivatives of a cell. positions: those of its nodes, by which equispaced nodes of quads and hexes of
+ * order 3 and more are distinguished from Gauss-Lobatto points; `stride` doubles lie between the beginnings of two. */
+const session_derivatives *session_derivatives_of(const session_polynomials *polynomials, int64_t cell,
+                                                  const double *positions, int stride);
+
+#endif

@@ -1,0 +1,197 @@
+/* Derivatives of cells' polynomials at nodes, against closed forms: on straight cells, the sums of values of any
+ * polynomial that the cell has are its gradient times those of places. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "session_derivatives.h"
+#include "test_mesh_order.h"
+
+enum { MOST_POWER = 4 };
+
+static double nothing(const double p[3])
+{
+    return p[0];
+}
+
+/* ---- polynomials ------------------------------------------------------------------------------------------------- */
+
+/* The product of powers of x + 0.3, y + 0.4 and z + 0.5, and its gradient. */
+static double monomial(const double at[3], const int powers[3], double gradient[3])
+{
+    double value = 1;
+    for (int a = 0; a < 3; a++) {
+        value *= pow(at[a] + 0.3 + 0.1 * a, powers[a]);
+        gradient[a] = powers[a];
+        for (int b = 0; b < 3; b++) gradient[a] *= pow(at[b] + 0.3 + 0.1 * b, powers[b] - (a == b && powers[b] > 0));
+    }
+    return value;
+}
+
+/* Which monomials the cell's polynomials contain. */
+static bool is_in_space(const session_nodes *of, const int q[3])
+{
+    const int p = of->order, plane = q[0] + q[1];
+    switch (of->type) {
+    case GRID_TRIANGLE: return plane <= p && q[2] == 0;
+    case GRID_TET: return plane + q[2] <= p;
+    case GRID_WEDGE:
+        return of->is_complete ? plane <= p && q[2] <= p : (plane <= 2 && q[2] <= 1) || (plane <= 1 && q[2] <= 2);
+    default:
+        if (of->type == GRID_QUAD && q[2]) return false;
+        if (of->is_complete) return q[0] <= p && q[1] <= p && q[2] <= p;
+        return q[0] <= 2 && q[1] <= 2 && q[2] <= 2 && (q[0] == 2) + (q[1] == 2) + (q[2] == 2) <= 1;
+    }
+}
+
+/* Sums of at most 125 terms, each rounded by 1e-16 of weights up to 10 times powers of up to 1.8^12. */
+#define ROUNDING 1e-9
+
+/* The largest error of a derivative at any node of any polynomial, in a cell whose nodes are at `places`. */
+static double find_error(const session_nodes *of, const session_derivatives *d, const double (*places)[3],
+                         const int powers[3])
+{
+    double worst = 0, gradient[3], unused[3];
+    for (int n = 0; n < of->count; n++)
+        for (int axis = 0; axis < d->axis_count; axis++) {
+            double edge[3] = {0}, rise = 0;
+            for (int t = d->starts[d->axis_count * n + axis]; t < d->starts[d->axis_count * n + axis + 1]; t++) {
+                for (int a = 0; a < 3; a++) edge[a] += d->weights[t] * places[d->nodes[t]][a];
+                rise += d->weights[t] * monomial(places[d->nodes[t]], powers, unused);
+            }
+            monomial(places[n], powers, gradient);
+            worst = fmax(worst, fabs(rise - (edge[0] * gradient[0] + edge[1] * gradient[1] + edge[2] * gradient[2])));
+        }
+    return worst;
+}
+
+static double worst_error(const session_nodes *of, const session_derivatives *d, const double (*places)[3])
+{
+    double worst = 0;
+    for (int i = 0; i < (MOST_POWER + 1) * (MOST_POWER + 1) * (MOST_POWER + 1); i++) {
+        const int powers[3] = {i % (MOST_POWER + 1), i / (MOST_POWER + 1) % (MOST_POWER + 1),
+                               i / (MOST_POWER + 1) / (MOST_POWER + 1)};
+        if (is_in_space(of, powers)) worst = fmax(worst, find_error(of, d, places, powers));
+    }
+    return worst;
+}
+
+/* Returns the volume of the box of a node's derivatives of places, or the area of their parallelogram. */
+static double box_volume(const session_derivatives *d, int node, const double (*places)[3])
+{
+    double e[3][3] = {{0}};
+    for (int axis = 0; axis < d->axis_count; axis++)
+        for (int t = d->starts[d->axis_count * node + axis]; t < d->starts[d->axis_count * node + axis + 1]; t++)
+            for (int a = 0; a < 3; a++) e[axis][a] += d->weights[t] * places[d->nodes[t]][a];
+    if (d->axis_count == 2) e[2][2] = 1;
+    return fabs(e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) + e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
+                e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]));
+}
+
+/* volume: that of the box. */
+static void derivatives_are_right(const char *name, const session_nodes *of, const session_derivatives *d,
+                                  const double (*places)[3], double volume)
+{
+    const double error = worst_error(of, d, places);
+    if (!(error < ROUNDING)) fprintf(stderr, "%s, order %d: a derivative is off by %g\n", name, of->order, error);
+    assert_true(error < ROUNDING);
+    for (int n = 0; n < of->count; n++) assert_true(fabs(box_volume(d, n, places) - volume) < ROUNDING);
+}
+
+/* ---- cells ------------------------------------------------------------------------------------------------------- */
+
+/* Moves nodes that are equispaced in a cube of [-1, 1]^3 to Gauss-Lobatto points. */
+static void place_lobatto(int p, double *coordinates, int64_t count)
+{
+    const double of3[4] = {-1, -1 / sqrt(5), 1 / sqrt(5), 1}, of4[5] = {-1, -sqrt(3. / 7), 0, sqrt(3. / 7), 1};
+    for (int64_t i = 0; i < 3 * count; i++) {
+        const int at = (int)lround((coordinates[i] + 1) / 2 * p);
+        coordinates[i] = p == 3 ? of3[at] : of4[at];
+    }
+}
+
+/* All cells of a cube, each of whose boxes has the cube's volume; is_lobatto: hexes of Gauss-Lobatto points. */
+static void check_kind(const order_kind *kind, bool is_lobatto)
+{
+    order_mesh mesh;
+    session_polynomials polynomials;
+    session_mesh of = {0};
+    double(*places)[3] = malloc(200 * sizeof *places);
+    order_mesh_create(kind, 1, 0, nothing, 0, 1, &mesh);
+    if (is_lobatto) place_lobatto(kind->order, mesh.coordinates, mesh.vertex_count);
+    of.given = mesh.mesh;
+    of.cells.vertex_count = mesh.vertex_count;
+    assert_true(session_polynomials_create(&of, &polynomials));
+    for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
+        for (int n = 0; n < mesh.nodes; n++)
+            memcpy(places[n], mesh.coordinates + 3 * mesh.connectivity[cell * mesh.nodes + n], sizeof places[n]);
+        const session_derivatives *d = session_derivatives_of(&polynomials, cell, places[0], 3);
+        assert_int_equal(d->axis_count, strstr(kind->name, "pyramid") ? 0 : 3);
+        if (d->axis_count)
+            derivatives_are_right(kind->name, &polynomials.rows.kinds[0].nodes, d, (const double(*)[3])places, 8);
+    }
+    session_polynomials_free(&polynomials);
+    order_mesh_free(&mesh);
+    free(places);
+}
+
+static void solid_cells_have_their_derivatives(void **state)
+{
+    (void)state;
+    for (int k = 0; k < order_kind_count; k++) check_kind(&order_kinds[k], false);
+}
+
+static void lobatto_points_are_recognised(void **state)
+{
+    (void)state;
+    for (int p = 3; p <= 4; p++) {
+        const order_kind kind = {"hex of Lobatto points", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
+        check_kind(&kind, true);
+        check_kind(&kind, false);
+    }
+}
+
+/* Quads and triangles, in the plane z = 0, whose nodes are in rows; and the quad of eight nodes. */
+static void shells_have_their_derivatives(void **state)
+{
+    (void)state;
+    static const double of8[8][3] = {{0, 0, 0},   {1, 0, 0},   {1, 1, 0},   {0, 1, 0},
+                                     {0.5, 0, 0}, {1, 0.5, 0}, {0.5, 1, 0}, {0, 0.5, 0}};
+    session_nodes of;
+    session_derivatives d;
+    for (int p = 1; p <= MOST_POWER; p++)
+        for (int is_quad = 0; is_quad < 2; is_quad++) {
+            double places[25][3] = {{0}};
+            int count = 0;
+            for (int j = 0; j <= p; j++)
+                for (int i = 0; i <= p - (is_quad ? 0 : j); i++, count++) {
+                    places[count][0] = (double)i / p;
+                    places[count][1] = (double)j / p;
+                }
+            assert_true(session_nodes_of(is_quad ? INSITU_LAGRANGE_QUAD : INSITU_LAGRANGE_TRIANGLE, count, &of));
+            assert_true(session_make_derivatives(&of, INSITU_ORDER_LEXICOGRAPHIC, false, &d));
+            assert_int_equal(d.axis_count, 2);
+            derivatives_are_right("shell", &of, &d, (const double(*)[3])places, 1);
+            session_drop_derivatives(&d);
+        }
+    assert_true(session_nodes_of(INSITU_QUADRATIC_QUAD, 8, &of));
+    assert_true(session_make_derivatives(&of, INSITU_ORDER_VTK, false, &d));
+    derivatives_are_right("quad of 8 nodes", &of, &d, of8, 1);
+    session_drop_derivatives(&d);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(solid_cells_have_their_derivatives),
+        cmocka_unit_test(lobatto_points_are_recognised),
+        cmocka_unit_test(shells_have_their_derivatives),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
