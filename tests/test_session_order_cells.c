@@ -11,10 +11,12 @@
 enum { SIDE = 240, PIXELS = SIDE * SIDE };
 
 /* A pixel is 1/100 wide; looked at along z from z = 5. */
-#define IMAGE(layer)                                                                                                   \
+#define PICTURE(layer, more)                                                                                           \
     "images:\n  - name: a\n    size: [240, 240]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, 5], "     \
     "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2.4}\n"                                        \
-    "    layers:\n      - " layer "\n    outputs: [{path: a.exr}]\n"
+    "    layers:\n      - " layer "\n    outputs: [{path: a.exr" more "}]\n"
+#define IMAGE(layer) PICTURE(layer, "")
+#define NUMBERED(layer) PICTURE(layer, ", data: true")
 #define LINED(width)                                                                                                   \
     IMAGE("surface: {colour: [1, 1, 1], edges: {width: " width                                                         \
           ", colour: [0, 0, 0]}, material: {ambient: 1, diffuse: 0, specular: 0}}")
@@ -152,6 +154,45 @@ static void edges_are_those_of_the_callers_cells(void **state)
         check_edges(&order_kinds[k], 0.1, LINED("3"), 3, 1);
         check_edges(&order_kinds[k], 0, LINED("20"), 20, fmin(0.25 * (length / 20 - 2), 1));
     }
+}
+
+/* Hexes of 8, 20 and 27 nodes in turn, in one mesh: all have lines along their edges, and a linear field has its normal
+ * everywhere. */
+static void cells_of_several_orders_share_a_mesh(void **state)
+{
+    (void)state;
+    static const struct {
+        unsigned char type;
+        int nodes;
+    } kinds[3] = {{INSITU_HEX, 8}, {INSITU_QUADRATIC_HEX, 20}, {INSITU_TRIQUADRATIC_HEX, 27}};
+    const order_kind kind = {"hex", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2};
+    order_mesh mesh;
+    edge_list edges;
+    unsigned char types[8];
+    int64_t offsets[9] = {0}, wrong = 0;
+    order_mesh_create(&kind, 2, 0, plane, own_rank, rank_count, &mesh);
+    for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
+        const int at = (int)(cell * rank_count + own_rank) % 3;
+        types[cell] = kinds[at].type;
+        offsets[cell + 1] = offsets[cell] + kinds[at].nodes;
+        memmove(mesh.connectivity + offsets[cell], mesh.connectivity + cell * 27,
+                (size_t)kinds[at].nodes * sizeof *mesh.connectivity);
+    }
+    mesh.mesh.cell_types = (insitu_array){types, INSITU_UINT8, 0};
+    mesh.mesh.offsets = (insitu_array){offsets, INSITU_INT64, 0};
+    mesh.mesh.connectivity_count = offsets[mesh.cell_count];
+    list_edges(&kind, 0, &edges);
+    caught_picture lined = draw_picture(LINED("3"), &mesh, NULL);
+    everywhere(own_rank || count_wrong(&lined, &edges, 3, 1) == 0);
+    caught_picture flat = draw_picture(NUMBERED("isosurface: {field: f, values: [0.1]}"), &mesh, NULL);
+    const double length = sqrt(1 + 0.3 * 0.3 + 0.2 * 0.2), normal[3] = {0.3 / length, 0.2 / length, 1 / length};
+    for (int pixel = 0; own_rank == 0 && pixel < PIXELS; pixel++)
+        for (int a = 0; a < 3 && isfinite(flat.depth[pixel]); a++)
+            wrong += !(fabs((double)flat.data[a * PIXELS + pixel] - normal[a]) < 1e-5);
+    everywhere(wrong == 0);
+    free_caught(&lined);
+    free_caught(&flat);
+    order_mesh_free(&mesh);
 }
 
 /* ---- shells ------------------------------------------------------------------------------------------------------ */
@@ -406,9 +447,13 @@ static int begin_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(edges_are_those_of_the_callers_cells),  cmocka_unit_test(shells_have_edges_of_their_own),
-        cmocka_unit_test(cells_that_cannot_be_shown_count_once), cmocka_unit_test(cells_that_show_nothing_count_once),
-        cmocka_unit_test(statistics_count_cells_once),           cmocka_unit_test(cell_values_count_once),
+        cmocka_unit_test(edges_are_those_of_the_callers_cells),
+        cmocka_unit_test(cells_of_several_orders_share_a_mesh),
+        cmocka_unit_test(shells_have_edges_of_their_own),
+        cmocka_unit_test(cells_that_cannot_be_shown_count_once),
+        cmocka_unit_test(cells_that_show_nothing_count_once),
+        cmocka_unit_test(statistics_count_cells_once),
+        cmocka_unit_test(cell_values_count_once),
         cmocka_unit_test(normals_of_means_are_those_of_pieces),
     };
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
