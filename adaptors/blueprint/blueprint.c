@@ -58,12 +58,11 @@ static known_mesh *add_known_mesh(insitu_blueprint *adaptor, const node *of, con
     known_mesh *known_meshes =
         realloc(adaptor->known_meshes, (size_t)(adaptor->known_count + 1) * sizeof *known_meshes);
     if (known_meshes) adaptor->known_meshes = known_meshes;
-    char *copy = known_meshes ? malloc(strlen(name) + 1) : NULL;
+    char *copy = known_meshes ? strdup(name) : NULL;
     if (!copy) {
         node_set_error(of, "", INSITU_ERROR_MEMORY, "no memory for a mesh's name");
         return NULL;
     }
-    strcpy(copy, name);
     adaptor->known_meshes[adaptor->known_count] = (known_mesh){.name = copy, .step_number = -1};
     return &adaptor->known_meshes[adaptor->known_count++];
 }
