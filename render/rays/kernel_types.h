@@ -14,7 +14,8 @@ enum {
     KERNEL_TILE_RUN = 4, /* number of consecutive tiles, row by row, that one thread draws before it takes more */
     KERNEL_BLOCK = 4,    /* pixels along a block's side */
     KERNEL_MAX_GROUP = RENDER_MAX_GROUP,
-    KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS
+    /* a volume's intervals of visible values, or the isovalues of a surface layer */
+    KERNEL_MAX_INTERVALS = RENDER_MAX_ISOVALUES > RENDER_MAX_INTERVALS ? RENDER_MAX_ISOVALUES : RENDER_MAX_INTERVALS
 };
 
 /* KERNEL_BLACK: transmittance below which the rest of a segment is dropped. KERNEL_SHORT: shortest integration step, in
