@@ -14,9 +14,10 @@ enum {
     KERNEL_TILE_RUN = 4, /* number of consecutive tiles, row by row, that one thread draws before it takes more */
     KERNEL_BLOCK = 4,    /* pixels along a block's side */
     KERNEL_MAX_GROUP = RENDER_MAX_GROUP,
-    /* a volume's intervals of visible values, or the isovalues of a surface layer */
-    KERNEL_MAX_INTERVALS = RENDER_MAX_ISOVALUES > RENDER_MAX_INTERVALS ? RENDER_MAX_ISOVALUES : RENDER_MAX_INTERVALS
+    KERNEL_MAX_INTERVALS = RENDER_MAX_ISOVALUES /* of a volume's visible values, or of a layer's isovalues */
 };
+
+_Static_assert((int)KERNEL_MAX_INTERVALS >= (int)RENDER_MAX_INTERVALS, "a volume's intervals fit");
 
 /* KERNEL_BLACK: transmittance below which the rest of a segment is dropped. KERNEL_SHORT: shortest integration step, in
  * unit distances and as a share of the ray's interval in a piece (kernel_integral.h). */
