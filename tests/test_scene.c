@@ -176,6 +176,10 @@ static const char every_key[] =
     "  l: {lambda2: u}\n"
     "  s: {strain_rate: u}\n"
     "  slice: {field: u, component: x}\n"
+    "meshes:\n"
+    "  plate: {warp: {field: DISPL, scale: -2.5}}\n"
+    "  plate/a.b: {warp: w}\n"
+    "  colour: {warp: {field: u, scale: 0}}\n"
     "writing: step\n"
     "parameters: {inflow: 2.5, _k-2: -1e-3, values: 3, color: 4, axis: 5}\n"
     "schedule: radix\n";
@@ -491,6 +495,33 @@ static void statistics_and_conditions_are_read(void **state)
     scene_free(&s);
 }
 
+/* Names of meshes are the simulation's: no short form is meant by them. */
+static void warps_are_read_by_their_meshes(void **state)
+{
+    (void)state;
+    static const scene_warp expected[] = {
+        {"plate", "DISPL", -2.5, 0, 0}, {"plate/a.b", "w", 1, 0, 0}, {"colour", "u", 0, 0, 0}};
+    scene s;
+    parse_good(every_key, &s);
+    assert_int_equal(s.warp_count, 3);
+    for (int i = 0; i < 3; i++) {
+        const scene_warp *warp = &s.warps[i];
+        assert_string_equal(warp->mesh, expected[i].mesh);
+        assert_string_equal(warp->field, expected[i].field);
+        assert_true(fabs(warp->scale - expected[i].scale) <= 0);
+        assert_int_equal(warp->line, s.warps[0].line + i);
+        assert_int_equal(warp->field_line, warp->line);
+    }
+    assert_ptr_equal(scene_find_warp(&s, "plate"), &s.warps[0]);
+    assert_ptr_equal(scene_find_warp(&s, "plate/a"), &s.warps[0]);
+    assert_ptr_equal(scene_find_warp(&s, "plate/a.b/c"), &s.warps[1]);
+    assert_null(scene_find_warp(&s, "plates"));
+    scene_free(&s);
+    parse_good(fewest_keys, &s);
+    assert_int_equal(s.warp_count, 0);
+    scene_free(&s);
+}
+
 /* Names of parameters are the scene's own: no short form, and no other spelling, is meant by them. */
 static void parameters_are_read_by_their_names(void **state)
 {
@@ -785,6 +816,22 @@ static const struct bad_file {
     {1, "statistics: [{field: f, path: a.csv, every: 0}]", 1, {"statistics[0].every: \"0\"", "1 to"}},
     {1, "statistics: [{field: f, path: a.csv, histogram: {bins: 300}}]", 1, {"histogram.bins: \"300\"", "1 to 256"}},
     {1, "statistics: [{field: f, path: a.csv, histogram: {range: [2, 2]}}]", 1, {"histogram.range: goes from 2"}},
+    {1, "meshes: 7", 1, {"meshes: \"7\" is not allowed", "a mapping from names to these"}},
+    {1, "meshes: {}", 1, {"meshes: a list of 0 is not allowed", "1 to 64"}},
+    {1, "meshes: {a: u}", 1, {"meshes[0]: \"u\" is not allowed", "a mapping with the keys name, warp"}},
+    {1, "meshes: {a: {}}", 1, {"meshes.a.warp: missing", "a mapping with the keys field, scale, or a field's name"}},
+    {1, "meshes: {a: {warp: }}", 1, {"meshes.a.warp: nothing is not allowed", "a field's name"}},
+    {1, "meshes: {a: {warp: [u, v]}}", 1, {"meshes.a.warp: a list is not allowed", "a mapping"}},
+    {1, "meshes: {a: {warp: {scale: 2}}}", 1, {"meshes.a.warp.field: missing", "a text"}},
+    {1, "meshes: {a: {warp: {field: u, scale: big}}}", 1, {"meshes.a.warp.scale: \"big\"", "a number"}},
+    {1, "meshes: {a: {warp: {field: u, scale: 1e31}}}", 1, {"meshes.a.warp.scale: \"1e31\"", "to 1e+30"}},
+    {1, "meshes: {a: {warp: {field: u, factor: 2}}}", 1, {"the key \"factor\" is unknown (did you mean scale?)"}},
+    {1, "meshes: {a: {warp: {field: u, offset: 2}}}", 1, {"meshes.a.warp: the key \"offset\"", "field, scale"}},
+    {1, "meshes: {a: {displacement: u}}", 1, {"meshes.a: the key \"displacement\" is unknown (did you mean warp?)"}},
+    {1, "meshes: {a: {warp: u}, b: {warp: u}, a: {warp: v}}", 1, {"meshes.a: the name is given twice"}},
+    {1, "meshes: {a.b: {warp: u}, \"a.b\": {warp: v}}", 1, {"meshes[1]: the name is given twice"}},
+    {1, "mesh: {a: {warp: u}}", 1, {"\"mesh\" is unknown (did you mean meshes?)"}},
+    {5, "    meshes: {a: {warp: u}}", 5, {"the key \"meshes\" is unknown", "stands at the top of the file"}},
     {1, "parameters: {a: 1, inflow: fast}", 1, {"parameters.inflow: \"fast\" is not allowed, expected a number"}},
     {1, "parameters: {inflow: }", 1, {"parameters.inflow: nothing is not allowed", "a number"}},
     {1, "parameters: {inflow: [1]}", 1, {"parameters.inflow: a list", "a number"}},
@@ -1387,6 +1434,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(lines_are_of_what_colours_the_layer),
         cmocka_unit_test(surfaces_have_their_colours),
         cmocka_unit_test(statistics_and_conditions_are_read),
+        cmocka_unit_test(warps_are_read_by_their_meshes),
         cmocka_unit_test(parameters_are_read_by_their_names),
         cmocka_unit_test(clips_are_of_the_image_and_of_layers),
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),

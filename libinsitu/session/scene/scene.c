@@ -182,6 +182,7 @@ static insitu_status convert_file(const scene_document *d, const scene_file *in,
     if (status == INSITU_OK) status = convert_images(d, in, out);
     if (status == INSITU_OK) status = scene_convert_statistics(d, in, out);
     if (status == INSITU_OK) status = scene_convert_parameters(d, out);
+    if (status == INSITU_OK) status = scene_convert_warps(d, in, out);
     return status == INSITU_OK ? scene_check_outputs(d, out) : status;
 }
 
@@ -198,6 +199,17 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
     for (int i = 0; i < field->mesh_count; i++)
         if (scene_name_stands_for(field->meshes[i], mesh)) return true;
     return field->mesh_count == 0;
+}
+
+const scene_warp *scene_find_warp(const scene *s, const char *mesh)
+{
+    const scene_warp *found = NULL;
+    for (int i = 0; i < s->warp_count; i++) {
+        const scene_warp *warp = &s->warps[i];
+        if (!scene_name_stands_for(warp->mesh, mesh)) continue;
+        if (!found || strlen(warp->mesh) > strlen(found->mesh)) found = warp;
+    }
+    return found;
 }
 
 /* ---- whole scenes ---- */
@@ -304,6 +316,7 @@ void scene_free(scene *s)
     scene_free_derived(s);
     for (int i = 0; i < s->parameter_count; i++) base_free(s->parameters[i].name);
     base_free(s->parameters);
+    scene_free_warps(s);
     for (int i = 0; i < s->database_count; i++) base_free(s->databases[i].path);
     base_free(s->databases);
     for (int i = 0; i < s->montage_count; i++) base_free(s->montages[i].name);

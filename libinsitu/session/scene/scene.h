@@ -560,6 +560,14 @@ typedef struct scene_parameter {
     double value;
 } scene_parameter;
 
+/* A mesh whose vertices are drawn at x + scale * u, where u is the value of a field at the vertex. */
+typedef struct scene_warp {
+    char *mesh;   /* name of the mesh, or beginning of the names of several, as at a layer (scene_name_stands_for()) */
+    char *field;  /* name of the field of displacements */
+    double scale; /* factor of the displacements */
+    int line, field_line; /* lines of the mesh's name and of the field in the scene file */
+} scene_warp;
+
 typedef struct scene {
     int derived_count;      /* number of derived fields, 0 .. SCENE_MAX_DERIVED */
     scene_derived *derived; /* derived fields; each comes after the fields from which it is derived */
@@ -577,6 +585,8 @@ typedef struct scene {
     scene_statistics *statistics;
     int parameter_count; /* number of parameters, 0 .. 64; their names differ */
     scene_parameter *parameters;
+    int warp_count; /* number of warps, 0 .. 64; the names of their meshes differ */
+    scene_warp *warps;
 } scene;
 
 /* Parses a text of `size` bytes. file_name is used in messages, and paths in the scene are relative to its folder.
@@ -592,6 +602,10 @@ const scene_parameter *scene_find_parameter(const scene *s, const char *name);
 /* Writes the end of a message about an unknown parameter: the name that was probably meant, and a list of all
  * parameters. */
 void scene_list_parameters(const scene *s, const char *name, char *words, size_t size);
+
+/* Returns the warp of the mesh of this name, or NULL if the mesh is drawn as it is. If several entries stand for the
+ * mesh, this is the one with the longest name. */
+const scene_warp *scene_find_warp(const scene *s, const char *mesh);
 
 /* The values by which placeholders are replaced. */
 typedef struct scene_moment {

@@ -396,6 +396,27 @@ DEFINE_MAPPING(derived, "fields", DERIVED_KEYS);
 static const cyaml_schema_value_t derived = {
     CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_derived, derived_fields)};
 
+#define WARP_KEYS(X)                                                                                                   \
+    X(TEXT("field", REQUIRED, scene_file_warp, field, 255),                                                            \
+      .help =                                                                                                          \
+          "Name of the field of displacements, one of the simulation's: 3 components at the vertices, or 2, along "    \
+          "x and y, on a mesh of triangles, quads and polygons.")                                                      \
+    X(CYAML_FIELD_FLOAT_PTR("scale", OPTIONAL, scene_file_warp, scale),                                                \
+      .help = "Factor of the displacements. With 0 the mesh is drawn as it is.", .default_text = "`1`", .low = -1e30,  \
+      .high = 1e30)
+DEFINE_MAPPING(warp, "warp", WARP_KEYS);
+
+#define MESH_KEYS(X)                                                                                                   \
+    X(TEXT("name", REQUIRED, scene_file_mesh, name, 255),                                                              \
+      .help = "The name that the simulation gives the mesh; or the beginning of several meshes' names, as at a "       \
+              "layer. Of several entries for a mesh, the one with the longest name holds.")                            \
+    X(CYAML_FIELD_MAPPING_PTR("warp", REQUIRED, scene_file_mesh, warp, warp_fields),                                   \
+      .help = "Draw the mesh's vertices at x + `scale` * `field`, as in [Warped meshes](#warped-meshes).",             \
+      .child = &warp_mapping)
+DEFINE_MAPPING(mesh, "meshes", MESH_KEYS);
+
+static const cyaml_schema_value_t mesh = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_mesh, mesh_fields)};
+
 static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)}, {0}};
 
 #define TOP_KEYS(X)                                                                                                    \
@@ -439,6 +460,10 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
       .help = "Fields that are computed from the simulation's fields, or from each other. This is a mapping from "     \
               "their names to their definitions: see [Derived fields](#derived-fields).",                              \
       .default_text = "none", .child = &derived_mapping, .is_named = true)                                             \
+    X(CYAML_FIELD_SEQUENCE("meshes", POINTER, scene_file, meshes, &mesh, 1, SCENE_MAX_NAMES),                          \
+      .help = "How meshes are drawn: a mapping from their names to what is to be done with them, as "                  \
+              "`meshes: {plate: {warp: {field: DISPL, scale: 10}}}`.",                                                 \
+      .default_text = "each as it is given", .child = &mesh_mapping, .is_named = true)                                 \
     X(CYAML_FIELD_IGNORE("parameters", OPTIONAL),                                                                      \
       .help = "Numbers for the simulation, which reads them by `insitu_parameter()`: `parameters: {inflow: 2.5}`. An " \
               "edit of the scene changes them from the step on that reads it, on all ranks at once. A name begins "    \

@@ -269,6 +269,16 @@ typedef struct scene_file_image {
     int outputs_count;
 } scene_file_image;
 
+typedef struct scene_file_warp {
+    char *field;
+    double *scale;
+} scene_file_warp;
+
+typedef struct scene_file_mesh {
+    char *name;
+    scene_file_warp *warp;
+} scene_file_mesh;
+
 typedef struct scene_file {
     int *threads;  /* number of threads per rank */
     int *tree;     /* whether trees are built over all cells or over candidates alone (scene_tree) */
@@ -280,6 +290,8 @@ typedef struct scene_file {
     int statistics_count;
     scene_file_derived *fields;
     int fields_count;
+    scene_file_mesh *meshes;
+    int meshes_count;
 } scene_file;
 
 struct scene_mapping;

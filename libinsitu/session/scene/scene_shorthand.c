@@ -223,8 +223,9 @@ static void expand_slice(rewrite *r, int *value)
     append_pair(r, *value, "planes", make_list_of(r, plane));
 }
 
-/* Expands a mapping from names to a list of mappings with the key `name`. A text becomes an expression. */
-static void expand_fields(rewrite *r, int *value)
+/* Expands a mapping from names to a list of mappings with the key `name`. A value that is no mapping becomes one, in
+ * which it has the key text_key; if that is NULL, it remains as it is, which the schema refuses. */
+static void expand_named(rewrite *r, const char *text_key, int *value)
 {
     if (find_node_by_index(r, *value)->type != YAML_MAPPING_NODE) return;
     const int list = make_list(r), from = *value;
@@ -234,12 +235,22 @@ static void expand_fields(rewrite *r, int *value)
         const yaml_node_pair_t pair = find_node_by_index(r, from)->data.mapping.pairs.start[i];
         const bool is_mapping = find_node_by_index(r, pair.value)->type == YAML_MAPPING_NODE;
         r->mark = find_node_by_index(r, pair.key)->start_mark;
-        const int entry = is_mapping ? pair.value : make_mapping(r);
-        if (!is_mapping) append_pair(r, entry, "expression", pair.value);
-        append_pair(r, entry, "name", pair.key);
+        const int entry = is_mapping || !text_key ? pair.value : make_mapping(r);
+        if (!is_mapping && text_key) append_pair(r, entry, text_key, pair.value);
+        if (is_mapping || text_key) append_pair(r, entry, "name", pair.key);
         append(r, list, entry);
     }
     *value = list;
+}
+
+static void expand_fields(rewrite *r, int *value)
+{
+    expand_named(r, "expression", value);
+}
+
+static void expand_meshes(rewrite *r, int *value)
+{
+    expand_named(r, NULL, value);
 }
 
 /* ---- whole documents --------------------------------------------------------------------------------------------- */
@@ -275,6 +286,8 @@ static const struct {
     {"text", expand_mappings, NULL},
     {"slice", expand_slice, NULL},
     {"fields", expand_fields, "a mapping from names to these, or to expressions"},
+    {"meshes", expand_meshes, "a mapping from names to these"},
+    {"warp", expand_field, "a field's name"},
 };
 
 const char *scene_shorthand_words(const char *key, size_t length)
@@ -351,8 +364,10 @@ bool scene_expand_shorthand(yaml_document_t *document)
     const int count = (int)(document->nodes.top - document->nodes.start);
     /* In these mappings keys are names that the scene chooses, which have no short forms. */
     const int parameters = find_named_mapping(&r, "parameters"), fields = find_named_mapping(&r, "fields");
+    const int meshes = find_named_mapping(&r, "meshes");
     for (int number = 1; number <= count && r.has_memory; number++)
-        if (number != parameters && number != fields && find_node_by_index(&r, number)->type == YAML_MAPPING_NODE)
+        if (number != parameters && number != fields && number != meshes &&
+            find_node_by_index(&r, number)->type == YAML_MAPPING_NODE)
             expand_mapping(&r, number);
     return r.has_memory;
 }
@@ -473,6 +488,11 @@ static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"q", "q_criterion"},
                                           {"shear_rate", "strain_rate"},
                                           {"formula", "expression"},
+                                          {"displacement", "warp"},
+                                          {"deform", "warp"},
+                                          {"vector", "field"},
+                                          {"factor", "scale"},
+                                          {"mesh", "meshes"},
                                           {"frequency", "every"},
                                           {"interval", "every"}};
 
