@@ -75,7 +75,7 @@ def scene_of(block):
     key = re.match(r"\s*([\w-]+)", block)[1]
     if key == "images":
         return block
-    if key in ("fields", "statistics", "parameters"):
+    if key in ("fields", "meshes", "statistics", "parameters"):
         return block if re.search(r"^images:", block, re.M) else image + layers + block
     return image + ("" if key == "layers" else layers) + textwrap.indent(block, "    ")
 

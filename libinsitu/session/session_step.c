@@ -31,6 +31,7 @@
 #include "session_surfaces.h"
 #include "session_torn.h"
 #include "session_vertex_order.h"
+#include "session_warped.h"
 
 static double milliseconds_since(double start)
 {
@@ -139,16 +140,21 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
                                    base_error *error)
 {
     const session_team *team = &s->team;
+    const scene *scene = &s->scene_file.scene;
     base_error reason = {.status = INSITU_OK};
+    bool are_cells_changed = changes->are_cells_changed;
     if (changes->are_levels_changed && session_update_covers(&s->meshes, team, error)) return error->status;
-    if (changes->are_cells_changed) session_check_meshes(&s->meshes, team, &reason);
+    if (session_update_warps(scene, s->scene_file.path, &s->meshes, team, &are_cells_changed, error))
+        return error->status;
+    if (are_cells_changed) session_check_meshes(&s->meshes, team, &reason);
     if (!refused->status) *refused = reason;
     const bool of_names = changes->are_names_changed || refused->status || s->catalogue.has_faults;
-    if (changes->are_cells_changed) session_forget_homes(&s->catalogue);
+    if (are_cells_changed) session_forget_homes(&s->catalogue);
     insitu_status status = list_meshes(s, of_names, changes->are_names_shared && !refused->status, error);
-    if (changes->are_cells_changed && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
-    if ((changes->are_cells_changed || of_names) && !status)
+    if (are_cells_changed && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
+    if ((are_cells_changed || of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
+    if (!status) session_check_warps(scene, &s->catalogue, &s->report);
     return status;
 }
 

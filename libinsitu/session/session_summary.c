@@ -91,7 +91,7 @@ static bool is_field_in_use(const session_mesh *mesh, int field)
 {
     for (int i = 0; i < mesh->scalar_count; i++)
         if (mesh->scalars[i].field == field) return true;
-    return false;
+    return mesh->fields[field].is_displacement;
 }
 
 static int64_t value_bytes(const insitu_field *field)
@@ -166,6 +166,7 @@ static void report_topology(session_report *out, copied_reasons *copied, const s
     add_copied(copied, t->face_bytes, "its faces' vertices, out of lists");
     add_copied(copied, mesh->conformed.bytes, "arrays that are not aligned or of types that are not read in place");
     add_copied(copied, mesh->lattice.bytes, "coordinates along the axes of its lattice");
+    add_copied(copied, mesh->warp.bytes, "coordinates of its vertices where the scene's warp moves them");
     if (mesh->covered) add_copied(copied, mesh->given.cell_count, "flags of cells that finer blocks cover");
     add_copied(copied, mesh->torn.bytes, "vertices of each cell's own, for fields with values at corners");
 }

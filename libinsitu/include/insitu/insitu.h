@@ -360,12 +360,13 @@ struct insitu_field;
  * members that belong to them (count, component_stride_bytes or components, index, corner_row, patches, changed), but
  * must not change name, centring and component_count. insitu_step() calls it on its caller's thread, at most once per
  * step, and only if a picture, a statistic or a condition of this step needs the field. The arrays are borrowed until
- * the step has returned. All ranks call the fill functions of their fields in the same order, by the names of meshes
- * and then of fields: if all ranks set the field with a fill function, it may communicate, on a communicator of the
- * caller's. It must not call the session. Each such call except insitu_error() is refused (the functions that return a
- * status return INSITU_ERROR_ARGUMENT, insitu_last_report() an empty report, and insitu_last_pictures() none) and is an
- * error of the step. A status other than INSITU_OK is also an error of the step. The step returns it on all ranks; the
- * other fill functions are still called. */
+ * the step has returned. All ranks call the fill functions of their fields in the same order: those by which the scene
+ * warps meshes by the names of meshes, then the others by the names of meshes and then of fields. So if all ranks set
+ * the field with a fill function, it may communicate, on a communicator of the caller's. It must not call the session.
+ * Each such call except insitu_error() is refused (the functions that return a status return INSITU_ERROR_ARGUMENT,
+ * insitu_last_report() an empty report, and insitu_last_pictures() none) and is an error of the step. A status other
+ * than INSITU_OK is also an error of the step. The step returns it on all ranks; the other fill functions are still
+ * called. */
 typedef insitu_status insitu_fill(void *fill_data, struct insitu_field *field);
 
 /* One rank's part of a field. It is borrowed in the same way as a mesh. Call insitu_field_defaults() first. */

@@ -471,7 +471,7 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
 static insitu_status check_plane(const session_mesh *mesh, const mesh_tally *tally, base_error *error)
 {
     const grid *g = &mesh->cells;
-    if (mesh->given.coordinates[2].data || g->lattice || tally->drawn_count == tally->shell_count) return INSITU_OK;
+    if (mesh->original.coordinates[2].data || g->lattice || tally->drawn_count == tally->shell_count) return INSITU_OK;
     int64_t cell = 0;
     while (cell + 1 < g->cell_count && (grid_is_ghost(g, cell) || grid_is_shell_type(grid_cell_type(g, cell)))) cell++;
     return base_fail(
@@ -566,12 +566,19 @@ static insitu_status describe_misfit(const session_mesh *mesh, base_error *error
 static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
     if (mesh->misfit.exists) return describe_misfit(mesh, error);
+    if (mesh->warp.problem.status) {
+        *error = mesh->warp.problem;
+        return error->status;
+    }
     session_fill_conformed(mesh, threads);
     if (!mesh->topology.is_made && session_make_topology(mesh, threads, error)) return error->status;
     insitu_status status = session_make_axes(mesh, error);
     if (!status) status = check_cells_of(mesh, threads, error);
     if (status) session_drop_topology(&mesh->topology);
-    return status;
+    if (!status || !mesh->warp.is_on) return status;
+    const base_error fault = *error;
+    *error = (base_error){0};
+    return base_fail(error, fault.status, "%.900s; the scene's warp moves its vertices", fault.message);
 }
 
 insitu_status session_check_meshes(const session_meshes *meshes, const session_team *team, base_error *error)

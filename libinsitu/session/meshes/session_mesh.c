@@ -338,9 +338,27 @@ void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh)
     meshes->are_cells_changed = true;
 }
 
+void session_mark_moved(session_meshes *meshes, session_mesh *mesh)
+{
+    mesh->coordinates_stamp = ++meshes->stamp;
+    mesh->is_check_stale = true;
+    mesh->torn.is_made = false;
+    session_drop_outers(mesh, false);
+    mesh->is_geometry_stale = true;
+    meshes->are_cells_changed = true;
+    for (int i = 0; i < mesh->scalar_count; i++) mesh->scalars[i].are_values_stale = true;
+}
+
+void session_drop_warp(session_mesh *mesh)
+{
+    for (int axis = 0; axis < 3; axis++) base_free((void *)(uintptr_t)mesh->warp.coordinates[axis].data);
+    mesh->warp = (session_warp){0};
+}
+
 static void drop_cells(session_mesh *mesh)
 {
     drop_derived_data(mesh);
+    session_drop_warp(mesh);
     session_drop_axes(&mesh->lattice);
     session_drop_conformed(&mesh->conformed);
     base_free(mesh->covered);

@@ -24,6 +24,7 @@ typedef struct session_field {
     /* set if the session computes the field from other fields, in `copy` (plan/session_derived.h) */
     bool is_derived;
     bool is_source;           /* set if a derived field that this step needs is computed from it */
+    bool is_displacement;     /* set if the scene warps the mesh by this field */
     uint64_t inputs_hash;     /* hash of the inputs of a derived field's values; 0: there are no values yet */
     int64_t version;          /* incremented at each known change of the values */
     insitu_patch *patches;    /* copy of the table given.patches, owned by the session */
@@ -185,6 +186,21 @@ typedef struct session_lattice {
     int64_t bytes;               /* size of the coordinates along all axes in bytes */
 } session_lattice;
 
+/* Coordinates that are read in place of the caller's, because the scene draws the mesh with moved vertices
+ * (session_warp.h). They are a copy reported to the user. */
+typedef struct session_warp {
+    bool is_on;    /* set if the moved coordinates are read */
+    bool is_stale; /* set if the caller's coordinates may have changed since they were moved */
+    uint64_t key;  /* hash that identifies the displacements by which they were moved */
+    /* the moved coordinates, owned and packed; no data along an axis along which nothing moves */
+    insitu_array coordinates[3];
+    insitu_array unmoved[3]; /* what session_mesh.given has without the warp */
+    /* the caller's lattice without coordinates along axes, as coordinates are then given by vertex */
+    insitu_lattice lattice;
+    int64_t bytes;
+    base_error problem; /* why the vertices could not be moved, which the check of the mesh returns */
+} session_warp;
+
 enum { SESSION_CONFORMED = 9 };
 
 /* Copies of arrays whose type cannot be read in place (session_conform.h). They are reported to the user. */
@@ -225,11 +241,13 @@ typedef struct session_mesh {
     int64_t block;        /* the block's number, or SESSION_WHOLE */
     char *label;          /* name for messages: "m", or "m[17]" for block 17 */
     insitu_mesh original; /* the caller's description */
-    insitu_mesh given;    /* the description with copies in place of the arrays that cannot be read in place */
+    /* the description with copies in place of the arrays that cannot be read in place, and of moved coordinates */
+    insitu_mesh given;
     session_conformed conformed;
     session_topology topology;
     session_torn torn;
     session_lattice lattice;
+    session_warp warp;
     /* One byte per cell, read in place of `ghosts`: set for ghosts and for cells that finer blocks cover
      * (outer/session_covers.h). A copy reported to the user; NULL: `ghosts` is read */
     unsigned char *covered;
@@ -294,7 +312,8 @@ typedef struct session_meshes {
     bool are_levels_changed;
     int64_t level_box_count; /* number of refined blocks near those of this rank, including its own */
     session_level_box *level_boxes;
-    int64_t stamp; /* incremented by each change of cells or coordinates */
+    int64_t stamp;   /* incremented by each change of cells or coordinates */
+    bool are_warped; /* set if the scene of the last step that drew warped meshes; the same on all ranks */
     /* error of a set call that cannot be stored with a mesh; it is kept for one step */
     base_error pending_error;
     char *pending_mesh, *pending_field; /* mesh and field of this error; NULL: it belongs to no particular one */
@@ -401,6 +420,10 @@ void session_drop_copy(session_field *field);
 void session_drop_field_tables(session_field *field);
 /* Frees the data that depends on the cells, after these have changed. Fields are kept. */
 void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh);
+/* Marks the coordinates of the vertices as changed. The cells are the same. */
+void session_mark_moved(session_meshes *meshes, session_mesh *mesh);
+/* Frees the moved coordinates, which must not be in use any more. */
+void session_drop_warp(session_mesh *mesh);
 /* Removes the derived fields, and with them all scalars and thresholds, which refer to fields by index. */
 void session_drop_derived(session_mesh *mesh);
 /* Frees the mesh of outer faces and, if with_faces, the faces themselves. The threshold is kept. */

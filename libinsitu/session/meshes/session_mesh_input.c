@@ -12,6 +12,7 @@
 #include "session_lattice.h"
 #include "session_nodes.h"
 #include "session_topology.h"
+#include "session_warp.h"
 
 void insitu_mesh_defaults(insitu_mesh *mesh)
 {
@@ -67,8 +68,7 @@ static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
     return status;
 }
 
-/* Returns whether cells without z coordinates may be visible, namely as shells in the plane z = 0. */
-static bool may_be_plane(const insitu_mesh *mesh)
+bool session_may_be_plane(const insitu_mesh *mesh)
 {
     if (mesh->lattice) return session_is_plane(mesh->lattice);
     const int type = (int)mesh->cell_type;
@@ -103,7 +103,7 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
     const session_array_rule rules[] = {
         {"x coordinates", vertices, numbers | (has_axes ? optional : 0), 1},
         {"y coordinates", vertices, numbers | (has_axes ? optional : 0), 1},
-        {"z coordinates", vertices, numbers | (has_axes || may_be_plane(mesh) ? optional : 0), 1},
+        {"z coordinates", vertices, numbers | (has_axes || session_may_be_plane(mesh) ? optional : 0), 1},
         {"vertex ids", vertices, integers | optional, 1},
         {"cell types", cells, any | optional, 1},
         {"connectivity indices", mesh->connectivity_count, any, 1},
@@ -374,6 +374,7 @@ static void store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_
 
     if (changed & INSITU_CHANGED_TOPOLOGY) {
         session_drop_cell_data(meshes, mesh);
+        session_drop_warp(mesh);
         base_free(mesh->covered);
         mesh->covered = NULL;
         meshes->are_levels_changed = meshes->are_levels_changed || had_levels || session_has_levels(given);
@@ -381,16 +382,12 @@ static void store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_
     if (had_ids != (given->vertex_ids.data != NULL) || had_levels != session_has_levels(given))
         meshes->are_names_changed = true;
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) {
-        mesh->coordinates_stamp = ++meshes->stamp;
-        mesh->is_check_stale = true;
-        mesh->torn.is_made = false;
-        session_drop_outers(mesh, (changed & INSITU_CHANGED_TOPOLOGY) != 0);
-        mesh->is_geometry_stale = true;
-        meshes->are_cells_changed = true;
-        for (int i = 0; i < mesh->scalar_count; i++) mesh->scalars[i].are_values_stale = true;
+        session_mark_moved(meshes, mesh);
+        mesh->warp.is_stale = true;
     }
     session_take_lattice(mesh);
     mesh->original.lattice = mesh->given.lattice;
+    if (mesh->warp.is_on) session_read_warp(mesh);
     session_read_topology(mesh);
     mesh->is_given = true;
     mesh->problem = (base_error){0};

@@ -10,6 +10,9 @@
 insitu_status session_set_mesh(session_meshes *meshes, const char *name, int64_t block, const insitu_mesh *given,
                                base_error *error);
 
+/* Returns whether cells without z coordinates may be visible, namely as shells in the plane z = 0. */
+bool session_may_be_plane(const insitu_mesh *mesh);
+
 /* Stores the error of a check, with `mesh "name": ` and, if there is a field, its name in front of the message. Returns
  * its status. */
 insitu_status session_prefix_error(base_error *error, const char *mesh, const char *field, const base_error *what);

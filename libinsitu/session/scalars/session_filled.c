@@ -28,12 +28,12 @@ static insitu_status call_fill(session_meshes *meshes, const session_mesh *mesh,
                      given->name, (int)status, insitu_status_name(status));
 }
 
-/* Calls the field's fill function, unless it was called in this step. If it has failed, its error is returned every
- * time the field is needed. */
-static insitu_status fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error)
+/* If the call has failed, its error is returned every time the field is needed. */
+insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error)
 {
     session_field *field = &mesh->fields[index];
     insitu_field filled;
+    if (!field->given.fill) return INSITU_OK;
     *error = field->fill_problem;
     if (field->is_filled) return error->status;
     field->is_filled = true;
@@ -51,7 +51,7 @@ static void fill_part(session_meshes *meshes, session_mesh *part, const char *na
     base_error own = {0};
     const int index = part->is_given ? session_find_field(part, name) : -1;
     if (index < 0 || !part->fields[index].given.fill || !is_needed(part, index, of_images)) return;
-    if (fill_field(meshes, part, index, &own)) session_store_problem(&part->fields[index], &own, error);
+    if (session_fill_field(meshes, part, index, &own)) session_store_problem(&part->fields[index], &own, error);
 }
 
 insitu_status session_fill_fields(session_meshes *meshes, const session_catalogue *catalogue, bool of_images,

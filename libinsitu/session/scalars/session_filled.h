@@ -11,6 +11,10 @@
 insitu_status session_fill_fields(session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
                                   base_error *error);
 
+/* Calls the field's fill function, if it has one, unless it was called in this step; *error is then that of the call.
+ * Local, but the function may communicate. */
+insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error);
+
 /* Ends the step. Afterwards the session does not read the filled arrays any more. */
 void session_forget_filled(const session_meshes *meshes);
 

@@ -1,0 +1,204 @@
+/* A moved coordinate has the type of the caller's, and is double on a lattice with coordinates along axes, which
+ * becomes one with coordinates by vertex. It is computed as x + scale * u in double and rounded once, so that equal
+ * vertices of blocks and ranks that have equal displacements stay equal. Coordinates are compared while they are
+ * written: a field that was set again with the same values moves nothing. */
+#include "session_warp.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_conform.h"
+#include "session_lattice.h"
+#include "session_region.h"
+#include "session_topology.h"
+
+void session_read_warp(session_mesh *mesh)
+{
+    session_warp *warp = &mesh->warp;
+    for (int axis = 0; axis < 3; axis++) {
+        warp->unmoved[axis] = mesh->given.coordinates[axis];
+        if (warp->coordinates[axis].data) mesh->given.coordinates[axis] = warp->coordinates[axis];
+    }
+    if (!mesh->given.lattice) return;
+    warp->lattice = *mesh->given.lattice;
+    for (int axis = 0; axis < 3; axis++) {
+        warp->lattice.origin[axis] = warp->lattice.spacing[axis] = 0;
+        warp->lattice.axes[axis] = (insitu_array){0};
+    }
+    mesh->given.lattice = &warp->lattice;
+}
+
+/* Makes the description refer to the caller's coordinates. */
+static void read_unmoved(session_mesh *mesh)
+{
+    if (!mesh->warp.is_on) return;
+    memcpy(mesh->given.coordinates, mesh->warp.unmoved, sizeof mesh->given.coordinates);
+    if (mesh->given.lattice) mesh->given.lattice = &mesh->lattice.given;
+    mesh->warp.is_on = false;
+    session_read_topology(mesh);
+}
+
+static void mark_moved(session_meshes *meshes, session_mesh *mesh)
+{
+    if (mesh->topology.depends_on_coordinates) session_drop_cell_data(meshes, mesh);
+    session_mark_moved(meshes, mesh);
+}
+
+void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
+{
+    const bool was_on = mesh->warp.is_on;
+    if (mesh->warp.problem.status) { /* the check of the mesh must find that it is gone */
+        mesh->is_check_stale = true;
+        meshes->are_cells_changed = true;
+    }
+    read_unmoved(mesh);
+    session_drop_warp(mesh);
+    if (was_on) {
+        mark_moved(meshes, mesh);
+        session_read_topology(mesh);
+    }
+}
+
+/* ---- moving ------------------------------------------------------------------------------------------------------ */
+
+/* Returns the type of the moved coordinates. Missing z coordinates get the type of the others. */
+static insitu_type moved_type(const insitu_mesh *given, int axis)
+{
+    if (session_has_axes(given)) return INSITU_FLOAT64;
+    return given->coordinates[given->coordinates[axis].data ? axis : 0].type;
+}
+
+/* Ensures that there is memory for the moved coordinates. *is_new is set if some of it is new. Returns false if memory
+ * runs out. */
+static bool reserve_coordinates(session_mesh *mesh, int moved_axes, bool *is_new)
+{
+    session_warp *warp = &mesh->warp;
+    warp->bytes = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        insitu_array *own = &warp->coordinates[axis];
+        const insitu_type type = moved_type(&mesh->given, axis);
+        const bool is_own = axis < moved_axes || session_has_axes(&mesh->given);
+        const int64_t bytes = mesh->given.vertex_count * session_type_size(type);
+        if (own->data && (!is_own || own->type != type)) {
+            base_free((void *)(uintptr_t)own->data);
+            *own = (insitu_array){0};
+        }
+        if (!is_own) continue;
+        warp->bytes += bytes;
+        if (own->data) continue;
+        *own = (insitu_array){base_calloc((size_t)bytes + 1, 1), type, 0};
+        *is_new = true;
+        if (!own->data) return false;
+    }
+    return true;
+}
+
+/* The coordinates along one axis before and after the move. */
+typedef struct moved_axis {
+    grid_array from;
+    grid_array by; /* displacements, in the order of the tuples; without data, nothing moves along the axis */
+    char *to;
+    bool is_wide;
+} moved_axis;
+
+/* Stores a vertex's moved coordinate. Returns whether it differs from the one that was there. */
+static bool move_coordinate(const moved_axis *axis, double scale, int64_t vertex, int64_t tuple)
+{
+    double place = grid_array_number(&axis->from, vertex);
+    if (axis->by.data) place += scale * grid_array_number(&axis->by, tuple);
+    const float narrow = (float)place;
+    const size_t size = axis->is_wide ? sizeof place : sizeof narrow;
+    const void *number = axis->is_wide ? (const void *)&place : (const void *)&narrow;
+    char *to = axis->to + vertex * (int64_t)size;
+    const bool differs = memcmp(to, number, size) != 0;
+    memcpy(to, number, size);
+    return differs;
+}
+
+/* Moves all vertices. *bad becomes the first vertex whose index is that of no tuple, or else the number of vertices.
+ * Returns whether a coordinate has changed. */
+static bool move_vertices(const session_mesh *mesh, const session_displacement *by, const moved_axis axes[3],
+                          int threads, int64_t *bad)
+{
+    const int64_t count = mesh->given.vertex_count;
+    int64_t first_bad = count;
+    bool is_moved = false;
+#pragma omp parallel num_threads(session_region_threads(threads, count))
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(min : first_bad) reduction(|| : is_moved) nowait
+        for (int64_t v = 0; v < count; v++) {
+            const int64_t tuple = by->index.data ? grid_array_index(&by->index, v) : v;
+            if (tuple < 0 || tuple >= by->count) {
+                first_bad = v < first_bad ? v : first_bad;
+                continue;
+            }
+            for (int axis = 0; axis < 3; axis++)
+                if (axes[axis].to) is_moved = move_coordinate(&axes[axis], by->scale, v, tuple) || is_moved;
+        }
+        region_leave();
+    }
+    *bad = first_bad;
+    return is_moved;
+}
+
+static insitu_status describe_index(const session_mesh *mesh, const session_displacement *by, int64_t vertex,
+                                    base_error *error)
+{
+    const long long base = mesh->given.index_base;
+    return base_fail(error, INSITU_ERROR_FIELD,
+                     "mesh \"%s\": field \"%s\": the index of vertex %lld is %lld, outside %lld..%lld (index_base is "
+                     "%lld)",
+                     mesh->label, mesh->fields[by->field].given.name, (long long)vertex + base,
+                     (long long)grid_array_index(&by->index, vertex) + base, base, (long long)by->count - 1 + base,
+                     base);
+}
+
+/* Computes the moved coordinates from the description without the warp. */
+static insitu_status compute_coordinates(session_mesh *mesh, const session_displacement *by, int threads, bool *differ,
+                                         base_error *error)
+{
+    moved_axis axes[3] = {{.to = NULL}};
+    int64_t bad;
+    if (!reserve_coordinates(mesh, by->component_count, differ))
+        return session_fail_for_memory(error, mesh->given.vertex_count * 24, "coordinates of a warped mesh");
+    const bool has_axes = session_has_axes(&mesh->given);
+    insitu_status status = has_axes ? session_make_axes(mesh, error) : INSITU_OK;
+    if (status) return status;
+    for (int axis = 0; axis < 3; axis++) {
+        const insitu_array *own = &mesh->warp.coordinates[axis];
+        if (!own->data) continue;
+        axes[axis] =
+            (moved_axis){.from = has_axes ? mesh->cells.coordinates[axis] : session_coordinates(&mesh->given, axis),
+                         .to = (char *)(uintptr_t)own->data,
+                         .is_wide = own->type == INSITU_FLOAT64};
+        if (axis < by->component_count) axes[axis].by = by->components[axis];
+    }
+    *differ = move_vertices(mesh, by, (const moved_axis *)axes, threads, &bad) || *differ;
+    if (has_axes) session_drop_axes(&mesh->lattice);
+    return bad < mesh->given.vertex_count ? describe_index(mesh, by, bad, error) : INSITU_OK;
+}
+
+insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, const session_displacement *by, int threads,
+                                base_error *error)
+{
+    session_warp *warp = &mesh->warp;
+    const bool was_on = warp->is_on;
+    bool differ = !was_on;
+    if (warp->is_on && !warp->is_stale && warp->key == by->key) return INSITU_OK;
+    if (warp->is_stale) session_fill_conformed(mesh, threads);
+    read_unmoved(mesh);
+    if (compute_coordinates(mesh, by, threads, &differ, error)) {
+        if (was_on) mark_moved(meshes, mesh);
+        session_read_topology(mesh);
+        return error->status;
+    }
+    warp->key = by->key;
+    warp->is_stale = false;
+    if (differ) mark_moved(meshes, mesh);
+    session_read_warp(mesh);
+    warp->is_on = true;
+    session_read_topology(mesh);
+    return INSITU_OK;
+}

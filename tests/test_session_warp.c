@@ -1,0 +1,880 @@
+/* Warped meshes: the pictures of a mesh that the scene warps are, to the bit, those of a mesh that is handed over with
+ * the vertices at x + scale * u, computed here in double: of all forms of meshes, lattices, blocks and cells of higher
+ * order, with displacements in arrays of any layout, on any ranks. Only what changes is computed anew. Statistics are
+ * those of the warped mesh, by closed forms. What is wrong with the field is told to all ranks, with the line and the
+ * key of the scene. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "session.h"
+#include "test_mesh_forms.h"
+#include "test_mesh_order.h"
+
+enum { SIDE = 3, MOST_TEXT = 1 << 13 };
+
+#define WARP "meshes: {m: {warp: {field: u, scale: 0.3}}}\n"
+static const double scale = 0.3;
+
+/* ---- displacements and moved coordinates ------------------------------------------------------------------------ */
+
+static void displace(const double p[3], double out[3])
+{
+    out[0] = 0.3 * sin(2 * p[1] + p[2]) + 0.1 * p[0];
+    out[1] = 0.25 * cos(3 * p[2] - p[0]);
+    out[2] = 0.3 * sin(2 * p[0]) * cos(p[1]);
+}
+
+static double number_of(const insitu_array *array, int64_t i)
+{
+    const int64_t size = array->type == INSITU_FLOAT64 ? 8 : 4;
+    const char *at = (const char *)array->data + i * (array->stride_bytes ? array->stride_bytes : size);
+    float narrow;
+    double wide;
+    if (size == 8) return memcpy(&wide, at, sizeof wide), wide;
+    return memcpy(&narrow, at, sizeof narrow), (double)narrow;
+}
+
+/* The place of a vertex by the description: by vertex, or along the axes of a lattice with packed strides. */
+static void place_of(const insitu_mesh *mesh, int64_t vertex, double out[3])
+{
+    const insitu_lattice *l = mesh->lattice;
+    const bool has_axes = l && !mesh->coordinates[0].data;
+    for (int axis = 0; axis < 3; axis++) {
+        const insitu_array *given = &mesh->coordinates[axis];
+        int64_t at = vertex;
+        for (int a = 0; has_axes && a < axis; a++) at /= l->cells[a] + 1;
+        if (has_axes) at %= l->cells[axis] + 1;
+        out[axis] = !has_axes               ? given->data ? number_of(given, vertex) : 0
+                    : l->axes[axis].data    ? number_of(&l->axes[axis], at)
+                    : l->spacing[axis] != 0 ? l->origin[axis] + l->spacing[axis] * (double)(l->first[axis] + at)
+                                            : 0;
+    }
+}
+
+/* A field "u" at the vertices, packed, and a mesh that is moved by it; both have arrays of their own. */
+typedef struct warped {
+    int components;
+    double *u;
+    insitu_field field;
+    void *places[3];
+    insitu_lattice lattice;
+    insitu_mesh moved;
+} warped;
+
+static void make_field(const insitu_mesh *mesh, int components, warped *out)
+{
+    *out = (warped){.components = components};
+    out->u = test_calloc((size_t)(components * mesh->vertex_count) + 1, sizeof(double));
+    for (int64_t v = 0; v < mesh->vertex_count; v++) {
+        double place[3], u[3];
+        place_of(mesh, v, place);
+        displace(place, u);
+        memcpy(out->u + components * v, u, (size_t)components * sizeof *u);
+    }
+    insitu_field_defaults(&out->field);
+    out->field.name = "u";
+    out->field.count = mesh->vertex_count;
+    out->field.component_count = components;
+    out->field.values = (insitu_array){out->u, INSITU_FLOAT64, 0};
+}
+
+/* The mesh with moved coordinates, of its own types; of double where a lattice has them along its axes. */
+static void move_mesh(const insitu_mesh *mesh, double factor, warped *w)
+{
+    const bool has_axes = mesh->lattice && !mesh->coordinates[0].data;
+    w->moved = *mesh;
+    for (int axis = 0; axis < 3; axis++) {
+        const insitu_array *given = &mesh->coordinates[axis];
+        if (!given->data && axis >= w->components && !has_axes) continue;
+        const insitu_type type = has_axes ? INSITU_FLOAT64 : mesh->coordinates[given->data ? axis : 0].type;
+        test_free(w->places[axis]);
+        w->places[axis] = test_calloc((size_t)mesh->vertex_count + 1, 8);
+        for (int64_t v = 0; v < mesh->vertex_count; v++) {
+            double place[3];
+            place_of(mesh, v, place);
+            const double moved = place[axis] + (axis < w->components ? factor * w->u[w->components * v + axis] : 0);
+            if (type == INSITU_FLOAT64)
+                ((double *)w->places[axis])[v] = moved;
+            else
+                ((float *)w->places[axis])[v] = (float)moved;
+        }
+        w->moved.coordinates[axis] = (insitu_array){w->places[axis], type, 0};
+    }
+    if (!mesh->lattice) return;
+    w->lattice = *mesh->lattice;
+    for (int axis = 0; axis < 3; axis++) {
+        w->lattice.spacing[axis] = w->lattice.origin[axis] = 0;
+        w->lattice.axes[axis] = (insitu_array){0};
+    }
+    w->moved.lattice = &w->lattice;
+}
+
+static void make_warped(const insitu_mesh *mesh, int components, warped *out)
+{
+    make_field(mesh, components, out);
+    move_mesh(mesh, scale, out);
+}
+
+static void free_warped(warped *w)
+{
+    test_free(w->u);
+    for (int axis = 0; axis < 3; axis++) test_free(w->places[axis]);
+    *w = (warped){0};
+}
+
+/* ---- pictures ---------------------------------------------------------------------------------------------------- */
+
+enum { MOST_PICTURES = 8 };
+
+typedef struct drawn {
+    int count;
+    caught_picture pictures[MOST_PICTURES];
+} drawn;
+
+static drawn step(insitu_session *session, int cycle)
+{
+    drawn out = {0};
+    forget_pictures();
+    const insitu_status status = insitu_step(session, cycle, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    everywhere(status == INSITU_OK);
+    for (; out.count < caught_count; out.count++) out.pictures[out.count] = caught[out.count];
+    caught_count = 0;
+    return out;
+}
+
+static void free_drawn(drawn *d)
+{
+    for (int i = 0; i < d->count; i++) free_caught(&d->pictures[i]);
+    *d = (drawn){0};
+}
+
+static bool are_same(const drawn *a, const drawn *b)
+{
+    bool is_same = a->count == b->count;
+    for (int i = 0; i < a->count && is_same; i++) {
+        is_same = same_pictures(&a->pictures[i], &b->pictures[i]);
+        if (!is_same) fprintf(stderr, "picture %d differs\n", i);
+    }
+    return is_same;
+}
+
+/* Compares, frees both, and tells where pictures of nothing were compared. */
+static void expect_same(drawn *a, drawn *b, const char *what)
+{
+    const bool is_same = are_same(a, b), has_any = own_rank != 0 || a->count > 0;
+    if (!is_same || !has_any) fprintf(stderr, "%s\n", what);
+    everywhere(is_same && has_any);
+    free_drawn(a);
+    free_drawn(b);
+}
+
+static insitu_session *open_warped(MPI_Comm comm, const char *scene)
+{
+    char text[MOST_TEXT];
+    insitu_session *session = NULL;
+    snprintf(text, sizeof text, WARP "%s", scene);
+    const insitu_status status = insitu_create_from_text(comm, text, &session);
+    if (status) fprintf(stderr, "%s\n", insitu_error(NULL));
+    assert_int_equal(status, INSITU_OK);
+    return session;
+}
+
+static insitu_session *open_plain(MPI_Comm comm, const char *scene)
+{
+    insitu_session *session = NULL;
+    assert_int_equal(insitu_create_from_text(comm, scene, &session), INSITU_OK);
+    return session;
+}
+
+/* ---- all forms ----------------------------------------------------------------------------------------------------
+ */
+
+static drawn draw_formed(insitu_session *session, const formed_mesh *m, const insitu_mesh *mesh, bool with_corners,
+                         const insitu_field *u)
+{
+    formed_mesh own = *m;
+    own.mesh = *mesh;
+    everywhere(formed_hand_over(session, &own, with_corners) == INSITU_OK);
+    if (u) everywhere(insitu_set_field(session, "m", u) == INSITU_OK);
+    drawn out = step(session, 0);
+    insitu_destroy(&session);
+    return out;
+}
+
+static void forms_draw_their_moved_meshes(void **state)
+{
+    (void)state;
+    for (mesh_form form = 0; form < MESH_FORM_COUNT; form++)
+        for (int with_corners = 0; with_corners <= formed_has_corners(form); with_corners++) {
+            const char *scene = with_corners ? formed_torn_scene : formed_scene;
+            formed_mesh m;
+            warped w;
+            formed_create(form, SIDE, own_rank, rank_count, &m);
+            make_warped(&m.mesh, 3, &w);
+            drawn a = draw_formed(open_warped(MPI_COMM_WORLD, scene), &m, &m.mesh, with_corners, &w.field);
+            drawn b = draw_formed(open_plain(MPI_COMM_WORLD, scene), &m, &w.moved, with_corners, NULL);
+            expect_same(&a, &b, mesh_form_name(form));
+            free_warped(&w);
+            formed_free(&m);
+        }
+}
+
+#define LAYERS(name, layers)                                                                                           \
+    "  - name: " name "\n    size: [24, 18]\n    layers: " layers "\n    outputs: [{path: " name ".exr}]\n"
+
+static const char all_layers[] = "threads: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1]}}]")
+    LAYERS("b", "[{volume: {field: f}}]") LAYERS("c", "[{slice: {field: f, planes: [{normal: [1, 2, 3]}]}}]")
+        LAYERS("d", "[{surface: {colour_by: {field: f}, edges: {}, threshold: {field: f, from: -0.8}}}]");
+static const char surfaces[] =
+    "threads: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1], normals: vertex}}]")
+        LAYERS("d", "[{surface: {colour_by: {field: f}, edges: {}}}]\n    shadows: true");
+
+/* "f" on one mesh; u: NULL, or the field of displacements. */
+static drawn draw_mesh(insitu_session *session, const insitu_mesh *mesh, const insitu_field *f, const insitu_field *u)
+{
+    everywhere(insitu_set_mesh(session, "m", mesh) == INSITU_OK);
+    everywhere(insitu_set_field(session, "m", f) == INSITU_OK);
+    if (u) everywhere(insitu_set_field(session, "m", u) == INSITU_OK);
+    drawn out = step(session, 0);
+    insitu_destroy(&session);
+    return out;
+}
+
+static void expect_moved(const insitu_mesh *mesh, const insitu_field *f, int components, const char *what)
+{
+    warped w;
+    make_warped(mesh, components, &w);
+    drawn a = draw_mesh(open_warped(MPI_COMM_WORLD, all_layers), mesh, f, &w.field);
+    drawn b = draw_mesh(open_plain(MPI_COMM_WORLD, all_layers), &w.moved, f, NULL);
+    expect_same(&a, &b, what);
+    free_warped(&w);
+}
+
+static void cells_of_higher_order_draw_their_moved_nodes(void **state)
+{
+    (void)state;
+    for (int k = 0; k < order_kind_count; k += 3) {
+        order_mesh m;
+        order_mesh_create(&order_kinds[k], 2, 0.1, test_wave, own_rank, rank_count, &m);
+        expect_moved(&m.mesh, &m.field, 3, order_kinds[k].name);
+        order_mesh_free(&m);
+    }
+}
+
+/* Lagrange hexes without connectivity, each with nodes of its own. */
+static void nodes_of_each_cells_own_are_moved(void **state)
+{
+    (void)state;
+    enum { ORDER = 2, NODES = 27, CELLS = 3 };
+    static double places[CELLS * NODES][3], values[CELLS * NODES];
+    for (int n = 0; n < CELLS * NODES; n++) {
+        const int node = n % NODES, cell = n / NODES + CELLS * own_rank;
+        places[n][0] = 0.5 * (node % 3) + cell;
+        places[n][1] = 0.5 * (node / 3 % 3);
+        places[n][2] = 0.5 * (node / 9);
+        values[n] = test_wave(places[n]);
+    }
+    insitu_mesh mesh;
+    insitu_field f;
+    insitu_mesh_defaults(&mesh);
+    mesh.vertex_count = (int64_t)CELLS * NODES;
+    mesh.cell_count = CELLS;
+    mesh.cell_type = INSITU_LAGRANGE_HEX;
+    mesh.order = ORDER;
+    mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
+    insitu_mesh_interleaved(&mesh, places, INSITU_FLOAT64);
+    insitu_field_defaults(&f);
+    f.name = "f";
+    f.count = mesh.vertex_count;
+    f.values = (insitu_array){values, INSITU_FLOAT64, 0};
+    expect_moved(&mesh, &f, 3, "own nodes");
+}
+
+/* ---- planes --------------------------------------------------------------------------------------------------- */
+
+/* This rank's rows of quads, of 3 x 3 each, in the plane z = 0, of floats or doubles. */
+typedef struct plane {
+    double wide[16][2], values[16];
+    float narrow[16][2];
+    int32_t quads[9][4];
+    insitu_mesh mesh;
+    insitu_field field;
+} plane;
+
+static void make_plane(bool is_wide, plane *out)
+{
+    for (int v = 0; v < 16; v++) {
+        const double place[3] = {0.25 * (v % 4), 0.25 * (v / 4 + 3 * own_rank), 0};
+        for (int a = 0; a < 2; a++) out->narrow[v][a] = (float)(out->wide[v][a] = place[a]);
+        out->values[v] = test_wave(place);
+    }
+    for (int q = 0; q < 9; q++) {
+        const int first = q % 3 + 4 * (q / 3), corners[4] = {first, first + 1, first + 5, first + 4};
+        for (int i = 0; i < 4; i++) out->quads[q][i] = corners[i];
+    }
+    insitu_mesh_defaults(&out->mesh);
+    out->mesh.vertex_count = 16;
+    out->mesh.cell_count = 9;
+    out->mesh.cell_type = INSITU_QUAD;
+    out->mesh.connectivity_count = 36;
+    out->mesh.connectivity = (insitu_array){out->quads, INSITU_INT32, 0};
+    for (int a = 0; a < 2; a++)
+        out->mesh.coordinates[a] = is_wide ? (insitu_array){&out->wide[0][a], INSITU_FLOAT64, 16}
+                                           : (insitu_array){&out->narrow[0][a], INSITU_FLOAT32, 8};
+    insitu_field_defaults(&out->field);
+    out->field.name = "f";
+    out->field.count = 16;
+    out->field.values = (insitu_array){out->values, INSITU_FLOAT64, 0};
+}
+
+static void planes_move_by_two_or_three_components(void **state)
+{
+    (void)state;
+    for (int is_wide = 0; is_wide < 2; is_wide++)
+        for (int components = 2; components <= 3; components++) {
+            plane p;
+            make_plane(is_wide, &p);
+            expect_moved(&p.mesh, &p.field, components, "a plane without z");
+            p.mesh.coordinates[2] = (insitu_array){p.values, INSITU_FLOAT64, 0};
+            if (is_wide) expect_moved(&p.mesh, &p.field, components, "a bent surface");
+        }
+}
+
+/* ---- lattices and blocks ---------------------------------------------------------------------------------------- */
+
+typedef enum lattice_form { UNIFORM, RECTILINEAR, CURVILINEAR, QUADS, LATTICE_FORMS } lattice_form;
+
+enum { ACROSS = 4, THICK = 2, MOST_VERTICES = 5 * 5 * 3 + 6 };
+
+typedef struct block {
+    float axes[3][8];
+    double places[3][MOST_VERTICES], values[MOST_VERTICES];
+    insitu_lattice lattice;
+    insitu_mesh mesh;
+    insitu_field field;
+} block;
+
+/* The block of this number among all ranks', along z; of quads along y. Curvilinear ones have padding along x. */
+static void make_block(lattice_form form, int number, block *out)
+{
+    const bool is_plane = form == QUADS, is_curved = form == CURVILINEAR;
+    const int64_t cells[3] = {ACROSS - (is_curved ? 1 : 0), is_plane ? THICK : ACROSS, is_plane ? 0 : THICK};
+    const int along = is_plane ? 1 : 2;
+    *out = (block){.lattice = {.cells = {cells[0], cells[1], cells[2]}}};
+    insitu_lattice *l = &out->lattice;
+    l->first[along] = (int64_t)THICK * number;
+    for (int axis = 0; axis < 3; axis++) {
+        l->origin[axis] = 0.1 * (axis + 1);
+        l->spacing[axis] = 0.13 + 0.02 * axis;
+        for (int n = 0; n < 8; n++) {
+            const double at = (double)(l->first[axis] + n);
+            out->axes[axis][n] = (float)(l->origin[axis] + 0.1 * at + 0.01 * at * at);
+        }
+    }
+    insitu_mesh_defaults(&out->mesh);
+    out->mesh.lattice = l;
+    out->mesh.cell_count = cells[0] * cells[1] * (is_plane ? 1 : cells[2]);
+    out->mesh.vertex_count = (cells[0] + 1 + (is_curved ? 1 : 0)) * (cells[1] + 1) * (cells[2] + 1);
+    if (form == RECTILINEAR || is_plane)
+        for (int axis = 0; axis < (is_plane ? 2 : 3); axis++)
+            l->axes[axis] = (insitu_array){out->axes[axis], INSITU_FLOAT32, 0};
+    for (int axis = 0; axis < 3 && form != UNIFORM; axis++) l->origin[axis] = l->spacing[axis] = 0;
+    if (is_curved) {
+        l->vertex_strides[0] = 1;
+        l->vertex_strides[1] = cells[0] + 2;
+        l->vertex_strides[2] = (cells[0] + 2) * (cells[1] + 1);
+    }
+    for (int64_t v = 0; v < out->mesh.vertex_count && is_curved; v++) {
+        const double at[3] = {(double)(v % (cells[0] + 2)), (double)(v / (cells[0] + 2) % (cells[1] + 1)),
+                              (double)(l->first[2] + v / l->vertex_strides[2])};
+        const bool is_padding = v % (cells[0] + 2) > cells[0];
+        for (int axis = 0; axis < 3; axis++)
+            out->places[axis][v] = is_padding ? (double)NAN : 0.15 * at[axis] + 0.02 * sin(at[(axis + 1) % 3]);
+    }
+    for (int axis = 0; axis < 3 && is_curved; axis++)
+        out->mesh.coordinates[axis] = (insitu_array){out->places[axis], INSITU_FLOAT64, 0};
+    for (int64_t v = 0; v < out->mesh.vertex_count; v++) {
+        double place[3];
+        place_of(&out->mesh, v, place);
+        out->values[v] = test_wave(place);
+    }
+    insitu_field_defaults(&out->field);
+    out->field.name = "f";
+    out->field.count = out->mesh.vertex_count;
+    out->field.values = (insitu_array){out->values, INSITU_FLOAT64, 0};
+}
+
+static void lattices_draw_their_moved_vertices(void **state)
+{
+    (void)state;
+    static const char *const names[LATTICE_FORMS] = {"uniform", "rectilinear", "curvilinear", "of quads"};
+    for (lattice_form form = 0; form < LATTICE_FORMS; form++) {
+        block b;
+        make_block(form, own_rank, &b);
+        expect_moved(&b.mesh, &b.field, 3, names[form]);
+        if (form == QUADS) expect_moved(&b.mesh, &b.field, 2, names[form]);
+    }
+}
+
+static void blocks_draw_their_moved_vertices(void **state)
+{
+    (void)state;
+    for (lattice_form form = 0; form < LATTICE_FORMS; form++) {
+        drawn pictures[2];
+        for (int is_moved = 0; is_moved < 2; is_moved++) {
+            insitu_session *session =
+                is_moved ? open_plain(MPI_COMM_WORLD, all_layers) : open_warped(MPI_COMM_WORLD, all_layers);
+            block b[2];
+            warped w[2];
+            for (int i = 0; i < 2; i++) {
+                make_block(form, 2 * own_rank + i, &b[i]);
+                make_warped(&b[i].mesh, 3, &w[i]);
+                everywhere(insitu_set_block(session, "m", i, is_moved ? &w[i].moved : &b[i].mesh) == INSITU_OK);
+                everywhere(insitu_set_block_field(session, "m", i, &b[i].field) == INSITU_OK);
+                everywhere(insitu_set_block_field(session, "m", i, &w[i].field) == INSITU_OK);
+            }
+            pictures[is_moved] = step(session, 0);
+            insitu_destroy(&session);
+            for (int i = 0; i < 2; i++) free_warped(&w[i]);
+        }
+        expect_same(&pictures[0], &pictures[1], "blocks");
+    }
+}
+
+/* ---- layouts of the displacements ------------------------------------------------------------------------------- */
+
+typedef struct filled_values {
+    const warped *from;
+    int calls;
+} filled_values;
+
+static insitu_status fill(void *data, insitu_field *field)
+{
+    filled_values *f = data;
+    int one = 1, ranks = 0;
+    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD); /* ends only where all ranks call it */
+    f->calls += ranks == rank_count;
+    field->count = f->from->field.count;
+    field->values = f->from->field.values;
+    return INSITU_OK;
+}
+
+typedef enum layout { TUPLES, FLOATS, APART, BY_INDEX, FILLED, LAYOUTS } layout;
+
+/* Whole numbers, so that all types hold them; in arrays of `room`. */
+static void lay_out(layout as, warped *w, void *room, int64_t *index, filled_values *values)
+{
+    static insitu_array apart[3];
+    const int64_t count = w->field.count;
+    insitu_field *u = &w->field;
+    for (int64_t i = 0; i < count && as == FLOATS; i++)
+        for (int c = 0; c < 3; c++) ((float *)room)[5 * i + c] = (float)w->u[3 * i + c];
+    if (as == FLOATS) {
+        u->values = (insitu_array){room, INSITU_FLOAT32, 20};
+        u->component_stride_bytes = 4;
+    }
+    for (int64_t i = 0; i < count && as == APART; i++) {
+        ((double *)room)[2 * i] = w->u[3 * i];
+        ((float *)room)[4 * count + i] = (float)w->u[3 * i + 1];
+        ((int16_t *)room)[12 * count + i] = (int16_t)w->u[3 * i + 2];
+    }
+    if (as == APART) {
+        apart[0] = (insitu_array){room, INSITU_FLOAT64, 16};
+        apart[1] = (insitu_array){(float *)room + 4 * count, INSITU_FLOAT32, 0};
+        apart[2] = (insitu_array){(int16_t *)room + 12 * count, INSITU_INT16, 0};
+        u->values = (insitu_array){0};
+        u->components = apart;
+    }
+    for (int64_t i = 0; i < count && as == BY_INDEX; i++) {
+        memcpy((double *)room + 3 * (count - 1 - i), w->u + 3 * i, 3 * sizeof(double));
+        index[i] = count - 1 - i;
+    }
+    if (as == BY_INDEX) {
+        u->values = (insitu_array){room, INSITU_FLOAT64, 0};
+        u->index = (insitu_array){index, INSITU_INT64, 0};
+    }
+    if (as != FILLED) return;
+    *values = (filled_values){w, 0};
+    u->fill = fill;
+    u->fill_data = values;
+}
+
+static void displacements_are_read_in_any_layout(void **state)
+{
+    (void)state;
+    session_input in;
+    input_create(&in, TEST_MIXED, SIDE, TEST_RANDOM, own_rank, rank_count);
+    const size_t count = (size_t)in.part.vertex_count;
+    void *room = test_calloc(6 * count + 1, 8);
+    int64_t *index = test_calloc(count + 1, sizeof *index);
+    for (layout as = 0; as < LAYOUTS; as++) {
+        warped w;
+        filled_values values = {0};
+        make_field(&in.mesh, 3, &w);
+        for (size_t i = 0; i < 3 * count; i++) w.u[i] = round(2 * w.u[i] / scale / 3);
+        move_mesh(&in.mesh, scale, &w);
+        insitu_field u = w.field;
+        lay_out(as, &w, room, index, &values);
+        drawn a;
+        if (as == FILLED) {
+            w.field.values = (insitu_array){0};
+            const insitu_field promised = w.field;
+            w.field = u;
+            a = draw_mesh(open_warped(MPI_COMM_WORLD, all_layers), &in.mesh, &in.field, &promised);
+            everywhere(values.calls == 1);
+        } else {
+            a = draw_mesh(open_warped(MPI_COMM_WORLD, all_layers), &in.mesh, &in.field, &w.field);
+        }
+        drawn b = draw_mesh(open_plain(MPI_COMM_WORLD, all_layers), &w.moved, &in.field, NULL);
+        expect_same(&a, &b, "a layout of the displacements");
+        free_warped(&w);
+    }
+    test_free(room);
+    test_free(index);
+    input_free(&in);
+}
+
+/* ---- partitions ---------------------------------------------------------------------------------------------------
+ */
+
+static void any_partition_draws_one_picture(void **state)
+{
+    (void)state;
+    for (test_partition_kind kind = 0; kind < TEST_PARTITION_COUNT; kind++) {
+        session_input part, whole;
+        warped of_part, of_whole;
+        input_create(&part, TEST_MIXED, SIDE, kind, own_rank, rank_count);
+        input_create(&whole, TEST_MIXED, SIDE, kind, 0, 1);
+        make_warped(&part.mesh, 3, &of_part);
+        make_warped(&whole.mesh, 3, &of_whole);
+        drawn a = draw_mesh(open_warped(MPI_COMM_WORLD, surfaces), &part.mesh, &part.field, &of_part.field);
+        drawn b = draw_mesh(open_warped(MPI_COMM_SELF, surfaces), &whole.mesh, &whole.field, &of_whole.field);
+        for (int i = 0; own_rank != 0 && i < b.count; i++) free_caught(&b.pictures[i]);
+        if (own_rank != 0) b.count = 0;
+        expect_same(&a, &b, test_partition_kind_name(kind));
+        free_warped(&of_part);
+        free_warped(&of_whole);
+        input_free(&part);
+        input_free(&whole);
+    }
+}
+
+/* ---- steps ------------------------------------------------------------------------------------------------------ */
+
+typedef struct stamps {
+    int64_t cells, coordinates;
+} stamps;
+
+static stamps stamps_of(const insitu_session *session)
+{
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+    return (stamps){mesh->cells_stamp, mesh->coordinates_stamp};
+}
+
+/* A step of the warped session draws what the moved mesh draws in another session, which has taken the same steps. */
+static void expect_step(insitu_session *session, insitu_session *plain, const session_input *in, double factor,
+                        warped *w, int cycle, const char *what)
+{
+    insitu_field f = in->field;
+    move_mesh(&in->mesh, factor, w);
+    w->moved.changed = cycle ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_ALL;
+    f.changed = INSITU_CHANGED_ALL;
+    everywhere(insitu_set_mesh(plain, "m", &w->moved) == INSITU_OK && insitu_set_field(plain, "m", &f) == INSITU_OK);
+    drawn a = step(session, cycle);
+    drawn b = step(plain, cycle);
+    expect_same(&a, &b, what);
+}
+
+static void steps_compute_only_what_has_changed(void **state)
+{
+    (void)state;
+    session_input in;
+    warped w;
+    input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
+    make_field(&in.mesh, 3, &w);
+    insitu_session *session = open_warped(MPI_COMM_WORLD, all_layers);
+    insitu_session *plain = open_plain(MPI_COMM_WORLD, all_layers);
+    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    expect_step(session, plain, &in, scale, &w, 0, "the first step");
+    const stamps first = stamps_of(session);
+
+    in.mesh.changed = in.field.changed = INSITU_CHANGED_NOTHING;
+    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    expect_step(session, plain, &in, scale, &w, 1, "the same values again");
+    everywhere(stamps_of(session).coordinates == first.coordinates);
+
+    everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
+    expect_step(session, plain, &in, scale, &w, 2, "the same mesh again");
+    everywhere(stamps_of(session).coordinates == first.coordinates);
+
+    if (own_rank == rank_count - 1) /* the others learn of it */
+        for (int64_t i = 0; i < 3 * in.part.vertex_count; i++) w.u[i] *= 1.5;
+    everywhere(insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    const int64_t before = insitu_last_report(session)->bytes_copied;
+    expect_step(session, plain, &in, scale, &w, 3, "other values on the last rank");
+    everywhere((stamps_of(session).coordinates != first.coordinates) == (own_rank == rank_count - 1));
+    everywhere(stamps_of(session).cells == first.cells && insitu_last_report(session)->bytes_copied == before);
+    everywhere(insitu_last_report(session)->refit_ms > 0 || own_rank != rank_count - 1);
+
+    in.mesh.changed = INSITU_CHANGED_GEOMETRY;
+    for (int64_t i = 0; i < 3 * in.part.vertex_count; i++) in.part.coordinates[i] *= 1.25;
+    everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
+    expect_step(session, plain, &in, scale, &w, 4, "other coordinates");
+
+    in.mesh.changed = in.field.changed = INSITU_CHANGED_ALL;
+    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    expect_step(session, plain, &in, scale, &w, 5, "everything anew");
+    insitu_destroy(&session);
+    insitu_destroy(&plain);
+    free_warped(&w);
+    input_free(&in);
+}
+
+static void edits_of_the_scene_warp_and_unwarp(void **state)
+{
+    (void)state;
+    session_input in;
+    warped w;
+    char text[MOST_TEXT];
+    input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
+    make_field(&in.mesh, 3, &w);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
+    insitu_session *plain = open_plain(MPI_COMM_WORLD, all_layers);
+    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    static const double factors[] = {0, 0.3, -0.2, 0, 0.3};
+    for (int i = 0; i < 5; i++) {
+        snprintf(text, sizeof text, "meshes: {m: {warp: {field: u, scale: %g}}}\n%s", factors[i], all_layers);
+        write_scene(i == 3 ? all_layers : text);
+        expect_step(session, plain, &in, factors[i], &w, i, "an edited scene");
+        const char *why = insitu_last_report(session)->copied_why;
+        everywhere(!strstr(why, "the scene's warp") == (factors[i] == 0 || in.part.vertex_count == 0));
+    }
+    insitu_destroy(&session);
+    insitu_destroy(&plain);
+    free_warped(&w);
+    input_free(&in);
+}
+
+static void copies_and_gradients_are_reported(void **state)
+{
+    (void)state;
+    session_input in;
+    warped w;
+    char words[160];
+    input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
+    make_field(&in.mesh, 3, &w);
+    insitu_session *session =
+        open_warped(MPI_COMM_WORLD,
+                    "fields: {g: {gradient: f, component: x}}\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: "
+                                                                                      "g}}}]"));
+    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    drawn a = step(session, 0);
+    const insitu_report *report = insitu_last_report(session);
+    snprintf(words, sizeof words, "where the scene's warp moves them: %lld bytes",
+             (long long)(24 * in.part.vertex_count));
+    everywhere(strstr(report->copied_why, words) != NULL);
+    everywhere(strstr(report->warnings, "derived field \"g\", are those of the warped mesh") != NULL);
+    everywhere(!strstr(report->left_out, "\"u\""));
+    free_drawn(&a);
+    insitu_destroy(&session);
+    free_warped(&w);
+    input_free(&in);
+}
+
+/* ---- statistics ------------------------------------------------------------------------------------------------- */
+
+/* Returns the number in this column of the last line. */
+static double last_number(const char *text, int column)
+{
+    const char *line = text, *end;
+    while ((end = strchr(line, '\n')) && end[1]) line = end + 1;
+    for (; column > 0 && line; column--) line = strchr(line, ',') ? strchr(line, ',') + 1 : NULL;
+    return line ? strtod(line, NULL) : NAN;
+}
+
+/* The cube of volume 8 is stretched by 1 + 0.3 along x. */
+static void statistics_are_of_the_warped_mesh(void **state)
+{
+    (void)state;
+    static char text[MOST_TEXT];
+    session_input in;
+    warped w;
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    make_field(&in.mesh, 3, &w);
+    for (int64_t v = 0; v < in.part.vertex_count; v++) {
+        w.u[3 * v] = in.part.coordinates[3 * v];
+        w.u[3 * v + 1] = w.u[3 * v + 2] = 0;
+    }
+    if (own_rank == 0) unlink("warp.csv");
+    insitu_session *session =
+        open_warped(MPI_COMM_WORLD, "statistics: [{field: f, path: warp.csv}]\nimages:\n" LAYERS(
+                                        "a", "[{surface: {}}]\n    when: {field: f, above: 1e30}"));
+    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+    insitu_destroy(&session);
+    read_file("warp.csv", sizeof text, text);
+    everywhere(own_rank != 0 || fabs(last_number(text, 3) - 8 * 1.3) <= 1e-8); /* nine digits are written */
+    free_warped(&w);
+    input_free(&in);
+}
+
+/* ---- what is wrong ---------------------------------------------------------------------------------------------- */
+
+typedef struct fault {
+    const char *warp;
+    void (*spoil)(insitu_field *u, insitu_mesh *mesh);
+    const char *words[2];
+} fault;
+
+static void in_cells(insitu_field *u, insitu_mesh *mesh)
+{
+    u->centring = INSITU_CELL;
+    u->count = mesh->cell_count;
+}
+
+static void at_corners(insitu_field *u, insitu_mesh *mesh)
+{
+    u->centring = INSITU_CORNER;
+    u->count = mesh->connectivity_count;
+}
+
+static void of_one(insitu_field *u, insitu_mesh *mesh)
+{
+    (void)mesh;
+    u->component_count = 1;
+}
+
+static void of_two(insitu_field *u, insitu_mesh *mesh)
+{
+    (void)mesh;
+    u->component_count = 2;
+}
+
+static void of_four(insitu_field *u, insitu_mesh *mesh)
+{
+    (void)mesh;
+    u->component_count = 4;
+}
+
+static void renamed(insitu_field *u, insitu_mesh *mesh)
+{
+    (void)mesh;
+    u->name = "v";
+}
+
+static void not_a_number(insitu_field *u, insitu_mesh *mesh)
+{
+    (void)mesh;
+    ((double *)(uintptr_t)u->values.data)[4] = (double)NAN;
+}
+
+static void by_bad_index(insitu_field *u, insitu_mesh *mesh)
+{
+    static int32_t index[1 << 12];
+    assert_true(mesh->vertex_count <= 1 << 12);
+    for (int64_t v = 0; v < mesh->vertex_count; v++) index[v] = (int32_t)v;
+    index[2] = 1 << 20;
+    u->index = (insitu_array){index, INSITU_INT32, 0};
+}
+
+static const fault faults[] = {
+    {"{field: u}",
+     in_cells,
+     {"scene text:1: meshes.m.warp.field: field \"u\" of mesh \"m\" has values at cells",
+      "expected values at vertices"}},
+    {"{field: u}",
+     at_corners,
+     {"meshes.m.warp.field: field \"u\" of mesh \"m\" has values at corners of cells", "expected values at vertices"}},
+    {"{field: u}", of_one, {"meshes.m.warp.field: field \"u\" of mesh \"m\" has 1 component, expected 3", ""}},
+    {"{field: u}", of_two, {"meshes.m.warp.field: field \"u\" of mesh \"m\" has 2 components, expected 3", ""}},
+    {"{field: u}", of_four, {"meshes.m.warp.field: field \"u\" of mesh \"m\" has 4 components, expected 3", ""}},
+    {"{field: u}", renamed, {"meshes.m.warp.field: mesh \"m\" has no field \"u\", expected one at its vertices", ""}},
+    {"{field: u}", by_bad_index, {"mesh \"m\": field \"u\": the index of vertex 2 is 1048576, outside 0..", ""}},
+    {"{field: u}", not_a_number, {"has a coordinate that is not finite", "the scene's warp moves its vertices"}},
+    {"{field: g}",
+     NULL,
+     {"scene text:1: meshes.m.warp.field: \"g\" is derived by the scene, expected a field that the", ""}},
+};
+
+static void faults_are_told_with_line_and_key(void **state)
+{
+    (void)state;
+    session_input in;
+    warped w;
+    input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
+    /* patches of the last rank's cells use vertex 1 */
+    const size_t size = (size_t)(4 * in.part.vertex_count + in.part.connectivity_count * 4) + 1;
+    double *values = test_calloc(size, sizeof *values);
+    for (size_t i = 0; i < sizeof faults / sizeof faults[0]; i++) {
+        char text[MOST_TEXT];
+        insitu_session *session = NULL;
+        snprintf(text, sizeof text, "meshes: {m: {warp: %s}}\nfields: {g: {gradient: f}}\n%s", faults[i].warp,
+                 surfaces);
+        assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, text, &session), INSITU_OK);
+        make_field(&in.mesh, 3, &w);
+        insitu_field u = w.field;
+        memset(values, 0, size * sizeof *values);
+        u.values.data = values;
+        if (own_rank == rank_count - 1 && faults[i].spoil) faults[i].spoil(&u, &in.mesh);
+        for (int cycle = 0; cycle < 2; cycle++) { /* told in each step until it is mended */
+            everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &u) == INSITU_OK);
+            forget_pictures();
+            const insitu_status status = insitu_step(session, cycle, 0);
+            everywhere(status != INSITU_OK && caught_count == 0);
+            told_everywhere(session, status, status, faults[i].words[0], faults[i].words[1]);
+        }
+        const insitu_field good = w.field;
+        everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &good) == INSITU_OK);
+        if (faults[i].spoil) {
+            drawn a = step(session, 2);
+            everywhere(own_rank != 0 || a.count == 2);
+            free_drawn(&a);
+        }
+        insitu_destroy(&session);
+        free_warped(&w);
+    }
+    test_free(values);
+    input_free(&in);
+}
+
+static void names_of_no_mesh_are_warned_of(void **state)
+{
+    (void)state;
+    char text[MOST_TEXT];
+    session_input in;
+    insitu_session *session = NULL;
+    input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
+    snprintf(text, sizeof text, "%s\nmeshes:\n  plate: {warp: u}\n", surfaces);
+    assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, text, &session), INSITU_OK);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    drawn a = step(session, 0);
+    everywhere(strstr(insitu_last_report(session)->warnings, "meshes.plate (line ") != NULL);
+    free_drawn(&a);
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(forms_draw_their_moved_meshes),
+        cmocka_unit_test(cells_of_higher_order_draw_their_moved_nodes),
+        cmocka_unit_test(nodes_of_each_cells_own_are_moved),
+        cmocka_unit_test(planes_move_by_two_or_three_components),
+        cmocka_unit_test(lattices_draw_their_moved_vertices),
+        cmocka_unit_test(blocks_draw_their_moved_vertices),
+        cmocka_unit_test(displacements_are_read_in_any_layout),
+        cmocka_unit_test(any_partition_draws_one_picture),
+        cmocka_unit_test(steps_compute_only_what_has_changed),
+        cmocka_unit_test(edits_of_the_scene_warp_and_unwarp),
+        cmocka_unit_test(copies_and_gradients_are_reported),
+        cmocka_unit_test(statistics_are_of_the_warped_mesh),
+        cmocka_unit_test(faults_are_told_with_line_and_key),
+        cmocka_unit_test(names_of_no_mesh_are_warned_of),
+    };
+    return run_session_tests(argc, argv, tests, NULL, NULL);
+}
