@@ -146,10 +146,12 @@ foreach(name zero_counts strides wrong_input)
 endforeach()
 insitu_add_mpi_test(session_wrong_input test_session_wrong_input WHOLE 1 3 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
-# Meshes that the scene warps, of all forms.
-insitu_session_program(test_session_warp)
-target_sources(test_session_warp PRIVATE test_mesh_forms.c test_owned_faces.c test_mesh_order.c)
-insitu_add_mpi_test(session_warp test_session_warp 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+# Meshes that the scene warps or mirrors, of all forms.
+foreach(name warp mirror)
+  insitu_session_program(test_session_${name})
+  target_sources(test_session_${name} PRIVATE test_transformed.c test_mesh_forms.c test_owned_faces.c test_mesh_order.c)
+  insitu_add_mpi_test(session_${name} test_session_${name} 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+endforeach()
 
 insitu_session_program(test_session_statistics)
 insitu_add_mpi_test(session_statistics test_session_statistics 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})

@@ -179,7 +179,9 @@ static const char every_key[] =
     "meshes:\n"
     "  plate: {warp: {field: DISPL, scale: -2.5}}\n"
     "  plate/a.b: {warp: w}\n"
-    "  colour: {warp: {field: u, scale: 0}}\n"
+    "  colour: {warp: {field: u, scale: 0}, mirror: [z, x]}\n"
+    "  axis: {mirror: y}\n"
+    "  axis/b: {mirror: {x: -1.5, z: 2}}\n"
     "writing: step\n"
     "parameters: {inflow: 2.5, _k-2: -1e-3, values: 3, color: 4, axis: 5}\n"
     "schedule: radix\n";
@@ -522,6 +524,30 @@ static void warps_are_read_by_their_meshes(void **state)
     scene_free(&s);
 }
 
+static void mirrors_are_read_by_their_meshes(void **state)
+{
+    (void)state;
+    static const scene_mirror expected[] = {
+        {"colour", 5, {0, 0, 0}, 0}, {"axis", 2, {0, 0, 0}, 0}, {"axis/b", 5, {-1.5, 0, 2}, 0}};
+    scene s;
+    parse_good(every_key, &s);
+    assert_int_equal(s.mirror_count, 3);
+    for (int i = 0; i < 3; i++) {
+        const scene_mirror *mirror = &s.mirrors[i];
+        assert_string_equal(mirror->mesh, expected[i].mesh);
+        assert_int_equal(mirror->axes, expected[i].axes);
+        for (int axis = 0; axis < 3; axis++) assert_true(fabs(mirror->planes[axis] - expected[i].planes[axis]) <= 0);
+        assert_int_equal(mirror->line, s.warps[2].line + i);
+    }
+    assert_ptr_equal(scene_find_mirror(&s, "axis/a"), &s.mirrors[1]);
+    assert_ptr_equal(scene_find_mirror(&s, "axis/b"), &s.mirrors[2]);
+    assert_null(scene_find_mirror(&s, "plate"));
+    scene_free(&s);
+    parse_good(fewest_keys, &s);
+    assert_int_equal(s.mirror_count, 0);
+    scene_free(&s);
+}
+
 /* Names of parameters are the scene's own: no short form, and no other spelling, is meant by them. */
 static void parameters_are_read_by_their_names(void **state)
 {
@@ -818,8 +844,21 @@ static const struct bad_file {
     {1, "statistics: [{field: f, path: a.csv, histogram: {range: [2, 2]}}]", 1, {"histogram.range: goes from 2"}},
     {1, "meshes: 7", 1, {"meshes: \"7\" is not allowed", "a mapping from names to these"}},
     {1, "meshes: {}", 1, {"meshes: a list of 0 is not allowed", "1 to 64"}},
-    {1, "meshes: {a: u}", 1, {"meshes[0]: \"u\" is not allowed", "a mapping with the keys name, warp"}},
-    {1, "meshes: {a: {}}", 1, {"meshes.a.warp: missing", "a mapping with the keys field, scale, or a field's name"}},
+    {1, "meshes: {a: u}", 1, {"meshes[0]: \"u\" is not allowed", "a mapping with the keys name, warp, mirror"}},
+    {1, "meshes: {a: {}}", 1, {"meshes.a: holds nothing, expected warp or mirror"}},
+    {1,
+     "meshes: {a: {mirror: w}}",
+     1,
+     {"meshes.a.mirror: \"w\" is not allowed", "one of x, y, z; or a list of 1 to 3"}},
+    {1, "meshes: {a: {mirror: }}", 1, {"meshes.a.mirror: nothing is not allowed", "a mapping with the keys x, y, z"}},
+    {1, "meshes: {a: {mirror: 0}}", 1, {"meshes.a.mirror: \"0\" is not allowed", "one of x, y, z"}},
+    {1, "meshes: {a: {mirror: []}}", 1, {"meshes.a.mirror: a list of 0", "a list of 1 to 3, each one of x, y, z"}},
+    {1, "meshes: {a: {mirror: [x, -y]}}", 1, {"meshes.a.mirror[1]: \"-y\" is not allowed", "one of x, y, z"}},
+    {1, "meshes: {a: {mirror: [x, y, x]}}", 1, {"meshes.a.mirror: x is given twice"}},
+    {1, "meshes: {a: {mirror: {}}}", 1, {"meshes.a.mirror: holds nothing", "the coordinate of a plane"}},
+    {1, "meshes: {a: {mirror: {w: 1}}}", 1, {"meshes.a.mirror: the key \"w\" is unknown", "x, y, z"}},
+    {1, "meshes: {a: {mirror: {x: left}}}", 1, {"meshes.a.mirror.x: \"left\"", "a number"}},
+    {1, "meshes: {a: {reflect: x}}", 1, {"meshes.a: the key \"reflect\" is unknown (did you mean mirror?)"}},
     {1, "meshes: {a: {warp: }}", 1, {"meshes.a.warp: nothing is not allowed", "a field's name"}},
     {1, "meshes: {a: {warp: [u, v]}}", 1, {"meshes.a.warp: a list is not allowed", "a mapping"}},
     {1, "meshes: {a: {warp: {scale: 2}}}", 1, {"meshes.a.warp.field: missing", "a text"}},
@@ -1435,6 +1474,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(surfaces_have_their_colours),
         cmocka_unit_test(statistics_and_conditions_are_read),
         cmocka_unit_test(warps_are_read_by_their_meshes),
+        cmocka_unit_test(mirrors_are_read_by_their_meshes),
         cmocka_unit_test(parameters_are_read_by_their_names),
         cmocka_unit_test(clips_are_of_the_image_and_of_layers),
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),

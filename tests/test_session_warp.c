@@ -10,8 +10,8 @@
 #include <unistd.h>
 
 #include "session.h"
-#include "test_mesh_forms.h"
 #include "test_mesh_order.h"
+#include "test_transformed.h"
 
 enum { SIDE = 3, MOST_TEXT = 1 << 13 };
 
@@ -25,33 +25,6 @@ static void displace(const double p[3], double out[3])
     out[0] = 0.3 * sin(2 * p[1] + p[2]) + 0.1 * p[0];
     out[1] = 0.25 * cos(3 * p[2] - p[0]);
     out[2] = 0.3 * sin(2 * p[0]) * cos(p[1]);
-}
-
-static double number_of(const insitu_array *array, int64_t i)
-{
-    const int64_t size = array->type == INSITU_FLOAT64 ? 8 : 4;
-    const char *at = (const char *)array->data + i * (array->stride_bytes ? array->stride_bytes : size);
-    float narrow;
-    double wide;
-    if (size == 8) return memcpy(&wide, at, sizeof wide), wide;
-    return memcpy(&narrow, at, sizeof narrow), (double)narrow;
-}
-
-/* The place of a vertex by the description: by vertex, or along the axes of a lattice with packed strides. */
-static void place_of(const insitu_mesh *mesh, int64_t vertex, double out[3])
-{
-    const insitu_lattice *l = mesh->lattice;
-    const bool has_axes = l && !mesh->coordinates[0].data;
-    for (int axis = 0; axis < 3; axis++) {
-        const insitu_array *given = &mesh->coordinates[axis];
-        int64_t at = vertex;
-        for (int a = 0; has_axes && a < axis; a++) at /= l->cells[a] + 1;
-        if (has_axes) at %= l->cells[axis] + 1;
-        out[axis] = !has_axes               ? given->data ? number_of(given, vertex) : 0
-                    : l->axes[axis].data    ? number_of(&l->axes[axis], at)
-                    : l->spacing[axis] != 0 ? l->origin[axis] + l->spacing[axis] * (double)(l->first[axis] + at)
-                                            : 0;
-    }
 }
 
 /* A field "u" at the vertices, packed, and a mesh that is moved by it; both have arrays of their own. */
@@ -125,85 +98,8 @@ static void free_warped(warped *w)
     *w = (warped){0};
 }
 
-/* ---- pictures ---------------------------------------------------------------------------------------------------- */
-
-enum { MOST_PICTURES = 8 };
-
-typedef struct drawn {
-    int count;
-    caught_picture pictures[MOST_PICTURES];
-} drawn;
-
-static drawn step(insitu_session *session, int cycle)
-{
-    drawn out = {0};
-    forget_pictures();
-    const insitu_status status = insitu_step(session, cycle, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    everywhere(status == INSITU_OK);
-    for (; out.count < caught_count; out.count++) out.pictures[out.count] = caught[out.count];
-    caught_count = 0;
-    return out;
-}
-
-static void free_drawn(drawn *d)
-{
-    for (int i = 0; i < d->count; i++) free_caught(&d->pictures[i]);
-    *d = (drawn){0};
-}
-
-static bool are_same(const drawn *a, const drawn *b)
-{
-    bool is_same = a->count == b->count;
-    for (int i = 0; i < a->count && is_same; i++) {
-        is_same = same_pictures(&a->pictures[i], &b->pictures[i]);
-        if (!is_same) fprintf(stderr, "picture %d differs\n", i);
-    }
-    return is_same;
-}
-
-/* Compares, frees both, and tells where pictures of nothing were compared. */
-static void expect_same(drawn *a, drawn *b, const char *what)
-{
-    const bool is_same = are_same(a, b), has_any = own_rank != 0 || a->count > 0;
-    if (!is_same || !has_any) fprintf(stderr, "%s\n", what);
-    everywhere(is_same && has_any);
-    free_drawn(a);
-    free_drawn(b);
-}
-
-static insitu_session *open_warped(MPI_Comm comm, const char *scene)
-{
-    char text[MOST_TEXT];
-    insitu_session *session = NULL;
-    snprintf(text, sizeof text, WARP "%s", scene);
-    const insitu_status status = insitu_create_from_text(comm, text, &session);
-    if (status) fprintf(stderr, "%s\n", insitu_error(NULL));
-    assert_int_equal(status, INSITU_OK);
-    return session;
-}
-
-static insitu_session *open_plain(MPI_Comm comm, const char *scene)
-{
-    insitu_session *session = NULL;
-    assert_int_equal(insitu_create_from_text(comm, scene, &session), INSITU_OK);
-    return session;
-}
-
 /* ---- all forms ----------------------------------------------------------------------------------------------------
  */
-
-static drawn draw_formed(insitu_session *session, const formed_mesh *m, const insitu_mesh *mesh, bool with_corners,
-                         const insitu_field *u)
-{
-    formed_mesh own = *m;
-    own.mesh = *mesh;
-    everywhere(formed_hand_over(session, &own, with_corners) == INSITU_OK);
-    if (u) everywhere(insitu_set_field(session, "m", u) == INSITU_OK);
-    drawn out = step(session, 0);
-    insitu_destroy(&session);
-    return out;
-}
 
 static void forms_draw_their_moved_meshes(void **state)
 {
@@ -215,41 +111,20 @@ static void forms_draw_their_moved_meshes(void **state)
             warped w;
             formed_create(form, SIDE, own_rank, rank_count, &m);
             make_warped(&m.mesh, 3, &w);
-            drawn a = draw_formed(open_warped(MPI_COMM_WORLD, scene), &m, &m.mesh, with_corners, &w.field);
-            drawn b = draw_formed(open_plain(MPI_COMM_WORLD, scene), &m, &w.moved, with_corners, NULL);
+            drawn a = draw_formed(open_text(MPI_COMM_WORLD, WARP, scene), &m, &m.mesh, with_corners, &w.field);
+            drawn b = draw_formed(open_text(MPI_COMM_WORLD, "", scene), &m, &w.moved, with_corners, NULL);
             expect_same(&a, &b, mesh_form_name(form));
             free_warped(&w);
             formed_free(&m);
         }
 }
 
-#define LAYERS(name, layers)                                                                                           \
-    "  - name: " name "\n    size: [24, 18]\n    layers: " layers "\n    outputs: [{path: " name ".exr}]\n"
-
-static const char all_layers[] = "threads: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1]}}]")
-    LAYERS("b", "[{volume: {field: f}}]") LAYERS("c", "[{slice: {field: f, planes: [{normal: [1, 2, 3]}]}}]")
-        LAYERS("d", "[{surface: {colour_by: {field: f}, edges: {}, threshold: {field: f, from: -0.8}}}]");
-static const char surfaces[] =
-    "threads: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1], normals: vertex}}]")
-        LAYERS("d", "[{surface: {colour_by: {field: f}, edges: {}}}]\n    shadows: true");
-
-/* "f" on one mesh; u: NULL, or the field of displacements. */
-static drawn draw_mesh(insitu_session *session, const insitu_mesh *mesh, const insitu_field *f, const insitu_field *u)
-{
-    everywhere(insitu_set_mesh(session, "m", mesh) == INSITU_OK);
-    everywhere(insitu_set_field(session, "m", f) == INSITU_OK);
-    if (u) everywhere(insitu_set_field(session, "m", u) == INSITU_OK);
-    drawn out = step(session, 0);
-    insitu_destroy(&session);
-    return out;
-}
-
 static void expect_moved(const insitu_mesh *mesh, const insitu_field *f, int components, const char *what)
 {
     warped w;
     make_warped(mesh, components, &w);
-    drawn a = draw_mesh(open_warped(MPI_COMM_WORLD, all_layers), mesh, f, &w.field);
-    drawn b = draw_mesh(open_plain(MPI_COMM_WORLD, all_layers), &w.moved, f, NULL);
+    drawn a = draw_mesh(open_text(MPI_COMM_WORLD, WARP, all_layers), mesh, f, &w.field);
+    drawn b = draw_mesh(open_text(MPI_COMM_WORLD, "", all_layers), &w.moved, f, NULL);
     expect_same(&a, &b, what);
     free_warped(&w);
 }
@@ -296,41 +171,6 @@ static void nodes_of_each_cells_own_are_moved(void **state)
 
 /* ---- planes --------------------------------------------------------------------------------------------------- */
 
-/* This rank's rows of quads, of 3 x 3 each, in the plane z = 0, of floats or doubles. */
-typedef struct plane {
-    double wide[16][2], values[16];
-    float narrow[16][2];
-    int32_t quads[9][4];
-    insitu_mesh mesh;
-    insitu_field field;
-} plane;
-
-static void make_plane(bool is_wide, plane *out)
-{
-    for (int v = 0; v < 16; v++) {
-        const double place[3] = {0.25 * (v % 4), 0.25 * (v / 4 + 3 * own_rank), 0};
-        for (int a = 0; a < 2; a++) out->narrow[v][a] = (float)(out->wide[v][a] = place[a]);
-        out->values[v] = test_wave(place);
-    }
-    for (int q = 0; q < 9; q++) {
-        const int first = q % 3 + 4 * (q / 3), corners[4] = {first, first + 1, first + 5, first + 4};
-        for (int i = 0; i < 4; i++) out->quads[q][i] = corners[i];
-    }
-    insitu_mesh_defaults(&out->mesh);
-    out->mesh.vertex_count = 16;
-    out->mesh.cell_count = 9;
-    out->mesh.cell_type = INSITU_QUAD;
-    out->mesh.connectivity_count = 36;
-    out->mesh.connectivity = (insitu_array){out->quads, INSITU_INT32, 0};
-    for (int a = 0; a < 2; a++)
-        out->mesh.coordinates[a] = is_wide ? (insitu_array){&out->wide[0][a], INSITU_FLOAT64, 16}
-                                           : (insitu_array){&out->narrow[0][a], INSITU_FLOAT32, 8};
-    insitu_field_defaults(&out->field);
-    out->field.name = "f";
-    out->field.count = 16;
-    out->field.values = (insitu_array){out->values, INSITU_FLOAT64, 0};
-}
-
 static void planes_move_by_two_or_three_components(void **state)
 {
     (void)state;
@@ -346,77 +186,14 @@ static void planes_move_by_two_or_three_components(void **state)
 
 /* ---- lattices and blocks ---------------------------------------------------------------------------------------- */
 
-typedef enum lattice_form { UNIFORM, RECTILINEAR, CURVILINEAR, QUADS, LATTICE_FORMS } lattice_form;
-
-enum { ACROSS = 4, THICK = 2, MOST_VERTICES = 5 * 5 * 3 + 6 };
-
-typedef struct block {
-    float axes[3][8];
-    double places[3][MOST_VERTICES], values[MOST_VERTICES];
-    insitu_lattice lattice;
-    insitu_mesh mesh;
-    insitu_field field;
-} block;
-
-/* The block of this number among all ranks', along z; of quads along y. Curvilinear ones have padding along x. */
-static void make_block(lattice_form form, int number, block *out)
-{
-    const bool is_plane = form == QUADS, is_curved = form == CURVILINEAR;
-    const int64_t cells[3] = {ACROSS - (is_curved ? 1 : 0), is_plane ? THICK : ACROSS, is_plane ? 0 : THICK};
-    const int along = is_plane ? 1 : 2;
-    *out = (block){.lattice = {.cells = {cells[0], cells[1], cells[2]}}};
-    insitu_lattice *l = &out->lattice;
-    l->first[along] = (int64_t)THICK * number;
-    for (int axis = 0; axis < 3; axis++) {
-        l->origin[axis] = 0.1 * (axis + 1);
-        l->spacing[axis] = 0.13 + 0.02 * axis;
-        for (int n = 0; n < 8; n++) {
-            const double at = (double)(l->first[axis] + n);
-            out->axes[axis][n] = (float)(l->origin[axis] + 0.1 * at + 0.01 * at * at);
-        }
-    }
-    insitu_mesh_defaults(&out->mesh);
-    out->mesh.lattice = l;
-    out->mesh.cell_count = cells[0] * cells[1] * (is_plane ? 1 : cells[2]);
-    out->mesh.vertex_count = (cells[0] + 1 + (is_curved ? 1 : 0)) * (cells[1] + 1) * (cells[2] + 1);
-    if (form == RECTILINEAR || is_plane)
-        for (int axis = 0; axis < (is_plane ? 2 : 3); axis++)
-            l->axes[axis] = (insitu_array){out->axes[axis], INSITU_FLOAT32, 0};
-    for (int axis = 0; axis < 3 && form != UNIFORM; axis++) l->origin[axis] = l->spacing[axis] = 0;
-    if (is_curved) {
-        l->vertex_strides[0] = 1;
-        l->vertex_strides[1] = cells[0] + 2;
-        l->vertex_strides[2] = (cells[0] + 2) * (cells[1] + 1);
-    }
-    for (int64_t v = 0; v < out->mesh.vertex_count && is_curved; v++) {
-        const double at[3] = {(double)(v % (cells[0] + 2)), (double)(v / (cells[0] + 2) % (cells[1] + 1)),
-                              (double)(l->first[2] + v / l->vertex_strides[2])};
-        const bool is_padding = v % (cells[0] + 2) > cells[0];
-        for (int axis = 0; axis < 3; axis++)
-            out->places[axis][v] = is_padding ? (double)NAN : 0.15 * at[axis] + 0.02 * sin(at[(axis + 1) % 3]);
-    }
-    for (int axis = 0; axis < 3 && is_curved; axis++)
-        out->mesh.coordinates[axis] = (insitu_array){out->places[axis], INSITU_FLOAT64, 0};
-    for (int64_t v = 0; v < out->mesh.vertex_count; v++) {
-        double place[3];
-        place_of(&out->mesh, v, place);
-        out->values[v] = test_wave(place);
-    }
-    insitu_field_defaults(&out->field);
-    out->field.name = "f";
-    out->field.count = out->mesh.vertex_count;
-    out->field.values = (insitu_array){out->values, INSITU_FLOAT64, 0};
-}
-
 static void lattices_draw_their_moved_vertices(void **state)
 {
     (void)state;
-    static const char *const names[LATTICE_FORMS] = {"uniform", "rectilinear", "curvilinear", "of quads"};
     for (lattice_form form = 0; form < LATTICE_FORMS; form++) {
         block b;
         make_block(form, own_rank, &b);
-        expect_moved(&b.mesh, &b.field, 3, names[form]);
-        if (form == QUADS) expect_moved(&b.mesh, &b.field, 2, names[form]);
+        expect_moved(&b.mesh, &b.field, 3, lattice_form_name(form));
+        if (form == QUADS) expect_moved(&b.mesh, &b.field, 2, lattice_form_name(form));
     }
 }
 
@@ -427,7 +204,7 @@ static void blocks_draw_their_moved_vertices(void **state)
         drawn pictures[2];
         for (int is_moved = 0; is_moved < 2; is_moved++) {
             insitu_session *session =
-                is_moved ? open_plain(MPI_COMM_WORLD, all_layers) : open_warped(MPI_COMM_WORLD, all_layers);
+                is_moved ? open_text(MPI_COMM_WORLD, "", all_layers) : open_text(MPI_COMM_WORLD, WARP, all_layers);
             block b[2];
             warped w[2];
             for (int i = 0; i < 2; i++) {
@@ -437,7 +214,7 @@ static void blocks_draw_their_moved_vertices(void **state)
                 everywhere(insitu_set_block_field(session, "m", i, &b[i].field) == INSITU_OK);
                 everywhere(insitu_set_block_field(session, "m", i, &w[i].field) == INSITU_OK);
             }
-            pictures[is_moved] = step(session, 0);
+            pictures[is_moved] = step_drawn(session, 0);
             insitu_destroy(&session);
             for (int i = 0; i < 2; i++) free_warped(&w[i]);
         }
@@ -524,12 +301,12 @@ static void displacements_are_read_in_any_layout(void **state)
             w.field.values = (insitu_array){0};
             const insitu_field promised = w.field;
             w.field = u;
-            a = draw_mesh(open_warped(MPI_COMM_WORLD, all_layers), &in.mesh, &in.field, &promised);
+            a = draw_mesh(open_text(MPI_COMM_WORLD, WARP, all_layers), &in.mesh, &in.field, &promised);
             everywhere(values.calls == 1);
         } else {
-            a = draw_mesh(open_warped(MPI_COMM_WORLD, all_layers), &in.mesh, &in.field, &w.field);
+            a = draw_mesh(open_text(MPI_COMM_WORLD, WARP, all_layers), &in.mesh, &in.field, &w.field);
         }
-        drawn b = draw_mesh(open_plain(MPI_COMM_WORLD, all_layers), &w.moved, &in.field, NULL);
+        drawn b = draw_mesh(open_text(MPI_COMM_WORLD, "", all_layers), &w.moved, &in.field, NULL);
         expect_same(&a, &b, "a layout of the displacements");
         free_warped(&w);
     }
@@ -551,8 +328,8 @@ static void any_partition_draws_one_picture(void **state)
         input_create(&whole, TEST_MIXED, SIDE, kind, 0, 1);
         make_warped(&part.mesh, 3, &of_part);
         make_warped(&whole.mesh, 3, &of_whole);
-        drawn a = draw_mesh(open_warped(MPI_COMM_WORLD, surfaces), &part.mesh, &part.field, &of_part.field);
-        drawn b = draw_mesh(open_warped(MPI_COMM_SELF, surfaces), &whole.mesh, &whole.field, &of_whole.field);
+        drawn a = draw_mesh(open_text(MPI_COMM_WORLD, WARP, surface_layers), &part.mesh, &part.field, &of_part.field);
+        drawn b = draw_mesh(open_text(MPI_COMM_SELF, WARP, surface_layers), &whole.mesh, &whole.field, &of_whole.field);
         for (int i = 0; own_rank != 0 && i < b.count; i++) free_caught(&b.pictures[i]);
         if (own_rank != 0) b.count = 0;
         expect_same(&a, &b, test_partition_kind_name(kind));
@@ -584,8 +361,8 @@ static void expect_step(insitu_session *session, insitu_session *plain, const se
     w->moved.changed = cycle ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_ALL;
     f.changed = INSITU_CHANGED_ALL;
     everywhere(insitu_set_mesh(plain, "m", &w->moved) == INSITU_OK && insitu_set_field(plain, "m", &f) == INSITU_OK);
-    drawn a = step(session, cycle);
-    drawn b = step(plain, cycle);
+    drawn a = step_drawn(session, cycle);
+    drawn b = step_drawn(plain, cycle);
     expect_same(&a, &b, what);
 }
 
@@ -596,8 +373,8 @@ static void steps_compute_only_what_has_changed(void **state)
     warped w;
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
     make_field(&in.mesh, 3, &w);
-    insitu_session *session = open_warped(MPI_COMM_WORLD, all_layers);
-    insitu_session *plain = open_plain(MPI_COMM_WORLD, all_layers);
+    insitu_session *session = open_text(MPI_COMM_WORLD, WARP, all_layers);
+    insitu_session *plain = open_text(MPI_COMM_WORLD, "", all_layers);
     everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     expect_step(session, plain, &in, scale, &w, 0, "the first step");
     const stamps first = stamps_of(session);
@@ -643,7 +420,7 @@ static void edits_of_the_scene_warp_and_unwarp(void **state)
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
     make_field(&in.mesh, 3, &w);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
-    insitu_session *plain = open_plain(MPI_COMM_WORLD, all_layers);
+    insitu_session *plain = open_text(MPI_COMM_WORLD, "", all_layers);
     everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     static const double factors[] = {0, 0.3, -0.2, 0, 0.3};
     for (int i = 0; i < 5; i++) {
@@ -668,11 +445,11 @@ static void copies_and_gradients_are_reported(void **state)
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
     make_field(&in.mesh, 3, &w);
     insitu_session *session =
-        open_warped(MPI_COMM_WORLD,
-                    "fields: {g: {gradient: f, component: x}}\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: "
-                                                                                      "g}}}]"));
+        open_text(MPI_COMM_WORLD, WARP,
+                  "fields: {g: {gradient: f, component: x}}\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: "
+                                                                                    "g}}}]"));
     everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
-    drawn a = step(session, 0);
+    drawn a = step_drawn(session, 0);
     const insitu_report *report = insitu_last_report(session);
     snprintf(words, sizeof words, "where the scene's warp moves them: %lld bytes",
              (long long)(24 * in.part.vertex_count));
@@ -710,9 +487,9 @@ static void statistics_are_of_the_warped_mesh(void **state)
         w.u[3 * v + 1] = w.u[3 * v + 2] = 0;
     }
     if (own_rank == 0) unlink("warp.csv");
-    insitu_session *session =
-        open_warped(MPI_COMM_WORLD, "statistics: [{field: f, path: warp.csv}]\nimages:\n" LAYERS(
-                                        "a", "[{surface: {}}]\n    when: {field: f, above: 1e30}"));
+    insitu_session *session = open_text(MPI_COMM_WORLD, WARP,
+                                        "statistics: [{field: f, path: warp.csv}]\nimages:\n" LAYERS(
+                                            "a", "[{surface: {}}]\n    when: {field: f, above: 1e30}"));
     everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     insitu_destroy(&session);
@@ -813,7 +590,7 @@ static void faults_are_told_with_line_and_key(void **state)
         char text[MOST_TEXT];
         insitu_session *session = NULL;
         snprintf(text, sizeof text, "meshes: {m: {warp: %s}}\nfields: {g: {gradient: f}}\n%s", faults[i].warp,
-                 surfaces);
+                 surface_layers);
         assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, text, &session), INSITU_OK);
         make_field(&in.mesh, 3, &w);
         insitu_field u = w.field;
@@ -830,7 +607,7 @@ static void faults_are_told_with_line_and_key(void **state)
         const insitu_field good = w.field;
         everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &good) == INSITU_OK);
         if (faults[i].spoil) {
-            drawn a = step(session, 2);
+            drawn a = step_drawn(session, 2);
             everywhere(own_rank != 0 || a.count == 2);
             free_drawn(&a);
         }
@@ -848,10 +625,10 @@ static void names_of_no_mesh_are_warned_of(void **state)
     session_input in;
     insitu_session *session = NULL;
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
-    snprintf(text, sizeof text, "%s\nmeshes:\n  plate: {warp: u}\n", surfaces);
+    snprintf(text, sizeof text, "%s\nmeshes:\n  plate: {warp: u}\n", surface_layers);
     assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, text, &session), INSITU_OK);
     everywhere(hand_over(session, &in) == INSITU_OK);
-    drawn a = step(session, 0);
+    drawn a = step_drawn(session, 0);
     everywhere(strstr(insitu_last_report(session)->warnings, "meshes.plate (line ") != NULL);
     free_drawn(&a);
     insitu_destroy(&session);

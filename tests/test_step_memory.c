@@ -42,25 +42,27 @@ static const char full_scene[] =
         IMAGE("b", "[35, 21]", VOLUME("c"), "    sampling: {max_error: 0.01, reproducible: true}\n" DECORATIONS)
             IMAGE("d", "[16, 16]", VOLUME("f") VOLUME("c"), "    sampling: {max_error: 0.01}\n");
 
-static const char edited_scene[] = "threads: 1\nfields: {l: {lambda2: [f, f, c]}, h: l * f + c}\nimages:\n" IMAGE(
-    "e", "[24, 16]",
-    "      - isosurface: {field: f, values: [0.2], normals: differences}\n"
-    "      - slice: {field: c, planes: [{normal: [1, 2, 3]}], lines: {count: 2}, clip: {sphere: {centre: "
-    "[0, 0, 0], radius: 0.5}}}\n"
-    "      - surface: {opacity: 0.5, colour_by: {field: h, discrete: 4,\n"
-    "          map: {colours: [[0, 0, 1], [1, 1, 1], [1, 0, 0]]},\n"
-    "          range: run, below: [0, 0, 0]}, lines: {field: f, values: [0.2]}}\n"
-    "      - volume: {field: f, discrete: 3, range: {percentile: [10, 90]}, scale: "
-    "symlog,\n"
-    "          threshold: 0.1, above: [1, 1, 1]}\n",
-    "    sampling: {step_cells: 0.5}\n    shadows: true\n    ambient_occlusion: "
-    "{samples: 2}\n") "  - name: k\n    size: [8, 8]\n    camera: {orbit: {views: 2}}\n"
-                      "    sweep: {isovalues: true, fields: [f, c]}\n    layers:\n"
-                      "      - isosurface: {field: f, values: [0.2, 0.5], colour_by: "
-                      "{field: f}}\n"
-                      "    outputs: [{cinema: memory.cdb}]\n"
-                      "  - name: n\n    size: [8, 8]\n    layers: [{surface: {}}]\n"
-                      "    outputs: [{path: n.png, grid: [1, 1]}]\n";
+static const char edited_scene[] =
+    "threads: 1\nmeshes: {m: {warp: {field: u, scale: 0.25}, mirror: {x: -1.25}}}\nfields: {l: {lambda2: [f, f, c]}, "
+    "h: l * f + c}\nimages:\n" IMAGE(
+        "e", "[24, 16]",
+        "      - isosurface: {field: f, values: [0.2], normals: differences}\n"
+        "      - slice: {field: c, planes: [{normal: [1, 2, 3]}], lines: {count: 2}, clip: {sphere: {centre: "
+        "[0, 0, 0], radius: 0.5}}}\n"
+        "      - surface: {opacity: 0.5, colour_by: {field: h, discrete: 4,\n"
+        "          map: {colours: [[0, 0, 1], [1, 1, 1], [1, 0, 0]]},\n"
+        "          range: run, below: [0, 0, 0]}, lines: {field: f, values: [0.2]}}\n"
+        "      - volume: {field: f, discrete: 3, range: {percentile: [10, 90]}, scale: "
+        "symlog,\n"
+        "          threshold: 0.1, above: [1, 1, 1]}\n",
+        "    sampling: {step_cells: 0.5}\n    shadows: true\n    ambient_occlusion: "
+        "{samples: 2}\n") "  - name: k\n    size: [8, 8]\n    camera: {orbit: {views: 2}}\n"
+                          "    sweep: {isovalues: true, fields: [f, c]}\n    layers:\n"
+                          "      - isosurface: {field: f, values: [0.2, 0.5], colour_by: "
+                          "{field: f}}\n"
+                          "    outputs: [{cinema: memory.cdb}]\n"
+                          "  - name: n\n    size: [8, 8]\n    layers: [{surface: {}}]\n"
+                          "    outputs: [{path: n.png, grid: [1, 1]}]\n";
 
 typedef struct memory_case {
     const char *name;
@@ -114,6 +116,10 @@ static insitu_status hand_over_scenery(insitu_session *session, const scenery *s
         insitu_status status = insitu_set_mesh(session, name, &in->mesh);
         if (!status) status = insitu_set_field(session, name, &in->field);
         if (!status) status = insitu_set_field(session, name, &cells);
+        insitu_field u = in->field;
+        u.name = "u", u.component_count = 3;
+        u.values.data = in->part.coordinates;
+        if (!status) status = insitu_set_field(session, name, &u);
         if (!first) first = status;
     }
     return first;

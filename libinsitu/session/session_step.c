@@ -25,6 +25,7 @@
 #include "session_indexed.h"
 #include "session_joints.h"
 #include "session_lines.h"
+#include "session_mirrors.h"
 #include "session_recentre.h"
 #include "session_smooth.h"
 #include "session_summary.h"
@@ -134,6 +135,25 @@ static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_
     return status;
 }
 
+/* Warps and mirrors meshes as the scene says. *are_cells_changed is set if that changes cells or coordinates on any
+ * rank. Collective. */
+static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed, base_error *error)
+{
+    const scene *scene = &s->scene_file.scene;
+    const bool is_any = scene->warp_count > 0 || scene->mirror_count > 0;
+    int mine, any;
+    if (!is_any && !s->meshes.are_transformed) return INSITU_OK;
+    session_update_warps(scene, s->scene_file.path, &s->meshes, s->team.threads);
+    session_update_mirrors(scene, &s->meshes, s->team.threads, error);
+    insitu_status status = session_agree(s->team.comm, error);
+    if (status) return status;
+    s->meshes.are_transformed = is_any;
+    mine = s->meshes.are_cells_changed;
+    status = session_check_mpi(error, MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, s->team.comm), "MPI_Allreduce");
+    *are_cells_changed = *are_cells_changed || any;
+    return status;
+}
+
 /* Checks the changed contents of meshes, and updates the catalogue. Meshes and fields with faults are put aside:
  * *refused is the first fault. Collective. */
 static insitu_status update_meshes(insitu_session *s, const session_changes *changes, base_error *refused,
@@ -144,8 +164,7 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     base_error reason = {.status = INSITU_OK};
     bool are_cells_changed = changes->are_cells_changed;
     if (changes->are_levels_changed && session_update_covers(&s->meshes, team, error)) return error->status;
-    if (session_update_warps(scene, s->scene_file.path, &s->meshes, team, &are_cells_changed, error))
-        return error->status;
+    if (transform_meshes(s, &are_cells_changed, error)) return error->status;
     if (are_cells_changed) session_check_meshes(&s->meshes, team, &reason);
     if (!refused->status) *refused = reason;
     const bool of_names = changes->are_names_changed || refused->status || s->catalogue.has_faults;
@@ -155,7 +174,7 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     if ((are_cells_changed || of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
     if (!status) session_check_warps(scene, &s->catalogue, &s->report);
-    return status;
+    return status ? status : session_check_mirrors(scene, &s->meshes, &s->catalogue, team, &s->report, error);
 }
 
 /* Makes the plan. If fields turn out to be invalid when their values are read, makes another one without their images.

@@ -105,12 +105,13 @@ static int64_t value_bytes(const insitu_field *field)
 static void report_field(session_report *out, copied_reasons *copied, const session_mesh *mesh, int index)
 {
     const insitu_field *field = &mesh->fields[index].given;
-    add_copied(copied, mesh->fields[index].copy_bytes, "field \"%s\" %s", field->name,
+    const int64_t copied_bytes = mesh->fields[index].has_borrowed_copy ? 0 : mesh->fields[index].copy_bytes;
+    add_copied(copied, copied_bytes, "field \"%s\" %s", field->name,
                mesh->fields[index].is_derived ? "derived from others"
                : field->index.data            ? "by its index"
                : field->corner_row            ? "in rows of corners"
                                               : "at the corners of a torn mesh");
-    if (is_field_in_use(mesh, index))
+    if (is_field_in_use(mesh, index) && !mesh->source)
         out->public_report.bytes_borrowed +=
             value_bytes(field) + array_bytes(&field->index, session_count_field_positions(&mesh->given, field)) +
             patch_bytes(field);
@@ -152,7 +153,7 @@ static void report_outer(session_report *out, copied_reasons *copied, const sess
 static void report_topology(session_report *out, copied_reasons *copied, const session_mesh *mesh)
 {
     const session_topology *t = &mesh->topology;
-    out->public_report.cells_recognised += t->recognised_count;
+    out->public_report.cells_recognised += mesh->source ? 0 : t->recognised_count;
     if (t->recognised_count)
         add_copied(copied, t->cell_bytes,
                    "%lld of %lld polyhedra are drawn as the tets, hexes, wedges or pyramids that their faces make",
@@ -166,6 +167,7 @@ static void report_topology(session_report *out, copied_reasons *copied, const s
     add_copied(copied, t->face_bytes, "its faces' vertices, out of lists");
     add_copied(copied, mesh->conformed.bytes, "arrays that are not aligned or of types that are not read in place");
     add_copied(copied, mesh->lattice.bytes, "coordinates along the axes of its lattice");
+    add_copied(copied, mesh->mirrored.bytes, "coordinates of its mirror images");
     add_copied(copied, mesh->warp.bytes, "coordinates of its vertices where the scene's warp moves them");
     if (mesh->covered) add_copied(copied, mesh->given.cell_count, "flags of cells that finer blocks cover");
     add_copied(copied, mesh->torn.bytes, "vertices of each cell's own, for fields with values at corners");
@@ -176,10 +178,12 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
     insitu_report *report = &out->public_report;
     int64_t unusable = 0;
     if (!mesh->is_given) return;
-    report->cells += session_cell_count(mesh);
-    report->bytes_borrowed += mesh_bytes(&mesh->original);
+    if (!mesh->source) {
+        report->cells += session_cell_count(mesh);
+        report->bytes_borrowed += mesh_bytes(&mesh->original);
+    }
     report_topology(out, copied, mesh);
-    if (!mesh->is_check_stale) {
+    if (!mesh->is_check_stale && !mesh->source) {
         report->cells_ghost += mesh->given_counts.ghost_count;
         report->cells_inverted += mesh->given_counts.inverted_count;
         report->cells_flat += mesh->given_counts.flat_count - mesh->given_counts.shell_count;
@@ -190,7 +194,7 @@ static void report_part(session_report *out, copied_reasons *copied, const sessi
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *scalar = &mesh->scalars[i];
         report_scalar(out, copied, mesh, scalar);
-        if (!scalar->is_used || !scalar->needs_ranges) continue;
+        if (!scalar->is_used || !scalar->needs_ranges || mesh->source) continue;
         const int64_t count = session_count_unusable(mesh, scalar);
         unusable = count > unusable ? count : unusable;
     }
@@ -219,6 +223,7 @@ static void report_left_out(session_report *out, const session_parts *parts)
     int64_t shown = 0, drawn = 0, given = 0, partial = 0;
     for (int i = 0; i < parts->count; i++) {
         const session_mesh *part = parts->items[i];
+        if (part->source) continue;
         given += part->is_given;
         shown += part->is_given && is_shown(part);
         if (!part->is_given || !part->is_needed) continue;

@@ -434,7 +434,7 @@ typedef struct insitu_report {
     /* number of turns in which those pixels were drawn in which cells or several volumes overlap; in each turn all
      * ranks wait for each other. The same on every rank */
     int turns;
-    int64_t cells;       /* number of cells, including ghosts */
+    int64_t cells;       /* number of cells, including ghosts; mirror images that the scene shows are not counted */
     int64_t cells_ghost; /* number of cells that are not drawn because they are flagged as ghosts */
     /* number of cells that are not drawn because their own field value or that of a vertex is not finite; of cells of
      * higher order some pieces are not drawn */

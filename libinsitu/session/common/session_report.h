@@ -70,8 +70,9 @@ typedef enum session_warning_kind {
     WARNING_UNSAID,      /* values have changed although the caller declared them unchanged */
     WARNING_OUTPUTS,     /* an image has no outputs */
     WARNING_PARAMETER,   /* a parameter of the scene is not used */
-    WARNING_MESH,        /* no mesh has a name for which the scene has a warp */
+    WARNING_MESH,        /* no mesh has a name that the scene gives at `meshes` */
     WARNING_WARP,        /* gradients are those of a warped mesh */
+    WARNING_MIRROR,      /* a mesh lies on both sides of its mirror plane */
     WARNING_WRITER,      /* rank 0 has no thread that writes pictures */
     WARNING_THREADS,     /* the scene or OpenMP requests more threads than can be started */
     WARNING_ISA          /* INSITU_ISA in this rank's environment is ignored */

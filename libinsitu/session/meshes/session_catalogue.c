@@ -44,13 +44,14 @@ static part_summary summarize_parts(const session_parts *parts)
     bool has_any = false;
     for (int i = 0; i < parts->count; i++) {
         const session_mesh *part = parts->items[i];
+        if (part->problem.status && !out.problem) out.problem = &part->problem;
+        if (part->source) continue;
         const bool has_cells = part->given.cell_count > 0, has_ids = part->given.vertex_ids.data != NULL;
         out.is_given = out.is_given || part->is_given || part->problem.status;
         out.has_cells = out.has_cells || has_cells;
         out.is_refined = out.is_refined || session_has_levels(&part->given);
         if (has_cells && !has_ids) out.has_ids = false;
         has_any = has_any || has_ids;
-        if (part->problem.status && !out.problem) out.problem = &part->problem;
     }
     out.has_ids = out.has_ids && has_any;
     return out;
@@ -58,7 +59,7 @@ static part_summary summarize_parts(const session_parts *parts)
 
 static const session_field *find_set_field(const session_mesh *part, const char *name)
 {
-    const int index = session_find_field(part, name);
+    const int index = part->source ? -1 : session_find_field(part, name);
     return index < 0 || part->fields[index].is_derived ? NULL : &part->fields[index];
 }
 
@@ -77,6 +78,7 @@ static void find_field_problem(const session_parts *parts, const session_field *
     for (int i = 0; i < parts->count && !problem->status; i++) {
         const session_mesh *part = parts->items[i];
         const session_field *field = find_set_field(part, as->name);
+        if (part->source) continue;
         if (field && field->problem.status) {
             *problem = field->problem;
         } else if (!field && part->given.cell_count > 0) {
@@ -101,7 +103,7 @@ static const session_field *next_set_field(field_visit *visit)
 {
     for (; visit->part < visit->parts->count; visit->part++, visit->next = 0) {
         const session_mesh *part = visit->parts->items[visit->part];
-        while (visit->next < part->field_count) {
+        while (visit->next < part->field_count && !part->source) {
             const session_field *field = &part->fields[visit->next++];
             if (!field->is_derived && is_first_part_with(visit->parts, visit->part, field)) return field;
         }

@@ -331,7 +331,7 @@ void session_read_lattice(session_mesh *mesh, grid *g)
         g->coordinates[axis] = (grid_array){.is_wide = true, .axis = &mesh->lattice.cells.axes[axis]};
 }
 
-static void fill_axis(const insitu_lattice *l, int axis, double *out)
+void session_fill_axis(const insitu_lattice *l, int axis, double *out)
 {
     const grid_array given = session_grid_array(&l->axes[axis]);
     for (int64_t n = 0; n < count_vertices_along(l, axis); n++) {
@@ -353,7 +353,7 @@ insitu_status session_make_axes(session_mesh *mesh, base_error *error)
         if (!places)
             return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld coordinates along %c",
                              mesh->label, (long long)count, axis_name[axis]);
-        fill_axis(l, axis, places);
+        session_fill_axis(l, axis, places);
         own->axis_coordinates[axis] = places;
         own->cells.axes[axis].places = places;
         own->bytes += count * (int64_t)sizeof *places;

@@ -25,6 +25,9 @@ void session_take_lattice(session_mesh *mesh);
  * coordinates. */
 void session_read_lattice(session_mesh *mesh, grid *g);
 
+/* Computes the cells[axis] + 1 coordinates along an axis of a lattice that is uniform or rectilinear. Local. */
+void session_fill_axis(const insitu_lattice *lattice, int axis, double *out);
+
 /* Computes the coordinates along the axes from the current contents of the arrays. Fails if one is not finite.
  * Local. */
 insitu_status session_make_axes(session_mesh *mesh, base_error *error);

@@ -208,7 +208,8 @@ void session_drop_field_tables(session_field *field)
 
 void session_drop_copy(session_field *field)
 {
-    base_free(field->copy);
+    if (!field->has_borrowed_copy) base_free(field->copy);
+    field->has_borrowed_copy = false;
     field->copy = NULL;
     field->copy_bytes = 0;
     field->is_copy_stale = true;
@@ -355,10 +356,20 @@ void session_drop_warp(session_mesh *mesh)
     mesh->warp = (session_warp){0};
 }
 
+void session_drop_mirrored(session_mirrored *mirrored)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        base_free((void *)(uintptr_t)mirrored->coordinates[axis].data);
+        base_free(mirrored->axes[axis]);
+    }
+    *mirrored = (session_mirrored){0};
+}
+
 static void drop_cells(session_mesh *mesh)
 {
     drop_derived_data(mesh);
     session_drop_warp(mesh);
+    session_drop_mirrored(&mesh->mirrored);
     session_drop_axes(&mesh->lattice);
     session_drop_conformed(&mesh->conformed);
     base_free(mesh->covered);
@@ -397,15 +408,22 @@ static void free_mesh(session_mesh *mesh)
     base_free(mesh);
 }
 
-/* Returns the number of meshes that precede the block or, if is_end, all meshes up to the last block of that name. */
-static int count_preceding_meshes(const session_meshes *meshes, const char *name, int64_t block, bool is_end)
+/* Compares a mesh with a name, a block's number and the axes of a mirror image, in this order. */
+static int compare_mesh(const session_mesh *mesh, const char *name, int64_t block, int mirror_axes)
+{
+    const int order = strcmp(mesh->name, name);
+    if (order) return order;
+    if (mesh->block != block) return mesh->block < block ? -1 : 1;
+    return mesh->mirror_axes - mirror_axes;
+}
+
+/* Returns the index of the part among the meshes, or the index at which it would be inserted. */
+static int find_mesh_index(const session_meshes *meshes, const char *name, int64_t block, int mirror_axes)
 {
     int low = 0, high = meshes->count;
     while (low < high) {
         const int middle = low + (high - low) / 2;
-        const session_mesh *mesh = meshes->items[middle];
-        const int order = strcmp(mesh->name, name);
-        if (order < 0 || (order == 0 && (is_end || mesh->block < block)))
+        if (compare_mesh(meshes->items[middle], name, block, mirror_axes) < 0)
             low = middle + 1;
         else
             high = middle;
@@ -413,30 +431,43 @@ static int count_preceding_meshes(const session_meshes *meshes, const char *name
     return low;
 }
 
-/* Returns the index of the block among the meshes, or the index at which it would be inserted. */
-static int find_mesh_index(const session_meshes *meshes, const char *name, int64_t block)
+/* More than any mirror_axes. */
+enum { ALL_AXES = 8 };
+
+/* Returns the number of meshes up to the last part of this name. */
+static int find_end_of_name(const session_meshes *meshes, const char *name)
 {
-    return count_preceding_meshes(meshes, name, block, false);
+    return find_mesh_index(meshes, name, INT64_MAX, ALL_AXES);
 }
 
 session_parts session_parts_at(const session_meshes *meshes, int first)
 {
     const char *name = meshes->items[first]->name;
     const bool has_more = first + 1 < meshes->count && strcmp(meshes->items[first + 1]->name, name) == 0;
-    return (session_parts){has_more ? count_preceding_meshes(meshes, name, 0, true) - first : 1, meshes->items + first};
+    return (session_parts){has_more ? find_end_of_name(meshes, name) - first : 1, meshes->items + first};
 }
 
 session_parts session_find_parts(const session_meshes *meshes, const char *name)
 {
-    const int first = find_mesh_index(meshes, name, INT64_MIN), end = count_preceding_meshes(meshes, name, 0, true);
+    const int first = find_mesh_index(meshes, name, INT64_MIN, 0), end = find_end_of_name(meshes, name);
     return (session_parts){end - first, meshes->items + first};
+}
+
+static session_mesh *find_part(const session_meshes *meshes, const char *name, int64_t block, int mirror_axes)
+{
+    const int at = find_mesh_index(meshes, name, block, mirror_axes);
+    session_mesh *mesh = at < meshes->count ? meshes->items[at] : NULL;
+    return mesh && compare_mesh(mesh, name, block, mirror_axes) == 0 ? mesh : NULL;
 }
 
 session_mesh *session_find_block(const session_meshes *meshes, const char *name, int64_t block)
 {
-    const int at = find_mesh_index(meshes, name, block);
-    session_mesh *mesh = at < meshes->count ? meshes->items[at] : NULL;
-    return mesh && mesh->block == block && strcmp(mesh->name, name) == 0 ? mesh : NULL;
+    return find_part(meshes, name, block, 0);
+}
+
+session_mesh *session_find_image(const session_meshes *meshes, const session_mesh *source, int mirror_axes)
+{
+    return find_part(meshes, source->name, source->block, mirror_axes);
 }
 
 /* Ensures that there is space for one more mesh. Returns false if memory runs out. */
@@ -460,29 +491,32 @@ void session_store_problem(session_field *field, const base_error *problem, base
 
 static void insert_mesh(session_meshes *meshes, session_mesh *mesh)
 {
-    const int at = find_mesh_index(meshes, mesh->name, mesh->block);
+    const int at = find_mesh_index(meshes, mesh->name, mesh->block, mesh->mirror_axes);
     memmove(meshes->items + at + 1, meshes->items + at, (size_t)(meshes->count - at) * sizeof *meshes->items);
     meshes->items[at] = mesh;
     meshes->count++;
 }
 
 /* Returns the name of a mesh or block for messages; NULL if memory runs out. */
-static char *make_label(const char *name, int64_t block)
+static char *make_label(const char *name, int64_t block, bool is_image)
 {
-    const size_t size = strlen(name) + 24;
+    const char *end = is_image ? " (mirrored)" : "";
+    const size_t size = strlen(name) + 40;
     char *label = base_alloc(size);
-    if (label && block == SESSION_WHOLE) snprintf(label, size, "%s", name);
-    if (label && block != SESSION_WHOLE) snprintf(label, size, "%s[%lld]", name, (long long)block);
+    if (label && block == SESSION_WHOLE) snprintf(label, size, "%s%s", name, end);
+    if (label && block != SESSION_WHOLE) snprintf(label, size, "%s[%lld]%s", name, (long long)block, end);
     return label;
 }
 
-session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t block, base_error *error)
+static session_mesh *add_part(session_meshes *meshes, const char *name, int64_t block, int mirror_axes,
+                              base_error *error)
 {
     session_mesh *mesh = base_calloc(1, sizeof *mesh);
     if (mesh) {
         mesh->name = base_strdup(name);
-        mesh->label = make_label(name, block);
+        mesh->label = make_label(name, block, mirror_axes != 0);
         mesh->block = block;
+        mesh->mirror_axes = mirror_axes;
     }
     if (!mesh || !mesh->name || !mesh->label || !reserve_mesh(meshes)) {
         session_fail_for_memory(error, (int64_t)sizeof *mesh, "a mesh's description");
@@ -491,6 +525,18 @@ session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t
     }
     insert_mesh(meshes, mesh);
     return mesh;
+}
+
+session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t block, base_error *error)
+{
+    return add_part(meshes, name, block, 0, error);
+}
+
+session_mesh *session_add_image(session_meshes *meshes, session_mesh *source, int mirror_axes, base_error *error)
+{
+    session_mesh *image = add_part(meshes, source->name, source->block, mirror_axes, error);
+    if (image) image->source = source;
+    return image;
 }
 
 /* Removes `count` meshes, beginning with the one at index `first`. */
@@ -509,7 +555,13 @@ static void remove_meshes(session_meshes *meshes, int first, int count)
 
 void session_remove_block(session_meshes *meshes, const char *name, int64_t block)
 {
-    if (session_find_block(meshes, name, block)) remove_meshes(meshes, find_mesh_index(meshes, name, block), 1);
+    const int first = find_mesh_index(meshes, name, block, 0), end = find_mesh_index(meshes, name, block, ALL_AXES);
+    remove_meshes(meshes, first, end - first);
+}
+
+void session_remove_image(session_meshes *meshes, session_mesh *image)
+{
+    remove_meshes(meshes, find_mesh_index(meshes, image->name, image->block, image->mirror_axes), 1);
 }
 
 void session_remove_mesh(session_meshes *meshes, const char *name)

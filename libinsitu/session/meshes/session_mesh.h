@@ -27,6 +27,8 @@ typedef struct session_field {
     bool is_displacement;     /* set if the scene warps the mesh by this field */
     uint64_t inputs_hash;     /* hash of the inputs of a derived field's values; 0: there are no values yet */
     int64_t version;          /* incremented at each known change of the values */
+    int64_t source_version;   /* on a mirror image: version of the source's field whose values this one has */
+    bool has_borrowed_copy;   /* set if `copy` belongs to the field of a mirror image's source */
     insitu_patch *patches;    /* copy of the table given.patches, owned by the session */
     insitu_array *components; /* copy of the table given.components, owned by the session */
     char *copy;               /* packed tuples with interleaved components; NULL: not copied yet */
@@ -201,6 +203,18 @@ typedef struct session_warp {
     base_error problem; /* why the vertices could not be moved, which the check of the mesh returns */
 } session_warp;
 
+/* The coordinates of a mirror image (session_mirror.h), of which those that are computed are a copy reported to the
+ * user. */
+typedef struct session_mirrored {
+    double planes[3];            /* coordinate of the mirror plane of each axis along which the image is mirrored */
+    insitu_array coordinates[3]; /* mirrored coordinates, owned and packed; no data if they are those of the source */
+    double *axes[3];             /* coordinates along a lattice's axes, owned; NULL: coordinates are given by vertex */
+    insitu_lattice lattice;      /* lattice of the description */
+    int64_t bytes;
+    /* values of the source's members of these names for which the image was made */
+    int64_t cells_stamp, coordinates_stamp;
+} session_mirrored;
+
 enum { SESSION_CONFORMED = 9 };
 
 /* Copies of arrays whose type cannot be read in place (session_conform.h). They are reported to the user. */
@@ -238,7 +252,11 @@ typedef struct session_counts {
 /* One rank's part of a mesh, or one block of it. Blocks of one mesh have the same name. */
 typedef struct session_mesh {
     char *name;
-    int64_t block;        /* the block's number, or SESSION_WHOLE */
+    int64_t block; /* the block's number, or SESSION_WHOLE */
+    /* Images are parts of the mesh beside the caller's own, of which statistics, counts and errors take no notice. */
+    struct session_mesh *source; /* the caller's part of which this one is a mirror image; NULL: it is the caller's */
+    int mirror_axes;             /* bit i is set if the image is mirrored along axis i; 0: it is the caller's part */
+    session_mirrored mirrored;
     char *label;          /* name for messages: "m", or "m[17]" for block 17 */
     insitu_mesh original; /* the caller's description */
     /* the description with copies in place of the arrays that cannot be read in place, and of moved coordinates */
@@ -312,8 +330,9 @@ typedef struct session_meshes {
     bool are_levels_changed;
     int64_t level_box_count; /* number of refined blocks near those of this rank, including its own */
     session_level_box *level_boxes;
-    int64_t stamp;   /* incremented by each change of cells or coordinates */
-    bool are_warped; /* set if the scene of the last step that drew warped meshes; the same on all ranks */
+    int64_t stamp; /* incremented by each change of cells or coordinates */
+    /* set if the scene of the last step that drew warped or mirrored meshes; the same on all ranks */
+    bool are_transformed;
     /* error of a set call that cannot be stored with a mesh; it is kept for one step */
     base_error pending_error;
     char *pending_mesh, *pending_field; /* mesh and field of this error; NULL: it belongs to no particular one */
@@ -400,7 +419,12 @@ session_field *session_add_field(session_mesh *mesh, const char *name);
 
 /* Adds an empty mesh or block, which must not exist yet. Returns NULL if memory runs out. */
 session_mesh *session_add_mesh(session_meshes *meshes, const char *name, int64_t block, base_error *error);
-/* Removes a block, or a mesh with all its blocks. Does nothing if it does not exist. */
+/* Adds an empty mirror image of a part, which must not exist yet. Returns NULL if memory runs out. */
+session_mesh *session_add_image(session_meshes *meshes, session_mesh *source, int mirror_axes, base_error *error);
+/* Returns the image of a part that is mirrored along these axes, or NULL if there is none. */
+session_mesh *session_find_image(const session_meshes *meshes, const session_mesh *source, int mirror_axes);
+void session_remove_image(session_meshes *meshes, session_mesh *image);
+/* Removes a block, or a mesh with all its blocks, with their images. Does nothing if it does not exist. */
 void session_remove_block(session_meshes *meshes, const char *name, int64_t block);
 void session_remove_mesh(session_meshes *meshes, const char *name);
 
@@ -424,6 +448,7 @@ void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh);
 void session_mark_moved(session_meshes *meshes, session_mesh *mesh);
 /* Frees the moved coordinates, which must not be in use any more. */
 void session_drop_warp(session_mesh *mesh);
+void session_drop_mirrored(session_mirrored *mirrored);
 /* Removes the derived fields, and with them all scalars and thresholds, which refer to fields by index. */
 void session_drop_derived(session_mesh *mesh);
 /* Frees the mesh of outer faces and, if with_faces, the faces themselves. The threshold is kept. */
@@ -452,6 +477,12 @@ typedef struct session_part_walk {
 
 /* Advances to the next part. Returns false after the last one. */
 bool session_next_part(session_part_walk *walk);
+
+/* Returns the part that the caller gave: the source of a mirror image, or the part itself. */
+static inline const session_mesh *session_source(const session_mesh *mesh)
+{
+    return mesh->source ? mesh->source : mesh;
+}
 
 /* Returns the number of cells that the caller gave; a lattice's array of cells may have padding. */
 static inline int64_t session_cell_count(const session_mesh *mesh)

@@ -357,8 +357,7 @@ static unsigned find_description_changes(const session_mesh *mesh, const insitu_
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
-/* Stores a description in the table. An error can only be lack of memory; the caller must then refuse the mesh. */
-static void store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error)
+void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error)
 {
     unsigned changed = given->changed;
     if (!mesh->is_given || has_other_shape(&mesh->original, given)) changed = INSITU_CHANGED_ALL;
@@ -419,7 +418,7 @@ static insitu_status set_mesh(session_meshes *meshes, const char *name, int64_t 
     if (!mesh) return INSITU_ERROR_MEMORY;
     base_error what = {0};
     const bool had_levels = session_has_levels(&mesh->given);
-    if (check_mesh(given, &what) == INSITU_OK) store_mesh(meshes, mesh, given, &what);
+    if (check_mesh(given, &what) == INSITU_OK) session_store_mesh(meshes, mesh, given, &what);
     if (!what.status) return INSITU_OK;
     meshes->are_levels_changed = meshes->are_levels_changed || had_levels;
     session_refuse_mesh(mesh);

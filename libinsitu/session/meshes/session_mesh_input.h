@@ -10,6 +10,10 @@
 insitu_status session_set_mesh(session_meshes *meshes, const char *name, int64_t block, const insitu_mesh *given,
                                base_error *error);
 
+/* Stores a description, which must be correct, in the table. An error can only be lack of memory; the caller must then
+ * refuse the mesh. Local. */
+void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error);
+
 /* Returns whether cells without z coordinates may be visible, namely as shells in the plane z = 0. */
 bool session_may_be_plane(const insitu_mesh *mesh);
 

@@ -397,13 +397,14 @@ insitu_status session_drop_faces_between_levels(const session_meshes *meshes, co
 {
     box_bins bins = {.count = 0};
     bool has_levels = false;
-    for (int i = 0; i < count; i++) has_levels = has_levels || is_level_block(parts[i].mesh);
+    for (int i = 0; i < count; i++) has_levels = has_levels || is_level_block(session_source(parts[i].mesh));
     if (has_levels && !bin_boxes(meshes->level_boxes, meshes->level_box_count, true, &bins))
         session_fail_for_memory(error, meshes->level_box_count * 32, "faces between levels");
-    for (int i = 0; i < count && has_levels && !error->status; i++)
-        if (is_level_block(parts[i].mesh) && !session_is_plane(parts[i].mesh->given.lattice) &&
-            !parts[i].outer->threshold.is_given)
-            drop_inner_faces(meshes, &bins, parts[i].mesh, parts[i].outer);
+    for (int i = 0; i < count && has_levels && !error->status; i++) {
+        const session_mesh *mesh = session_source(parts[i].mesh); /* an image's cells and faces have the same numbers */
+        if (is_level_block(mesh) && !session_is_plane(mesh->given.lattice) && !parts[i].outer->threshold.is_given)
+            drop_inner_faces(meshes, &bins, mesh, parts[i].outer);
+    }
     bins_free(&bins);
     return error->status;
 }

@@ -17,6 +17,7 @@
 #include "session_derived.h"
 #include "session_field_input.h"
 #include "session_hash.h"
+#include "session_mirrors.h"
 #include "session_recentre.h"
 #include "session_region.h"
 #include "session_scalars.h"
@@ -66,7 +67,8 @@ static bool next_visited_part(const derive_work *w, part_visit *v)
 {
     while (v->next_index < v->parts.count) {
         v->part = v->parts.items[v->next_index++];
-        v->field_index = v->part->is_given ? session_find_field(v->part, w->derived->name) : -1;
+        const bool is_own = v->part->is_given && !v->part->source;
+        v->field_index = is_own ? session_find_field(v->part, w->derived->name) : -1;
         if (v->field_index >= 0) return true;
     }
     return false;
@@ -518,6 +520,7 @@ insitu_status session_derive(const session_derive_basis *basis, uint64_t needed,
         if (!(needed >> i & 1)) continue;
         derive_work work = {.basis = basis, .derived = &basis->scene->derived[i], .derived_index = i};
         status = derive_field(&work, error);
+        session_share_derived(basis->meshes, work.derived->name);
         base_free(work.recentrings);
         base_free(work.stale);
     }

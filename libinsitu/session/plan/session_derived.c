@@ -67,7 +67,7 @@ void session_mark_sources(const scene *scene, uint64_t needed, const session_mes
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         for (int f = 0; f < mesh->field_count; f++) mesh->fields[f].is_source = false;
-        for (int i = 0; i < scene->derived_count; i++) {
+        for (int i = 0; i < scene->derived_count && !mesh->source; i++) {
             if (!(needed >> i & 1) || session_find_field(mesh, scene->derived[i].name) < 0) continue;
             for (int k = 0; k < scene->derived[i].input_count; k++) {
                 const int source = session_find_field(mesh, scene->derived[i].inputs[k].name);

@@ -27,7 +27,7 @@ static const scene_field *next_field(field_walk *walk)
 
 static int64_t count_unusable(const session_mesh *mesh, const scene_field *field)
 {
-    const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
+    const session_scalar *scalar = mesh->is_given && !mesh->source ? session_find_scalar(mesh, field) : NULL;
     return scalar ? session_count_unusable(mesh, scalar) : 0;
 }
 

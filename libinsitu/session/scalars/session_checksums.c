@@ -113,7 +113,7 @@ static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, ses
     const bool has_changed =
         !scalar->may_have_changed && scalar->has_checksum && scalar->sample_checksum != find_sample(mesh, scalar);
     session_warn_locally(
-        report, &warning, has_changed,
+        report, &warning, has_changed && !mesh->source,
         "mesh \"%s\": field \"%s\" has other values than in the last picture, but was not set again, or with "
         "INSITU_CHANGED_NOTHING: set it with INSITU_CHANGED_VALUES, as such changes may be missed",
         mesh->label, field);
@@ -140,6 +140,7 @@ static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, i
 static void report_unchanged(const session_mesh *mesh, const session_scalar *scalar, int64_t *blocks,
                              session_report *report)
 {
+    if (mesh->source) return;
     if (mesh->block != SESSION_WHOLE)
         (*blocks)++;
     else

@@ -331,7 +331,8 @@ static void store_field(session_meshes *meshes, session_mesh *mesh, int index, c
     field->problem = (base_error){0};
 }
 
-static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const insitu_field *given, base_error *error)
+insitu_status session_set_part_field(session_meshes *meshes, session_mesh *mesh, const insitu_field *given,
+                                     base_error *error)
 {
     int index = session_find_field(mesh, given->name);
     if (index < 0) {
@@ -403,7 +404,7 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, int64_
         refuse_missing_mesh(meshes, name, block, field_name, error);
     else if (!mesh->is_given)
         return refuse_field(meshes, mesh, field_name, error);
-    else if (set_field(meshes, mesh, field, error) != INSITU_ERROR_MEMORY)
+    else if (session_set_part_field(meshes, mesh, field, error) != INSITU_ERROR_MEMORY)
         return error->status;
     session_store_pending(meshes, error, name, field_name && *field_name ? field_name : NULL);
     return error->status;

@@ -9,6 +9,11 @@
 insitu_status session_set_field(session_meshes *meshes, const char *name, int64_t block, const insitu_field *field,
                                 base_error *error);
 
+/* Checks and stores a field's description on one part of a mesh. Fails only for lack of memory, without storing the
+ * error, or for a wrong description, whose error the field keeps. Local. */
+insitu_status session_set_part_field(session_meshes *meshes, session_mesh *mesh, const insitu_field *given,
+                                     base_error *error);
+
 /* Checks and stores a field's description after its fill function has set its values. The error message names the mesh
  * and the field. Local. */
 insitu_status session_store_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error);

@@ -18,7 +18,7 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         const int index = scene_field_is_on(field, mesh->label) ? session_find_field(mesh, field->name) : -1;
-        if (index >= 0) mesh->fields[index].is_in_statistics = true;
+        if (index >= 0 && !mesh->source) mesh->fields[index].is_in_statistics = true;
     }
 }
 

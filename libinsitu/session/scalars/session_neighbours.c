@@ -4,10 +4,30 @@
 
 #include "session_torn.h"
 
+static double given_coordinate(const session_mesh *mesh, int axis, int64_t vertex)
+{
+    const grid_array places =
+        mesh->cells.lattice ? mesh->cells.coordinates[axis] : session_coordinates(&mesh->given, axis);
+    return grid_array_number(&places, vertex);
+}
+
+/* Returns the axes along which a vertex of a mirror image lies elsewhere than the vertex of its source, one bit each.
+ * Vertices in the mirror planes are those of the source. */
+static uint64_t find_mirrored_axes(const session_mesh *mesh, int64_t vertex)
+{
+    uint64_t axes = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        if (!(mesh->mirror_axes >> axis & 1)) continue;
+        const double own = given_coordinate(mesh, axis, vertex), other = given_coordinate(mesh->source, axis, vertex);
+        axes |= (uint64_t)(own < other || own > other) << axis;
+    }
+    return axes;
+}
+
 static session_key key_of_id(const session_mesh *mesh, int64_t vertex)
 {
     const grid_array ids = session_grid_array(&mesh->given.vertex_ids);
-    return (session_key){{(uint64_t)grid_array_index(&ids, vertex), 0, 0}};
+    return (session_key){{(uint64_t)grid_array_index(&ids, vertex), find_mirrored_axes(mesh, vertex), 0}};
 }
 
 static session_key key_of_position(const grid_array coordinates[3], int64_t vertex)

@@ -2,7 +2,6 @@
 
 #include <string.h>
 
-#include "session_agree.h"
 #include "session_filled.h"
 #include "session_hash.h"
 #include "session_mesh_input.h"
@@ -124,20 +123,11 @@ static void update_mesh(const warp_step *step, session_mesh *mesh)
     step->meshes->are_cells_changed = true;
 }
 
-insitu_status session_update_warps(const scene *scene, const char *scene_path, session_meshes *meshes,
-                                   const session_team *team, bool *has_moved, base_error *error)
+void session_update_warps(const scene *scene, const char *scene_path, session_meshes *meshes, int threads)
 {
-    const warp_step step = {scene, scene_path, meshes, team->threads};
-    int mine, any;
-    if (!scene->warp_count && !meshes->are_warped) return INSITU_OK;
+    const warp_step step = {scene, scene_path, meshes, threads};
     for (int i = 0; i < meshes->count; i++)
-        if (meshes->items[i]->is_given) update_mesh(&step, meshes->items[i]);
-    meshes->are_warped = scene->warp_count > 0;
-    mine = meshes->are_cells_changed;
-    const insitu_status status =
-        session_check_mpi(error, MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
-    if (!status) *has_moved = *has_moved || any;
-    return status;
+        if (meshes->items[i]->is_given && !meshes->items[i]->source) update_mesh(&step, meshes->items[i]);
 }
 
 /* ---- warnings ---------------------------------------------------------------------------------------------------- */

@@ -5,13 +5,11 @@
 #include "scene.h"
 #include "session_catalogue.h"
 #include "session_report.h"
-#include "session_team.h"
 
 /* Moves the vertices of this rank's meshes as the scene says, as far as the mesh, the field or the scene has changed.
- * It precedes the check of the meshes, which returns errors of the field. scene_path is for messages. *has_moved is set
- * if the cells or coordinates of any mesh have changed on any rank. Collective. */
-insitu_status session_update_warps(const scene *scene, const char *scene_path, session_meshes *meshes,
-                                   const session_team *team, bool *has_moved, base_error *error);
+ * It precedes the check of the meshes, which returns errors of the field. scene_path is for messages. Local, but fill
+ * functions may communicate. */
+void session_update_warps(const scene *scene, const char *scene_path, session_meshes *meshes, int threads);
 
 /* Warns of entries of the scene that stand for no mesh, and of gradients on warped meshes. Local. */
 void session_check_warps(const scene *scene, const session_catalogue *catalogue, session_report *report);

@@ -182,7 +182,7 @@ static insitu_status convert_file(const scene_document *d, const scene_file *in,
     if (status == INSITU_OK) status = convert_images(d, in, out);
     if (status == INSITU_OK) status = scene_convert_statistics(d, in, out);
     if (status == INSITU_OK) status = scene_convert_parameters(d, out);
-    if (status == INSITU_OK) status = scene_convert_warps(d, in, out);
+    if (status == INSITU_OK) status = scene_convert_meshes_drawn(d, in, out);
     return status == INSITU_OK ? scene_check_outputs(d, out) : status;
 }
 
@@ -208,6 +208,17 @@ const scene_warp *scene_find_warp(const scene *s, const char *mesh)
         const scene_warp *warp = &s->warps[i];
         if (!scene_name_stands_for(warp->mesh, mesh)) continue;
         if (!found || strlen(warp->mesh) > strlen(found->mesh)) found = warp;
+    }
+    return found;
+}
+
+const scene_mirror *scene_find_mirror(const scene *s, const char *mesh)
+{
+    const scene_mirror *found = NULL;
+    for (int i = 0; i < s->mirror_count; i++) {
+        const scene_mirror *mirror = &s->mirrors[i];
+        if (!scene_name_stands_for(mirror->mesh, mesh)) continue;
+        if (!found || strlen(mirror->mesh) > strlen(found->mesh)) found = mirror;
     }
     return found;
 }
@@ -316,7 +327,7 @@ void scene_free(scene *s)
     scene_free_derived(s);
     for (int i = 0; i < s->parameter_count; i++) base_free(s->parameters[i].name);
     base_free(s->parameters);
-    scene_free_warps(s);
+    scene_free_meshes(s);
     for (int i = 0; i < s->database_count; i++) base_free(s->databases[i].path);
     base_free(s->databases);
     for (int i = 0; i < s->montage_count; i++) base_free(s->montages[i].name);

@@ -568,6 +568,14 @@ typedef struct scene_warp {
     int line, field_line; /* lines of the mesh's name and of the field in the scene file */
 } scene_warp;
 
+/* A mesh that is drawn together with its mirror images. */
+typedef struct scene_mirror {
+    char *mesh;       /* name of the mesh, or beginning of the names of several, as at a layer */
+    int axes;         /* bit i is set if the mesh is mirrored along axis i; at least one is */
+    double planes[3]; /* coordinate of the mirror plane of each of these axes */
+    int line;         /* line of the mesh's name in the scene file */
+} scene_mirror;
+
 typedef struct scene {
     int derived_count;      /* number of derived fields, 0 .. SCENE_MAX_DERIVED */
     scene_derived *derived; /* derived fields; each comes after the fields from which it is derived */
@@ -587,6 +595,8 @@ typedef struct scene {
     scene_parameter *parameters;
     int warp_count; /* number of warps, 0 .. 64; the names of their meshes differ */
     scene_warp *warps;
+    int mirror_count; /* number of mirrors, 0 .. 64; the names of their meshes differ */
+    scene_mirror *mirrors;
 } scene;
 
 /* Parses a text of `size` bytes. file_name is used in messages, and paths in the scene are relative to its folder.
@@ -606,6 +616,8 @@ void scene_list_parameters(const scene *s, const char *name, char *words, size_t
 /* Returns the warp of the mesh of this name, or NULL if the mesh is drawn as it is. If several entries stand for the
  * mesh, this is the one with the longest name. */
 const scene_warp *scene_find_warp(const scene *s, const char *mesh);
+/* Returns the mirror of the mesh of this name, by the same rule. */
+const scene_mirror *scene_find_mirror(const scene *s, const char *mesh);
 
 /* The values by which placeholders are replaced. */
 typedef struct scene_moment {

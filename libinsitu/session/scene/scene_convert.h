@@ -138,8 +138,9 @@ insitu_status scene_convert_statistics(const scene_document *d, const scene_file
 insitu_status scene_convert_derived(const scene_document *d, const scene_file *in, scene *out);
 void scene_free_derived(scene *s);
 insitu_status scene_convert_parameters(const scene_document *d, scene *out);
-insitu_status scene_convert_warps(const scene_document *d, const scene_file *in, scene *out);
-void scene_free_warps(scene *s);
+/* Converts the warps and mirrors of meshes. */
+insitu_status scene_convert_meshes_drawn(const scene_document *d, const scene_file *in, scene *out);
+void scene_free_meshes(scene *s);
 
 /* Rejects two outputs that would be written to the same file. */
 insitu_status scene_check_outputs(const scene_document *d, const scene *s);

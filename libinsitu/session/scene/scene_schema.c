@@ -406,13 +406,38 @@ static const cyaml_schema_value_t derived = {
       .high = 1e30)
 DEFINE_MAPPING(warp, "warp", WARP_KEYS);
 
+static const cyaml_strval_t axis_words[] = {{"x", 0}, {"y", 1}, {"z", 2}};
+static const cyaml_schema_value_t axis_word = {
+    CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, axis_words, CYAML_ARRAY_LEN(axis_words))};
+static const scene_form plane_forms[] = {{{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)}, {0}}};
+typedef struct no_members {
+    char unused;
+} no_members; /* a struct without members, for a mapping that is one of several forms and is read from the document */
+
+#define MIRROR_KEYS(X)                                                                                                 \
+    X(CYAML_FIELD_IGNORE("x", OPTIONAL), .help = "The mirror plane perpendicular to x is at this x.",                  \
+      .default_text = "none", .forms = plane_forms, .form_count = 1)                                                   \
+    X(CYAML_FIELD_IGNORE("y", OPTIONAL), .help = "The mirror plane perpendicular to y is at this y.",                  \
+      .default_text = "none", .forms = plane_forms, .form_count = 1)                                                   \
+    X(CYAML_FIELD_IGNORE("z", OPTIONAL), .help = "The mirror plane perpendicular to z is at this z.",                  \
+      .default_text = "none", .forms = plane_forms, .form_count = 1)
+DEFINE_MAPPING(mirror, "mirror", MIRROR_KEYS);
+static const scene_form mirror_forms[] = {
+    {{CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, axis_words, CYAML_ARRAY_LEN(axis_words))}, {0}},
+    {{CYAML_VALUE_SEQUENCE(CYAML_FLAG_DEFAULT, int, &axis_word, 1, 3)}, {0}},
+    {{CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, no_members, mirror_fields)}, {.child = &mirror_mapping}}};
+
 #define MESH_KEYS(X)                                                                                                   \
     X(TEXT("name", REQUIRED, scene_file_mesh, name, 255),                                                              \
       .help = "The name that the simulation gives the mesh; or the beginning of several meshes' names, as at a "       \
-              "layer. Of several entries for a mesh, the one with the longest name holds.")                            \
-    X(CYAML_FIELD_MAPPING_PTR("warp", REQUIRED, scene_file_mesh, warp, warp_fields),                                   \
+              "layer. Of several entries for a mesh that have a key, the one with the longest name holds.")            \
+    X(CYAML_FIELD_MAPPING_PTR("warp", OPTIONAL, scene_file_mesh, warp, warp_fields),                                   \
       .help = "Draw the mesh's vertices at x + `scale` * `field`, as in [Warped meshes](#warped-meshes).",             \
-      .child = &warp_mapping)
+      .default_text = "none", .child = &warp_mapping)                                                                  \
+    X(CYAML_FIELD_IGNORE("mirror", OPTIONAL),                                                                          \
+      .help = "Draw the mesh together with its mirror images, as in [Mirrored meshes](#mirrored-meshes): an axis, or " \
+              "several, whose mirror planes are at 0, or a mapping from axes to the planes' coordinates.",             \
+      .default_text = "none", .forms = mirror_forms, .form_count = (int)CYAML_ARRAY_LEN(mirror_forms))
 DEFINE_MAPPING(mesh, "meshes", MESH_KEYS);
 
 static const cyaml_schema_value_t mesh = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_mesh, mesh_fields)};

@@ -54,6 +54,10 @@ static void append_list(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t
     case CYAML_MAPPING: append_words(words, " mappings"); return;
     case CYAML_INT: append_words(words, " whole numbers"); break;
     case CYAML_SEQUENCE_FIXED: append_words(words, " lists of %u numbers", entry->sequence.max); break;
+    case CYAML_ENUM:
+        append_words(words, ", each ");
+        append_choices(words, entry);
+        return;
     default: append_words(words, " numbers"); break;
     }
     append_range(words, key);

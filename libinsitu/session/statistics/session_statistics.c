@@ -179,7 +179,7 @@ static bool set_up_pass(const statistics_work *w, int wish, int mesh, statistics
 {
     const session_mesh *of = w->meshes->items[mesh];
     *pass = (statistics_pass){.mesh = of, .g = &of->cells, .team = w->team, .buffers = w->buffers};
-    return of->is_given && session_find_values(of, w->wishes[wish].field, &pass->field);
+    return of->is_given && !of->source && session_find_values(of, w->wishes[wish].field, &pass->field);
 }
 
 /* Stores an error if a thread's buffer could not be allocated on any rank. */

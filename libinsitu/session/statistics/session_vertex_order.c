@@ -70,7 +70,7 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
     const session_parts parts = session_find_parts(meshes, name);
     for (int i = 0; i < parts.count; i++) {
         const session_mesh *part = parts.items[i];
-        if (!part->is_given) continue;
+        if (!part->is_given || part->source) continue;
         sums[DRAWN] += part->given_counts.drawn_count - part->given_counts.shell_count;
         sums[FLAT] += part->given_counts.flat_count - part->given_counts.shell_count;
         /* the axes of a lattice may have either direction, so that left-handed cells are not counted */

@@ -1,0 +1,158 @@
+/* The image is described like a mesh of the caller's, with changes as far as the source has changed. Its arrays are the
+ * source's: the caller's, or copies that the source owns. */
+#include "session_mirror.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_conform.h"
+#include "session_lattice.h"
+#include "session_mesh_input.h"
+#include "session_region.h"
+
+static bool is_mirrored(const session_mesh *image, int axis)
+{
+    return image->mirror_axes >> axis & 1;
+}
+
+/* ---- coordinates by vertex ----------------------------------------------------------------------------------------
+ */
+
+/* Mirrors coordinates along an axis, in their own type. */
+static void mirror_numbers(const grid_array *from, double plane, int64_t count, int threads, const insitu_array *to)
+{
+    char *out = (char *)(uintptr_t)to->data;
+    const bool is_wide = to->type == INSITU_FLOAT64;
+#pragma omp parallel num_threads(session_region_threads(threads, count))
+    {
+        region_enter();
+#pragma omp for schedule(static) nowait
+        for (int64_t v = 0; v < count; v++) {
+            const double place = 2 * plane - grid_array_number(from, v);
+            if (is_wide)
+                ((double *)(void *)out)[v] = place;
+            else
+                ((float *)(void *)out)[v] = (float)place;
+        }
+        region_leave();
+    }
+}
+
+/* Mirrors the coordinates of the source's vertices. Returns false if memory runs out. */
+static bool mirror_vertices(session_mesh *image, int threads)
+{
+    const insitu_mesh *given = &image->source->given;
+    session_mirrored *m = &image->mirrored;
+    for (int axis = 0; axis < 3; axis++) {
+        if (!is_mirrored(image, axis)) continue;
+        const insitu_type type = given->coordinates[given->coordinates[axis].data ? axis : 0].type;
+        const grid_array from = session_coordinates(given, axis);
+        const int64_t bytes = given->vertex_count * session_type_size(type);
+        insitu_array *own = &m->coordinates[axis];
+        if (own->data && own->type != type) {
+            base_free((void *)(uintptr_t)own->data);
+            own->data = NULL;
+        }
+        if (!own->data) *own = (insitu_array){base_alloc((size_t)bytes + 1), type, 0};
+        if (!own->data) return false;
+        mirror_numbers(&from, m->planes[axis], given->vertex_count, threads, own);
+        m->bytes += bytes;
+    }
+    return true;
+}
+
+/* ---- coordinates along a lattice's axes -----------------------------------------------------------------------------
+ */
+
+static bool mirror_lattice(session_mesh *image)
+{
+    const insitu_lattice *given = image->source->given.lattice;
+    session_mirrored *m = &image->mirrored;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t count = given->cells[axis] + 1;
+        if (!m->axes[axis]) m->axes[axis] = base_alloc((size_t)count * sizeof *m->axes[axis]);
+        double *places = m->axes[axis];
+        if (!places) return false;
+        session_fill_axis(given, axis, places);
+        for (int64_t n = 0; n < count && is_mirrored(image, axis); n++) places[n] = 2 * m->planes[axis] - places[n];
+        m->bytes += count * (int64_t)sizeof *places;
+    }
+    return true;
+}
+
+/* ---- the image ------------------------------------------------------------------------------------------------------
+ */
+
+/* Describes the lattice without levels of refinement: the flags of covered cells are the source's. */
+static void describe_lattice(session_mesh *image, insitu_mesh *out)
+{
+    session_mirrored *m = &image->mirrored;
+    m->lattice = *image->source->given.lattice;
+    for (int axis = 0; axis < 3; axis++) {
+        m->lattice.origin[axis] = m->lattice.spacing[axis] = 0;
+        m->lattice.first[axis] = m->lattice.refinement[axis] = 0;
+        m->lattice.axes[axis] = (insitu_array){m->axes[axis], INSITU_FLOAT64, 0};
+    }
+    out->lattice = &m->lattice;
+}
+
+static insitu_mesh describe_image(session_mesh *image, unsigned changed)
+{
+    const session_mesh *source = image->source;
+    insitu_mesh out = source->given;
+    out.changed = changed;
+    for (int axis = 0; axis < 3; axis++)
+        if (image->mirrored.coordinates[axis].data) out.coordinates[axis] = image->mirrored.coordinates[axis];
+    if (out.lattice) describe_lattice(image, &out);
+    if (source->covered) out.ghosts = (insitu_array){source->covered, INSITU_UINT8, 0};
+    return out;
+}
+
+/* Returns the INSITU_CHANGED_* bits of what has changed since the image was made. */
+static unsigned find_changes(const session_mesh *image, const double planes[3])
+{
+    const session_mirrored *m = &image->mirrored;
+    if (!image->is_given || m->cells_stamp != image->source->cells_stamp) return INSITU_CHANGED_ALL;
+    bool is_moved = m->coordinates_stamp != image->source->coordinates_stamp;
+    for (int axis = 0; axis < 3; axis++)
+        is_moved = is_moved ||
+                   (is_mirrored(image, axis) && (m->planes[axis] < planes[axis] || m->planes[axis] > planes[axis]));
+    return is_moved ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
+}
+
+/* Mirrors the coordinates, in memory that is kept while the cells are the same. Returns false if memory runs out. */
+static bool mirror_coordinates(session_mesh *image, const double planes[3], unsigned changed, int threads)
+{
+    const session_mesh *source = image->source;
+    const bool has_axes = session_has_axes(&source->given);
+    session_mirrored *m = &image->mirrored;
+    if (changed & INSITU_CHANGED_TOPOLOGY || has_axes != (m->axes[0] != NULL)) session_drop_mirrored(m);
+    m->bytes = 0;
+    m->cells_stamp = source->cells_stamp;
+    m->coordinates_stamp = source->coordinates_stamp;
+    memcpy(m->planes, planes, sizeof m->planes);
+    return has_axes ? mirror_lattice(image) : mirror_vertices(image, threads);
+}
+
+session_mesh *session_mirror_mesh(session_meshes *meshes, session_mesh *source, int mirror_axes, const double planes[3],
+                                  int threads, base_error *error)
+{
+    session_mesh *image = session_find_image(meshes, source, mirror_axes);
+    if (!image) image = session_add_image(meshes, source, mirror_axes, error);
+    if (!image) return NULL;
+    const unsigned changed = find_changes(image, planes);
+    if (changed == INSITU_CHANGED_NOTHING) return image;
+    base_error problem = {.status = INSITU_OK};
+    if (source->is_check_stale) session_fill_conformed(source, threads);
+    if (!mirror_coordinates(image, planes, changed, threads))
+        session_fail_for_memory(&problem, source->given.vertex_count * 24, "coordinates of a mirrored mesh");
+    if (!problem.status) {
+        const insitu_mesh description = describe_image(image, changed);
+        session_store_mesh(meshes, image, &description, &problem);
+    }
+    if (!problem.status) return image;
+    *error = problem;
+    session_remove_image(meshes, image);
+    return NULL;
+}

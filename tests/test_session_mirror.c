@@ -1,0 +1,653 @@
+/* Mirrored meshes: the pictures of a mesh that the scene mirrors are, to the bit, those of a mesh that consists of
+ * blocks of which each second is the mirror image of the one before: of all forms of meshes, lattices, blocks, levels
+ * of refinement and cells of higher order, warped or not, on any ranks. Colours by derived fields are those of the
+ * given mesh, and statistics and counts are of its cells alone. Steps follow what changes. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "session.h"
+#include "session_scalars.h"
+#include "test_mesh_order.h"
+#include "test_transformed.h"
+
+enum { SIDE = 3, MOST_TEXT = 1 << 13, MOST_IMAGES = 8 };
+
+/* ---- images by hand -------------------------------------------------------------------------------------------------
+ */
+
+/* The planes of a mirror, and the text of the scene for it. */
+typedef struct mirror {
+    int axes;
+    double planes[3];
+    const char *text;
+} mirror;
+
+static const mirror mirrors[] = {
+    {1, {-1, 0, 0}, "meshes: {m: {mirror: {x: -1}}}\n"},
+    {6, {0, 1, -1}, "meshes: {m: {mirror: {y: 1, z: -1}}}\n"},
+    {7, {1, 1, 1}, "meshes:\n  m: {mirror: {x: 1, y: 1, z: 1}}\n"},
+    {2, {0, 0, 0}, "meshes: {m: {mirror: [y]}}\n"},
+};
+enum { MIRRORS = sizeof mirrors / sizeof mirrors[0] };
+
+/* An image's description and its arrays. */
+typedef struct mirror_image {
+    void *places[3];
+    double *along[3];
+    int64_t *ids;
+    insitu_lattice lattice;
+    insitu_mesh mesh;
+} mirror_image;
+
+static void mirror_by_vertex(const insitu_mesh *mesh, int axes, const mirror *by, mirror_image *out)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const insitu_array *given = &mesh->coordinates[axis];
+        if (!(axes >> axis & 1)) continue;
+        const insitu_type type = mesh->coordinates[given->data ? axis : 0].type;
+        out->places[axis] = test_calloc((size_t)mesh->vertex_count + 1, 8);
+        for (int64_t v = 0; v < mesh->vertex_count; v++) {
+            double place[3];
+            place_of(mesh, v, place);
+            if (type == INSITU_FLOAT64)
+                ((double *)out->places[axis])[v] = 2 * by->planes[axis] - place[axis];
+            else
+                ((float *)out->places[axis])[v] = (float)(2 * by->planes[axis] - place[axis]);
+        }
+        out->mesh.coordinates[axis] = (insitu_array){out->places[axis], type, 0};
+    }
+}
+
+/* A lattice with coordinates along its axes becomes rectilinear. */
+static void mirror_along_axes(const insitu_mesh *mesh, int axes, const mirror *by, mirror_image *out)
+{
+    int64_t stride = 1;
+    for (int axis = 0; axis < 3; axis++) {
+        const int64_t count = mesh->lattice->cells[axis] + 1;
+        out->along[axis] = test_calloc((size_t)count, sizeof(double));
+        for (int64_t n = 0; n < count; n++) {
+            double place[3];
+            place_of(mesh, n * stride, place);
+            out->along[axis][n] = axes >> axis & 1 ? 2 * by->planes[axis] - place[axis] : place[axis];
+        }
+        stride *= count;
+        out->lattice.axes[axis] = (insitu_array){out->along[axis], INSITU_FLOAT64, 0};
+        out->lattice.spacing[axis] = out->lattice.origin[axis] = 0;
+    }
+}
+
+/* Ids of vertices that are not in the mirror planes are others. */
+static void renumber(const insitu_mesh *mesh, int axes, const mirror *by, mirror_image *out)
+{
+    out->ids = test_calloc((size_t)mesh->vertex_count + 1, sizeof *out->ids);
+    for (int64_t v = 0; v < mesh->vertex_count; v++) {
+        double place[3];
+        out->ids[v] = ((const int64_t *)mesh->vertex_ids.data)[v];
+        place_of(mesh, v, place);
+        for (int axis = 0; axis < 3; axis++)
+            if (axes >> axis & 1 && place[axis] != by->planes[axis]) out->ids[v] += (int64_t)1 << (45 + axis);
+    }
+    out->mesh.vertex_ids = (insitu_array){out->ids, INSITU_INT64, 0};
+}
+
+static void make_image(const insitu_mesh *mesh, int axes, const mirror *by, mirror_image *out)
+{
+    *out = (mirror_image){.mesh = *mesh};
+    if (mesh->lattice) {
+        out->lattice = *mesh->lattice;
+        out->mesh.lattice = &out->lattice;
+    }
+    if (mesh->lattice && !mesh->coordinates[0].data)
+        mirror_along_axes(mesh, axes, by, out);
+    else
+        mirror_by_vertex(mesh, axes, by, out);
+    if (mesh->vertex_ids.data) renumber(mesh, axes, by, out);
+}
+
+static void free_image(mirror_image *i)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        test_free(i->places[axis]);
+        test_free(i->along[axis]);
+    }
+    test_free(i->ids);
+}
+
+/* ---- pictures --------------------------------------------------------------------------------------------------- */
+
+/* Hands a mesh and its images over as blocks with these fields, the first of them with this number. Returns how many.
+ */
+static int hand_over_blocks(insitu_session *session, int first, const insitu_mesh *mesh, const mirror *by,
+                            const insitu_field *fields, int count, mirror_image images[MOST_IMAGES])
+{
+    int block = first;
+    for (int axes = 0; axes < 8; axes++) {
+        if (axes & ~by->axes) continue;
+        make_image(mesh, axes, by, &images[axes]);
+        everywhere(insitu_set_block(session, "m", block, &images[axes].mesh) == INSITU_OK);
+        for (int f = 0; f < count; f++)
+            everywhere(insitu_set_block_field(session, "m", block, &fields[f]) == INSITU_OK);
+        block++;
+    }
+    return block - first;
+}
+
+static void free_images(const mirror *by, mirror_image images[MOST_IMAGES])
+{
+    for (int axes = 0; axes < 8; axes++)
+        if (!(axes & ~by->axes)) free_image(&images[axes]);
+}
+
+static drawn draw_blocks(const char *scene, const insitu_mesh *mesh, const mirror *by, const insitu_field *fields,
+                         int count)
+{
+    mirror_image images[MOST_IMAGES];
+    insitu_session *session = open_text(MPI_COMM_WORLD, "", scene);
+    hand_over_blocks(session, 0, mesh, by, fields, count, images);
+    drawn out = step_drawn(session, 0);
+    insitu_destroy(&session);
+    free_images(by, images);
+    return out;
+}
+
+static void expect_mirrored(const insitu_mesh *mesh, const insitu_field *f, const mirror *by, const char *what)
+{
+    drawn a = draw_mesh(open_text(MPI_COMM_WORLD, by->text, all_layers), mesh, f, NULL);
+    drawn b = draw_blocks(all_layers, mesh, by, f, 1);
+    expect_same(&a, &b, what);
+}
+
+static void forms_draw_their_images(void **state)
+{
+    (void)state;
+    for (mesh_form form = 0; form < MESH_FORM_COUNT; form++)
+        for (int with_corners = 0; with_corners <= formed_has_corners(form); with_corners++) {
+            const char *scene = with_corners ? formed_torn_scene : formed_scene;
+            const mirror *by = &mirrors[form % 2];
+            formed_mesh m;
+            formed_create(form, SIDE, own_rank, rank_count, &m);
+            drawn a = draw_formed(open_text(MPI_COMM_WORLD, by->text, scene), &m, &m.mesh, with_corners, NULL);
+            drawn b = draw_blocks(scene, &m.mesh, by, m.fields, with_corners ? FORMED_FIELDS : FORMED_D);
+            expect_same(&a, &b, mesh_form_name(form));
+            formed_free(&m);
+        }
+}
+
+static void all_planes_have_their_images(void **state)
+{
+    (void)state;
+    session_input in;
+    input_create(&in, TEST_MIXED, SIDE, TEST_RANDOM, own_rank, rank_count);
+    for (int i = 0; i < 3; i++) expect_mirrored(&in.mesh, &in.field, &mirrors[i], mirrors[i].text);
+    input_free(&in);
+}
+
+static void cells_of_higher_order_draw_their_images(void **state)
+{
+    (void)state;
+    for (int k = 0; k < order_kind_count; k += 4) {
+        order_mesh m;
+        order_mesh_create(&order_kinds[k], 2, 0.1, test_wave, own_rank, rank_count, &m);
+        expect_mirrored(&m.mesh, &m.field, &mirrors[0], order_kinds[k].name);
+        order_mesh_free(&m);
+    }
+}
+
+static void planes_and_lattices_draw_their_images(void **state)
+{
+    (void)state;
+    for (int is_wide = 0; is_wide < 2; is_wide++) {
+        plane p;
+        make_plane(is_wide, &p);
+        expect_mirrored(&p.mesh, &p.field, &mirrors[3], "a plane");
+    }
+    for (lattice_form form = 0; form < LATTICE_FORMS; form++) {
+        block b;
+        make_block(form, own_rank, &b);
+        expect_mirrored(&b.mesh, &b.field, &mirrors[0], lattice_form_name(form));
+        if (form != QUADS) expect_mirrored(&b.mesh, &b.field, &mirrors[1], lattice_form_name(form));
+    }
+}
+
+static void blocks_draw_their_images(void **state)
+{
+    (void)state;
+    for (lattice_form form = 0; form < LATTICE_FORMS; form++) {
+        drawn pictures[2];
+        const mirror *by = &mirrors[0];
+        for (int by_hand = 0; by_hand < 2; by_hand++) {
+            insitu_session *session = open_text(MPI_COMM_WORLD, by_hand ? "" : by->text, all_layers);
+            block b[2];
+            mirror_image images[2][MOST_IMAGES];
+            for (int i = 0, number = 0; i < 2; i++) {
+                make_block(form, 2 * own_rank + i, &b[i]);
+                if (by_hand)
+                    number += hand_over_blocks(session, number, &b[i].mesh, by, &b[i].field, 1, images[i]);
+                else
+                    everywhere(insitu_set_block(session, "m", i, &b[i].mesh) == INSITU_OK &&
+                               insitu_set_block_field(session, "m", i, &b[i].field) == INSITU_OK);
+            }
+            pictures[by_hand] = step_drawn(session, 0);
+            insitu_destroy(&session);
+            for (int i = 0; by_hand && i < 2; i++) free_images(by, images[i]);
+        }
+        expect_same(&pictures[0], &pictures[1], "blocks");
+    }
+}
+
+/* ---- levels of refinement -----------------------------------------------------------------------------------------
+ */
+
+enum { COARSE = 4, FINE = 4 };
+
+/* The coarse block of 4^3 cells from x = 0 on, or the fine one on its first half along x, y and z; mirrored: the same
+ * at negative x, with indices and values from the other end. */
+static void make_level(bool is_fine, bool is_mirrored, double values[125], insitu_lattice *l, insitu_mesh *mesh,
+                       insitu_field *f)
+{
+    const int count = is_fine ? FINE : COARSE;
+    *l = (insitu_lattice){.cells = {count, count, count}};
+    for (int axis = 0; axis < 3; axis++) {
+        l->spacing[axis] = is_fine ? 0.125 : 0.25;
+        l->refinement[axis] = is_fine ? 2 : 1;
+    }
+    l->origin[1] = l->origin[2] = (double)own_rank;
+    if (is_mirrored) l->first[0] = -count;
+    for (int v = 0; v < 125; v++) {
+        const int at[3] = {v % 5, v / 5 % 5, v / 25};
+        double place[3];
+        for (int axis = 0; axis < 3; axis++) place[axis] = l->origin[axis] + l->spacing[axis] * at[axis];
+        const int to = is_mirrored ? v - at[0] + 4 - at[0] : v;
+        values[to] = test_wave(place);
+    }
+    insitu_mesh_defaults(mesh);
+    mesh->lattice = l;
+    mesh->vertex_count = 125;
+    mesh->cell_count = 64;
+    insitu_field_defaults(f);
+    f->name = "f";
+    f->count = 125;
+    f->values = (insitu_array){values, INSITU_FLOAT64, 0};
+}
+
+static void levels_draw_their_images(void **state)
+{
+    (void)state;
+    static const char scene[] =
+        "threads: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1], normals: vertex}}]")
+            LAYERS("b", "[{surface: {colour_by: {field: f}, edges: {}}}]") LAYERS("c", "[{surface: {opacity: 0.5}}]");
+    drawn pictures[2];
+    for (int by_hand = 0; by_hand < 2; by_hand++) {
+        insitu_session *session = open_text(MPI_COMM_WORLD, by_hand ? "" : "meshes: {m: {mirror: x}}\n", scene);
+        double values[4][125];
+        insitu_lattice l[4];
+        insitu_mesh mesh[4];
+        insitu_field f[4];
+        for (int i = 0; i < (by_hand ? 4 : 2); i++) {
+            make_level(i % 2, i / 2, values[i], &l[i], &mesh[i], &f[i]);
+            everywhere(insitu_set_block(session, "m", i, &mesh[i]) == INSITU_OK &&
+                       insitu_set_block_field(session, "m", i, &f[i]) == INSITU_OK);
+        }
+        pictures[by_hand] = step_drawn(session, 0);
+        insitu_destroy(&session);
+    }
+    expect_same(&pictures[0], &pictures[1], "levels of refinement");
+}
+
+/* ---- partitions and derived fields ----------------------------------------------------------------------------------
+ */
+
+static void any_partition_draws_one_picture(void **state)
+{
+    (void)state;
+    for (test_partition_kind kind = 0; kind < TEST_PARTITION_COUNT; kind++) {
+        session_input part, whole;
+        input_create(&part, TEST_MIXED, SIDE, kind, own_rank, rank_count);
+        input_create(&whole, TEST_MIXED, SIDE, kind, 0, 1);
+        const char *text = mirrors[1].text;
+        drawn a = draw_mesh(open_text(MPI_COMM_WORLD, text, surface_layers), &part.mesh, &part.field, NULL);
+        drawn b = draw_mesh(open_text(MPI_COMM_SELF, text, surface_layers), &whole.mesh, &whole.field, NULL);
+        if (own_rank != 0) free_drawn(&b);
+        expect_same(&a, &b, test_partition_kind_name(kind));
+        input_free(&part);
+        input_free(&whole);
+    }
+}
+
+/* Returns the derived values at the vertices of this rank's part. */
+static double *values_of(const insitu_session *session, const char *name, int64_t count)
+{
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+    double *out = test_calloc((size_t)count + 1, sizeof *out);
+    const int index = session_find_field(mesh, name);
+    assert_true(index >= 0 && mesh->fields[index].is_derived);
+    const grid_field values = session_given_field(mesh, index, 0);
+    for (int64_t v = 0; v < count; v++) out[v] = grid_field_value(&values, v);
+    return out;
+}
+
+/* The image's colours are those of the source's gradients: no sum at the mirror plane takes cells of the image. */
+static void derived_fields_are_those_of_the_source(void **state)
+{
+    (void)state;
+    static const char scene[] =
+        "threads: 1\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: g, range: [-6, 6]}}}]")
+            LAYERS("b", "[{isosurface: {field: h, values: [0.2]}}]");
+    session_input in;
+    input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
+    char before[MOST_TEXT];
+    snprintf(before, sizeof before, "%sfields: {g: {gradient: f, component: x}, h: f * f}\n", mirrors[0].text);
+    insitu_session *session = open_text(MPI_COMM_WORLD, before, scene);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    for (int cycle = 0; cycle < 2; cycle++) {
+        for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] *= cycle ? 1.5 : 1;
+        everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
+        drawn a = step_drawn(session, cycle);
+        double *values[2] = {values_of(session, "g", in.part.vertex_count),
+                             values_of(session, "h", in.part.vertex_count)};
+        insitu_session *alone = open_text(MPI_COMM_WORLD, before + strlen(mirrors[0].text), scene);
+        everywhere(hand_over(alone, &in) == INSITU_OK);
+        drawn of_alone = step_drawn(alone, cycle);
+        double *expected = values_of(alone, "g", in.part.vertex_count);
+        everywhere(memcmp(values[0], expected, (size_t)in.part.vertex_count * sizeof *expected) == 0);
+        insitu_destroy(&alone);
+        free_drawn(&of_alone);
+        test_free(expected);
+        insitu_field fields[2] = {in.field, in.field};
+        for (int i = 0; i < 2; i++) {
+            fields[i].name = i ? "h" : "g";
+            fields[i].values = (insitu_array){values[i], INSITU_FLOAT64, 0};
+        }
+        drawn b = draw_blocks(scene, &in.mesh, &mirrors[0], fields, 2);
+        expect_same(&a, &b, "derived fields");
+        test_free(values[0]);
+        test_free(values[1]);
+    }
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* ---- steps ----------------------------------------------------------------------------------------------------------
+ */
+
+typedef struct filled_values {
+    const double *values;
+    int64_t count;
+    int calls;
+} filled_values;
+
+static insitu_status fill(void *data, insitu_field *field)
+{
+    filled_values *f = data;
+    int one = 1, ranks = 0;
+    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD); /* ends only where all ranks call it */
+    f->calls += ranks == rank_count;
+    field->count = f->count;
+    field->values = (insitu_array){f->values, INSITU_FLOAT64, 0};
+    return INSITU_OK;
+}
+
+/* A step of the mirrored session draws what the blocks draw in another one that has taken the same steps. */
+static void expect_step(insitu_session *session, insitu_session *blocks, const session_input *in, const mirror *by,
+                        int cycle, const char *what)
+{
+    mirror_image images[MOST_IMAGES];
+    insitu_mesh mesh = in->mesh;
+    insitu_field f = in->field;
+    mesh.changed = f.changed = INSITU_CHANGED_ALL;
+    hand_over_blocks(blocks, 0, &mesh, by, &f, 1, images);
+    drawn a = step_drawn(session, cycle);
+    drawn b = step_drawn(blocks, cycle);
+    expect_same(&a, &b, what);
+    free_images(by, images);
+}
+
+static void steps_follow_what_changes(void **state)
+{
+    (void)state;
+    session_input in;
+    const mirror *by = &mirrors[0];
+    input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
+    insitu_session *session = open_text(MPI_COMM_WORLD, by->text, all_layers);
+    insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    expect_step(session, blocks, &in, by, 0, "the first step");
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+    const session_mesh *its_image = session_find_image(&session->meshes, mesh, 1);
+    const int64_t stamp = its_image->coordinates_stamp;
+
+    in.mesh.changed = in.field.changed = INSITU_CHANGED_NOTHING;
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    expect_step(session, blocks, &in, by, 1, "nothing new");
+    everywhere(session_find_image(&session->meshes, mesh, 1) == its_image && its_image->coordinates_stamp == stamp);
+
+    for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] = cos(3 * in.part.values[v]);
+    in.field.changed = INSITU_CHANGED_VALUES;
+    everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
+    expect_step(session, blocks, &in, by, 2, "other values");
+    everywhere(its_image->coordinates_stamp == stamp);
+
+    double *elsewhere = test_calloc((size_t)in.part.vertex_count + 1, sizeof *elsewhere);
+    for (int64_t v = 0; v < in.part.vertex_count; v++) elsewhere[v] = -in.part.values[v];
+    in.field.values.data = elsewhere;
+    everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
+    expect_step(session, blocks, &in, by, 3, "values elsewhere");
+
+    for (int64_t i = 0; i < 3 * in.part.vertex_count; i++)
+        in.part.coordinates[i] = i % 3 ? 1.1 * in.part.coordinates[i] : in.part.coordinates[i];
+    in.mesh.changed = INSITU_CHANGED_GEOMETRY;
+    everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
+    expect_step(session, blocks, &in, by, 4, "other coordinates");
+
+    in.part.ghosts[0] = 1;
+    in.mesh.changed = in.field.changed = INSITU_CHANGED_ALL;
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    expect_step(session, blocks, &in, by, 5, "a ghost");
+
+    everywhere(insitu_set_mesh(session, "m", NULL) == INSITU_OK && session->meshes.count == 0);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    expect_step(session, blocks, &in, by, 6, "the mesh removed and set again");
+    insitu_destroy(&session);
+    insitu_destroy(&blocks);
+    test_free(elsewhere);
+    input_free(&in);
+}
+
+static void edits_of_the_scene_mirror_and_unmirror(void **state)
+{
+    (void)state;
+    session_input in;
+    char text[MOST_TEXT];
+    static const int order[] = {-1, 0, 1, 0, -1, 2};
+    static const mirror none = {0, {0, 0, 0}, ""};
+    input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
+    insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    for (int i = 0; i < 6; i++) {
+        const mirror *by = order[i] < 0 ? &none : &mirrors[order[i]];
+        snprintf(text, sizeof text, "%s# %d\n%s", by->text, i, all_layers);
+        write_scene(text);
+        if (i) everywhere(insitu_set_mesh(blocks, "m", NULL) == INSITU_OK);
+        expect_step(session, blocks, &in, by, i, "an edited scene");
+    }
+    insitu_destroy(&session);
+    insitu_destroy(&blocks);
+    input_free(&in);
+}
+
+static void faults_are_those_of_the_given_mesh(void **state)
+{
+    (void)state;
+    session_input in;
+    const mirror *by = &mirrors[1];
+    input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
+    insitu_session *session = open_text(MPI_COMM_WORLD, by->text, all_layers);
+    insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
+    for (int cycle = 0; cycle < 2; cycle++) {
+        const double good = in.part.coordinates[4];
+        if (own_rank == rank_count - 1) in.part.coordinates[4] = (double)NAN;
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        insitu_status status = insitu_step(session, cycle, 0);
+        told_everywhere(session, status, INSITU_ERROR_MESH, "mesh \"m\": cell",
+                        "vertex 1 has a coordinate that is not");
+        in.part.coordinates[4] = good;
+        if (cycle) continue;
+        everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
+        everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
+        expect_step(session, blocks, &in, by, cycle, "a mended mesh");
+        insitu_field wrong = in.field; /* the field alone */
+        wrong.count--;
+        everywhere(insitu_set_field(session, "m", &wrong) == INSITU_ERROR_FIELD);
+        status = insitu_step(session, cycle, 0);
+        told_everywhere(session, status, INSITU_ERROR_FIELD, "mesh \"m\": field \"f\"");
+        everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
+        expect_step(session, blocks, &in, by, cycle, "a mended field");
+    }
+    insitu_destroy(&session);
+    insitu_destroy(&blocks);
+    input_free(&in);
+}
+
+/* ---- with a warp, and filled fields ---------------------------------------------------------------------------------
+ */
+
+static void warped_meshes_are_mirrored_after_the_warp(void **state)
+{
+    (void)state;
+    session_input in;
+    input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
+    const int64_t count = 3 * in.part.vertex_count;
+    double *u = test_calloc((size_t)count + 1, sizeof *u);
+    for (int64_t i = 0; i < count; i++) u[i] = i % 3 ? 0.3 * sin(3 * in.part.coordinates[i - i % 3]) : 0;
+    filled_values values = {u, in.part.vertex_count, 0};
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = "u";
+    field.component_count = 3;
+    field.fill = fill;
+    field.fill_data = &values;
+    static const char scene[] =
+        "threads: 1\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: u, component: y}}}]")
+            LAYERS("b", "[{volume: {field: f}}]");
+    drawn a =
+        draw_mesh(open_text(MPI_COMM_WORLD, "meshes: {m: {warp: {field: u, scale: 0.5}, mirror: {x: -1}}}\n", scene),
+                  &in.mesh, &in.field, &field);
+    everywhere(values.calls == 1);
+    for (int64_t i = 0; i < count; i++) in.part.coordinates[i] += 0.5 * u[i];
+    insitu_field fields[2] = {in.field, field};
+    fields[1].fill = NULL;
+    fields[1].count = in.part.vertex_count;
+    fields[1].values = (insitu_array){u, INSITU_FLOAT64, 0};
+    drawn b = draw_blocks(scene, &in.mesh, &mirrors[0], fields, 2);
+    expect_same(&a, &b, "a warped mesh");
+    test_free(u);
+    input_free(&in);
+}
+
+static void filled_fields_are_made_once(void **state)
+{
+    (void)state;
+    session_input in;
+    input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
+    filled_values values = {in.part.values, in.part.vertex_count, 0};
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = "f";
+    field.fill = fill;
+    field.fill_data = &values;
+    insitu_session *session = open_text(MPI_COMM_WORLD, mirrors[0].text, all_layers);
+    insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
+    everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
+    everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
+    for (int cycle = 0; cycle < 3; cycle++) {
+        for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] *= 0.9;
+        expect_step(session, blocks, &in, &mirrors[0], cycle, "filled values");
+        everywhere(values.calls == cycle + 1);
+    }
+    insitu_destroy(&session);
+    insitu_destroy(&blocks);
+    input_free(&in);
+}
+
+/* ---- numbers and warnings -------------------------------------------------------------------------------------------
+ */
+
+/* Returns the number in this column of the last line. */
+static double last_number(const char *text, int column)
+{
+    const char *line = text, *end;
+    while ((end = strchr(line, '\n')) && end[1]) line = end + 1;
+    for (; column > 0 && line; column--) line = strchr(line, ',') ? strchr(line, ',') + 1 : NULL;
+    return line ? strtod(line, NULL) : NAN;
+}
+
+static void numbers_are_of_the_given_cells(void **state)
+{
+    (void)state;
+    static char text[MOST_TEXT];
+    session_input in;
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    if (own_rank == 0) unlink("mirror.csv");
+    insitu_session *session =
+        open_text(MPI_COMM_WORLD, mirrors[2].text,
+                  "statistics: [{field: f, path: mirror.csv}]\nimages:\n" LAYERS("a", "[{surface: {}}]"));
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    drawn a = step_drawn(session, 0);
+    const insitu_report *report = insitu_last_report(session);
+    char words[100];
+    snprintf(words, sizeof words, "coordinates of its mirror images: %lld bytes",
+             (long long)((3 * 1 + 3 * 2 + 3) * 8 * in.part.vertex_count));
+    everywhere(report->cells == in.part.cell_count && report->cells_inverted == 0);
+    everywhere(strstr(report->copied_why, words) != NULL);
+    everywhere(*report->warnings == '\0');
+    insitu_destroy(&session);
+    read_file("mirror.csv", sizeof text, text);
+    everywhere(own_rank != 0 || (fabs(last_number(text, 3) - 8) <= 1e-8 && fabs(last_number(text, 2) - 27) <= 0));
+    free_drawn(&a);
+    input_free(&in);
+}
+
+static void what_is_hardly_meant_is_warned_of(void **state)
+{
+    (void)state;
+    session_input in;
+    input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
+    insitu_session *session =
+        open_text(MPI_COMM_WORLD, "meshes:\n  m: {mirror: {y: 0.5}}\n  plate: {mirror: z}\n", surface_layers);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    drawn a = step_drawn(session, 0);
+    const char *warnings = insitu_last_report(session)->warnings;
+    everywhere(strstr(warnings,
+                      "meshes.m (line 2 of the scene): the mesh lies on both sides of its mirror plane y = 0.5, "
+                      "from -1 to 1") != NULL);
+    everywhere(strstr(warnings, "meshes.plate (line 3 of the scene): no mesh has this name") != NULL);
+    free_drawn(&a);
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(forms_draw_their_images),
+        cmocka_unit_test(all_planes_have_their_images),
+        cmocka_unit_test(cells_of_higher_order_draw_their_images),
+        cmocka_unit_test(planes_and_lattices_draw_their_images),
+        cmocka_unit_test(blocks_draw_their_images),
+        cmocka_unit_test(levels_draw_their_images),
+        cmocka_unit_test(any_partition_draws_one_picture),
+        cmocka_unit_test(derived_fields_are_those_of_the_source),
+        cmocka_unit_test(steps_follow_what_changes),
+        cmocka_unit_test(edits_of_the_scene_mirror_and_unmirror),
+        cmocka_unit_test(faults_are_those_of_the_given_mesh),
+        cmocka_unit_test(warped_meshes_are_mirrored_after_the_warp),
+        cmocka_unit_test(filled_fields_are_made_once),
+        cmocka_unit_test(numbers_are_of_the_given_cells),
+        cmocka_unit_test(what_is_hardly_meant_is_warned_of),
+    };
+    return run_session_tests(argc, argv, tests, NULL, NULL);
+}
