@@ -135,7 +135,7 @@ static const char every_key[] =
     "      colour: [1, 0, 0.5]\n"
     "      size: 0.04\n"
     "    outputs:\n"
-    "      - {path: c.png, decorations: false, grid: [2, 1]}\n"
+    "      - {path: c.png, decorations: false, grid: [2, 1], shared_bars: false}\n"
     "      - {path: \"c{time:.1e}.exr\", decorations: true}\n"
     "  - name: fourth\n"
     "    camera:\n"

@@ -224,6 +224,30 @@ static void grids_number_their_cells(void **state)
     scene_free(&s);
 }
 
+/* Words of 0.03 of the height: 0.03 * 24 * 9 = 6.48 pixels; of 0.1: 21.6. */
+static void strips_of_bars_are_as_wide_as_words_need(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *decorations;
+        int width;
+        bool is_left;
+    } cases[] = {{"colour_bar: true", 7, false}, {"size: 0.1, colour_bar: {at: left}", 22, true}};
+    for (int i = 0; i < 2; i++) {
+        char text[512];
+        scene s;
+        snprintf(text, sizeof text,
+                 "images:\n- name: a\n  size: [32, 24]\n  layers: [{slice: {field: p}}]\n  decorations: {%s}\n"
+                 "  outputs: [{path: a.png, grid: [1, 1], shared_bars: true}, {path: b.png, grid: [1, 1]}]\n",
+                 cases[i].decorations);
+        parse_good(text, &s);
+        assert_true(s.montages[0].shares_bars && !s.montages[1].shares_bars);
+        assert_true(s.montages[0].bar_width == cases[i].width && s.montages[1].bar_width == 0);
+        assert_true(s.montages[0].are_bars_left == cases[i].is_left);
+        scene_free(&s);
+    }
+}
+
 /* ---- paths ----------------------------------------------------------------------------------------------------- */
 
 static const char moving[] = "angle: 30, path: [{time: 1, position: [0, 0, 8], focal: [0, 0, 0]}, "
@@ -314,6 +338,7 @@ int main(void)
         cmocka_unit_test(sweeps_make_each_combination_once),
         cmocka_unit_test(sweeps_go_through_planes),
         cmocka_unit_test(grids_number_their_cells),
+        cmocka_unit_test(strips_of_bars_are_as_wide_as_words_need),
         cmocka_unit_test(databases_have_the_columns_of_their_images),
         cmocka_unit_test(paths_go_through_their_places_and_stay_at_the_ends),
         cmocka_unit_test(paths_of_two_places_ease_in_and_out),

@@ -13,6 +13,8 @@
 int own_rank, rank_count;
 caught_picture caught[MAX_CAUGHT];
 int caught_count;
+placed_picture placed[MAX_CAUGHT];
+int placed_count;
 const char *unwritable;
 void (*before_writing)(void);
 
@@ -245,6 +247,7 @@ void free_caught(caught_picture *picture)
 
 void forget_pictures(void)
 {
+    placed_count = 0;
     for (int i = 0; i < caught_count; i++) free_caught(&caught[i]);
     caught_count = 0;
 }
@@ -378,6 +381,14 @@ static void catch_bars(const insitu_decorations *decorations, char *out, size_t 
 insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error)
 {
     (void)error;
+    if (placed_count < MAX_CAUGHT) {
+        placed_picture *p = &placed[placed_count++];
+        *p = (placed_picture){
+            .x = place->x, .y = place->y, .width = image->width, .height = image->height, .of_width = place->width};
+        if (image->decorations) p->size = image->decorations->size * image->height;
+        if (image->decorations) memcpy(p->colour, image->decorations->colour, sizeof p->colour);
+        if (image->decorations) catch_bars(image->decorations, p->bars, sizeof p->bars);
+    }
     for (int y = 0; y < image->height; y++)
         memcpy(place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x),
                image->rgba + 4 * (ptrdiff_t)y * image->width, 4 * (size_t)image->width * sizeof(float));

@@ -143,6 +143,17 @@ double colour_difference(const caught_picture *a, const caught_picture *b);
 /* Paths with this in them cannot be written. NULL: all can. */
 extern const char *unwritable;
 
+/* What was put into places of larger pictures since the last forget_pictures(), with its colour bars. */
+typedef struct placed_picture {
+    int x, y, width, height, of_width;
+    double size;     /* of words, in pixels; 0 without decorations */
+    float colour[3]; /* of words */
+    char bars[200];
+} placed_picture;
+
+extern placed_picture placed[MAX_CAUGHT];
+extern int placed_count;
+
 /* Pictures are written before a step is over, unless session_writes_behind (session_image.h) is set. Then the writing
  * thread first calls this, if it is not NULL. */
 extern void (*before_writing)(void);

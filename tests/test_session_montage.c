@@ -89,9 +89,72 @@ static void files_that_cannot_be_written_are_told(void **state)
     forget_pictures();
 }
 
+/* ---- shared colour bars -------------------------------------------------------------------------------------------
+ */
+
+/* Two pictures with colour bars on a side, of ranges up to 1 and to `high`, in one row. */
+static void write_bars(char text[2048], const char *side, const char *high)
+{
+    static const char image[] = "  - name: %s\n    size: [32, 24]\n    camera: {automatic: {direction: %s}}\n"
+                                "    layers: [{slice: {field: f, range: [-1, %s]}}]\n"
+                                "    decorations: {size: 0.1, title: t, colour_bar: {at: %s, labels: heat}}\n"
+                                "    outputs: [{path: all.png, grid: [2, 1], shared_bars: true}]\n";
+    int used = snprintf(text, 2048, "writing: step\nimages:\n");
+    used += snprintf(text + used, 2048 - (size_t)used, image, "a", "[1, 2, 3]", "1", side);
+    snprintf(text + used, 2048 - (size_t)used, image, "b", "[1, 1, 1]", high, side);
+}
+
+/* The strip is 9 times as wide as words are high, rounded up. */
+enum { STRIP = 22 };
+
+static bool are_placed(const char *side, bool is_shared)
+{
+    const int left = strcmp(side, "left") == 0 ? STRIP : 0;
+    bool is_well = caught_count == 1 && placed_count == (is_shared ? 3 : 2) && caught[0].width == 2 * WIDTH + STRIP;
+    for (int i = 0; i < 2 && is_well; i++)
+        is_well = placed[i].x == left + i * WIDTH && placed[i].y == 0 && placed[i].width == WIDTH &&
+                  placed[i].of_width == 2 * WIDTH + STRIP && (*placed[i].bars == '\0') == is_shared;
+    if (!is_well || !is_shared) return is_well;
+    const placed_picture *strip = &placed[2];
+    return strip->x == (left ? 0 : 2 * WIDTH) && strip->width == STRIP && strip->height == HEIGHT &&
+           strncmp(strip->bars, "heat:", 5) == 0 && strchr(strip->bars, '\n') == strrchr(strip->bars, '\n') &&
+           strip->size > 2.39 && strip->size < 2.41 && strip->colour[0] > 0.8F &&
+           memcmp(strip->colour, placed[0].colour, sizeof strip->colour) == 0;
+}
+
+static void alike_colour_bars_are_drawn_once(void **state)
+{
+    (void)state;
+    static const char *const sides[] = {"right", "left"};
+    session_input in;
+    char text[2048];
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    for (int i = 0; i < 4; i++) {
+        const bool is_shared = i / 2 == 0;
+        insitu_session *session = NULL;
+        write_bars(text, sides[i % 2], is_shared ? "1" : "1.5");
+        const insitu_status status = insitu_create_from_text(MPI_COMM_WORLD, text, &session);
+        if (status) fprintf(stderr, "%s\n", insitu_error(NULL));
+        assert_int_equal(status, INSITU_OK);
+        for (int cycle = 0; cycle < 2; cycle++) {
+            forget_pictures();
+            assert_int_equal(hand_over(session, &in), INSITU_OK);
+            assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
+            everywhere(own_rank != 0 || are_placed(sides[i % 2], is_shared));
+            const char *told =
+                strstr(insitu_last_report(session)->warnings, "all.png: the pictures in it have different");
+            everywhere((told != NULL) == (!is_shared && cycle == 0)); /* once */
+        }
+        insitu_destroy(&session);
+    }
+    input_free(&in);
+    forget_pictures();
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(cells_have_the_pictures_of_a_step),
-                                       cmocka_unit_test(files_that_cannot_be_written_are_told)};
+                                       cmocka_unit_test(files_that_cannot_be_written_are_told),
+                                       cmocka_unit_test(alike_colour_bars_are_drawn_once)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

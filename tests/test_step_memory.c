@@ -61,8 +61,10 @@ static const char edited_scene[] =
                           "      - isosurface: {field: f, values: [0.2, 0.5], colour_by: "
                           "{field: f}}\n"
                           "    outputs: [{cinema: memory.cdb}]\n"
-                          "  - name: n\n    size: [8, 8]\n    layers: [{surface: {}}]\n"
-                          "    outputs: [{path: n.png, grid: [1, 1]}]\n";
+                          "  - name: n\n    size: [8, 8]\n    layers: [{surface: {colour_by: f}}]\n"
+                          "    decorations: {title: n, colour_bar: true, outline: true}\n"
+                          "    outputs: [{path: n.png, grid: [1, 1]}, {path: o.png, grid: [2, 1], shared_bars: "
+                          "true}]\n";
 
 typedef struct memory_case {
     const char *name;

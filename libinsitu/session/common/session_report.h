@@ -67,6 +67,7 @@ typedef enum session_warning_kind {
     WARNING_GREY,        /* a surface lacks the field that colours it */
     WARNING_OVERLAP,     /* cells overlap in some pixels */
     WARNING_WORDS,       /* a text of a picture cannot be drawn as written */
+    WARNING_BARS,        /* pictures that are to share their colour bars have different ones */
     WARNING_UNSAID,      /* values have changed although the caller declared them unchanged */
     WARNING_OUTPUTS,     /* an image has no outputs */
     WARNING_PARAMETER,   /* a parameter of the scene is not used */

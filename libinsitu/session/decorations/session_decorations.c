@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "session_hash.h"
 
 /* ---- the box ------------------------------------------------------------------------------------------------- */
 
@@ -345,6 +346,32 @@ static void fill_bars(session_decorations *d, const scene_image *image, const se
                 &transfers[given->layers->surface_count + i]);
 }
 
+static void hash_colours(uint64_t *hash, const float *colours, int count)
+{
+    session_hash_bytes(hash, &count, sizeof count);
+    if (colours) session_hash_bytes(hash, colours, 3 * (size_t)count * sizeof *colours);
+}
+
+/* Returns a hash of what the bars show. */
+static uint64_t hash_bars(const insitu_decorations *d)
+{
+    uint64_t hash = SESSION_HASH_BEGIN;
+    for (int i = 0; i < d->bar_count; i++) {
+        const insitu_colour_bar *bar = &d->bars[i];
+        const int kinds[2] = {bar->is_banded, (int)bar->at};
+        session_hash_text(&hash, bar->label);
+        session_hash_bytes(&hash, kinds, sizeof kinds);
+        hash_colours(&hash, bar->colours, bar->colour_count);
+        hash_colours(&hash, bar->below, bar->below != NULL);
+        hash_colours(&hash, bar->above, bar->above != NULL);
+        for (int k = 0; k < bar->tick_count; k++) {
+            session_hash_bytes(&hash, &bar->ticks[k].place, sizeof bar->ticks[k].place);
+            session_hash_text(&hash, bar->ticks[k].text);
+        }
+    }
+    return hash;
+}
+
 /* ---- all decorations ----------------------------------------------------------------------------------------- */
 
 static void fill_axes(session_decorations *d, const render_camera *c)
@@ -395,12 +422,50 @@ session_decorations *session_make_decorations(const scene_image *image, const se
     choose_text_colour(image, d->decorations.colour);
     fill_axes(d, &basis->view->camera);
     if (scene->has_bars) fill_bars(d, image, basis);
+    d->bars_hash = hash_bars(&d->decorations);
     if (d->strokes) {
         fill_outline(d, basis->outline, &basis->view->camera);
         if (basis->extent->cell_count) fill_length_decorations(d, scene, basis->extent, &basis->view->camera);
         if (add_scene_texts(d, scene, basis->moment)) return d;
     }
     session_free_decorations(d);
+    return NULL;
+}
+
+/* Makes the pointers of a copy refer to the copy itself. */
+static void refer_to_itself(session_decorations *copy)
+{
+    insitu_decorations *const both[2] = {&copy->decorations, &copy->background};
+    for (int i = 0; i < 2; i++) {
+        both[i]->words = copy->words;
+        both[i]->bars = copy->bars;
+        both[i]->strokes = copy->strokes;
+        both[i]->labels = copy->ruler_labels;
+    }
+    for (int i = 0; i < copy->decorations.bar_count; i++) {
+        copy->bars[i].label = copy->labels[i];
+        copy->bars[i].ticks = copy->ticks[i];
+    }
+}
+
+session_decorations *session_copy_decorations(const session_decorations *from)
+{
+    const size_t strokes = (size_t)from->decorations.stroke_count;
+    session_decorations *copy = base_alloc(sizeof *copy);
+    if (!copy) return NULL;
+    *copy = *from;
+    copy->decorations.words_count = 0;
+    copy->strokes = base_alloc((strokes + 1) * sizeof *copy->strokes);
+    bool is_done = copy->strokes != NULL;
+    if (is_done && strokes) memcpy(copy->strokes, from->strokes, strokes * sizeof *copy->strokes);
+    for (int i = 0; i < from->decorations.words_count && is_done; i++) {
+        copy->words[i].text = base_strdup(from->words[i].text);
+        is_done = copy->words[i].text != NULL;
+        copy->decorations.words_count += is_done;
+    }
+    refer_to_itself(copy);
+    if (is_done) return copy;
+    session_free_decorations(copy);
     return NULL;
 }
 

@@ -25,6 +25,7 @@ typedef struct session_decorations {
     const scene_field *fields[SESSION_MAX_BARS];     /* the fields that the colour bars show */
     insitu_stroke *strokes;                          /* buffer for the boxes of the outline and for the rulers */
     insitu_label ruler_labels[SESSION_RULER_LABELS]; /* numbers and names along the rulers */
+    uint64_t bars_hash; /* hash of the words, colours and numbers of the bars; equal bars have equal hashes */
 } session_decorations;
 
 /* Input for computing decorations. */
@@ -39,6 +40,9 @@ typedef struct session_decoration_basis {
 
 /* Returns the decorations of an image, which must have some. Returns NULL if memory runs out. Local. */
 session_decorations *session_make_decorations(const scene_image *image, const session_decoration_basis *basis);
+
+/* Returns a copy of the decorations, which refers to the same scene. Returns NULL if memory runs out. Local. */
+session_decorations *session_copy_decorations(const session_decorations *from);
 
 /* Frees the decorations. decorations may be NULL. */
 void session_free_decorations(session_decorations *decorations);

@@ -353,6 +353,29 @@ static scene_moment make_moment(const session_drawing *d, const scene_image *ima
     return scene_moment_of(image, d->cycle, d->report->public_report.time);
 }
 
+/* Compares the picture's colour bars with those of the step's earlier pictures with which it shares them. */
+static void compare_bars(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
+{
+    for (int i = 0; i < image->output_count && decorations && d->shared_bars; i++) {
+        const scene_output *output = &image->outputs[i];
+        if (!output->shares_bars) continue;
+        session_shared_bars *bars = &d->shared_bars[output->montage];
+        if (!bars->path) *bars = (session_shared_bars){output->path, decorations->bars_hash, false};
+        bars->differ = bars->differ || bars->hash != decorations->bars_hash;
+    }
+}
+
+static void warn_of_bars(const session_drawing *d)
+{
+    for (int i = 0; i < d->scene->montage_count && d->shared_bars; i++) {
+        const session_shared_bars *bars = &d->shared_bars[i];
+        if (!bars->path) continue;
+        session_warn_locally(
+            d->report, &(session_warning){WARNING_BARS, bars->path, NULL, 0}, bars->differ,
+            "%s: the pictures in it have different colour bars and cannot share them: each has its own", bars->path);
+    }
+}
+
 /* Passes the picture to the writer, which becomes the owner of its memory. Called on rank 0 only. */
 static void queue_picture(const session_drawing *d, const scene_image *image, canvas *c, base_error *error)
 {
@@ -372,6 +395,7 @@ static void queue_picture(const session_drawing *d, const scene_image *image, ca
     files->channels = c->channels;
     files->deep = c->deep;
     files->decorations = c->decorations;
+    compare_bars(d, image, c->decorations);
     c->memory = (session_picture){0};
     c->channels = (session_channels){0};
     c->deep = (deep_image){0};
@@ -489,12 +513,26 @@ static void write_tables(const session_drawing *d, base_error *first)
     if (!first->status) *first = reason;
 }
 
-insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, uint64_t *drawn,
+static bool has_shared_bars(const scene *scene)
+{
+    bool is_any = false;
+    for (int i = 0; i < scene->montage_count; i++) is_any = is_any || scene->montages[i].shares_bars;
+    return is_any;
+}
+
+insitu_status session_draw_images(const session_drawing *drawing, const session_plan *plan, uint64_t *drawn,
                                   base_error *error)
 {
     base_error first = plan->refusal;
+    session_drawing own = *drawing;
+    const session_drawing *d = &own;
+    const bool are_bars_shared = has_shared_bars(d->scene);
+    /* without memory, only the warning is lost */
+    own.shared_bars = are_bars_shared && d->team->rank == 0
+                          ? base_calloc((size_t)d->scene->montage_count, sizeof *own.shared_bars)
+                          : NULL;
     /* if pictures are written during the step, rank 0 may have warnings for all ranks */
-    bool has_lines = !d->writes_behind;
+    bool has_lines = !d->writes_behind || are_bars_shared;
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
         has_lines = has_lines || scene_has_words(plan->images[i]);
@@ -508,6 +546,8 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
         }
         if (first.status == INSITU_OK) first = reason;
     }
+    warn_of_bars(d);
+    base_free(own.shared_bars);
     if (has_lines) session_share_lines(d->report, 0, d->team, &first);
     write_tables(d, &first);
     if (first.status) *error = first;

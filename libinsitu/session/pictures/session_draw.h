@@ -15,6 +15,13 @@
 #include "session_team.h"
 #include "session_writer.h"
 
+/* The colour bars of the pictures of a montage that are to share them, as far as they are drawn in a step. */
+typedef struct session_shared_bars {
+    const char *path; /* path of the output, with placeholders; NULL: no picture has been drawn yet */
+    uint64_t hash;    /* session_decorations.bars_hash of the first picture */
+    bool differ;      /* set if another picture has other bars */
+} session_shared_bars;
+
 /* Input data for drawing images. */
 typedef struct session_drawing {
     const session_team *team;
@@ -33,12 +40,14 @@ typedef struct session_drawing {
     session_writer *writer; /* used on rank 0 only */
     const session_catalogue *catalogue;
     bool writes_behind; /* set if pictures are written by a thread after the step has ended */
+    /* one entry for each montage of the scene, on rank 0, while session_draw_images() runs; otherwise NULL */
+    session_shared_bars *shared_bars;
 } session_drawing;
 
 /* Draws the plan's images and passes them to the writer. An image that fails is skipped. Returns the error of the plan
  * if there is one, and otherwise the first error of an image. *drawn receives one bit for each image of the scene file
  * that was drawn, at the position of its number. Collective. */
-insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, uint64_t *drawn,
+insitu_status session_draw_images(const session_drawing *drawing, const session_plan *plan, uint64_t *drawn,
                                   base_error *error);
 
 #endif

@@ -46,7 +46,7 @@ static void write_output(session_files *files, const scene_output *output)
                                                                            : &decorations->background};
     base_error reason = {0};
     if (output->montage >= 0) {
-        if (session_add_panel(files->montages, files->scene, &files->image, output, &picture, path, &reason))
+        if (session_add_panel(files->montages, files->scene, &files->image, output, &picture, decorations, path, &reason))
             base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
         return;
     }

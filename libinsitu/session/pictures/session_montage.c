@@ -1,5 +1,7 @@
 #include "session_montage.h"
 
+#include <string.h>
+
 #include "memory.h"
 #include "session_image.h"
 
@@ -9,9 +11,22 @@ static insitu_status fail_for_memory(const scene_montage *montage, base_error *e
                      montage->rows);
 }
 
+static int width_of(const scene_montage *montage)
+{
+    return montage->width * montage->columns + montage->bar_width;
+}
+
 static int64_t count_pixels(const scene_montage *montage)
 {
-    return (int64_t)montage->width * montage->columns * montage->height * montage->rows;
+    return (int64_t)width_of(montage) * montage->height * montage->rows;
+}
+
+/* Returns the place of a panel. */
+static insitu_place find_place(const scene_montage *of, const session_montage *m, int panel)
+{
+    const int left = of->are_bars_left ? of->bar_width : 0;
+    return (insitu_place){m->rgba, width_of(of), left + panel % of->columns * of->width,
+                          panel / of->columns * of->height};
 }
 
 /* Allocates the whole picture, which is transparent at first. */
@@ -23,22 +38,43 @@ static insitu_status begin_montage(session_montages *montages, const scene *scen
     }
     if (!montages->items) return fail_for_memory(&scene->montages[index], error);
     session_montage *m = &montages->items[index];
-    if (!m->rgba) m->rgba = base_calloc(4 * (size_t)count_pixels(&scene->montages[index]), sizeof *m->rgba);
-    return m->rgba ? INSITU_OK : fail_for_memory(&scene->montages[index], error);
+    const scene_montage *of = &scene->montages[index];
+    if (!m->rgba) m->rgba = base_calloc(4 * (size_t)count_pixels(of), sizeof *m->rgba);
+    if (of->shares_bars && !m->panels) {
+        m->panels = base_calloc((size_t)of->panel_count, sizeof *m->panels);
+        m->panel_count = m->panels ? of->panel_count : 0;
+    }
+    return m->rgba && (m->panels || !of->shares_bars) ? INSITU_OK : fail_for_memory(&scene->montages[index], error);
 }
 
 static void end(session_montage *m)
 {
+    for (int i = 0; i < m->panel_count; i++) session_free_decorations(m->panels[i]);
+    base_free(m->panels);
     base_free(m->rgba);
     base_free(m->path);
     *m = (session_montage){0};
 }
 
+/* Keeps a picture without its decorations in its panel, and a copy of them. */
+static insitu_status keep_panel(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
+                                const session_decorations *decorations, base_error *error)
+{
+    const insitu_place place = find_place(of, m, panel);
+    const size_t row = 4 * (size_t)picture->width;
+    for (int y = 0; y < picture->height; y++)
+        memcpy(place.rgba + 4 * ((ptrdiff_t)(place.y + y) * place.width + place.x), picture->rgba + (ptrdiff_t)row * y,
+               row * sizeof *place.rgba);
+    m->panels[panel] = session_copy_decorations(decorations);
+    return m->panels[panel] ? INSITU_OK : fail_for_memory(of, error);
+}
+
 insitu_status session_add_panel(session_montages *montages, const scene *scene, const scene_image *image,
-                                const scene_output *output, const insitu_image *picture, char *path, base_error *error)
+                                const scene_output *output, const insitu_image *picture,
+                                const session_decorations *decorations, char *path, base_error *error)
 {
     const scene_montage *of = &scene->montages[output->montage];
-    const int cell = output->first_panel + image->variant.view;
+    const int panel = output->first_panel + image->variant.view;
     const insitu_status status = begin_montage(montages, scene, output->montage, error);
     if (status) {
         base_free(path);
@@ -47,10 +83,76 @@ insitu_status session_add_panel(session_montages *montages, const scene *scene, 
     session_montage *m = &montages->items[output->montage];
     base_free(m->path);
     m->path = path;
-    const insitu_place place = {m->rgba, of->width * of->columns, cell % of->columns * of->width,
-                                cell / of->columns * of->height};
+    if (of->shares_bars) return keep_panel(of, m, panel, picture, decorations, error);
+    const insitu_place place = find_place(of, m, panel);
     return session_place_image(picture, &place, error);
 }
+
+/* ---- shared colour bars -------------------------------------------------------------------------------------------
+ */
+
+/* Returns the decorations of the first panel that has a picture, if all panels have the same bars, or else NULL. */
+static const session_decorations *find_shared(const scene_montage *of, const session_montage *m)
+{
+    const session_decorations *first = NULL;
+    for (int i = 0; i < of->panel_count; i++) {
+        if (!m->panels[i]) continue;
+        if (!first) first = m->panels[i];
+        if (m->panels[i]->bars_hash != first->bars_hash) return NULL;
+    }
+    return first;
+}
+
+/* Draws the decorations of a panel over its picture. buffer has the size of the picture. */
+static insitu_status decorate_panel(const scene_montage *of, session_montage *m, int panel, bool has_bars,
+                                    float *buffer, base_error *error)
+{
+    insitu_decorations decorations = m->panels[panel]->decorations;
+    const insitu_image picture = {
+        .width = of->width, .height = of->height, .rgba = buffer, .decorations = &decorations};
+    const insitu_place place = find_place(of, m, panel);
+    const size_t row = 4 * (size_t)of->width;
+    for (int y = 0; y < of->height; y++)
+        memcpy(buffer + (ptrdiff_t)row * y, place.rgba + 4 * ((ptrdiff_t)(place.y + y) * place.width + place.x),
+               row * sizeof *buffer);
+    if (!has_bars) decorations.bar_count = 0;
+    return session_place_image(&picture, &place, error);
+}
+
+/* Draws the bars into the strip beside the panels, with words as large as in the panels. */
+static insitu_status draw_strip(const scene_montage *of, session_montage *m, const session_decorations *shared,
+                                base_error *error)
+{
+    const int height = of->height * of->rows;
+    insitu_decorations decorations = shared->background;
+    memcpy(decorations.colour, shared->decorations.colour, sizeof decorations.colour);
+    decorations.size = shared->decorations.size / of->rows;
+    decorations.bar_count = shared->decorations.bar_count;
+    decorations.words_count = decorations.stroke_count = decorations.label_count = 0;
+    decorations.scale_bar.length = 0;
+    float *empty = base_calloc(4 * (size_t)of->bar_width * (size_t)height, sizeof *empty);
+    if (!empty) return fail_for_memory(of, error);
+    const insitu_image strip = {.width = of->bar_width, .height = height, .rgba = empty, .decorations = &decorations};
+    const insitu_place place = {m->rgba, width_of(of), of->are_bars_left ? 0 : of->width * of->columns, 0};
+    const insitu_status status = session_place_image(&strip, &place, error);
+    base_free(empty);
+    return status;
+}
+
+/* Draws the decorations of all panels, and the bars that they share. */
+static insitu_status finish_panels(const scene_montage *of, session_montage *m, base_error *error)
+{
+    const session_decorations *shared = find_shared(of, m);
+    float *buffer = base_alloc(4 * (size_t)of->width * (size_t)of->height * sizeof *buffer);
+    insitu_status status = buffer ? INSITU_OK : fail_for_memory(of, error);
+    for (int i = 0; i < of->panel_count && !status; i++)
+        if (m->panels[i]) status = decorate_panel(of, m, i, !shared, buffer, error);
+    base_free(buffer);
+    return status || !shared ? status : draw_strip(of, m, shared, error);
+}
+
+/* ---- files --------------------------------------------------------------------------------------------------------
+ */
 
 insitu_status session_write_montages(session_montages *montages, const scene *scene, base_error *error)
 {
@@ -58,10 +160,11 @@ insitu_status session_write_montages(session_montages *montages, const scene *sc
         session_montage *m = &montages->items[i];
         const scene_montage *of = &scene->montages[i];
         if (!m->rgba) continue;
-        const insitu_image whole = {.width = of->width * of->columns, .height = of->height * of->rows, .rgba = m->rgba};
+        const insitu_image whole = {.width = width_of(of), .height = of->height * of->rows, .rgba = m->rgba};
         base_error reason = {0};
         const insitu_image_format format = of->format == SCENE_PNG16 ? INSITU_PNG16 : INSITU_PNG8;
-        if (session_write_image(&whole, format, m->path, &reason) != INSITU_OK)
+        if (of->shares_bars) finish_panels(of, m, &reason);
+        if (reason.status || session_write_image(&whole, format, m->path, &reason) != INSITU_OK)
             base_fail(error, reason.status, "%.900s", reason.message);
         end(m);
     }

@@ -390,6 +390,7 @@ typedef struct scene_output {
     /* number of bytes of `path` that are the database's folder and its slash; 0 without a database */
     int folder_bytes;
     int columns, rows; /* numbers of pictures side by side in one file; 0: the picture has a file of its own */
+    bool shares_bars;  /* set if colour bars that all these pictures have in common are drawn once, beside them */
     int montage;       /* index of the scene's montage that contains the picture; -1: none */
     int first_panel;   /* number of the panel that shows the first view */
 } scene_output;
@@ -400,7 +401,10 @@ typedef struct scene_montage {
     int columns, rows;
     int width, height; /* size of each picture in pixels */
     scene_format format;
-    int panel_count; /* number of pictures in a step, at most columns × rows */
+    int panel_count;    /* number of pictures in a step, at most columns × rows */
+    bool shares_bars;   /* set if colour bars that all pictures have in common are drawn beside them */
+    int bar_width;      /* width in pixels of the strip for these bars; 0 without shares_bars */
+    bool are_bars_left; /* set if the strip is left of the pictures, otherwise it is right of them */
 } scene_montage;
 
 /* A Cinema database by Spec D: a folder of pictures, and a table that describes them. */

@@ -205,6 +205,9 @@ static insitu_status convert_grid(const scene_document *d, const char *path, con
                                   scene_output *out)
 {
     out->montage = -1;
+    out->shares_bars = in->shared_bars && *in->shared_bars;
+    if (!in->grid && out->shares_bars)
+        return scene_fail_at_key(d, path, "shared_bars", "given without grid, expected beside it");
     if (!in->grid) return INSITU_OK;
     if (out->format == SCENE_EXR)
         return scene_fail_at_key(d, path, "grid", "given for an EXR, expected for a PNG only");
@@ -228,6 +231,9 @@ static insitu_status convert_output(const scene_document *d, const char *path, c
     if (!status) status = convert_grid(d, path, in, out);
     if (status) return status;
     out->has_decorations = in->decorations ? *in->decorations : out->format != SCENE_EXR;
+    if (out->shares_bars && !(out->has_decorations && image->decorations.has_bars))
+        return scene_fail_at_key(d, path, "shared_bars",
+                                 "given, and the picture has no colour bars, expected decorations with a colour_bar");
     if (in->cinema) return scene_convert_cinema(d, path, in, image, out);
     out->path = base_strdup(in->path);
     return out->path ? INSITU_OK : scene_fail_for_memory(d);

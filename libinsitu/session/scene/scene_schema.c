@@ -199,6 +199,13 @@ DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
               "place whose picture is not due, or could not be drawn, stays transparent. Rank 0 holds 16 bytes per "   \
               "pixel of the whole file while a step's pictures are written. Not allowed with `cinema`.",               \
       .default_text = "none", .low = 1, .high = 16)                                                                    \
+    X(CYAML_FIELD_BOOL_PTR("shared_bars", OPTIONAL, scene_file_output, shared_bars),                                   \
+      .help = "With `grid`: if all pictures of a step have the same colour bars, these are drawn once, in a strip "    \
+              "beside the pictures, on the side that the first image's `colour_bar` names. Bars are the same if "      \
+              "their words, colours and numbers are. Otherwise each picture has its own bars, the strip stays "        \
+              "empty, and a warning says so. All pictures must set the same value, and each image needs a "            \
+              "`colour_bar`.",                                                                                         \
+      .default_text = "`false`")                                                                                       \
     X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
       .help = "Bits per channel of a PNG: 8 or 16. EXR always has 32-bit floats: R, G, B (linear, times A), A, and "   \
               "the depth, Z.",                                                                                         \

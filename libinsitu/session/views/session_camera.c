@@ -85,6 +85,14 @@ static int count_bars(const scene_image *image, double *letters)
     return count;
 }
 
+/* Returns whether a file shows the picture's colour bars inside the picture, and not beside it. */
+static bool has_bars_inside(const scene_image *image)
+{
+    bool is_any = image->output_count == 0;
+    for (int i = 0; i < image->output_count; i++) is_any = is_any || !image->outputs[i].shares_bars;
+    return image->decorations.has_bars && is_any;
+}
+
 /* Returns the width of all columns of colour bars, as a multiple of the height of text. */
 static double find_bar_width(const scene_image *image)
 {
@@ -94,7 +102,7 @@ static double find_bar_width(const scene_image *image)
     const double words = letter_width * letters, width = fmax(bar_room, fmin(words, label_width) + bar_borders);
     const double each = bar_height + line_height * fmax(1, ceil(words / label_width));
     const double rows = fmax(1, floor((1 / d->size - (d->title ? title_room : 0) - bar_borders) / each));
-    return d->has_bars ? width * fmax(1, ceil(count / rows)) : 0;
+    return has_bars_inside(image) ? width * fmax(1, ceil(count / rows)) : 0;
 }
 
 /* Returns the height of the lines at the middle of the top or bottom, or of those at its corners, whichever is larger,

@@ -1,6 +1,7 @@
 /* Converts outputs with a grid, and finds which pictures are panels of one file. Panels are numbered in the order in
  * which pictures are drawn: images in the order of the scene, each image's sweep in its order, and for each of these
  * the views of its orbit. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -28,6 +29,10 @@ static insitu_status check_views(const scene_document *d, const char *path, cons
                              output->path);
 }
 
+/* The width of the strip for shared colour bars, as a multiple of the height of words: a bar with the widest label that
+ * is not wrapped, and its borders (adaptors/image/layout.cpp). */
+static const double bar_strip = 9;
+
 /* Returns the index of the montage of this name, which is added if there is none yet; -1 if memory ran out. */
 static int find_montage(scene *s, const scene_image *image, const scene_output *output, char *name)
 {
@@ -47,7 +52,11 @@ static int find_montage(scene *s, const scene_image *image, const scene_output *
                                               .rows = output->rows,
                                               .width = image->width,
                                               .height = image->height,
-                                              .format = output->format};
+                                              .format = output->format,
+                                              .shares_bars = output->shares_bars,
+                                              .are_bars_left = image->decorations.bar_anchor == SCENE_LEFT};
+    if (output->shares_bars)
+        items[s->montage_count].bar_width = (int)ceil(bar_strip * image->decorations.size * image->height);
     return s->montage_count++;
 }
 
@@ -65,6 +74,10 @@ static insitu_status check_panels(const scene_document *d, const char *path, con
             image->height, m->width, m->height);
     if (output->format != m->format)
         return scene_fail_at_key(d, path, "bits", "differs from that of the file's first picture, expected the same");
+    if (output->shares_bars != m->shares_bars)
+        return scene_fail_at_key(d, path, "shared_bars",
+                                 "is %s, and %s for the file's first picture, expected the same",
+                                 output->shares_bars ? "true" : "false", m->shares_bars ? "true" : "false");
     if (m->panel_count > m->columns * m->rows)
         return scene_fail_at_key(d, path, "grid", "[%d, %d] has %d cells for %d pictures up to here, expected no fewer",
                                  m->columns, m->rows, m->columns * m->rows, m->panel_count);
