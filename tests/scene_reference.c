@@ -174,9 +174,11 @@ static const char introduction[] =
     "- Statistics, `when` and the counts of the report include only the given cells.\n"
     "- A mesh with cells on both sides of its mirror plane overlaps its image. A warning says so.\n"
     "\n"
-    "**Memory.** Each image takes 4 or 8 bytes per vertex for each axis along which it is mirrored, which the report "
-    "counts as\n"
-    "copied. It also has a tree of its own. All other arrays are the given ones.\n";
+    "**Memory.** Each image has coordinates of its own, of 12 or 24 bytes per vertex. If the given coordinates are "
+    "packed in an\n"
+    "array for each axis, an image only has 4 or 8 bytes for each axis along which it is mirrored. The report counts "
+    "them as\n"
+    "copied. Each image also has a tree of its own. All other arrays are the given ones.\n";
 
 enum { MOST_MAPPINGS = 128 };
 static const scene_mapping *shown[MOST_MAPPINGS];

@@ -600,7 +600,7 @@ static void numbers_are_of_the_given_cells(void **state)
     const insitu_report *report = insitu_last_report(session);
     char words[100];
     snprintf(words, sizeof words, "coordinates of its mirror images: %lld bytes",
-             (long long)((3 * 1 + 3 * 2 + 3) * 8 * in.part.vertex_count));
+             (long long)(7 * 3 * 8 * in.part.vertex_count));
     everywhere(report->cells == in.part.cell_count && report->cells_inverted == 0);
     everywhere(strstr(report->copied_why, words) != NULL);
     everywhere(*report->warnings == '\0');

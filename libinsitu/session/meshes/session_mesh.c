@@ -352,16 +352,14 @@ void session_mark_moved(session_meshes *meshes, session_mesh *mesh)
 
 void session_drop_warp(session_mesh *mesh)
 {
-    for (int axis = 0; axis < 3; axis++) base_free((void *)(uintptr_t)mesh->warp.coordinates[axis].data);
+    base_free(mesh->warp.places);
     mesh->warp = (session_warp){0};
 }
 
 void session_drop_mirrored(session_mirrored *mirrored)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        base_free((void *)(uintptr_t)mirrored->coordinates[axis].data);
-        base_free(mirrored->axes[axis]);
-    }
+    base_free(mirrored->places);
+    for (int axis = 0; axis < 3; axis++) base_free(mirrored->axes[axis]);
     *mirrored = (session_mirrored){0};
 }
 

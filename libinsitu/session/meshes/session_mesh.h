@@ -191,12 +191,12 @@ typedef struct session_lattice {
 /* Coordinates that are read in place of the caller's, because the scene draws the mesh with moved vertices
  * (session_warp.h). They are a copy reported to the user. */
 typedef struct session_warp {
-    bool is_on;    /* set if the moved coordinates are read */
-    bool is_stale; /* set if the caller's coordinates may have changed since they were moved */
-    uint64_t key;  /* hash that identifies the displacements by which they were moved */
-    /* the moved coordinates, owned and packed; no data along an axis along which nothing moves */
-    insitu_array coordinates[3];
-    insitu_array unmoved[3]; /* what session_mesh.given has without the warp */
+    bool is_on;                  /* set if the moved coordinates are read */
+    bool is_stale;               /* set if the caller's coordinates may have changed since they were moved */
+    uint64_t key;                /* hash that identifies the displacements by which they were moved */
+    char *places;                /* memory of the moved coordinates (session_places.h) */
+    insitu_array coordinates[3]; /* the moved coordinates; no data along an axis if they are the caller's */
+    insitu_array unmoved[3];     /* what session_mesh.given has without the warp */
     /* the caller's lattice without coordinates along axes, as coordinates are then given by vertex */
     insitu_lattice lattice;
     int64_t bytes;
@@ -207,7 +207,8 @@ typedef struct session_warp {
  * user. */
 typedef struct session_mirrored {
     double planes[3];            /* coordinate of the mirror plane of each axis along which the image is mirrored */
-    insitu_array coordinates[3]; /* mirrored coordinates, owned and packed; no data if they are those of the source */
+    char *places;                /* memory of the mirrored coordinates (session_places.h) */
+    insitu_array coordinates[3]; /* the mirrored coordinates; no data along an axis if they are those of the source */
     double *axes[3];             /* coordinates along a lattice's axes, owned; NULL: coordinates are given by vertex */
     insitu_lattice lattice;      /* lattice of the description */
     int64_t bytes;

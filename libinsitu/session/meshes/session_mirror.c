@@ -9,6 +9,7 @@
 #include "session_conform.h"
 #include "session_lattice.h"
 #include "session_mesh_input.h"
+#include "session_places.h"
 #include "session_region.h"
 
 static bool is_mirrored(const session_mesh *image, int axis)
@@ -19,21 +20,36 @@ static bool is_mirrored(const session_mesh *image, int axis)
 /* ---- coordinates by vertex ----------------------------------------------------------------------------------------
  */
 
-/* Mirrors coordinates along an axis, in their own type. */
-static void mirror_numbers(const grid_array *from, double plane, int64_t count, int threads, const insitu_array *to)
+/* Returns the axes along which the image has coordinates of its own: those along which it is mirrored, or all of the
+ * source's if these are not packed in an array for each axis. */
+static int find_own_axes(const session_mesh *image)
 {
-    char *out = (char *)(uintptr_t)to->data;
-    const bool is_wide = to->type == INSITU_FLOAT64;
+    enum { IN_PLANE = 3, ALL = 7 };
+    const insitu_mesh *given = &image->source->given;
+    bool are_packed = true;
+    for (int axis = 0; axis < 3; axis++) {
+        const insitu_array *array = &given->coordinates[axis];
+        are_packed = are_packed &&
+                     (!array->data || !array->stride_bytes || array->stride_bytes == session_type_size(array->type));
+    }
+    return are_packed ? image->mirror_axes : image->mirror_axes | (given->coordinates[2].data ? ALL : IN_PLANE);
+}
+
+/* Copies coordinates along an axis, in their own type, or mirrors them. */
+static void mirror_numbers(const session_mesh *image, int axis, int threads)
+{
+    const grid_array from = session_coordinates(&image->source->given, axis);
+    const double plane = image->mirrored.planes[axis];
+    const insitu_array *to = &image->mirrored.coordinates[axis];
+    const int64_t count = image->source->given.vertex_count;
+    const bool is_copied = !is_mirrored(image, axis);
 #pragma omp parallel num_threads(session_region_threads(threads, count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t v = 0; v < count; v++) {
-            const double place = 2 * plane - grid_array_number(from, v);
-            if (is_wide)
-                ((double *)(void *)out)[v] = place;
-            else
-                ((float *)(void *)out)[v] = (float)place;
+            const double place = grid_array_number(&from, v);
+            session_store_place(to, v, is_copied ? place : 2 * plane - place);
         }
         region_leave();
     }
@@ -44,21 +60,15 @@ static bool mirror_vertices(session_mesh *image, int threads)
 {
     const insitu_mesh *given = &image->source->given;
     session_mirrored *m = &image->mirrored;
-    for (int axis = 0; axis < 3; axis++) {
-        if (!is_mirrored(image, axis)) continue;
-        const insitu_type type = given->coordinates[given->coordinates[axis].data ? axis : 0].type;
-        const grid_array from = session_coordinates(given, axis);
-        const int64_t bytes = given->vertex_count * session_type_size(type);
-        insitu_array *own = &m->coordinates[axis];
-        if (own->data && own->type != type) {
-            base_free((void *)(uintptr_t)own->data);
-            own->data = NULL;
-        }
-        if (!own->data) *own = (insitu_array){base_alloc((size_t)bytes + 1), type, 0};
-        if (!own->data) return false;
-        mirror_numbers(&from, m->planes[axis], given->vertex_count, threads, own);
-        m->bytes += bytes;
-    }
+    const int axes = find_own_axes(image);
+    insitu_type types[3];
+    bool is_new = false;
+    for (int axis = 0; axis < 3; axis++)
+        types[axis] = given->coordinates[given->coordinates[axis].data ? axis : 0].type;
+    if (!session_reserve_places(&m->places, m->coordinates, given->vertex_count, axes, types, &m->bytes, &is_new))
+        return false;
+    for (int axis = 0; axis < 3; axis++)
+        if (axes >> axis & 1) mirror_numbers(image, axis, threads);
     return true;
 }
 

@@ -6,10 +6,10 @@
 
 #include <string.h>
 
-#include "memory.h"
 #include "session_agree.h"
 #include "session_conform.h"
 #include "session_lattice.h"
+#include "session_places.h"
 #include "session_region.h"
 #include "session_topology.h"
 
@@ -69,37 +69,24 @@ static insitu_type moved_type(const insitu_mesh *given, int axis)
     return given->coordinates[given->coordinates[axis].data ? axis : 0].type;
 }
 
-/* Ensures that there is memory for the moved coordinates. *is_new is set if some of it is new. Returns false if memory
- * runs out. */
-static bool reserve_coordinates(session_mesh *mesh, int moved_axes, bool *is_new)
+/* Ensures that there is memory for the moved coordinates. *is_new is set if it is new. Returns false if memory runs
+ * out. If z is not given and does not move, it stays as it is. */
+static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *is_new)
 {
+    enum { IN_PLANE = 3, ALL = 7 };
+    const insitu_mesh *given = &mesh->given;
+    const bool has_z = component_count == 3 || given->coordinates[2].data || session_has_axes(given);
+    const insitu_type types[3] = {moved_type(given, 0), moved_type(given, 1), moved_type(given, 2)};
     session_warp *warp = &mesh->warp;
-    warp->bytes = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        insitu_array *own = &warp->coordinates[axis];
-        const insitu_type type = moved_type(&mesh->given, axis);
-        const bool is_own = axis < moved_axes || session_has_axes(&mesh->given);
-        const int64_t bytes = mesh->given.vertex_count * session_type_size(type);
-        if (own->data && (!is_own || own->type != type)) {
-            base_free((void *)(uintptr_t)own->data);
-            *own = (insitu_array){0};
-        }
-        if (!is_own) continue;
-        warp->bytes += bytes;
-        if (own->data) continue;
-        *own = (insitu_array){base_calloc((size_t)bytes + 1, 1), type, 0};
-        *is_new = true;
-        if (!own->data) return false;
-    }
-    return true;
+    return session_reserve_places(&warp->places, warp->coordinates, given->vertex_count, has_z ? ALL : IN_PLANE, types,
+                                  &warp->bytes, is_new);
 }
 
 /* The coordinates along one axis before and after the move. */
 typedef struct moved_axis {
     grid_array from;
-    grid_array by; /* displacements, in the order of the tuples; without data, nothing moves along the axis */
-    char *to;
-    bool is_wide;
+    grid_array by;          /* displacements, in the order of the tuples; without data, nothing moves along the axis */
+    const insitu_array *to; /* NULL: the coordinates are not copied */
 } moved_axis;
 
 /* Stores a vertex's moved coordinate. Returns whether it differs from the one that was there. */
@@ -107,13 +94,7 @@ static bool move_coordinate(const moved_axis *axis, double scale, int64_t vertex
 {
     double place = grid_array_number(&axis->from, vertex);
     if (axis->by.data) place += scale * grid_array_number(&axis->by, tuple);
-    const float narrow = (float)place;
-    const size_t size = axis->is_wide ? sizeof place : sizeof narrow;
-    const void *number = axis->is_wide ? (const void *)&place : (const void *)&narrow;
-    char *to = axis->to + vertex * (int64_t)size;
-    const bool differs = memcmp(to, number, size) != 0;
-    memcpy(to, number, size);
-    return differs;
+    return session_store_place(axis->to, vertex, place);
 }
 
 /* Moves all vertices. *bad becomes the first vertex whose index is that of no tuple, or else the number of vertices.
@@ -169,10 +150,8 @@ static insitu_status compute_coordinates(session_mesh *mesh, const session_displ
     for (int axis = 0; axis < 3; axis++) {
         const insitu_array *own = &mesh->warp.coordinates[axis];
         if (!own->data) continue;
-        axes[axis] =
-            (moved_axis){.from = has_axes ? mesh->cells.coordinates[axis] : session_coordinates(&mesh->given, axis),
-                         .to = (char *)(uintptr_t)own->data,
-                         .is_wide = own->type == INSITU_FLOAT64};
+        axes[axis] = (moved_axis){
+            .from = has_axes ? mesh->cells.coordinates[axis] : session_coordinates(&mesh->given, axis), .to = own};
         if (axis < by->component_count) axes[axis].by = by->components[axis];
     }
     *differ = move_vertices(mesh, by, (const moved_axis *)axes, threads, &bad) || *differ;

@@ -1,0 +1,46 @@
+#include "session_places.h"
+
+#include "memory.h"
+
+static bool has_axis(int axes, int axis)
+{
+    return axes >> axis & 1;
+}
+
+/* Returns whether the coordinates have these axes and types. */
+static bool are_as_asked(const insitu_array coordinates[3], int axes, const insitu_type types[3])
+{
+    bool are_so = true;
+    for (int axis = 0; axis < 3; axis++)
+        are_so = are_so && (coordinates[axis].data != NULL) == has_axis(axes, axis) &&
+                 (!coordinates[axis].data || coordinates[axis].type == types[axis]);
+    return are_so;
+}
+
+bool session_reserve_places(char **places, insitu_array coordinates[3], int64_t count, int axes,
+                            const insitu_type types[3], int64_t *bytes, bool *is_new)
+{
+    int64_t largest = 0, offset = 0, used = 0;
+    bool has_one_type = true;
+    for (int axis = 0; axis < 3; axis++) {
+        if (!has_axis(axes, axis)) continue;
+        const int64_t size = session_type_size(types[axis]);
+        has_one_type = has_one_type && (!largest || size == largest);
+        largest = size > largest ? size : largest;
+        used++;
+    }
+    *bytes = used * count * largest;
+    if (*places && are_as_asked(coordinates, axes, types)) return true;
+    base_free(*places);
+    *places = base_calloc((size_t)*bytes + 1, 1);
+    *is_new = true;
+    for (int axis = 0; axis < 3; axis++) {
+        coordinates[axis] = (insitu_array){0};
+        if (!*places || !has_axis(axes, axis)) continue;
+        /* numbers of different sizes stand in an array for each axis */
+        coordinates[axis] = (insitu_array){*places + offset, types[axis],
+                                           has_one_type ? used * largest : session_type_size(types[axis])};
+        offset += has_one_type ? largest : count * largest;
+    }
+    return *places != NULL;
+}
