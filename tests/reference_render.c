@@ -19,8 +19,8 @@ typedef struct event {
     bool is_sample;
     int order; /* surface id or volume layer */
     double transmittance;
-    double blur;       /* of a hit: cell size × conditioning, by which rounding moves it */
-    reference_hit hit; /* of a sample: colour alone */
+    double error_bound; /* of a hit: cell size × conditioning, by which rounding moves it */
+    reference_hit hit;  /* of a sample: colour alone */
 } event;
 
 struct reference_scene {
@@ -319,7 +319,7 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     const bool has_gradient = along != 0;
     if (!has_gradient) t->out->ambiguous = true;
     e->hit.conditioning = has_gradient ? 1 / fabs(along) : 1;
-    e->blur = c->size * e->hit.conditioning;
+    e->error_bound = c->size * e->hit.conditioning;
     surface_colour(t, c, layer, value_index, depth, colour);
     shade(t, &layer->material, colour, e->hit.normal, e->hit.colour);
     return &e->hit;
@@ -543,7 +543,8 @@ static void margins_between(const event *events, int64_t count, double *margin)
 {
     for (int64_t i = 0; i + 1 < count; i++)
         if (events[i].is_sample != events[i + 1].is_sample)
-            lessen(margin, (events[i + 1].depth - events[i].depth) / fmax(events[i].blur, events[i + 1].blur));
+            lessen(margin,
+                   (events[i + 1].depth - events[i].depth) / fmax(events[i].error_bound, events[i + 1].error_bound));
 }
 
 static void blend_events(trace *t, const float background[4])

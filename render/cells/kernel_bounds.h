@@ -30,7 +30,7 @@ typedef struct kernel_contractions {
     /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
      * iteration is not a contraction */
     float grow[SIMD_WIDTH];
-    float blur[SIMD_WIDTH], rim[SIMD_WIDTH];
+    float error_bound[SIMD_WIDTH], rim[SIMD_WIDTH];
 } kernel_contractions;
 
 /* Bounds for one cell and isovalue per lane. */
@@ -368,13 +368,13 @@ SIMD_INLINE void kernel_half_rate(const kernel_bounds_lanes *b, int type, const 
     }
     value += kernel_half_abs(r->gradient[2]) * extent[2];
     const kernel_half face = r->gap + speed * (r->slope * r->gap + 1e-6);
-    const kernel_half blur = kernel_half_sqrt(own) + speed * value * 5e-7 + 1e-6;
-    const kernel_half rim = 2 * ((face + blur) / rest) + 4e-6;
+    const kernel_half error_bound = kernel_half_sqrt(own) + speed * value * 5e-7 + 1e-6;
+    const kernel_half rim = 2 * ((face + error_bound) / rest) + 4e-6;
     const kernel_half_mask contracts = r->is_regular & (kernel_half_mask)(r->rise > 0) &
                                        (kernel_half_mask)(rate < 0.9) & (kernel_half_mask)(rim < 0.015625);
     kernel_half_store(out->grow, half,
                       kernel_half_select(contracts, 1.0001 * rate / rest, kernel_half_all((double)INFINITY)));
-    kernel_half_store(out->blur, half, blur);
+    kernel_half_store(out->error_bound, half, error_bound);
     kernel_half_store(out->rim, half, rim);
 }
 
@@ -465,12 +465,12 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
     for (int i = 0; i < 3; i++) {
         const kernel_half side = kernel_half_abs(b.inverse[i][0]) + kernel_half_abs(b.inverse[i][1]);
         const kernel_half term = spread * side;
-        const kernel_half blur = across * side + 1e-6 * b.reach[2] * kernel_half_abs(b.inverse[i][2]);
+        const kernel_half error_bound = across * side + 1e-6 * b.reach[2] * kernel_half_abs(b.inverse[i][2]);
         w[i] = b.inverse[i][2];
         length += w[i] * w[i];
         off += term * term;
-        gap += blur * blur;
-        kernel_half_planes(&b, type, i, blur + 1e-5, half, out);
+        gap += error_bound * error_bound;
+        kernel_half_planes(&b, type, i, error_bound + 1e-5, half, out);
     }
     kernel_lanes_corners(&slopes, type, w, &most);
     const kernel_half theta = kernel_half_sqrt(kernel_half_sqrt(kernel_half_sqrt(most.bend)));

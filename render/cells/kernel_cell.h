@@ -99,15 +99,15 @@ SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a
 
 /* The largest error d of an edge's function (see above), and the edge's extent, in which distances across the ray count
  * for a quarter. */
-typedef struct kernel_blur {
+typedef struct kernel_edge_error {
     float error, extent;
-} kernel_blur;
+} kernel_edge_error;
 
-SIMD_INLINE kernel_blur kernel_line_blur(const kernel_line *l, float radius, kernel_spot a, kernel_spot b)
+SIMD_INLINE kernel_edge_error kernel_line_error(const kernel_line *l, float radius, kernel_spot a, kernel_spot b)
 {
     const float x = fabsf(a.x - b.x), y = fabsf(a.y - b.y), z = fabsf(a.z - b.z);
-    return (kernel_blur){6e-8f * (3 * fabsf(l->c) + radius * (4 * fabsf(l->cu) + 3 * fabsf(l->cv))),
-                         z + 0.25f * (x + y)};
+    return (kernel_edge_error){6e-8f * (3 * fabsf(l->c) + radius * (4 * fabsf(l->cu) + 3 * fabsf(l->cv))),
+                               z + 0.25f * (x + y)};
 }
 
 /* Returns the least sum of weights that is accurate enough for a triangle, computed from the sums of its edges' errors
@@ -118,14 +118,14 @@ SIMD_INLINE float kernel_least_weight(float errors, float extents)
 }
 
 /* Returns the larger error and the larger extent of two edges. */
-SIMD_INLINE kernel_blur kernel_blur_more(kernel_blur a, kernel_blur b)
+SIMD_INLINE kernel_edge_error kernel_edge_error_max(kernel_edge_error a, kernel_edge_error b)
 {
-    return (kernel_blur){a.error < b.error ? b.error : a.error, a.extent < b.extent ? b.extent : a.extent};
+    return (kernel_edge_error){a.error < b.error ? b.error : a.error, a.extent < b.extent ? b.extent : a.extent};
 }
 
 /* Returns an upper bound of kernel_least_weight() for all triangles whose edges have errors and extents of at most
  * `most`. */
-SIMD_INLINE float kernel_blur_least(kernel_blur most)
+SIMD_INLINE float kernel_least_weight_bound(kernel_edge_error most)
 {
     return 1.0001f * kernel_least_weight(3 * most.error, 3 * most.extent);
 }
@@ -407,7 +407,7 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
 
 SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
-    kernel_blur blur[KERNEL_TET_EDGES];
+    kernel_edge_error error_bound[KERNEL_TET_EDGES];
     float size[4];
     for (int i = 0; i < 4; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
     c->doubt = 0;
@@ -415,12 +415,13 @@ SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const k
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         const kernel_spot from = kernel_cell_spot(c, i), to = kernel_cell_spot(c, j);
         c->lines[n] = kernel_line_between(f, from, to, size[i], size[j]);
-        blur[n] = kernel_line_blur(&c->lines[n], tile->radius, from, to);
+        error_bound[n] = kernel_line_error(&c->lines[n], tile->radius, from, to);
         c->doubt = c->doubt < c->lines[n].bound ? c->lines[n].bound : c->doubt;
     }
     for (int n = 0; n < 4; n++) {
-        const kernel_blur *ij = &blur[(int)kernel_tet_face[n][3]], *jk = &blur[(int)kernel_tet_face[n][4]];
-        const kernel_blur *ik = &blur[(int)kernel_tet_face[n][5]];
+        const kernel_edge_error *ij = &error_bound[(int)kernel_tet_face[n][3]],
+                                *jk = &error_bound[(int)kernel_tet_face[n][4]];
+        const kernel_edge_error *ik = &error_bound[(int)kernel_tet_face[n][5]];
         c->least[n] = kernel_least_weight((ij->error + jk->error) + ik->error, (ij->extent + jk->extent) + ik->extent);
     }
 }
@@ -441,16 +442,16 @@ SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, cons
         ends[shape->edge_count + face][1] = (signed char)corner[2];
     }
     for (int i = 0; i < c->count; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
-    kernel_blur most = {0, 0};
+    kernel_edge_error most = {0, 0};
     for (int n = 0; n < count; n++) {
         const int i = ends[n][0], j = ends[n][1], a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
         const kernel_spot from = kernel_cell_spot(c, a), to = kernel_cell_spot(c, b);
         c->lines[n] = kernel_line_between(f, from, to, size[a], size[b]);
         if (kernel_has_triangles(c->type))
-            most = kernel_blur_more(most, kernel_line_blur(&c->lines[n], tile->radius, from, to));
+            most = kernel_edge_error_max(most, kernel_line_error(&c->lines[n], tile->radius, from, to));
     }
     /* hexes have triangles only if a quad has collapsed, so their weights are always checked exactly */
-    c->least[0] = kernel_is_box(c->type) ? (float)INFINITY : kernel_blur_least(most);
+    c->least[0] = kernel_is_box(c->type) ? (float)INFINITY : kernel_least_weight_bound(most);
 }
 
 static __attribute__((unused)) void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)

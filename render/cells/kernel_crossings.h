@@ -112,10 +112,10 @@ SIMD_INLINE vf kernel_weight(vf ij, vf jk, vf ik)
     return (jk - ik) + ij;
 }
 
-SIMD_INLINE kernel_blur kernel_edge_blur(const kernel_packet *p, kernel_spot a, kernel_spot b)
+SIMD_INLINE kernel_edge_error kernel_edge_error_between(const kernel_packet *p, kernel_spot a, kernel_spot b)
 {
     const kernel_line l = kernel_line_of(p, a, b);
-    return kernel_line_blur(&l, p->tile->radius, a, b);
+    return kernel_line_error(&l, p->tile->radius, a, b);
 }
 
 /* Returns the least sum of weights that is accurate enough for the triangle i, j, k, whose vertices are in the order of
@@ -123,7 +123,8 @@ SIMD_INLINE kernel_blur kernel_edge_blur(const kernel_packet *p, kernel_spot a, 
 static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_packet *p, kernel_spot i, kernel_spot j,
                                                                    kernel_spot k)
 {
-    const kernel_blur ij = kernel_edge_blur(p, i, j), jk = kernel_edge_blur(p, j, k), ik = kernel_edge_blur(p, i, k);
+    const kernel_edge_error ij = kernel_edge_error_between(p, i, j), jk = kernel_edge_error_between(p, j, k),
+                            ik = kernel_edge_error_between(p, i, k);
     return kernel_least_weight((ij.error + jk.error) + ik.error, (ij.extent + jk.extent) + ik.extent);
 }
 

@@ -82,9 +82,9 @@ SIMD_INLINE void kernel_lanes_line(const kernel_frame *f, const vf a[3], const v
     }
 }
 
-/* Computes the error that the edge function may have, and the edge's extent (kernel_blur). */
-SIMD_INLINE void kernel_lanes_line_blur(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
-                                        vf *extent)
+/* Computes the error that the edge function may have, and the edge's extent (kernel_edge_error). */
+SIMD_INLINE void kernel_lanes_line_error(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
+                                         vf *extent)
 {
     vf apart[3];
     for (int i = 0; i < 3; i++) apart[i] = vf_abs(a[i] - b[i]);

@@ -47,7 +47,7 @@ typedef struct kernel_local_cells {
     /* square of an upper bound of the Frobenius norm of n's derivative */
     float bend[SIMD_WIDTH];
     /* error bound of the reference coordinates: a point closer to the cell's border may be on either side of it */
-    float blur[SIMD_WIDTH];
+    float error_bound[SIMD_WIDTH];
 } kernel_local_cells;
 
 SIMD_INLINE int kernel_bent_terms(int type)
@@ -321,12 +321,12 @@ SIMD_INLINE void kernel_local_invert(const vf m[3][8], vf inverse[3][3])
 }
 
 /* Computes bounds of the affine approximation y of the reference coordinates: its range over all vertices, widened by
- * the error bound of kernel_local_blur(). No point of the cell is outside of these bounds, because each is a mean of
- * the vertices with non-negative weights. */
+ * the error bound of kernel_local_error_bound(). No point of the cell is outside of these bounds, because each is a
+ * mean of the vertices with non-negative weights. */
 SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inverse[3][3], const vf offset[3],
                                     kernel_local_cells *out)
 {
-    const vf pad = 1e-3f + vf_load(out->blur);
+    const vf pad = 1e-3f + vf_load(out->error_bound);
     for (int i = 0; i < 3; i++) {
         vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
         for (int n = 0; n < count; n++) {
@@ -343,7 +343,8 @@ SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inver
  * (kernel_quad.h) err by 3e-7 of the cell's size and by half a unit in the last place of their depth; projected
  * vertices err by a few units of their positions across the ray; and r errs by the 2e-6 that Newton's method leaves,
  * and by as many units of a position. */
-SIMD_INLINE void kernel_local_blur(int count, const vf places[3][8], const vf inverse[3][3], kernel_local_cells *out)
+SIMD_INLINE void kernel_local_error_bound(int count, const vf places[3][8], const vf inverse[3][3],
+                                          kernel_local_cells *out)
 {
     vf size[3], most = vf_set(0);
     for (int a = 0; a < 3; a++) {
@@ -354,7 +355,7 @@ SIMD_INLINE void kernel_local_blur(int count, const vf places[3][8], const vf in
         most = vf_max((vf_abs(inverse[i][0]) * size[0] + vf_abs(inverse[i][1]) * size[1]) * 4.0f +
                           vf_abs(inverse[i][2]) * size[2],
                       most);
-    vf_store(out->blur, 4e-6f + 1.2e-7f * most);
+    vf_store(out->error_bound, 4e-6f + 1.2e-7f * most);
 }
 
 /* Computes the coefficients of one cell of this type per lane, from vertices in tile space and the field at them.
@@ -383,9 +384,9 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
             vf_store(out->bent[k][i], bent[k][i]);
         }
     }
-    kernel_local_blur(count, places, (const vf(*)[3])inverse, out);
+    kernel_local_error_bound(count, places, (const vf(*)[3])inverse, out);
     kernel_local_reach(count, (const vf(*)[8])at, (const vf(*)[3])inverse, offset, out);
-    const vm sharp = vf_lt(vf_load(out->blur), vf_set(0.05f));
+    const vm sharp = vf_lt(vf_load(out->error_bound), vf_set(0.05f));
     if (!bends) return sharp;
     const vf bend = kernel_local_bent(type, (const vf(*)[3])bent);
     vf_store(out->bend, bend);

@@ -84,7 +84,7 @@ SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, 
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         vf line[3];
         kernel_lanes_line(f, at[i], at[j], line);
-        kernel_lanes_line_blur(line, tile->radius, at[i], at[j], &error[n], &extent[n]);
+        kernel_lanes_line_error(line, tile->radius, at[i], at[j], &error[n], &extent[n]);
         out->c[n] = line[0];
         out->cu[n] = line[1];
         out->cv[n] = line[2];

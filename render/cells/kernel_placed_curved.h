@@ -267,7 +267,7 @@ SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposi
 }
 
 /* The edges' lines with their bounds, each from the shape's first vertex to its second, and the errors and extents of
- * kernel_blur. */
+ * kernel_edge_error. */
 typedef struct kernel_lanes_lines {
     vf line[KERNEL_CURVED_EDGES][4], error[KERNEL_CURVED_EDGES], extent[KERNEL_CURVED_EDGES];
 } kernel_lanes_lines;
@@ -284,7 +284,7 @@ SIMD_INLINE void kernel_lanes_lines_of(const kernel_placed_curved *placed, const
     for (int n = 0; n < shape->edge_count; n++) {
         const int i = shape->edges[n][0], j = shape->edges[n][1];
         kernel_lanes_line(f, at[i], at[j], out->line[n]);
-        kernel_lanes_line_blur(out->line[n], tile->radius, at[i], at[j], &out->error[n], &out->extent[n]);
+        kernel_lanes_line_error(out->line[n], tile->radius, at[i], at[j], &out->error[n], &out->extent[n]);
         out->line[n][3] = kernel_lanes_doubt(size[i], size[j]);
     }
 }

@@ -134,11 +134,11 @@ SIMD_INLINE kernel_spot kernel_polyhedron_spot(const polyhedron *c, int i)
     return (kernel_spot){c->x[i], c->y[i], c->z[i]};
 }
 
-SIMD_INLINE kernel_blur kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
+SIMD_INLINE kernel_edge_error kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
 {
     const kernel_line line = kernel_line_of(p, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
     memcpy(c->lines[n], &line, sizeof line);
-    return kernel_line_blur(&line, p->tile->radius, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
+    return kernel_line_error(&line, p->tile->radius, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
 }
 
 SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
@@ -146,12 +146,12 @@ SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
     for (int i = 0; i <= c->vertex_count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->is_placed = true;
     if (!p->is_pencil) return;
-    kernel_blur most = {0, 0};
+    kernel_edge_error most = {0, 0};
     for (int i = 0; i < c->edge_count; i++)
-        most = kernel_blur_more(most, kernel_polyhedron_line(c, p, i, c->edges[i][0], c->edges[i][1]));
+        most = kernel_edge_error_max(most, kernel_polyhedron_line(c, p, i, c->edges[i][0], c->edges[i][1]));
     for (int i = 0; i < c->vertex_count; i++)
-        most = kernel_blur_more(most, kernel_polyhedron_line(c, p, c->edge_count + i, i, c->vertex_count));
-    c->least = kernel_blur_least(most);
+        most = kernel_edge_error_max(most, kernel_polyhedron_line(c, p, c->edge_count + i, i, c->vertex_count));
+    c->least = kernel_least_weight_bound(most);
 }
 
 /* ---- crossings of the surface ---- */

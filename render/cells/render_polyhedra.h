@@ -38,7 +38,8 @@ typedef struct polyhedron {
     double fall, rise;
     /* edge functions (kernel_cell.h): of the edges, then of the lines from each vertex to the centre */
     float (*lines)[4];
-    float least;       /* least sum of weights that is accurate enough for all of its triangles (kernel_blur_least()) */
+    float
+        least; /* least sum of weights that is accurate enough for all of its triangles (kernel_least_weight_bound()) */
     int64_t *vertices; /* vertex indices in the mesh, vertex_count of them */
     int (*edges)[2];
     polyhedron_facet *facets;

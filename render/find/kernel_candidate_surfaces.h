@@ -79,7 +79,7 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, k
 {
     const kernel_differential *differential = kernel_cell_differential(type);
     const int count = grid_type_vertices(type);
-    vf d[4][3], n[3][3], middle[4], g[3], size = vf_set(0), error = size, blur = size;
+    vf d[4][3], n[3][3], middle[4], g[3], size = vf_set(0), error = size, error_bound = size;
     for (int a = 0; a < 4; a++) {
         middle[a] = d[a][0] = d[a][1] = d[a][2] = vf_set(0);
         for (int i = 0; i < count; i++) {
@@ -114,9 +114,9 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, k
     for (int a = 0; a < 3; a++) {
         vf reach = vf_set(0);
         for (int i = 0; i < count; i++) reach = vf_max(vf_abs(l->at[i][a]), reach);
-        blur += vf_abs(g[a]) * reach;
+        error_bound += vf_abs(g[a]) * reach;
     }
-    const vf thickness = error + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * blur;
+    const vf thickness = error + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * error_bound;
     out->thickness = vf_select(vf_lt(thickness, vf_set(1)), thickness, vf_set(INFINITY));
 }
 

@@ -157,10 +157,10 @@ SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
 /* Computes the pixels between the extent's ends, clipped to from .. to. Returns false if there are none. `zero` is the
  * pixel at extent 0. blur: the error bound of the extent, in pixels. The extent is widened by blur, by 1/100 pixel and
  * by 3e-5 of the numbers, which is more than the error of rays that hit only by rounding. */
-SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int from, int to, uint16_t *first,
+SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float error_bound, int from, int to, uint16_t *first,
                                      uint16_t *last)
 {
-    const float pad = 0.01f + 3e-5f * (simd_max(fabsf(e.low), fabsf(e.high)) + fabsf(zero)) + blur;
+    const float pad = 0.01f + 3e-5f * (simd_max(fabsf(e.low), fabsf(e.high)) + fabsf(zero)) + error_bound;
     const float low = simd_max(ceilf(e.low + zero - pad), (float)from);
     const float high = simd_min(floorf(e.high + zero + pad), (float)to);
     if (!(low <= high)) return false;
@@ -189,10 +189,11 @@ SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent 
         out->y1 = (uint16_t)s->last[1];
         return true;
     }
-    const float blur = 2e-6f * (camera->is_orthographic ? size + 1 : 1);
-    return kernel_extent_range(columns, s->column_0, blur * fabsf(s->column_scale), s->first[0], s->last[0], &out->x0,
-                               &out->x1) &&
-           kernel_extent_range(rows, s->row_0, blur * fabsf(s->row_scale), s->first[1], s->last[1], &out->y0, &out->y1);
+    const float error_bound = 2e-6f * (camera->is_orthographic ? size + 1 : 1);
+    return kernel_extent_range(columns, s->column_0, error_bound * fabsf(s->column_scale), s->first[0], s->last[0],
+                               &out->x0, &out->x1) &&
+           kernel_extent_range(rows, s->row_0, error_bound * fabsf(s->row_scale), s->first[1], s->last[1], &out->y0,
+                               &out->y1);
 }
 
 SIMD_INLINE bool kernel_outline_candidate(const kernel_finder *s, kernel_outline *o, kernel_candidate *out)
@@ -342,9 +343,10 @@ SIMD_INLINE kernel_ends_lanes kernel_no_ends(void)
 
 /* Computes the first and the last pixel between each lane's bounds low and high, with the margin of
  * kernel_extent_range(). Returns the lanes that contain a pixel. */
-SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, const int ends[2], vf *first, vf *last)
+SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound, const int ends[2], vf *first,
+                                  vf *last)
 {
-    const vf pad = (0.01f + blur + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));
+    const vf pad = (0.01f + error_bound + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));
     *first = vf_max(-vf_floor(pad - (low + zero)), vf_set((float)ends[0]));
     *last = vf_min(vf_floor((high + zero) + pad), vf_set((float)ends[1]));
     return vf_le(*first, *last);
@@ -363,12 +365,12 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsig
     int32_t ends[4][SIMD_WIDTH];
     const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
     /* All lanes use the largest error bound of any of them. */
-    const float blur = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
+    const float error_bound = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
     const int columns[2] = {s->first[0], s->last[0]}, rows[2] = {s->first[1], s->last[1]};
-    vm candidates =
-        kernel_pixel_range(e->left, e->right, s->column_0, blur * fabsf(s->column_scale), columns, &first[0], &last[0]);
-    candidates = vm_and(candidates, kernel_pixel_range(e->top, e->bottom, s->row_0, blur * fabsf(s->row_scale), rows,
-                                                       &first[1], &last[1]));
+    vm candidates = kernel_pixel_range(e->left, e->right, s->column_0, error_bound * fabsf(s->column_scale), columns,
+                                       &first[0], &last[0]);
+    candidates = vm_and(candidates, kernel_pixel_range(e->top, e->bottom, s->row_0, error_bound * fabsf(s->row_scale),
+                                                       rows, &first[1], &last[1]));
     const vm anywhere = flat ? vm_none() : vm_not(vf_lt(0.01f * size, e->near));
     const vm behind = vf_lt((e->far + s->t_near) + pad, vf_set(s->t_near));
     lanes &= vm_bits(vm_andnot(vm_or(candidates, anywhere), behind));

@@ -50,7 +50,7 @@ typedef struct kernel_sight {
 
 /* The coefficients of kernel_contractions, gathered for each ray's own cell. */
 typedef struct kernel_contraction {
-    vf offset[3], middle, bent[4][3], field[4], grow, blur, rim;
+    vf offset[3], middle, bent[4][3], field[4], grow, error_bound, rim;
 } kernel_contraction;
 
 /* The result for each ray: whether it has exactly one crossing, or none. For rays in `one`, t is the depth relative to
@@ -89,7 +89,7 @@ SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type
     }
     out->middle = kernel_take(c->middle, lane);
     out->grow = kernel_take(c->grow, lane);
-    out->blur = kernel_take(c->blur, lane);
+    out->error_bound = kernel_take(c->error_bound, lane);
     out->rim = kernel_take(c->rim, lane);
 }
 
@@ -156,10 +156,10 @@ SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
 SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
     const vf most = kernel_contraction_reach(type, c->rim, s) - kernel_dot(s, q);
-    vf blur = 8.0f * c->blur;
+    vf error_bound = 8.0f * c->error_bound;
     /* twice the error of crossings of faces, because for a pyramid the reference domain is not widened */
-    if (kernel_has_apex(type)) blur = 4.0f * c->rim;
-    return vf_lt(2.0f * most + blur, 0.999f * kernel_dot(s, s));
+    if (kernel_has_apex(type)) error_bound = 4.0f * c->rim;
+    return vf_lt(2.0f * most + error_bound, 0.999f * kernel_dot(s, s));
 }
 
 SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight *ray, vm rays, kernel_contracted *out,
@@ -196,7 +196,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight
         }
         for (int i = 0; i < 3; i++) q[i] = out->r[i];
     }
-    const vf off = c->grow * vf_sqrt(kernel_dot(s, s)) + (1.0f + c->grow) * c->blur;
+    const vf off = c->grow * vf_sqrt(kernel_dot(s, s)) + (1.0f + c->grow) * c->error_bound;
     const vm inside = vf_lt(off + c->rim, kernel_contraction_inside(type, out->r));
     out->one = vm_andnot(vm_and(sure, vm_and(inside, vf_lt(off, vf_set(KERNEL_CONTRACTION_END)))), out->none);
     vf e = ray->level + c->middle;

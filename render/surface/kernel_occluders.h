@@ -40,7 +40,7 @@ enum {
     KERNEL_SLAB_GRADIENT = 6,
     KERNEL_SLAB_LEVEL = 9,
     KERNEL_SLAB_THICKNESS,
-    KERNEL_SLAB_BLUR, /* rounding error of the slab's linear function L, divided by the size of positions */
+    KERNEL_SLAB_ERROR, /* rounding error of the slab's linear function L, divided by the size of positions */
     KERNEL_SLAB_REACH,
     KERNEL_SLAB_ROWS
 };
@@ -188,7 +188,7 @@ SIMD_INLINE void kernel_plumb_level(const kernel_plumb *p, const float *rows, vf
         *rise += g * p->ray->direction[a];
     }
     *thickness =
-        vf_load(rows + KERNEL_SLAB_BLUR * SIMD_WIDTH) * p->size + vf_load(rows + KERNEL_SLAB_THICKNESS * SIMD_WIDTH);
+        vf_load(rows + KERNEL_SLAB_ERROR * SIMD_WIDTH) * p->size + vf_load(rows + KERNEL_SLAB_THICKNESS * SIMD_WIDTH);
 }
 
 /* Returns the cells of a leaf in which the ray may meet the surface: it meets the cell's box, and the slab within the

@@ -287,11 +287,11 @@ SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
     const kernel_frame *f = t->frame;
     const bool flat = f->job->camera.is_orthographic;
     const double unit = flat ? f->job->space.scale : 1;
-    const float blur = flat ? 4e-6f * (2 + fabsf((float)f->depth_shift)) : 4e-6f;
+    const float error_bound = flat ? 4e-6f * (2 + fabsf((float)f->depth_shift)) : 4e-6f;
     s->column_scale = (float)(1 / (fabs(f->slope_dx) * unit));
     s->row_scale = (float)(1 / (fabs(f->slope_dy) * unit));
-    s->pad[0] = 0.01f + blur * s->column_scale + 3e-5f * (float)f->job->camera.width;
-    s->pad[1] = 0.01f + blur * s->row_scale + 3e-5f * (float)f->job->camera.height;
+    s->pad[0] = 0.01f + error_bound * s->column_scale + 3e-5f * (float)f->job->camera.width;
+    s->pad[1] = 0.01f + error_bound * s->row_scale + 3e-5f * (float)f->job->camera.height;
     kernel_tile_find_planes(&t->tree_planes, s->planes);
 }
 

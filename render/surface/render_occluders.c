@@ -247,7 +247,7 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
     /* Values are rounded to 6e-8 of the largest. Roots have an error of KERNEL_ROOT_BAND and of the rounding of
      * positions. */
     out->rows[KERNEL_SLAB_THICKNESS] = (float)(off * 1.0001 + 1e-5);
-    out->rows[KERNEL_SLAB_BLUR] = (float)(16 * 6e-8 * steep);
+    out->rows[KERNEL_SLAB_ERROR] = (float)(16 * 6e-8 * steep);
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
 }
 

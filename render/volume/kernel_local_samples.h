@@ -102,9 +102,10 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batc
     const vf place[3] = {rays.rays.origin_x + rays.rays.slope_x * depth, rays.rays.origin_y + rays.rays.slope_y * depth,
                          depth};
     const vm known = kernel_local_find(type, &b->lanes.cells, rays.lane, place, &points);
-    const vf inside = kernel_local_inside(type, points.r), blur = kernel_take(b->lanes.cells.blur, rays.lane);
-    const vm own = vm_and(vm_and(active, known), vf_lt(blur, inside));
-    const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -blur)));
+    const vf inside = kernel_local_inside(type, points.r),
+             error_bound = kernel_take(b->lanes.cells.error_bound, rays.lane);
+    const vm own = vm_and(vm_and(active, known), vf_lt(error_bound, inside));
+    const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -error_bound)));
     vf_store(values, kernel_local_value(type, &b->lanes.cells, rays.lane, &points));
     const vi numbers = bits >> KERNEL_LOCAL_NUMBER;
     memcpy(at, &rays.at, sizeof at);
