@@ -56,7 +56,7 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     fragment_list *own = &end->writers[number].list;
     const bool folds = frame->job->reproducible && frame->job->volume_count && !frame->job->separate_samples;
     render_folding fold = {.job = frame->job, .has_segments = frame->has_segments};
-#pragma omp for schedule(dynamic, KERNEL_TILE_RUN) nowait
+#pragma omp for schedule(dynamic, KERNEL_TILES_PER_TASK) nowait
     for (int tile = 0; tile < columns * rows; tile++) {
         if (!render_thread_begin(kernels, thread)) continue;
         if (thread->polyhedra) polyhedra_reset(thread->polyhedra);

@@ -290,8 +290,8 @@ static bool kernel_tile_find_take(kernel_candidate_list *list)
         int part;
         const int value = kernel_tile_source(t, found->source, &part);
         const kernel_tile_candidate candidate =
-            kernel_candidate_in_tile(found, kernel_span_in_tile(found->x0, found->x1, t->tile.x0),
-                                     kernel_span_in_tile(found->y0, found->y1, t->tile.y0));
+            kernel_candidate_in_tile(found, kernel_range_in_tile(found->x0, found->x1, t->tile.x0),
+                                     kernel_range_in_tile(found->y0, found->y1, t->tile.y0));
         if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, candidate.box, found->near))
             kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
     }
@@ -434,7 +434,7 @@ static bool has_surface(const kernel_frame *f, const kernel_thread *thread, int 
 static bool begins_run(const kernel_frame *f, int x0, int y0)
 {
     const int columns = (f->job->camera.width - 1) / KERNEL_TILE + 1;
-    return (y0 / KERNEL_TILE * columns + x0 / KERNEL_TILE) % KERNEL_TILE_RUN == 0;
+    return (y0 / KERNEL_TILE * columns + x0 / KERNEL_TILE) % KERNEL_TILES_PER_TASK == 0;
 }
 
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)

@@ -34,17 +34,16 @@ static void chord_polyhedron(kernel_packet *p, const chord_state *state, const g
 {
     polyhedron *c =
         p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part, 0, index);
-    kernel_passage r;
-    kernel_stay stay;
+    kernel_poly_crossings r;
+    kernel_polyhedron_interval stay;
     if (!c) p->thread->out_of_memory = true;
     if (!c) return;
     if (!c->is_placed) {
         kernel_polyhedron_place(c, p);
         for (int i = 0; i <= c->vertex_count; i++) c->f[i] = 0;
     }
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
-    while (kernel_passage_next(&r, &stay))
-        chord_note(state, stay.interval.mask, stay.interval.t_in, stay.interval.t_out);
+    if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    while (kernel_poly_next(&r, &stay)) chord_note(state, stay.interval.mask, stay.interval.t_in, stay.interval.t_out);
 }
 
 static void chord_cell(kernel_packet *p, const chord_state *state, const grid_field *field, int part, uint32_t index,

@@ -249,8 +249,8 @@ SIMD_INLINE bool kernel_local_push(const kernel_arrays *p, kernel_local_queue *q
 /* ---- intervals of rays in cells ---- */
 
 /* Computes the interval of depths, relative to `depth`, in which each ray may be inside its cell's slabs. */
-SIMD_INLINE void kernel_local_stretch(const kernel_local_cells *cells, const kernel_lane_rays *rays, vf depth, vf *near,
-                                      vf *far)
+SIMD_INLINE void kernel_local_slab_interval(const kernel_local_cells *cells, const kernel_lane_rays *rays, vf depth,
+                                            vf *near, vf *far)
 {
     const vf d[2] = {(rays->rays.origin_x + rays->rays.slope_x * depth) - kernel_take(cells->origin[0], rays->lane),
                      (rays->rays.origin_y + rays->rays.slope_y * depth) - kernel_take(cells->origin[1], rays->lane)};

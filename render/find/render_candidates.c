@@ -112,10 +112,10 @@ static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint3
 {
     for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
         for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++) {
-            const kernel_tile_span rows = kernel_span_in_tile(s->y0, s->y1, y * KERNEL_TILE);
+            const kernel_tile_range rows = kernel_range_in_tile(s->y0, s->y1, y * KERNEL_TILE);
             for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++)
                 out[at[y * across + x]++] =
-                    kernel_candidate_in_tile(s, kernel_span_in_tile(s->x0, s->x1, x * KERNEL_TILE), rows);
+                    kernel_candidate_in_tile(s, kernel_range_in_tile(s->x0, s->x1, x * KERNEL_TILE), rows);
         }
 }
 

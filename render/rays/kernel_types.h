@@ -11,8 +11,8 @@
 
 enum {
     KERNEL_TILE = 16,
-    KERNEL_TILE_RUN = 4, /* number of consecutive tiles, row by row, that one thread draws before it takes more */
-    KERNEL_BLOCK = 4,    /* pixels along a block's side */
+    KERNEL_TILES_PER_TASK = 4, /* number of consecutive tiles, row by row, that one thread draws before it takes more */
+    KERNEL_BLOCK = 4,          /* pixels along a block's side */
     KERNEL_MAX_GROUP = RENDER_MAX_GROUP,
     KERNEL_MAX_INTERVALS = RENDER_MAX_ISOVALUES /* of a volume's visible values, or of a layer's isovalues */
 };

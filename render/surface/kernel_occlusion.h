@@ -113,28 +113,28 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
     }
 }
 
-static void kernel_occlusion_stay(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_passage *r,
-                                  kernel_stay *stay)
+static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r,
+                                      kernel_polyhedron_interval *stay)
 {
-    kernel_walk walk;
-    kernel_passage_profile(r, stay);
-    kernel_walk_begin(stay, wanted, &walk);
+    kernel_profile_walk walk;
+    kernel_poly_profile(r, stay);
+    kernel_profile_walk_begin(stay, wanted, &walk);
     do {
-        const vm found = kernel_walk_next(r, stay, &walk);
+        const vm found = kernel_profile_walk_next(r, stay, &walk);
         walk.open = vm_andnot(walk.open, kernel_occlusion_take(p, o, found, walk.t));
     } while (vm_any(walk.open));
 }
 
 static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion *o, polyhedron *c, vm rays)
 {
-    kernel_passage r;
-    kernel_stay stay;
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
-    while (kernel_passage_next(&r, &stay)) {
+    kernel_poly_crossings r;
+    kernel_polyhedron_interval stay;
+    if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    while (kernel_poly_next(&r, &stay)) {
         const vm changes = kernel_changes_sign(&stay.interval);
         const vm wanted =
             vm_and(kernel_is_near(p, &stay.interval), vm_or(changes, kernel_polyhedron_turns(p, c, &r, &stay)));
-        if (vm_any(wanted)) kernel_occlusion_stay(p, o, wanted, &r, &stay);
+        if (vm_any(wanted)) kernel_occlusion_interval(p, o, wanted, &r, &stay);
     }
 }
 

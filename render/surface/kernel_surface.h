@@ -342,13 +342,13 @@ static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron 
 
 /* Computes the signed sum of the gradients of overlapping tets at the hits. Returns the rays for which the signs sum to
  * 1, so that the sum is valid. */
-static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron *c, const kernel_passage *r, vm hit,
-                                        vf t, vf out[3])
+static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron *c, const kernel_poly_crossings *r,
+                                        vm hit, vf t, vf out[3])
 {
     vf cover = vf_set(0);
     for (int n = 0; n < r->segment_count; n++) {
-        const kernel_tet_span *s = &r->segments[n];
-        const vm in = vm_and(hit, kernel_tet_span_holds(s, t, false));
+        const kernel_subtet_interval *s = &r->segments[n];
+        const vm in = vm_and(hit, kernel_subtet_interval_contains(s, t, false));
         if (!vm_any(in)) continue;
         double g[3];
         kernel_polyhedron_gradient(p, c, s->facet, g);
@@ -360,14 +360,14 @@ static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron
 
 /* Computes the gradient at the hits: that of the tet with positive sign that contains the hit or is nearest to it along
  * the ray. */
-static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c, const kernel_passage *r, vm hit, vf t,
-                                     vf out[3])
+static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c, const kernel_poly_crossings *r,
+                                     vm hit, vf t, vf out[3])
 {
     for (int a = 0; a < 3; a++) out[a] = vf_set(0);
     if (!c->is_star) hit = vm_andnot(hit, kernel_polyhedron_sum_normals(p, c, r, hit, t, out));
     vf nearest = vf_set(INFINITY);
     for (int n = 0; n < r->segment_count; n++) {
-        const kernel_tet_span *s = &r->segments[n];
+        const kernel_subtet_interval *s = &r->segments[n];
         const vf away = vf_max(vf_max(s->t0 - t, t - s->t1), vf_set(0));
         const vm nearer = vm_and(vm_and(hit, s->mask), vf_lt(away, nearest));
         if (!vm_any(nearer) || s->sign < 0) continue;
@@ -395,12 +395,12 @@ static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhed
 
 /* Finds, for each hit, the tet of non-negative sign that contains it or is nearest to it along the ray; -1 if there is
  * none. */
-static void kernel_polyhedron_facets(const kernel_passage *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
+static void kernel_polyhedron_facets(const kernel_poly_crossings *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
 {
     vf nearest = vf_set(INFINITY);
     vi facet = vi_set(-1);
     for (int n = 0; n < r->segment_count; n++) {
-        const kernel_tet_span *s = &r->segments[n];
+        const kernel_subtet_interval *s = &r->segments[n];
         const vf away = vf_max(vf_max(s->t0 - t, t - s->t1), vf_set(0));
         const vm nearer = vm_and(vm_and(hit, s->mask), vf_lt(away, nearest));
         if (s->sign < 0) continue;
@@ -413,7 +413,7 @@ static void kernel_polyhedron_facets(const kernel_passage *r, vm hit, vf t, int3
 /* Computes normals by interpolating the vertices' gradients in the tets (RENDER_VERTEX). */
 static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_packet *p, const polyhedron *c,
                                                                const render_surface_layer *layer,
-                                                               const kernel_passage *r, vm hit, vf t, vf out[3])
+                                                               const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
     const render_vertex_gradients *gradients = &layer->gradients[c->part];
     const int centre = c->vertex_count;
@@ -489,8 +489,8 @@ SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
 /* Returns the rays that may be on the other side of the isovalue between two faces of the same sign. The bound is not
  * valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or the reverse; such rays are always
  * returned. */
-SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, const kernel_passage *r,
-                                       const kernel_stay *stay)
+SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, const kernel_poly_crossings *r,
+                                       const kernel_polyhedron_interval *stay)
 {
     const kernel_interval *i = &stay->interval;
     const vm longer = vm_and(i->mask, vf_lt(i->t_in, i->t_out));
@@ -510,16 +510,16 @@ SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, co
 /* The state of rays that follow their profiles from crossing to crossing. If tets overlap at a face, the field just
  * behind it may be on the other side of the isovalue than the face's own value, which decides. The field then jumps at
  * the face, and the jump is a crossing. */
-typedef struct kernel_walk {
+typedef struct kernel_profile_walk {
     vm open;  /* rays whose profile continues */
     vm below; /* rays that are below the isovalue at the end of the current piece */
     /* rays whose face value and profile are on different sides of the isovalue, at the entry and at the exit */
     vm jump_in, jump_out;
     kernel_profile_piece piece; /* current piece of each ray */
     vf t, w;                    /* depth of the crossing that was found, and the colour field there */
-} kernel_walk;
+} kernel_profile_walk;
 
-static void kernel_walk_begin(const kernel_stay *stay, vm rays, kernel_walk *walk)
+static void kernel_profile_walk_begin(const kernel_polyhedron_interval *stay, vm rays, kernel_profile_walk *walk)
 {
     const kernel_interval *i = &stay->interval;
     const vf zero = vf_set(0);
@@ -545,7 +545,8 @@ SIMD_INLINE void kernel_piece_take(vm rays, const kernel_profile_piece *from, ke
  * face counts as a piece. A value inside the cell that equals the isovalue up to rounding is treated as if it were on
  * the side from which the ray comes: a ray may meet several sheets at one point, each with its own rounding, and their
  * signs would alternate. The values at the faces are not changed. */
-SIMD_INLINE vm kernel_walk_on(const kernel_passage *r, const kernel_stay *stay, vm left, kernel_walk *walk)
+SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, const kernel_polyhedron_interval *stay,
+                                           vm left, kernel_profile_walk *walk)
 {
     kernel_profile_piece next = walk->piece;
     const vf zero = vf_set(0);
@@ -565,13 +566,14 @@ SIMD_INLINE vf kernel_just_behind(vf t)
 }
 
 /* Finds the next crossing of each open ray; returns the rays that have one. */
-static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, kernel_walk *walk)
+static vm kernel_profile_walk_next(const kernel_poly_crossings *r, const kernel_polyhedron_interval *stay,
+                                   kernel_profile_walk *walk)
 {
     const vm jump = walk->jump_in;
     vm found = jump, left = vm_andnot(walk->open, jump);
     walk->jump_in = vm_none();
     while (vm_any(left)) {
-        const vm on = kernel_walk_on(r, stay, left, walk);
+        const vm on = kernel_profile_walk_advance(r, stay, left, walk);
         const vm cross = vm_and(left, vm_xor(vf_lt(walk->piece.v1, vf_set(0)), walk->below));
         walk->below = vm_xor(walk->below, cross);
         walk->open = vm_andnot(walk->open, vm_andnot(left, on));
@@ -590,7 +592,8 @@ static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, ker
 /* Computes the contour lines' field, its gradient and the surface's normal at the hits, in the tet that contains the
  * hit or is nearest to it. */
 static __attribute__((noinline)) void kernel_polyhedron_along(const kernel_packet *p, const kernel_surface *s,
-                                                              const kernel_passage *r, vm hit, vf t, kernel_along *out)
+                                                              const kernel_poly_crossings *r, vm hit, vf t,
+                                                              kernel_along *out)
 {
     const polyhedron *c = r->cell;
     const grid_field *field = &s->layer->lines->field.fields[c->part];
@@ -624,12 +627,12 @@ static __attribute__((noinline)) void kernel_polyhedron_along(const kernel_packe
     }
 }
 
-static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, int value, kernel_passage *r,
-                                     vm hit, const kernel_walk *walk)
+static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, int value, kernel_poly_crossings *r,
+                                     vm hit, const kernel_profile_walk *walk)
 {
     kernel_hit_places at = {.t = walk->t, .w = walk->w};
     if (!vm_any(hit)) return;
-    kernel_passage_segments(r);
+    kernel_poly_segments(r);
     if (state->surface->layer->normal == RENDER_VERTEX)
         kernel_polyhedron_smooth(p, r->cell, state->surface->layer, r, hit, walk->t, at.normal);
     else
@@ -644,13 +647,13 @@ static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *sta
 
 /* Accepts the crossings of one interval. A ray ends at the first crossing of an opaque surface in front of the eye. */
 static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, int value, vm wanted,
-                                    kernel_passage *r, kernel_stay *stay)
+                                    kernel_poly_crossings *r, kernel_polyhedron_interval *stay)
 {
-    kernel_walk walk;
-    kernel_passage_profile(r, stay);
-    kernel_walk_begin(stay, wanted, &walk);
+    kernel_profile_walk walk;
+    kernel_poly_profile(r, stay);
+    kernel_profile_walk_begin(stay, wanted, &walk);
     do {
-        const vm found = kernel_walk_next(r, stay, &walk);
+        const vm found = kernel_profile_walk_next(r, stay, &walk);
         const vm kept = kernel_kept(p, state->surface, found, walk.t);
         kernel_polyhedron_accept(p, state, value, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
         if (state->is_opaque) walk.open = vm_andnot(walk.open, kept);
@@ -660,10 +663,10 @@ static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *stat
 static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *state, polyhedron *c, int value, vm rays)
 {
     const render_surface_layer *layer = state->surface->layer;
-    kernel_passage r;
-    kernel_stay stay;
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, layer->colour_map != NULL)) return;
-    while (kernel_passage_next(&r, &stay)) {
+    kernel_poly_crossings r;
+    kernel_polyhedron_interval stay;
+    if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, layer->colour_map != NULL)) return;
+    while (kernel_poly_next(&r, &stay)) {
         const vm near = kernel_is_near(p, &stay.interval);
         if (!vm_any(near)) continue;
         const vm wanted =

@@ -68,7 +68,7 @@ typedef struct kernel_knot {
 /* State of the bisection of one ray's interval. */
 typedef struct kernel_bisection {
     const kernel_segment_state *state;
-    const kernel_span *span;
+    const kernel_cell_interval *span;
     const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
     double u, v, slope, shift;   /* constants of the ray: at depth t it is at (u, v) * (slope * t + shift) */
     kernel_knot in, out;         /* ends of the interval, at the crossings of the faces */
@@ -317,11 +317,11 @@ static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h,
         const float end = n < (int)subdivisions ? (float)kernel_between(from->t, to->t, after) : (float)to->t;
         const double in = kernel_between(values[0], values[1], before);
         const double out = kernel_between(values[0], values[1], after);
-        const kernel_run run = {.length = vf_set((float)((to->t - from->t) / subdivisions * h->per_t)),
-                                .v_in = vf_set((float)in),
-                                .v_out = vf_set((float)out),
-                                .rest_in = vf_set((float)(in - (double)(float)in)),
-                                .rest_out = vf_set((float)(out - (double)(float)out))};
+        const kernel_unit_segment run = {.length = vf_set((float)((to->t - from->t) / subdivisions * h->per_t)),
+                                         .v_in = vf_set((float)in),
+                                         .v_out = vf_set((float)out),
+                                         .rest_in = vf_set((float)(in - (double)(float)in)),
+                                         .rest_out = vf_set((float)(out - (double)(float)out))};
         if (begin < end) kernel_emit_segment(p, h->state, lane, vf_set(begin), vf_set(end), &run);
         begin = end;
     }
@@ -377,8 +377,8 @@ static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_s
 }
 
 /* Divides an interval, whose ends and middle are known, into subintervals by bisection, and adds their segments. */
-static void kernel_stretch_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_knot from,
-                                 kernel_subinterval whole)
+static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_knot from,
+                                     kernel_subinterval whole)
 {
     const kernel_segments *list = h->state->list;
     const vm only = vm_from_bits(1u << lane);
@@ -416,8 +416,10 @@ static void kernel_stretch_halve(kernel_packet *p, kernel_bisection *h, int lane
 }
 
 /* Adds the segments of the rays' intervals from t0 to t1 by bisection; only those that begin in the window are kept. */
-static __attribute__((noinline, cold)) void kernel_span_bisect(kernel_packet *p, const kernel_segment_state *state,
-                                                               const kernel_span *span, vm rays, vf t0, vf t1)
+static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_packet *p,
+                                                                        const kernel_segment_state *state,
+                                                                        const kernel_cell_interval *span, vm rays,
+                                                                        vf t0, vf t1)
 {
     const kernel_interval *i = span->interval;
     const kernel_frame *f = p->frame;
@@ -457,7 +459,7 @@ static __attribute__((noinline, cold)) void kernel_span_bisect(kernel_packet *p,
         sub.end.t = (double)t1[n];
         sub.middle = kernel_knot_between(&h, &from, &sub.end, 0.5);
         sub.is_monotone = !span->map;
-        kernel_stretch_halve(p, &h, n, begin, sub);
+        kernel_subinterval_halve(p, &h, n, begin, sub);
     }
 }
 
@@ -474,13 +476,13 @@ typedef struct kernel_parts {
 } kernel_parts;
 
 /* Returns t at the n-th boundary between subintervals, and stores the field there in *value. */
-SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_span *span, const kernel_parts *s, vm rays, int n,
-                                vf *value)
+SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_cell_interval *span, const kernel_parts *s, vm rays,
+                                int n, vf *value)
 {
     const vm inner = vm_and(rays, vf_lt(vf_set((float)n), s->count));
     const vf t = vf_select(inner, s->t0 + s->span * (float)n, s->t1);
     *value = s->last;
-    if (vm_any(inner)) *value = vf_select(inner, kernel_span_value(p, span, inner, t), s->last);
+    if (vm_any(inner)) *value = vf_select(inner, kernel_cell_interval_value(p, span, inner, t), s->last);
     return t;
 }
 
@@ -495,12 +497,13 @@ SIMD_INLINE vf kernel_parts_lift(const kernel_parts *s, vm is_first, vm is_last)
 }
 
 /* Adds a tet's interval from t0 to t1 as one segment, computed in double, if it begins in the window. */
-SIMD_INLINE void kernel_span_double(kernel_segment_state *state, const kernel_span *span, vm rays, vf t0, vf t1)
+SIMD_INLINE void kernel_cell_interval_double(kernel_segment_state *state, const kernel_cell_interval *span, vm rays,
+                                             vf t0, vf t1)
 {
     const kernel_interval *i = span->interval;
     const kernel_double *precise = span->precise;
-    const kernel_run whole = {precise->length, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
-    const kernel_run run = kernel_run_within(&whole, kernel_share(i, t0), kernel_share(i, t1));
+    const kernel_unit_segment whole = {precise->length, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
+    const kernel_unit_segment run = kernel_unit_segment_part(&whole, kernel_share(i, t0), kernel_share(i, t1));
     const kernel_interval sub = {.t_in = t0, .t_out = t1, .v_in = run.v_in, .v_out = run.v_out};
     const kernel_double own = {run.length, run.rest_in, run.rest_out};
     const vm mine = vm_and(vf_le(state->list->t_begin, t0), vf_lt(t0, state->list->t_end));
@@ -508,22 +511,22 @@ SIMD_INLINE void kernel_span_double(kernel_segment_state *state, const kernel_sp
 }
 
 /* Adds the segments of the interval from t0 to t1 that begin in the window. */
-SIMD_INLINE void kernel_span_segments(kernel_packet *p, kernel_segment_state *state, const kernel_span *span, vm rays,
-                                      vf t0, vf t1)
+SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segment_state *state,
+                                               const kernel_cell_interval *span, vm rays, vf t0, vf t1)
 {
     kernel_segments *list = state->list;
     kernel_parts s = {.t0 = t0, .t1 = t1, .from = t0};
     if (span->precise) {
-        kernel_span_double(state, span, rays, t0, t1);
+        kernel_cell_interval_double(state, span, rays, t0, t1);
         return;
     }
-    s.before = kernel_span_value(p, span, rays, t0);
-    s.last = kernel_span_value(p, span, rays, t1);
+    s.before = kernel_cell_interval_value(p, span, rays, t0);
+    s.last = kernel_cell_interval_value(p, span, rays, t1);
     vm halved;
     const kernel_interval stretch = {.t_in = t0, .t_out = t1, .v_in = s.before, .v_out = s.last};
-    s.count = kernel_span_subdivisions(p, state, span, rays, &stretch, &halved);
+    s.count = kernel_cell_interval_subdivisions(p, state, span, rays, &stretch, &halved);
     if (__builtin_expect(vm_any(halved), 0)) {
-        kernel_span_bisect(p, state, span, halved, t0, t1);
+        kernel_cell_interval_bisect(p, state, span, halved, t0, t1);
         rays = vm_andnot(rays, halved);
         if (!vm_any(rays)) return;
     }
@@ -543,7 +546,8 @@ SIMD_INLINE void kernel_span_segments(kernel_packet *p, kernel_segment_state *st
             const kernel_double precise = kernel_double_of(&sub);
             kernel_segments_add(state->pieces, list, vm_and(open, mine), &sub, list->is_double ? &precise : NULL);
         } else if (vm_any(vm_and(open, mine))) {
-            const kernel_run run = kernel_run_of((s.to - s.from) * list->per_t, s.before + lift, s.after + lift);
+            const kernel_unit_segment run =
+                kernel_unit_segment_of((s.to - s.from) * list->per_t, s.before + lift, s.after + lift);
             kernel_emit_segment(p, state, vm_and(open, mine), s.from, s.to, &run);
         }
         s.from = s.to;
@@ -556,7 +560,8 @@ SIMD_INLINE void kernel_span_segments(kernel_packet *p, kernel_segment_state *st
 }
 
 /* Divides the interval at surfaces, and adds the segments of its parts that begin in the window. */
-SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, const kernel_span *span)
+SIMD_INLINE void kernel_cell_interval_integrate(kernel_packet *p, kernel_segment_state *state,
+                                                const kernel_cell_interval *span)
 {
     const kernel_interval *i = span->interval;
     const kernel_segments *list = state->list;
@@ -568,7 +573,7 @@ SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, 
         vf to = end;
         if (list->cuts.row_count) to = vf_min(end, kernel_next_cut(p, &list->cuts, from, true));
         const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
-        if (vm_any(mine)) kernel_span_segments(p, state, span, mine, from, to);
+        if (vm_any(mine)) kernel_cell_interval_segments(p, state, span, mine, from, to);
         from = to;
         open = vm_and(open, vf_lt(from, end));
     }
@@ -576,19 +581,20 @@ SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, 
 
 /* Adds a tet's segments on rays whose interval is cut by surfaces, or whose segments must be mixed with other
  * volumes. */
-static __attribute__((noinline)) void kernel_tet_course(kernel_packet *p, kernel_segment_state *state,
-                                                        const kernel_cell *c, const kernel_double_cell *double_cell,
-                                                        kernel_interval i)
+static __attribute__((noinline)) void kernel_tet_segments_general(kernel_packet *p, kernel_segment_state *state,
+                                                                  const kernel_cell *c,
+                                                                  const kernel_double_cell *double_cell,
+                                                                  kernel_interval i)
 {
-    kernel_span span = {.interval = &i};
+    kernel_cell_interval span = {.interval = &i};
     kernel_double precise;
     if (state->mixing > 0) {
-        kernel_span_bound(state, c->f, c->count, &span);
+        kernel_cell_interval_bound(state, c->f, c->count, &span);
     } else if (state->list->is_double) {
         precise = kernel_tet_double(p, c, double_cell, &state->list->rays, &i);
         span.precise = &precise;
     }
-    kernel_span_run(p, state, &span);
+    kernel_cell_interval_integrate(p, state, &span);
 }
 
 /* Adds a tet's interval as one segment, which only surfaces cut. double_cell is read only if the list is in double. */
@@ -606,7 +612,7 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     cut = state->mixing > 0 ? hit : vm_and(hit, cut);
     if (__builtin_expect(vm_any(cut), 0)) {
         i.mask = cut;
-        kernel_tet_course(p, state, c, double_cell, i);
+        kernel_tet_segments_general(p, state, c, double_cell, i);
         i.mask = vm_andnot(hit, cut);
     }
     const vm window = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
@@ -627,12 +633,12 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, k
                                                              const kernel_cell *c, const kernel_map *map)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_span span = {.map = map, .cell = c};
+    kernel_cell_interval span = {.map = map, .cell = c};
     const int intervals = kernel_curved_intervals(p, c, p->active, list);
-    if (intervals && (map || state->pieces->has_rests)) kernel_span_bound(state, c->f, c->count, &span);
+    if (intervals && (map || state->pieces->has_rests)) kernel_cell_interval_bound(state, c->f, c->count, &span);
     for (int k = 0; k < intervals; k++) {
         span.interval = &list[k];
-        kernel_span_run(p, state, &span);
+        kernel_cell_interval_integrate(p, state, &span);
     }
 }
 
@@ -645,7 +651,7 @@ SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *
 
 /* Sets the window's samples begin .. end - 1 that lie in the piece of the profile and in the interval. A sample that
  * another cell has already set keeps its value, as in kernel_fill(). */
-static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state, const kernel_stay *stay,
+static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state, const kernel_polyhedron_interval *stay,
                                    const kernel_profile_piece *piece, int begin, int end)
 {
     kernel_samples *s = state->samples;
@@ -669,13 +675,14 @@ static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state,
     }
 }
 
-static void kernel_polyhedron_stay(kernel_packet *p, kernel_volume_state *state, kernel_passage *r, kernel_stay *stay)
+static void kernel_polyhedron_interval_integrate(kernel_packet *p, kernel_volume_state *state, kernel_poly_crossings *r,
+                                                 kernel_polyhedron_interval *stay)
 {
     const kernel_interval *i = &stay->interval;
     int begin, end;
-    kernel_sample_span(p, state->samples, i, &begin, &end);
+    kernel_sample_range(p, state->samples, i, &begin, &end);
     if (begin >= end) return;
-    if (!r->cell->is_constant) kernel_passage_profile(r, stay);
+    if (!r->cell->is_constant) kernel_poly_profile(r, stay);
     kernel_profile_piece piece = kernel_profile_begin(stay, stay->u_in);
     while (vm_any(kernel_profile_open(stay, &piece, i->mask))) {
         kernel_profile_next(r, stay, stay->u_out, &piece);
@@ -703,23 +710,23 @@ static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int par
 static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *state, int part, uint32_t index, vm rays)
 {
     const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
-    kernel_passage r;
-    kernel_stay stay;
-    if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
-    while (kernel_passage_next(&r, &stay)) kernel_polyhedron_stay(p, state, &r, &stay);
+    kernel_poly_crossings r;
+    kernel_polyhedron_interval stay;
+    if (!c || !kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    while (kernel_poly_next(&r, &stay)) kernel_polyhedron_interval_integrate(p, state, &r, &stay);
 }
 
 /* Adds the segments of a polyhedron: the pieces of the ray's profile, on which the field is exactly linear. */
 static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *state, int part, uint32_t index, vm rays)
 {
     const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
-    kernel_passage r;
-    kernel_stay stay;
-    if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
-    kernel_span span = {.map = NULL};
-    if (state->mixing > 0) kernel_span_bound(state, c->f, c->vertex_count, &span);
-    while (kernel_passage_next(&r, &stay)) {
-        if (!c->is_constant) kernel_passage_profile(&r, &stay);
+    kernel_poly_crossings r;
+    kernel_polyhedron_interval stay;
+    if (!c || !kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    kernel_cell_interval span = {.map = NULL};
+    if (state->mixing > 0) kernel_cell_interval_bound(state, c->f, c->vertex_count, &span);
+    while (kernel_poly_next(&r, &stay)) {
+        if (!c->is_constant) kernel_poly_profile(&r, &stay);
         kernel_profile_piece piece = kernel_profile_begin(&stay, stay.u_in);
         vm open = kernel_profile_open(&stay, &piece, stay.interval.mask);
         while (vm_any(open)) {
@@ -727,7 +734,7 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *s
             const kernel_interval i = {
                 .mask = open, .t_in = piece.t0, .t_out = piece.t1, .v_in = piece.v0, .v_out = piece.v1};
             span.interval = &i;
-            kernel_span_run(p, state, &span);
+            kernel_cell_interval_integrate(p, state, &span);
             open = kernel_profile_open(&stay, &piece, open);
         }
     }

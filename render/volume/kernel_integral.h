@@ -100,13 +100,13 @@ SIMD_INLINE kernel_light kernel_clear(void)
 /* A segment: its length in unit distances, and the values at its ends in the transfer function's domain. Each value is
  * v + rest, where rest is the rounding error of v as far as it is known; it matters because steps and poles of the
  * function magnify it. */
-typedef struct kernel_run {
+typedef struct kernel_unit_segment {
     vf length, v_in, v_out, rest_in, rest_out;
-} kernel_run;
+} kernel_unit_segment;
 
-SIMD_INLINE kernel_run kernel_run_of(vf length, vf v_in, vf v_out)
+SIMD_INLINE kernel_unit_segment kernel_unit_segment_of(vf length, vf v_in, vf v_out)
 {
-    return (kernel_run){length, v_in, v_out, vf_set(0), vf_set(0)};
+    return (kernel_unit_segment){length, v_in, v_out, vf_set(0), vf_set(0)};
 }
 
 /* The piece of the transfer function that each ray is in. If all rays are in the same piece, `common` points to it,
@@ -170,7 +170,7 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
 }
 
 /* A ray's position in a piece of the transfer function. */
-typedef struct kernel_way {
+typedef struct kernel_piece_state {
     vf below, above; /* distances of the value to the piece's low and high end */
     vf todo;         /* remaining change of the value within this piece */
     vf left;         /* length of the ray over which this change takes place, in unit distances */
@@ -179,19 +179,19 @@ typedef struct kernel_way {
      * segment's begin */
     vf edge, rest;
     vm is_last; /* the segment ends in this piece */
-} kernel_way;
+} kernel_piece_state;
 
 /* Properties of a segment that are the same in all its pieces. */
-typedef struct kernel_leg {
+typedef struct kernel_segment_constants {
     vm falling, level;
     vf turn; /* sign of the value's change along the ray: 1 or -1 */
     vf v_out, rest_out, length, per_value;
-} kernel_leg;
+} kernel_segment_constants;
 
-SIMD_INLINE kernel_leg kernel_leg_of(const kernel_run *run)
+SIMD_INLINE kernel_segment_constants kernel_segment_constants_of(const kernel_unit_segment *run)
 {
     const vf one = vf_set(1), rise = (run->v_out - run->v_in) + (run->rest_out - run->rest_in), change = vf_abs(rise);
-    kernel_leg out = {.v_out = run->v_out, .rest_out = run->rest_out, .length = run->length};
+    kernel_segment_constants out = {.v_out = run->v_out, .rest_out = run->rest_out, .length = run->length};
     out.falling = vf_lt(rise, vf_set(0));
     out.level = vf_lt(change, vf_set(KERNEL_TINY));
     out.turn = vf_select(out.falling, -one, one);
@@ -200,7 +200,8 @@ SIMD_INLINE kernel_leg kernel_leg_of(const kernel_run *run)
 }
 
 /* Sets the positions of the rays in `fresh`, which enter the piece with the given ends. */
-SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fresh, const kernel_piece_ends *ends)
+SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *way, const kernel_segment_constants *leg, vm fresh,
+                                          const kernel_piece_ends *ends)
 {
     const vf v = way->edge, zero = vf_set(0);
     const vf below = vf_max((v - ends->low) + (way->rest - ends->low_rest), zero);
@@ -220,7 +221,7 @@ SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fre
 
 /* Interpolates between at_low and at_high from both ends of the piece. Near an end with value 0 the result is as exact
  * as the distance to that end. */
-SIMD_INLINE vf kernel_way_weigh(const kernel_way *way, vf inverse, vf at_low, vf at_high)
+SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *way, vf inverse, vf at_low, vf at_high)
 {
     const vf zero = vf_set(0), one = vf_set(1);
     const vf from_low = at_low * vf_clamp(way->above * inverse, zero, one);
@@ -229,28 +230,28 @@ SIMD_INLINE vf kernel_way_weigh(const kernel_way *way, vf inverse, vf at_low, vf
 }
 
 /* One step of the integration in a piece. */
-typedef struct kernel_stretch {
+typedef struct kernel_integration_step {
     vf opacity, clear; /* opacity at the step's begin, and 1 - opacity */
     vf rise;           /* change of the opacity over the rest of the ray's part in the piece */
     vf share;          /* fraction of that rest that the step covers */
     vf length;         /* length of the step, in unit distances */
     vm is_opaque;
-} kernel_stretch;
+} kernel_integration_step;
 
-SIMD_INLINE kernel_stretch kernel_stretch_begin(const kernel_pieces *t, const kernel_piece_place *at,
-                                                const kernel_way *way, vf turn)
+SIMD_INLINE kernel_integration_step kernel_integration_step_begin(const kernel_pieces *t, const kernel_piece_place *at,
+                                                                  const kernel_piece_state *way, vf turn)
 {
     const vf inverse = kernel_piece_entry(t, at, KERNEL_PIECE_INVERSE);
-    kernel_stretch out;
-    out.opacity = kernel_way_weigh(way, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
-                                   kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
-    out.clear = kernel_way_weigh(way, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
-                                 kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
+    kernel_integration_step out;
+    out.opacity = kernel_piece_state_interpolate(way, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
+                                                 kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
+    out.clear = kernel_piece_state_interpolate(way, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
+                                               kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
     out.rise = turn * way->todo * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
     return out;
 }
 
-SIMD_INLINE void kernel_stretch_limit(kernel_stretch *st, vf left, vf shortest)
+SIMD_INLINE void kernel_integration_step_limit(kernel_integration_step *st, vf left, vf shortest)
 {
     const vf zero = vf_set(0), one = vf_set(1), rise = vf_abs(st->rise), ratio = st->clear * KERNEL_STEP_RATIO;
     const vm bent = vf_lt(ratio, rise);
@@ -270,7 +271,7 @@ SIMD_INLINE void kernel_stretch_limit(kernel_stretch *st, vf left, vf shortest)
 
 /* Computes the step's emitted light (*e0) and the first moment of the emission along the step (*e1). Returns the step's
  * optical depth. */
-SIMD_INLINE vf kernel_stretch_sum(const kernel_stretch *st, vf *e0, vf *e1)
+SIMD_INLINE vf kernel_integration_step_sum(const kernel_integration_step *st, vf *e0, vf *e1)
 {
     vf sigma[KERNEL_NODES], depth = vf_set(0);
     const vf rise = st->rise * st->share, zero = vf_set(0), one = vf_set(1);
@@ -294,10 +295,10 @@ SIMD_INLINE vf kernel_stretch_sum(const kernel_stretch *st, vf *e0, vf *e1)
 /* Adds the light of one integration step, over which the value changes by `move`. `below` is the distance of the value
  * at the step's begin from the piece's low end. */
 SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_place *at, vm open, vf below, vf move,
-                                   const kernel_stretch *st, kernel_light *light)
+                                   const kernel_integration_step *st, kernel_light *light)
 {
     vf e0, e1;
-    const vf depth = kernel_stretch_sum(st, &e0, &e1);
+    const vf depth = kernel_integration_step_sum(st, &e0, &e1);
     const vf whole = light->transmittance * e0, moment = light->transmittance * e1 * move;
     for (int a = 0; a < 3; a++) {
         const vf slope = kernel_piece_entry(t, at, KERNEL_PIECE_COLOUR_SLOPE + a);
@@ -310,21 +311,21 @@ SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_pl
 }
 
 /* Integrates the segment and adds its light behind that in *light. */
-SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_run *run, kernel_light *light)
+SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_unit_segment *run, kernel_light *light)
 {
-    const kernel_leg leg = kernel_leg_of(run);
+    const kernel_segment_constants leg = kernel_segment_constants_of(run);
     const vf zero = vf_set(0);
-    kernel_way way = {zero, zero, zero, zero, zero, run->v_in, run->rest_in, vm_none()};
+    kernel_piece_state way = {zero, zero, zero, zero, zero, run->v_in, run->rest_in, vm_none()};
     vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, leg.falling);
     vm open = rays, fresh = rays;
     while (vm_any(open)) {
         const kernel_piece_place at = kernel_piece_place_of(t, open, piece);
         if (vm_any(fresh)) {
             const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
-            kernel_way_enter(&way, &leg, fresh, &ends);
+            kernel_piece_state_enter(&way, &leg, fresh, &ends);
         }
-        kernel_stretch st = kernel_stretch_begin(t, &at, &way, leg.turn);
-        kernel_stretch_limit(&st, way.left, way.shortest);
+        kernel_integration_step st = kernel_integration_step_begin(t, &at, &way, leg.turn);
+        kernel_integration_step_limit(&st, way.left, way.shortest);
         const vf size = way.todo * st.share, move = leg.turn * size;
         kernel_light_step(t, &at, open, way.below, move, &st, light);
         way.below += move;

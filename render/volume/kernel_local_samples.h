@@ -162,7 +162,7 @@ SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batc
     vf base, step, near, far;
     kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_bytes(b->lanes.rays.lane + n));
     const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
-    kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
+    kernel_local_slab_interval(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
     const vf inverse = 1.0f / step, begin = depth - base, end = vf_min(depth + far, vf_gather(b->far, rays.at)) - base;
     const float zero = (float)b->first;

@@ -49,7 +49,7 @@ typedef struct kernel_local_list {
 
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
 
-typedef struct kernel_local_stretches {
+typedef struct kernel_local_segment_batch {
     kernel_local_lanes lanes;          /* must be the first member, as callbacks get it alone */
     kernel_tile_ray_segments *packets; /* packets of the tile */
     unsigned blocks;                   /* blocks of the current window */
@@ -59,7 +59,7 @@ typedef struct kernel_local_stretches {
     kernel_local_list met, crossed[2];
     /* By packet and lane: begin and end of the window, side by side; likewise begin and end of the ray. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
-} kernel_local_stretches;
+} kernel_local_segment_batch;
 
 /* Returns whether segments of cells of this type are computed in lanes in this frame. */
 SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
@@ -69,7 +69,7 @@ SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
 
 /* Adds a segment to the list of the ray at `at`, if it begins before the window's end. It must not begin before the
  * window. */
-SIMD_INLINE void kernel_local_put(const kernel_local_stretches *b, int at, const kernel_segment *s)
+SIMD_INLINE void kernel_local_put(const kernel_local_segment_batch *b, int at, const kernel_segment *s)
 {
     kernel_tile_ray_segments *r = &b->packets[at / SIMD_WIDTH];
     kernel_segments *list = &r->list;
@@ -77,7 +77,8 @@ SIMD_INLINE void kernel_local_put(const kernel_local_stretches *b, int at, const
     if (!(s->t_in < list->t_end[lane])) return;
     const kernel_segment_double precise = {s->t_out - s->t_in, 0, 0, 0};
     if (__builtin_expect(kernel_segments_put(list, lane, s, &precise), 1)) return;
-    const kernel_run run = kernel_run_of((vf_set(s->t_out) - s->t_in) * list->per_t, vf_set(s->v_in), vf_set(s->v_out));
+    const kernel_unit_segment run =
+        kernel_unit_segment_of((vf_set(s->t_out) - s->t_in) * list->per_t, vf_set(s->v_in), vf_set(s->v_out));
     kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->heap);
 }
 
@@ -101,7 +102,7 @@ SIMD_INLINE vf kernel_local_primitive(const kernel_local_polynomial *p, vf u)
 
 /* Adds one segment per lane to the lists of the given rays. ends: t_in, t_out, v_in, v_out; places: position of each
  * ray's pixel among the packets. */
-SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, vi places, vm rays, const vf ends[4])
+SIMD_INLINE void kernel_local_put_all(const kernel_local_segment_batch *b, vi places, vm rays, const vf ends[4])
 {
     kernel_segment all[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
@@ -114,7 +115,7 @@ SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, vi places
 }
 
 /* Adds the segments of rays for which one segment is enough. */
-SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays)
+SIMD_INLINE void kernel_local_emit_one(const kernel_local_segment_batch *b, const kernel_local_pairs *p, vm rays)
 {
     const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_lift(p);
     const vf ends[4] = {t0, t1, p->ends[0].value + lift, p->ends[1].value + lift};
@@ -123,7 +124,7 @@ SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const ke
 
 /* Adds the segments of rays that need several: equal subintervals of the interval, with chords that have the mean of
  * the polynomial through the sampled values. */
-static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_stretches *b,
+static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_segment_batch *b,
                                                              const kernel_local_pairs *p, vm rays)
 {
     const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].value,
@@ -150,7 +151,7 @@ static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_
     }
 }
 
-SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays)
+SIMD_INLINE void kernel_local_emit(const kernel_local_segment_batch *b, const kernel_local_pairs *p, vm rays)
 {
     const vm single = vm_and(rays, vf_le(p->count, vf_set(1))), more = vm_andnot(rays, single);
     kernel_local_emit_one(b, p, single);
@@ -190,7 +191,7 @@ SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_loca
 /* Adds the segments of rays for which one polynomial is not accurate enough: their intervals are divided into halves,
  * quarters or eighths, with a polynomial for each part. Returns the rays for which eighths are not accurate enough
  * either. */
-SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_local_stretches *b,
+SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_local_segment_batch *b,
                                      const kernel_local_pairs *whole, vm rays, int type)
 {
     kernel_local_division d;
@@ -210,7 +211,7 @@ SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_lo
 }
 
 static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_tile_trace *t,
-                                                                const kernel_local_stretches *b,
+                                                                const kernel_local_segment_batch *b,
                                                                 const kernel_local_pairs *whole, vm rays, int type)
 {
     return KERNEL_OF_TYPE(type, kernel_local_by_parts, t, b, whole, rays);
@@ -219,7 +220,7 @@ static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_til
 /* ---- rays ---- */
 
 /* Processes the rays in `wanted` in single cells; rays of the same cell and packet are processed together. */
-static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_trace *t, kernel_local_stretches *b,
+static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_trace *t, kernel_local_segment_batch *b,
                                                                   const kernel_local_queue *q,
                                                                   const kernel_lane_rays *rays, unsigned wanted)
 {
@@ -266,7 +267,7 @@ SIMD_INLINE vm kernel_local_list_take(const kernel_local_list *list, const kerne
 
 /* Finds, for a vector of rays from index n on, the faces of their cells that they cross. Rays that cross two faces are
  * listed in `crossed`; uncertain rays are processed in single cells. */
-SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_stretches *b,
+SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_segment_batch *b,
                                              const kernel_local_queue *q, int type, int n)
 {
     kernel_lane_rays rays;
@@ -282,7 +283,7 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_
 }
 
 /* Adds the segments of a vector of rays, from index n on, each of which crosses two faces of its cell. */
-SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_stretches *b,
+SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_segment_batch *b,
                                              const kernel_local_queue *q, const kernel_local_list *list, int type,
                                              int n)
 {
@@ -309,7 +310,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
 }
 
 /* Lists those of the rays from index n on that may meet their cells within the window. */
-SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_local_stretches *b, int n)
+SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_local_segment_batch *b, int n)
 {
     const int left = b->lanes.rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
@@ -318,14 +319,14 @@ SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_l
     vf near, far, begin, end;
     kernel_lane_rays_of(&rays, &t->tile, pixel, lane);
     const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
-    kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
+    kernel_local_slab_interval(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
     const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
     kernel_local_list_add(&b->met, vm_and(active, meets), pixel | lane << KERNEL_LOCAL_CELL);
 }
 
-SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_local_stretches *b, const kernel_local_queue *q,
-                                           int type)
+SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_local_segment_batch *b,
+                                           const kernel_local_queue *q, int type)
 {
     for (int i = 0; i < 2; i++) b->crossed[i].count = 0;
     for (int n = 0; n < b->met.count; n += SIMD_WIDTH) kernel_local_segments_faces(t, b, q, type, n);
@@ -336,7 +337,7 @@ SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_local_st
 
 static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, kernel_local_lanes *l, int type)
 {
-    kernel_local_stretches *b = (kernel_local_stretches *)l;
+    kernel_local_segment_batch *b = (kernel_local_segment_batch *)l;
     kernel_pixel_list_close(&l->rays);
     b->met.count = 0;
     for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_segments_meet(t, b, n);
@@ -348,7 +349,7 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 
 /* Transforms the queue's cells into tile space; returns the visible ones, and stores in *lanes those that can be
  * processed in lanes. */
-SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, kernel_local_stretches *b,
+SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, kernel_local_segment_batch *b,
                                                     unsigned *lanes, int type)
 {
     vf lists[5][8];
@@ -363,15 +364,16 @@ SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, 
 SIMD_INLINE vm kernel_local_is_steep(const kernel_local_budget *b)
 {
     const kernel_segment_state state = {.pieces = b->pieces};
-    const kernel_span all = {.step_count = b->pieces->step_count};
+    const kernel_cell_interval all = {.step_count = b->pieces->step_count};
     const vf low = vf_load(b->bounds.low), high = vf_load(b->bounds.high);
-    return vm_or(kernel_span_is_steep(&state, low, high, false), kernel_span_steps(&state, &all, low, high));
+    return vm_or(kernel_cell_interval_is_steep(&state, low, high, false),
+                 kernel_cell_interval_steps(&state, &all, low, high));
 }
 
 static __attribute__((noinline)) unsigned kernel_local_segments_place(kernel_tile_trace *t, kernel_local_lanes *l,
                                                                       int type, unsigned *lanes)
 {
-    kernel_local_stretches *b = (kernel_local_stretches *)l;
+    kernel_local_segment_batch *b = (kernel_local_segment_batch *)l;
     const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_place_of, t, b, lanes);
     const float(*values)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])b->faces.at[3];
     KERNEL_OF_TYPE(type, kernel_local_bound, &b->budget, values);
@@ -392,7 +394,7 @@ SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kern
 }
 
 /* Lowers the far limit of the blocks in which a ray's window has been shortened. */
-SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_local_stretches *b)
+SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_local_segment_batch *b)
 {
     for (unsigned blocks = b->blocks; blocks; blocks &= blocks - 1) {
         const int block = __builtin_ctz(blocks);
@@ -410,14 +412,14 @@ SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_loca
 static void kernel_local_segments_finish(kernel_tile_trace *t, kernel_local_lanes *l, int unused)
 {
     (void)unused;
-    kernel_local_segments_shorten(t, (kernel_local_stretches *)l);
+    kernel_local_segments_shorten(t, (kernel_local_segment_batch *)l);
 }
 
 static const kernel_local_stages kernel_segment_stages = {false, kernel_local_segments_place,
                                                           kernel_local_segments_cast, kernel_local_segments_finish};
 
 /* Copies the packets' windows and the limits of their rays into arrays per pixel. */
-static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_stretches *b,
+static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_segment_batch *b,
                                         kernel_tile_ray_segments *packets, unsigned blocks, kernel_tile_take *take,
                                         kernel_ray_segments_take *alone)
 {

@@ -163,8 +163,8 @@ static __attribute__((noinline)) void kernel_pre_subdivide(const kernel_preinteg
     all->rough = all->absorbed * rough;
 }
 
-static __attribute__((noinline)) void kernel_integrate_apart(const kernel_pieces *t, vm rays, const kernel_run *run,
-                                                             kernel_light *light)
+static __attribute__((noinline)) void kernel_integrate_apart(const kernel_pieces *t, vm rays,
+                                                             const kernel_unit_segment *run, kernel_light *light)
 {
     kernel_integrate(t, rays, run, light);
 }
@@ -180,7 +180,7 @@ SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_pre_subinterval 
 
 /* Integrates the rays for which one subinterval is not accurate enough. */
 static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pieces, vm rays,
-                                                        const kernel_pre_end *from, const kernel_run *run,
+                                                        const kernel_pre_end *from, const kernel_unit_segment *run,
                                                         const kernel_pre_subinterval *whole, kernel_light *light)
 {
     const vf room = vf_max(whole->allowed - whole->rough, vf_set(1e-30f));
@@ -208,7 +208,7 @@ static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pie
 /* Returns the light of the segment alone, within the error budget; kernel_integrate() would compute it exactly. *end:
  * table position of the end of the rays' previous segments, which is reused if it is the begin of this one; it becomes
  * the end of this one. */
-SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_run *run,
+SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_unit_segment *run,
                                               kernel_pre_end *end)
 {
     kernel_light light = kernel_clear();

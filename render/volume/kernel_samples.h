@@ -61,8 +61,8 @@ SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s
 
 /* Finds the window's samples that may lie in the interval of some ray, as indices *begin .. *end - 1 into the
  * window. */
-SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
-                                    int *begin, int *end)
+SIMD_INLINE void kernel_sample_range(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
+                                     int *begin, int *end)
 {
     const vf from = (i->t_in - p->sample_base) * p->sample_inverse;
     const vf to = (i->t_out - p->sample_base) * p->sample_inverse;
@@ -146,7 +146,7 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
                              const kernel_interval *i)
 {
     int begin, end;
-    kernel_sample_span(p, state->samples, i, &begin, &end);
+    kernel_sample_range(p, state->samples, i, &begin, &end);
     if (begin < end) kernel_fill_some(p, state, map, i, begin, end);
 }
 
@@ -159,7 +159,7 @@ typedef struct kernel_blend {
     vf depth, lost[3];
     vf light; /* share of the light that passes all of this rank's samples so far */
     /* Used if all samples and segments are folded (render_fold.h). stretch: number of the last sample's interval of
-     * length 1 / FRAGMENT_STRETCHES; within: light that passes all samples so far. `light` is then the light at the end
+     * length 1 / FRAGMENT_INTERVALS; within: light that passes all samples so far. `light` is then the light at the end
      * of the last interval. */
     vf stretch, within;
 } kernel_blend;
@@ -184,7 +184,7 @@ SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, v
     const kernel_fragments own = {
         t_in, t_out, {colour[0], colour[1], colour[2]}, clear, vf_select(fresh, vf_set(FRAGMENT_EARLY), vf_set(0))};
     kernel_emit(p, vm_and(has, vm_or(fresh, kernel_shows(colour, clear))), FRAGMENT_VOLUME, &own);
-    const vf stretch = vf_floor(t_in * (float)FRAGMENT_STRETCHES);
+    const vf stretch = vf_floor(t_in * (float)FRAGMENT_INTERVALS);
     const vm next = vm_andnot(has, vf_eq(stretch, b->stretch));
     b->light = vf_select(next, b->within, b->light);
     b->stretch = vf_select(has, stretch, b->stretch);

@@ -102,7 +102,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         vi_store(items, item);
         vf_gather_rows(&list->items[0][0].t_in, items, segment);
         const vf t_out = segment[1];
-        kernel_run run = kernel_run_of((t_out - t_in) * list->per_t, segment[2], segment[3]);
+        kernel_unit_segment run = kernel_unit_segment_of((t_out - t_in) * list->per_t, segment[2], segment[3]);
         kernel_light light = kernel_clear();
         if (list->is_double) {
             vf_gather_rows(&list->precise[0][0].length, items, precise);

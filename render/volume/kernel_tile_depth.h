@@ -12,8 +12,8 @@
  *
  * Samples do not depend on windows (kernel_tile_volume.h). But windows decide which overlaps of cells are detected
  * behind the depth at which all light is absorbed, and so whether a pixel is drawn a second time. So that windows do
- * not depend on the number of threads, a tile uses results only of earlier tiles in its run of KERNEL_TILE_RUN tiles,
- * which one thread draws in order. */
+ * not depend on the number of threads, a tile uses results only of earlier tiles in its run of KERNEL_TILES_PER_TASK
+ * tiles, which one thread draws in order. */
 #ifndef RENDER_KERNEL_TILE_DEPTH_H
 #define RENDER_KERNEL_TILE_DEPTH_H
 

@@ -45,7 +45,7 @@
 typedef struct kernel_tile_segments {
     kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
     kernel_double_cell precise;
-    kernel_local_stretches stretches;
+    kernel_local_segment_batch stretches;
     int volume;  /* index of the current volume */
     float depth; /* depth of the next window; 0 if it is not known yet */
 } kernel_tile_segments;
@@ -134,7 +134,7 @@ static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_
 static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_trace *t, unsigned lanes)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    kernel_local_stretches *b = &s->stretches;
+    kernel_local_segment_batch *b = &s->stretches;
     const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_PIXELS, &b->lanes);
     for (int n = 0; n < b->lanes.rays.count; n += SIMD_WIDTH) {
         kernel_lane_rays r;
@@ -183,7 +183,7 @@ SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_tile_ray_
 {
     const kernel_frame *f = p->frame;
     const float mixing = f->job->separate_samples ? f->mixing : 0;
-    r->list.per_t = f->volumes[volume].exponent / p->sample_step * p->clip_stretch;
+    r->list.per_t = f->volumes[volume].exponent / p->sample_step * p->clip_length_ratio;
     r->state = (kernel_segment_state){&r->list, &f->pieces[volume], volume, f->allowance, mixing, f->reach[volume]};
 }
 
