@@ -47,7 +47,7 @@ static const double box_margin = 1e-5;
 
 /* The six sample points are the ends of a cross around the hit, whose three bars are two reaches long. The test is
  * whether one of the bars meets the box. */
-bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_box *box)
+bool render_differences_meet(const render_job *job, const render_pending_hit *hit, const render_box *box)
 {
     const uint32_t width = (uint32_t)job->camera.width;
     const double z = (double)hit->t / job->space.scale + job->space.depth_origin;
@@ -83,7 +83,7 @@ static int by_place(const void *a, const void *b)
     return (x->index > y->index) - (x->index < y->index);
 }
 
-static place_of_hit place_of(const render_camera *camera, const render_waiting_hit *hit, int64_t index)
+static place_of_hit place_of(const render_camera *camera, const render_pending_hit *hit, int64_t index)
 {
     const uint32_t x = hit->pixel % (uint32_t)camera->width, y = hit->pixel / (uint32_t)camera->width;
     const uint64_t tile = (uint64_t)(y / KERNEL_TILE) << 16 | x / KERNEL_TILE;
@@ -91,8 +91,8 @@ static place_of_hit place_of(const render_camera *camera, const render_waiting_h
     return (place_of_hit){tile << 8 | block, hit->kind, y % KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_BLOCK, index};
 }
 
-static void put_in_order(const render_camera *camera, render_waiting_list *list, int64_t first, int64_t count,
-                         place_of_hit *places, render_waiting_list *room)
+static void put_in_order(const render_camera *camera, render_pending_list *list, int64_t first, int64_t count,
+                         place_of_hit *places, render_pending_list *room)
 {
     for (int64_t i = 0; i < count; i++) places[i] = place_of(camera, &list->items[first + i], i);
     memcpy(room->items, list->items + first, (size_t)count * sizeof *room->items);
@@ -104,11 +104,11 @@ static void put_in_order(const render_camera *camera, render_waiting_list *list,
     }
 }
 
-bool render_differences_sort(const render_job *job, render_waiting_list *list)
+bool render_differences_sort(const render_job *job, render_pending_list *list)
 {
     const int64_t most = list->count < SORTED_HITS ? list->count : SORTED_HITS;
     place_of_hit *places = base_alloc((size_t)(most + 1) * sizeof *places);
-    render_waiting_list room = {.items = base_alloc((size_t)(most + 1) * sizeof *room.items),
+    render_pending_list room = {.items = base_alloc((size_t)(most + 1) * sizeof *room.items),
                                 .looks = base_alloc((size_t)(most + 1) * sizeof *room.looks)};
     const bool has_room = places && room.items && room.looks;
     for (int64_t first = 0; first < list->count && has_room; first += most) {
@@ -128,9 +128,9 @@ typedef struct chunk_work {
     kernel_frame frame;
     const kernel_table *kernels;
     int threads;
-    const render_waiting_hit *hits;
+    const render_pending_hit *hits;
     render_samples_about *samples;
-    const render_waiting_list *list; /* hits to be lit; NULL if samples are to be taken */
+    const render_pending_list *list; /* hits to be lit; NULL if samples are to be taken */
     const render_samples_about *merged;
     fragment *out;
 } chunk_work;
@@ -138,9 +138,9 @@ typedef struct chunk_work {
 static void work_on(chunk_work *work, kernel_thread *thread, int64_t first, int64_t count)
 {
     if (work->list)
-        work->kernels->light_waiting(&work->frame, thread, work->list, work->merged, first, count, work->out);
+        work->kernels->light_pending(&work->frame, thread, work->list, work->merged, first, count, work->out);
     else
-        work->kernels->sample_waiting(&work->frame, thread, work->hits + first, work->samples + first, count);
+        work->kernels->sample_pending(&work->frame, thread, work->hits + first, work->samples + first, count);
 }
 
 static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_t first, int64_t count,
@@ -173,7 +173,7 @@ static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_
     return status;
 }
 
-insitu_status render_differences_sample(const render_job *job, const render_waiting_hit *hits,
+insitu_status render_differences_sample(const render_job *job, const render_pending_hit *hits,
                                         render_samples_about *out, int64_t count, base_error *error)
 {
     chunk_work work = {.hits = hits, .samples = out};
@@ -192,12 +192,12 @@ void render_differences_merge(render_samples_about *into, const render_samples_a
     }
 }
 
-insitu_status render_differences_light(const render_job *job, const render_waiting_list *list,
+insitu_status render_differences_light(const render_job *job, const render_pending_list *list,
                                        const render_samples_about *samples, int64_t first, int64_t count, fragment *out,
                                        base_error *error)
 {
     /* With a list that begins at hit `first`, hits, samples and fragments have the same indices, from 0 on. */
-    const render_waiting_list some = {list->items + first, list->looks + first, count, count};
+    const render_pending_list some = {list->items + first, list->looks + first, count, count};
     chunk_work work = {.list = &some, .merged = samples, .out = out};
     return count ? work_on_all(job, &work, 0, count, error) : INSITU_OK;
 }

@@ -75,23 +75,23 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
 
 /* ---- hits that need samples of other ranks ------------------------------------------------------------------- */
 
-static bool grow_list(render_waiting_list *list, int64_t capacity)
+static bool grow_list(render_pending_list *list, int64_t capacity)
 {
-    render_waiting_hit *items = base_realloc(list->items, (size_t)capacity * sizeof *items);
+    render_pending_hit *items = base_realloc(list->items, (size_t)capacity * sizeof *items);
     if (items) list->items = items;
-    render_waiting_look *looks = base_realloc(list->looks, (size_t)capacity * sizeof *looks);
+    render_pending_shading *looks = base_realloc(list->looks, (size_t)capacity * sizeof *looks);
     if (looks) list->looks = looks;
     if (!items || !looks) return false;
     list->capacity = capacity;
     return true;
 }
 
-static bool grow_waiting(render_waiting_list *list)
+static bool grow_pending(render_pending_list *list)
 {
     return grow_list(list, list->capacity + list->capacity / 2 + 1024);
 }
 
-static bool append_waiting(render_waiting_list *to, const render_waiting_list *from)
+static bool append_pending(render_pending_list *to, const render_pending_list *from)
 {
     const int64_t count = to->count + from->count;
     if (!from->count) return true;
@@ -127,7 +127,7 @@ static void begin_threads(const kernel_frame *frame, const frame_end *end, kerne
                                     .out_of_memory = false,
                                     .find_polyhedron = polyhedra_find,
                                     .polyhedron_scratch = polyhedra_scratch,
-                                    .grow_waiting = grow_waiting,
+                                    .grow_pending = grow_pending,
                                     .now = now};
     for (int i = 0; i < threads && has_polyhedra; i++) states[i].out_of_memory = !states[i].polyhedra;
 }
@@ -142,7 +142,7 @@ static bool end_threads(const render_job *job, kernel_thread *states, int thread
         base_free(states[i].bin.room);
         base_free(states[i].volume_bin.room);
         has_memory = has_memory && !states[i].out_of_memory;
-        if (has_memory && job->waiting) has_memory = append_waiting(&job->waiting->list, &states[i].waiting);
+        if (has_memory && job->waiting) has_memory = append_pending(&job->waiting->list, &states[i].waiting);
         base_free(states[i].waiting.items);
         base_free(states[i].waiting.looks);
         surface = fmax(surface, states[i].surface_seconds);

@@ -204,14 +204,14 @@ SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_t
 }
 
 /* Cells whose vertex indices are being prefetched. */
-typedef struct kernel_pending {
+typedef struct kernel_prefetch_queue {
     int count;
     const kernel_tile_candidate *items[SIMD_WIDTH];
-} kernel_pending;
+} kernel_prefetch_queue;
 
 /* Sorts pending cells by their part, and leaves them in order of depth within each: a batch holds cells of one part,
  * and those of blocks alternate in depth. */
-static void kernel_pending_sort(kernel_pending *w)
+static void kernel_pending_sort(kernel_prefetch_queue *w)
 {
     for (int n = 1; n < w->count; n++) {
         const kernel_tile_candidate *item = w->items[n];
@@ -224,7 +224,7 @@ static void kernel_pending_sort(kernel_pending *w)
 
 /* Prefetches the vertices of all pending cells, then queues them for tracing. */
 static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_tile_queue *m,
-                                                               kernel_pending *w)
+                                                               kernel_prefetch_queue *w)
 {
     kernel_pending_sort(w);
     for (int n = 0; n < w->count; n++) {
@@ -250,7 +250,7 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
                                                                    bool transparent)
 {
     kernel_tile_queue *queue = &((kernel_tile_search *)t->search)->queue;
-    kernel_pending pending = {0};
+    kernel_prefetch_queue pending = {0};
     kernel_tile_queue_begin(queue);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
         for (int i = q->first[bin]; i >= 0; i = q->items[i].next) {
@@ -491,5 +491,5 @@ const kernel_table KERNEL_TABLE = {SIMD_WIDTH,
                                    find_candidates,
                                    kernel_occlude,
                                    kernel_occlude_by_cell,
-                                   kernel_sample_waiting,
-                                   kernel_light_waiting};
+                                   kernel_sample_pending,
+                                   kernel_light_pending};

@@ -321,8 +321,8 @@ typedef struct kernel_thread {
     bool (*reserve)(fragment_list *list, int64_t more);
     /* Hits whose normals need samples of other ranks' cells, and the function that adds space for more; it returns
      * false if memory ran out. */
-    render_waiting_list waiting;
-    bool (*grow_waiting)(render_waiting_list *list);
+    render_pending_list waiting;
+    bool (*grow_pending)(render_pending_list *list);
     bool out_of_memory;
     /* counters for render_statistics: failed inversions of cells' maps, and cells visited by volumes */
     int64_t map_failures, volume_cells;
@@ -358,10 +358,10 @@ typedef struct kernel_table {
                             const struct kernel_occluder *occluder);
     /* Samples this rank's cells around each of `count` hits, for normals by central differences; out[i] belongs to
      * hits[i]. */
-    void (*sample_waiting)(const kernel_frame *frame, kernel_thread *thread, const render_waiting_hit *hits,
+    void (*sample_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
                            render_samples_about *out, int64_t count);
     /* Computes the fragments out[i] of the list's hits i from samples[i], first <= i < first + count. */
-    void (*light_waiting)(const kernel_frame *frame, kernel_thread *thread, const render_waiting_list *list,
+    void (*light_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_list *list,
                           const render_samples_about *samples, int64_t first, int64_t count, fragment *out);
 } kernel_table;
 

@@ -280,13 +280,13 @@ SIMD_INLINE kernel_look kernel_look_of(const vf normal[3], const vf colour[3])
 /* Moves hits whose normals need samples of other ranks to the thread's waiting list, and emits a placeholder fragment
  * for each, at which volumes are cut. Returns the remaining hits. reach: distance to the samples; hits with 0 do not
  * wait. */
-static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const kernel_surface *s, int value, vm hit,
-                                                      vf t, vf reach, const kernel_look *look)
+static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, const kernel_surface *s, int value,
+                                                            vm hit, vf t, vf reach, const kernel_look *look)
 {
     const vf *normal = look->normal, *colour = look->colour;
-    render_waiting_list *list = &p->thread->waiting;
+    render_pending_list *list = &p->thread->waiting;
     const vm waits = vm_and(hit, vf_lt(vf_set(0), reach));
-    if (list->capacity - list->count < SIMD_WIDTH && !p->thread->grow_waiting(list)) {
+    if (list->capacity - list->count < SIMD_WIDTH && !p->thread->grow_pending(list)) {
         p->thread->out_of_memory = true;
         return vm_none();
     }
@@ -294,9 +294,9 @@ static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const ke
     kernel_emit(p, waits, s->first_kind + (uint32_t)value, &place);
     for (unsigned left = vm_bits(waits); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
-        list->items[list->count] = (render_waiting_hit){p->pixel[i], s->first_kind + (uint32_t)value, t[i], reach[i]};
-        list->looks[list->count++] = (render_waiting_look){{normal[0][i], normal[1][i], normal[2][i]},
-                                                           {colour[0][i], colour[1][i], colour[2][i]}};
+        list->items[list->count] = (render_pending_hit){p->pixel[i], s->first_kind + (uint32_t)value, t[i], reach[i]};
+        list->looks[list->count++] = (render_pending_shading){{normal[0][i], normal[1][i], normal[2][i]},
+                                                              {colour[0][i], colour[1][i], colour[2][i]}};
     }
     return vm_andnot(hit, waits);
 }

@@ -198,7 +198,7 @@ SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_s
 /* ---- hits that wait for samples of other ranks ---- */
 
 /* A run of consecutive hits of a list: all are in one packet and of one isovalue, each in its own lane. */
-typedef struct kernel_waiting_run {
+typedef struct kernel_pending_group {
     kernel_tile tile; /* the run's tile, which is kept for the next run */
     kernel_packet packet;
     const kernel_surface *surface;
@@ -206,19 +206,19 @@ typedef struct kernel_waiting_run {
     int lanes[SIMD_WIDTH];
     vm rays;
     vf t, reach;
-} kernel_waiting_run;
+} kernel_pending_group;
 
-SIMD_INLINE void kernel_waiting_begin(kernel_waiting_run *run)
+SIMD_INLINE void kernel_pending_packet_begin(kernel_pending_group *run)
 {
     run->tile.x0 = run->tile.y0 = -1;
 }
 
-SIMD_INLINE int kernel_waiting_lane(int x, int y)
+SIMD_INLINE int kernel_pending_lane(int x, int y)
 {
     return y % KERNEL_PACKET_ROWS * KERNEL_PACKET_COLUMNS + x % KERNEL_PACKET_COLUMNS;
 }
 
-SIMD_INLINE void kernel_waiting_surface(kernel_waiting_run *run, const kernel_frame *f, uint32_t kind)
+SIMD_INLINE void kernel_pending_surface(kernel_pending_group *run, const kernel_frame *f, uint32_t kind)
 {
     for (int n = 0; n < f->surface_count; n++) {
         const kernel_surface *s = &f->surfaces[n];
@@ -229,8 +229,8 @@ SIMD_INLINE void kernel_waiting_surface(kernel_waiting_run *run, const kernel_fr
 }
 
 /* Sets up the run that begins with the first of the hits; run->count becomes its length. */
-static void kernel_waiting_take(kernel_waiting_run *run, const kernel_frame *f, kernel_thread *thread,
-                                const render_waiting_hit *hits, int64_t count)
+static void kernel_pending_group_begin(kernel_pending_group *run, const kernel_frame *f, kernel_thread *thread,
+                                       const render_pending_hit *hits, int64_t count)
 {
     const uint32_t width = (uint32_t)f->job->camera.width, kind = hits->kind;
     const int x = (int)(hits->pixel % width), y = (int)(hits->pixel / width);
@@ -242,13 +242,13 @@ static void kernel_waiting_take(kernel_waiting_run *run, const kernel_frame *f, 
         kernel_tile_rays(&run->tile, f);
         thread->serial++;
     }
-    kernel_waiting_surface(run, f, kind);
+    kernel_pending_surface(run, f, kind);
     for (run->count = 0; run->count < count; run->count++) {
-        const render_waiting_hit *hit = &hits[run->count];
+        const render_pending_hit *hit = &hits[run->count];
         const int column = (int)(hit->pixel % width) - x0, row = (int)(hit->pixel / width) - y0;
         if (hit->kind != kind || column < 0 || column >= KERNEL_PACKET_COLUMNS || row < 0 || row >= KERNEL_PACKET_ROWS)
             break;
-        const int lane = kernel_waiting_lane(column, row);
+        const int lane = kernel_pending_lane(column, row);
         if (bits >> lane & 1) break;
         bits |= 1u << lane;
         run->lanes[run->count] = lane;
@@ -263,14 +263,14 @@ static void kernel_waiting_take(kernel_waiting_run *run, const kernel_frame *f, 
 }
 
 /* Samples this rank's cells around all hits of the list; out[i] gets the samples of hits[i]. */
-static void kernel_sample_waiting(const kernel_frame *f, kernel_thread *thread, const render_waiting_hit *hits,
+static void kernel_sample_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_hit *hits,
                                   render_samples_about *out, int64_t count)
 {
-    kernel_waiting_run run;
-    kernel_waiting_begin(&run);
+    kernel_pending_group run;
+    kernel_pending_packet_begin(&run);
     for (int64_t i = 0; i < count; i += run.count) {
         kernel_samples_about about;
-        kernel_waiting_take(&run, f, thread, hits + i, count - i);
+        kernel_pending_group_begin(&run, f, thread, hits + i, count - i);
         kernel_sample_about(&run.packet, run.surface, run.value, run.rays, run.t, run.reach, &about);
         for (int n = 0; n < run.count; n++) {
             render_samples_about *own = &out[i + n];
@@ -284,7 +284,7 @@ static void kernel_sample_waiting(const kernel_frame *f, kernel_thread *thread, 
     }
 }
 
-SIMD_INLINE void kernel_load_about(const kernel_waiting_run *run, const render_samples_about *samples,
+SIMD_INLINE void kernel_load_about(const kernel_pending_group *run, const render_samples_about *samples,
                                    kernel_samples_about *out)
 {
     for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {

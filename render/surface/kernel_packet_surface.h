@@ -47,15 +47,15 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
 
 /* Lights `count` hits of the waiting list from index `first` on, by the merged samples of all ranks. out[i] becomes the
  * fragment of hit i. */
-static void kernel_light_waiting(const kernel_frame *f, kernel_thread *thread, const render_waiting_list *list,
+static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_list *list,
                                  const render_samples_about *samples, int64_t first, int64_t count, fragment *out)
 {
-    kernel_waiting_run run;
-    kernel_waiting_begin(&run);
+    kernel_pending_group run;
+    kernel_pending_packet_begin(&run);
     for (int64_t i = first; i < first + count; i += run.count) {
         kernel_samples_about about;
         vf normal[3], colour[3];
-        kernel_waiting_take(&run, f, thread, list->items + i, first + count - i);
+        kernel_pending_group_begin(&run, f, thread, list->items + i, first + count - i);
         for (int a = 0; a < 3; a++) {
             normal[a] = colour[a] = vf_set(0);
             for (int n = 0; n < run.count; n++) {

@@ -41,7 +41,7 @@
 SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
                              kernel_look *look)
 {
-    if (p->frame->job->waiting) return kernel_wait(p, s, value, hit, t, reach, look);
+    if (p->frame->job->waiting) return kernel_defer_hits(p, s, value, hit, t, reach, look);
     kernel_differences(p, s, value, hit, t, reach, look->normal);
     return hit;
 }

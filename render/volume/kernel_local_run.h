@@ -47,8 +47,8 @@ SIMD_INLINE void kernel_local_end(kernel_tile_trace *t, kernel_local_lanes *l)
 }
 
 /* Queues a hex, wedge or pyramid. */
-SIMD_INLINE void kernel_local_wait(kernel_tile_trace *t, kernel_local_lanes *l, int part, int type, uint32_t cell,
-                                   unsigned blocks, unsigned box)
+SIMD_INLINE void kernel_local_enqueue(kernel_tile_trace *t, kernel_local_lanes *l, int part, int type, uint32_t cell,
+                                      unsigned blocks, unsigned box)
 {
     const int queue = kernel_local_queue_of(type);
     if (part != l->part) {

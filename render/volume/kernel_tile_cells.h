@@ -212,8 +212,8 @@ SIMD_INLINE void kernel_tile_take_pending(kernel_tile_trace *t, kernel_tile_cell
 /* Makes the volume and mesh part those of the pending tets; tets of another part are processed first. Returns whether
  * the part's tets are processed in lanes: they are not if the field is constant per cell, because it is not
  * interpolated then. */
-SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
-                                      kernel_tile_take *take)
+SIMD_INLINE bool kernel_tile_set_tet_part(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
+                                          kernel_tile_take *take)
 {
     if (part != cells->plain_part || volume != cells->plain_volume) {
         kernel_tile_take_pending(t, cells, take);
@@ -226,8 +226,8 @@ SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *c
 }
 
 /* Queues a tet. If the queue is full, some tets are processed. box: its box of pixels (kernel_tile_box()). */
-SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
-                                  unsigned box, kernel_tile_take *take)
+SIMD_INLINE void kernel_tile_enqueue_tet(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
+                                         unsigned box, kernel_tile_take *take)
 {
     if (kernel_local_push(&cells->arrays, &cells->tets, cell, blocks, box, GRID_TET))
         kernel_tile_take_some(t, cells, take);
@@ -249,12 +249,12 @@ SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, const kernel_cell_v
 {
     const grid *g = t->frame->job->parts[part].cells;
     kernel_tile_cells *pending = t->thread->tile_cells;
-    const bool waits = kernel_tile_wait_for(t, pending, volume, part, visitor->take);
+    const bool waits = kernel_tile_set_tet_part(t, pending, volume, part, visitor->take);
     if (!waits) kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
     const unsigned box = kernel_tile_box(blocks, KERNEL_ALL_PIXELS);
     for (int n = 0; n < count; n++)
         if (waits && kernel_is_linear(kernel_arrays_type(&pending->arrays, cells[n])))
-            kernel_tile_wait(t, pending, cells[n], blocks, box, visitor->take);
+            kernel_tile_enqueue_tet(t, pending, cells[n], blocks, box, visitor->take);
         else
             kernel_tile_meet_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
 }
@@ -392,9 +392,9 @@ SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *
                                        kernel_tile_take *take)
 {
     const int part = (int)item->source;
-    if (kernel_tile_wait_for(t, cells, 0, part, take) &&
+    if (kernel_tile_set_tet_part(t, cells, 0, part, take) &&
         kernel_is_linear(kernel_arrays_type(&cells->arrays, item->cell)))
-        kernel_tile_wait(t, cells, item->cell, blocks, item->box, take);
+        kernel_tile_enqueue_tet(t, cells, item->cell, blocks, item->box, take);
     else
         kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);
 }

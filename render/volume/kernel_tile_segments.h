@@ -86,7 +86,7 @@ static bool kernel_segments_queue(kernel_tile_trace *t, int part, uint32_t cell,
     const int type = grid_cell_type(g, cell);
     if (!kernel_arrays_fit(g) || !kernel_local_segments_fit(t->frame, type)) return false;
     kernel_local_lanes *l = &t->thread->tile_segments->stretches.lanes;
-    kernel_local_wait(t, l, part, type, cell, blocks, kernel_tile_box(blocks, box));
+    kernel_local_enqueue(t, l, part, type, cell, blocks, kernel_tile_box(blocks, box));
     return true;
 }
 

@@ -88,7 +88,8 @@ static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, 
     const grid *g = t->frame->job->parts[part].cells;
     const int type = grid_cell_type(g, cell);
     if (!kernel_arrays_fit(g) || !kernel_local_fits(t->frame, type)) return false;
-    kernel_local_wait(t, &t->thread->tile_volume->batch.lanes, part, type, cell, blocks, kernel_tile_box(blocks, box));
+    kernel_local_enqueue(t, &t->thread->tile_volume->batch.lanes, part, type, cell, blocks,
+                         kernel_tile_box(blocks, box));
     return true;
 }
 

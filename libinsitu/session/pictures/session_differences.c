@@ -19,14 +19,14 @@
 
 enum {
     ROUND_HITS = 1 << 18,
-    REQUEST_WORDS = sizeof(render_waiting_hit) / 8,
+    REQUEST_WORDS = sizeof(render_pending_hit) / 8,
     ANSWER_WORDS = sizeof(render_samples_about) / 8
 };
 
 typedef struct differing {
     MPI_Comm comm;
     const render_job *job;
-    render_waiting_list *list;
+    render_pending_list *list;
     int rank, ranks;
     int64_t round_hits, rounds; /* number of hits per round, and number of rounds on all ranks */
     /* Ranks that may have samples for any of this rank's hits, and their boxes. */
@@ -109,7 +109,7 @@ static bool write_requests(differing *d, session_mail *out)
     int64_t requests = 0;
     for (int n = 0; n < d->near_count; n++)
         for (int64_t i = 0; i < d->count; i++) {
-            const render_waiting_hit *hit = &d->list->items[d->first + i];
+            const render_pending_hit *hit = &d->list->items[d->first + i];
             if (!render_differences_meet(d->job, hit, &d->boxes[d->near_ranks[n]])) continue;
             if (requests == capacity) {
                 capacity += capacity / 2 + 1024;
@@ -136,7 +136,7 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
     out->words = base_alloc((size_t)(out->total + 1) * sizeof *out->words);
     if (!out->counts || !out->words) return false;
     for (int r = 0; r < d->ranks; r++) out->counts[r] = in->counts[r] / REQUEST_WORDS * ANSWER_WORDS;
-    render_differences_sample(d->job, (const render_waiting_hit *)(const void *)in->words,
+    render_differences_sample(d->job, (const render_pending_hit *)(const void *)in->words,
                               (render_samples_about *)(void *)out->words, count, error);
     return true;
 }
@@ -224,7 +224,7 @@ insitu_status session_differ_fragments(MPI_Comm comm, const render_job *job, fra
     const insitu_status status = compute_differences(&d, fragments, error);
     base_free(d.list->items);
     base_free(d.list->looks);
-    *d.list = (render_waiting_list){0};
+    *d.list = (render_pending_list){0};
     *ms += 1e3 * (MPI_Wtime() - start);
     return status;
 }

@@ -53,7 +53,7 @@ static insitu_status trace_fragments(const session_frame_target *t, const render
 {
     int ranks = 1;
     MPI_Comm_size(t->comm, &ranks);
-    render_waiting waiting = {0};
+    render_pending_hits waiting = {0};
     render_job traced = *job;
     traced.waiting = ranks > 1 && render_has_differences(job) ? &waiting : NULL;
     if (job->part_count > 0 && !error->status) render_frame(&traced, fragments, rendered, error);
