@@ -155,7 +155,7 @@ typedef struct render_pending_shading {
 /* Growing lists of hits and their looks, with the same count. Memory comes from memory.h. */
 typedef struct render_pending_list {
     render_pending_hit *items;
-    render_pending_shading *looks;
+    render_pending_shading *shadings;
     int64_t count, capacity;
 } render_pending_list;
 

@@ -96,11 +96,11 @@ static void put_in_order(const render_camera *camera, render_pending_list *list,
 {
     for (int64_t i = 0; i < count; i++) places[i] = place_of(camera, &list->items[first + i], i);
     memcpy(room->items, list->items + first, (size_t)count * sizeof *room->items);
-    memcpy(room->looks, list->looks + first, (size_t)count * sizeof *room->looks);
+    memcpy(room->shadings, list->shadings + first, (size_t)count * sizeof *room->shadings);
     qsort(places, (size_t)count, sizeof *places, by_place);
     for (int64_t i = 0; i < count; i++) {
         list->items[first + i] = room->items[places[i].index];
-        list->looks[first + i] = room->looks[places[i].index];
+        list->shadings[first + i] = room->shadings[places[i].index];
     }
 }
 
@@ -109,15 +109,15 @@ bool render_differences_sort(const render_job *job, render_pending_list *list)
     const int64_t most = list->count < SORTED_HITS ? list->count : SORTED_HITS;
     place_of_hit *places = base_alloc((size_t)(most + 1) * sizeof *places);
     render_pending_list room = {.items = base_alloc((size_t)(most + 1) * sizeof *room.items),
-                                .looks = base_alloc((size_t)(most + 1) * sizeof *room.looks)};
-    const bool has_room = places && room.items && room.looks;
+                                .shadings = base_alloc((size_t)(most + 1) * sizeof *room.shadings)};
+    const bool has_room = places && room.items && room.shadings;
     for (int64_t first = 0; first < list->count && has_room; first += most) {
         const int64_t left = list->count - first;
         put_in_order(&job->camera, list, first, left < most ? left : most, places, &room);
     }
     base_free(places);
     base_free(room.items);
-    base_free(room.looks);
+    base_free(room.shadings);
     return has_room;
 }
 
@@ -197,7 +197,7 @@ insitu_status render_differences_light(const render_job *job, const render_pendi
                                        base_error *error)
 {
     /* With a list that begins at hit `first`, hits, samples and fragments have the same indices, from 0 on. */
-    const render_pending_list some = {list->items + first, list->looks + first, count, count};
+    const render_pending_list some = {list->items + first, list->shadings + first, count, count};
     chunk_work work = {.list = &some, .merged = samples, .out = out};
     return count ? work_on_all(job, &work, 0, count, error) : INSITU_OK;
 }

@@ -79,9 +79,9 @@ static bool grow_list(render_pending_list *list, int64_t capacity)
 {
     render_pending_hit *items = base_realloc(list->items, (size_t)capacity * sizeof *items);
     if (items) list->items = items;
-    render_pending_shading *looks = base_realloc(list->looks, (size_t)capacity * sizeof *looks);
-    if (looks) list->looks = looks;
-    if (!items || !looks) return false;
+    render_pending_shading *shadings = base_realloc(list->shadings, (size_t)capacity * sizeof *shadings);
+    if (shadings) list->shadings = shadings;
+    if (!items || !shadings) return false;
     list->capacity = capacity;
     return true;
 }
@@ -97,7 +97,7 @@ static bool append_pending(render_pending_list *to, const render_pending_list *f
     if (!from->count) return true;
     if (count > to->capacity && !grow_list(to, count)) return false;
     memcpy(to->items + to->count, from->items, (size_t)from->count * sizeof *to->items);
-    memcpy(to->looks + to->count, from->looks, (size_t)from->count * sizeof *to->looks);
+    memcpy(to->shadings + to->count, from->shadings, (size_t)from->count * sizeof *to->shadings);
     to->count = count;
     return true;
 }
@@ -144,7 +144,7 @@ static bool end_threads(const render_job *job, kernel_thread *states, int thread
         has_memory = has_memory && !states[i].out_of_memory;
         if (has_memory && job->waiting) has_memory = append_pending(&job->waiting->list, &states[i].waiting);
         base_free(states[i].waiting.items);
-        base_free(states[i].waiting.looks);
+        base_free(states[i].waiting.shadings);
         surface = fmax(surface, states[i].surface_seconds);
         volume = fmax(volume, states[i].volume_seconds);
         statistics->map_failures += states[i].map_failures;

@@ -143,7 +143,7 @@ static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_ra
 
 /* ---- rays that must be tested exactly in a cell */
 
-static void tracer_look(tracer *t, const double eye[3], const hit_axes *a, bool is_orthographic)
+static void tracer_set_camera(tracer *t, const double eye[3], const hit_axes *a, bool is_orthographic)
 {
     render_camera *c = &t->moved.camera;
     memcpy(c->eye, eye, sizeof c->eye);
@@ -159,7 +159,7 @@ static void tracer_look(tracer *t, const double eye[3], const hit_axes *a, bool 
 }
 
 /* Sets up the bundle with the rays of a hit's hemisphere. */
-static void look_at_hemisphere(tracer *t, const render_hit *hit)
+static void set_hemisphere_rays(tracer *t, const render_hit *hit)
 {
     const render_occlusion *o = t->job->occlusion;
     const render_space *space = &t->job->space;
@@ -167,7 +167,7 @@ static void look_at_hemisphere(tracer *t, const render_hit *hit)
     kernel_bundle *b = &t->bundle;
     double directions[RENDER_MAX_SAMPLES][3];
     hit_hemisphere(t->job, hit->pixel, directions);
-    tracer_look(t, p.start, &p.a, false);
+    tracer_set_camera(t, p.start, &p.a, false);
     b->tile.centre_x = b->tile.centre_y = 0;
     b->tile.radius = 0;
     for (int k = 0; k < o->samples; k++) {
@@ -186,7 +186,7 @@ static void look_at_hemisphere(tracer *t, const render_hit *hit)
 }
 
 /* Sets up the bundle with a hit's ray to a light. */
-static void look_at_light(tracer *t, const render_hit *hit, int light)
+static void set_light_ray(tracer *t, const render_hit *hit, int light)
 {
     const hit_axes a = hit_axes_around(t->job->lights[light].direction);
     const render_space *space = &t->job->space;
@@ -197,7 +197,7 @@ static void look_at_light(tracer *t, const render_hit *hit, int light)
     const double x = hit_dot(a.right, from), y = hit_dot(a.up, from);
     const double centre[2] = {(floor(x * LIGHT_TILES) + 0.5) / LIGHT_TILES,
                               (floor(y * LIGHT_TILES) + 0.5) / LIGHT_TILES};
-    tracer_look(t, space->origin, &a, true);
+    tracer_set_camera(t, space->origin, &a, true);
     b->tile.centre_x = centre[0] / space->scale;
     b->tile.centre_y = centre[1] / space->scale;
     b->tile.radius = 0.5F / LIGHT_TILES;
@@ -234,7 +234,7 @@ static void settle_hemisphere(tracer *t, const render_hit *hit, kernel_doubt *do
 {
     uint64_t open = 0;
     int32_t ray_of[RENDER_MAX_SAMPLES];
-    look_at_hemisphere(t, hit);
+    set_hemisphere_rays(t, hit);
     for (int64_t i = 0; i < count; i++) {
         const int k = t->names[doubts[i].ray].number;
         ray_of[k] = doubts[i].ray;
@@ -264,7 +264,7 @@ static void settle_light(tracer *t, const render_hit *hit, const kernel_doubt *d
 {
     kernel_straight *ray = &t->rays[doubt->ray];
     if (!ray->is_open) return;
-    look_at_light(t, hit, t->names[doubt->ray].number - RENDER_MAX_SAMPLES);
+    set_light_ray(t, hit, t->names[doubt->ray].number - RENDER_MAX_SAMPLES);
     t->bundle.open = 1;
     ask_cell(t, doubt->occluder);
     ray->is_open = t->bundle.open;

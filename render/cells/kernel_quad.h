@@ -339,7 +339,7 @@ typedef struct kernel_patch_at {
     vf sx, sy, rx, ry, det, dx, dy;
 } kernel_patch_at;
 
-SIMD_INLINE kernel_patch_at kernel_patch_look(const kernel_patch *p, vf s, vf r)
+SIMD_INLINE kernel_patch_at kernel_patch_evaluate(const kernel_patch *p, vf s, vf r)
 {
     kernel_patch_at at;
     at.rx = p->gx + s * p->hx, at.ry = p->gy + s * p->hy;
@@ -356,7 +356,7 @@ enum { KERNEL_PATCH_STEPS = 4 };
 SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    const kernel_patch_at at = kernel_patch_look(p, *s, *r);
+    const kernel_patch_at at = kernel_patch_evaluate(p, *s, *r);
     const vf inverse = vf_select(vf_eq(at.det, zero), zero, 1.0f / at.det);
     *s = vf_clamp(*s + (at.dx * at.ry - at.dy * at.rx) * inverse, zero, one);
     *r = vf_clamp(*r + (at.sx * at.dy - at.sy * at.dx) * inverse, zero, one);
@@ -369,7 +369,7 @@ SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
 SIMD_INLINE vm kernel_patch_arrived(const kernel_patch *p, vf s, vf r)
 {
     const vf one = vf_set(1);
-    const kernel_patch_at at = kernel_patch_look(p, s, r);
+    const kernel_patch_at at = kernel_patch_evaluate(p, s, r);
     const vf e = vf_abs(p->ex) + vf_abs(p->ey), g = vf_abs(p->gx) + vf_abs(p->gy);
     const vf rim = vf_min(vf_min(s, one - s), vf_min(r, one - r));
     const vm open = vf_lt(e * (p->gz + 0.5f * g) + g * p->ez, vf_abs(at.det) * 8.0f);

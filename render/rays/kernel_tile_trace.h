@@ -173,8 +173,9 @@ typedef void kernel_tile_take(kernel_tile_trace *t, int part, const struct kerne
 
 /* Returns the node's placement with those of the given blocks that it may meet; none if its values are invisible.
  * interest is NULL if all values are visible. */
-SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                              const kernel_interest *interest, int64_t node, unsigned blocks)
+SIMD_INLINE kernel_placement kernel_tile_classify_node(const kernel_tile_trace *t, const mmbvh *tree,
+                                                       const mmbvh_ranges *ranges, const kernel_interest *interest,
+                                                       int64_t node, unsigned blocks)
 {
     kernel_placement placement = {0};
     if (interest && !kernel_node_shows(interest, ranges, node)) return placement;
@@ -200,7 +201,7 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
     kernel_tile_entry stack[MMBVH_MAX_DEPTH + 1];
     int top = 0;
     if (!tree->node_count) return;
-    const kernel_placement root = kernel_tile_look(t, tree, ranges, interest, 0, blocks);
+    const kernel_placement root = kernel_tile_classify_node(t, tree, ranges, interest, 0, blocks);
     if (root.blocks) stack[top++] = (kernel_tile_entry){0, root.near, root.blocks};
     while (top) {
         const kernel_tile_entry e = stack[--top];
@@ -212,8 +213,8 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
             visit(t, part, tree->cells + ref, count, blocks);
             continue;
         }
-        const kernel_placement left = kernel_tile_look(t, tree, ranges, interest, ref, blocks);
-        const kernel_placement right = kernel_tile_look(t, tree, ranges, interest, ref + 1, blocks);
+        const kernel_placement left = kernel_tile_classify_node(t, tree, ranges, interest, ref, blocks);
+        const kernel_placement right = kernel_tile_classify_node(t, tree, ranges, interest, ref + 1, blocks);
         const kernel_tile_entry entries[2] = {{ref, left.near, left.blocks}, {ref + 1, right.near, right.blocks}};
         const int far = left.along < right.along;
         if (entries[far].blocks) stack[top++] = entries[far];

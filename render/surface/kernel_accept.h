@@ -268,20 +268,20 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
 }
 
 /* Properties of hits before lighting: a vector along the normal, in camera axes, and the colour. */
-typedef struct kernel_look {
+typedef struct kernel_shading_input {
     vf normal[3], colour[3];
-} kernel_look;
+} kernel_shading_input;
 
-SIMD_INLINE kernel_look kernel_look_of(const vf normal[3], const vf colour[3])
+SIMD_INLINE kernel_shading_input kernel_shading_input_of(const vf normal[3], const vf colour[3])
 {
-    return (kernel_look){{normal[0], normal[1], normal[2]}, {colour[0], colour[1], colour[2]}};
+    return (kernel_shading_input){{normal[0], normal[1], normal[2]}, {colour[0], colour[1], colour[2]}};
 }
 
 /* Moves hits whose normals need samples of other ranks to the thread's waiting list, and emits a placeholder fragment
  * for each, at which volumes are cut. Returns the remaining hits. reach: distance to the samples; hits with 0 do not
  * wait. */
 static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, const kernel_surface *s, int value,
-                                                            vm hit, vf t, vf reach, const kernel_look *look)
+                                                            vm hit, vf t, vf reach, const kernel_shading_input *look)
 {
     const vf *normal = look->normal, *colour = look->colour;
     render_pending_list *list = &p->thread->waiting;
@@ -295,8 +295,8 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
     for (unsigned left = vm_bits(waits); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
         list->items[list->count] = (render_pending_hit){p->pixel[i], s->first_kind + (uint32_t)value, t[i], reach[i]};
-        list->looks[list->count++] = (render_pending_shading){{normal[0][i], normal[1][i], normal[2][i]},
-                                                              {colour[0][i], colour[1][i], colour[2][i]}};
+        list->shadings[list->count++] = (render_pending_shading){{normal[0][i], normal[1][i], normal[2][i]},
+                                                                 {colour[0][i], colour[1][i], colour[2][i]}};
     }
     return vm_andnot(hit, waits);
 }

@@ -20,7 +20,7 @@ SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface 
     for (int value = 0; value < s->layer->value_count; value++) {
         const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
         if (!vm_any(mine)) continue;
-        kernel_look look = kernel_look_of(hits->normal, hits->colour);
+        kernel_shading_input look = kernel_shading_input_of(hits->normal, hits->colour);
         ready = vm_or(ready, kernel_differ(p, s, value, mine, p->t_far, hits->reach, &look));
         for (int a = 0; a < 3; a++) hits->normal[a] = look.normal[a];
     }
@@ -59,8 +59,8 @@ static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, c
         for (int a = 0; a < 3; a++) {
             normal[a] = colour[a] = vf_set(0);
             for (int n = 0; n < run.count; n++) {
-                normal[a][run.lanes[n]] = list->looks[i + n].normal[a];
-                colour[a][run.lanes[n]] = list->looks[i + n].colour[a];
+                normal[a][run.lanes[n]] = list->shadings[i + n].normal[a];
+                colour[a][run.lanes[n]] = list->shadings[i + n].colour[a];
             }
         }
         kernel_load_about(&run, samples + i, &about);

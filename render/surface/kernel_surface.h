@@ -39,7 +39,7 @@
 /* Computes the normals of hits by differences, and returns the hits. If other ranks may have samples, hits are moved to
  * the waiting list instead, and only the remaining ones are returned. */
 SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
-                             kernel_look *look)
+                             kernel_shading_input *look)
 {
     if (p->frame->job->waiting) return kernel_defer_hits(p, s, value, hit, t, reach, look);
     kernel_differences(p, s, value, hit, t, reach, look->normal);
@@ -51,7 +51,7 @@ typedef struct kernel_accepted {
     int value;
     vf t, reach;
     vf opacity; /* used only by transparent surfaces */
-    kernel_look look;
+    kernel_shading_input look;
     kernel_hit_cells cells;
 } kernel_accepted;
 
@@ -59,7 +59,7 @@ typedef struct kernel_accepted {
 static __attribute__((noinline, cold)) void kernel_accept_tied(kernel_packet *p, const kernel_surface *s, vm tied,
                                                                const kernel_accepted *h)
 {
-    kernel_look own = h->look;
+    kernel_shading_input own = h->look;
     vm ready = tied;
     if (s->layer->normal == RENDER_DIFFERENCES) ready = kernel_differ(p, s, h->value, tied, h->t, h->reach, &own);
     if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, tied, h->t, &h->cells, own.normal);

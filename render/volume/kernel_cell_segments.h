@@ -226,9 +226,9 @@ typedef struct kernel_subinterval_values {
 
 /* Computes the subinterval's largest sampled deviation from its chord, and the range of its values, from the field at
  * its middle and quarters. */
-static kernel_subinterval_values kernel_subinterval_look(const kernel_bisection *h, const kernel_knot *from,
-                                                         kernel_subinterval *sub, const kernel_knot *first,
-                                                         const kernel_knot *third)
+static kernel_subinterval_values kernel_subinterval_sample(const kernel_bisection *h, const kernel_knot *from,
+                                                           kernel_subinterval *sub, const kernel_knot *first,
+                                                           const kernel_knot *third)
 {
     const double a = from->v, b = sub->end.v, rise = b - a;
     kernel_subinterval_values out = {0, fmin(a, b), fmax(a, b)};
@@ -389,7 +389,7 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
         kernel_subinterval sub = stack[--count];
         const kernel_knot first = kernel_knot_between(h, &from, &sub.middle, 0.5);
         const kernel_knot third = kernel_knot_between(h, &sub.middle, &sub.end, 0.5);
-        const kernel_subinterval_values values = kernel_subinterval_look(h, &from, &sub, &first, &third);
+        const kernel_subinterval_values values = kernel_subinterval_sample(h, &from, &sub, &first, &third);
         const kernel_step *step = kernel_step_between(h, values.low, values.high);
         const kernel_medium_range s = kernel_subinterval_range(h, &values, sub.middle.v, step);
         const double length = (sub.end.t - from.t) * h->per_t;

@@ -223,7 +223,7 @@ insitu_status session_differ_fragments(MPI_Comm comm, const render_job *job, fra
     d.round_hits = session_mail_round(d.ranks, ROUND_HITS);
     const insitu_status status = compute_differences(&d, fragments, error);
     base_free(d.list->items);
-    base_free(d.list->looks);
+    base_free(d.list->shadings);
     *d.list = (render_pending_list){0};
     *ms += 1e3 * (MPI_Wtime() - start);
     return status;
