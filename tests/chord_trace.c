@@ -38,8 +38,8 @@ static void chord_polyhedron(kernel_packet *p, const chord_state *state, const g
     kernel_polyhedron_interval stay;
     if (!c) p->thread->out_of_memory = true;
     if (!c) return;
-    if (!c->is_placed) {
-        kernel_polyhedron_place(c, p);
+    if (!c->is_transformed) {
+        kernel_polyhedron_transform(c, p);
         for (int i = 0; i <= c->vertex_count; i++) c->f[i] = 0;
     }
     if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
@@ -56,8 +56,8 @@ static void chord_cell(kernel_packet *p, const chord_state *state, const grid_fi
         chord_polyhedron(p, state, field, part, index, rays);
         return;
     }
-    if (!c->is_placed) {
-        kernel_cell_place(c, p, p->frame->job->parts[part].cells);
+    if (!c->is_transformed) {
+        kernel_cell_transform(c, p, p->frame->job->parts[part].cells);
         for (int i = 0; i < c->count; i++) c->f[i] = 0;
     }
     if (c->type == GRID_TET)

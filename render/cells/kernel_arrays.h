@@ -278,7 +278,7 @@ SIMD_INLINE vm kernel_taken_before(bool is_narrow, const kernel_taken a[3], cons
 
 /* Reads the coordinates of one vertex per lane. is_narrow: whether all three arrays are float32 that can be
  * gathered. */
-SIMD_INLINE void kernel_arrays_place(const kernel_arrays *p, bool is_narrow, vi vertex, kernel_taken out[3])
+SIMD_INLINE void kernel_arrays_positions(const kernel_arrays *p, bool is_narrow, vi vertex, kernel_taken out[3])
 {
     for (int a = 0; a < 3; a++) {
         if (is_narrow)

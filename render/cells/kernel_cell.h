@@ -135,7 +135,7 @@ enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSIN
 typedef struct kernel_cell {
     uint32_t serial, index; /* key of the cell cache: number of the tile, index of the cell */
     int part, layer;        /* key of the cell cache: mesh part, and the layer whose field the cell has */
-    bool is_finite, is_placed, is_constant, has_lines, has_normal;
+    bool is_finite, is_transformed, is_constant, has_lines, has_normal;
     int type, count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];
@@ -240,7 +240,7 @@ static __attribute__((noinline, unused)) void kernel_cell_fetch(kernel_cell *c, 
                                                                 uint32_t index)
 {
     c->index = index;
-    c->is_placed = false;
+    c->is_transformed = false;
     c->type = grid_cell_type(g, index);
     if (kernel_has_own_faces(c->type) && kernel_is_tet(g, index, c->vertices))
         c->type = GRID_TET, c->count = 4;
@@ -347,8 +347,8 @@ static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
 }
 
 /* Transforms a position into tile space (kernel_packet.h). */
-SIMD_INLINE void kernel_place_in(const kernel_frame *f, const kernel_tile *tile, const double *world, float *out_x,
-                                 float *out_y, float *out_z)
+SIMD_INLINE void kernel_transform_in_tile(const kernel_frame *f, const kernel_tile *tile, const double *world,
+                                          float *out_x, float *out_y, float *out_z)
 {
     const double *eye = f->job->camera.eye;
     const double d0 = world[0] - eye[0], d1 = world[1] - eye[1], d2 = world[2] - eye[2];
@@ -366,12 +366,13 @@ static __attribute__((noinline, unused)) void kernel_cell_move(kernel_cell *c, c
                                                                const kernel_tile *tile, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
-    for (int i = 0; i < c->count; i++) kernel_place_in(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
-    c->is_placed = true;
+    for (int i = 0; i < c->count; i++) kernel_transform_in_tile(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    c->is_transformed = true;
     c->has_lines = c->has_normal = false;
 }
 
-SIMD_INLINE void kernel_cell_place_in(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)
+SIMD_INLINE void kernel_cell_transform_in_tile(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile,
+                                               const grid *g)
 {
     kernel_cell_move(c, f, tile, g);
     kernel_cell_order(c);

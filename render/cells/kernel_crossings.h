@@ -146,9 +146,9 @@ static __attribute__((noinline, cold)) void kernel_triangle_mend(const kernel_pa
     *ik = vf_select(weak, kernel_edge_between(ax, ay, cx, cy), *ik);
 }
 
-SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
+SIMD_INLINE void kernel_transform(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
 {
-    kernel_place_in(p->frame, p->tile, world, out_x, out_y, out_z);
+    kernel_transform_in_tile(p->frame, p->tile, world, out_x, out_y, out_z);
 }
 
 /* The following functions intersect rays with hexes, wedges and pyramids, which have quadrilateral faces and may be
@@ -168,9 +168,9 @@ SIMD_INLINE void kernel_curved_edge(const kernel_packet *p, const kernel_cell *c
     out->e[a][b] = kernel_edge(p, &c->lines[n], kernel_cell_spot(c, a), kernel_cell_spot(c, b));
 }
 
-SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const grid *g)
+SIMD_INLINE void kernel_cell_transform(kernel_cell *c, const kernel_packet *p, const grid *g)
 {
-    kernel_cell_place_in(c, p->frame, p->tile, g);
+    kernel_cell_transform_in_tile(c, p->frame, p->tile, g);
     if (p->is_pencil) kernel_cell_lines(c, p->frame, p->tile);
 }
 

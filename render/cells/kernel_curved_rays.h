@@ -9,7 +9,7 @@
 
 #include "kernel_crossings.h"
 #include "kernel_packet.h"
-#include "kernel_placed_curved.h"
+#include "kernel_transformed_curved.h"
 #include "kernel_quad.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_trace.h"
@@ -107,7 +107,7 @@ SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kern
     kernel_curved_count(faces, rays, alone, out);
 }
 
-SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel_lane_rays *p, int type,
+SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
                                      kernel_curved_crossed *out)
 {
     const vi all = vi_set((1 << KERNEL_CURVED_FACES) - 1);
@@ -122,13 +122,13 @@ typedef struct kernel_curved_quad {
     vf f[4];
 } kernel_curved_quad;
 
-SIMD_INLINE vi kernel_face_word(const kernel_placed_curved *h, vi lane, vi face)
+SIMD_INLINE vi kernel_face_word(const kernel_transformed_curved *h, vi lane, vi face)
 {
     return vi_from_bits(vf_gather((const float *)(const void *)h->corners, face * SIMD_WIDTH + lane));
 }
 
-SIMD_INLINE void kernel_curved_quad_take(const kernel_placed_curved *h, const kernel_lane_rays *p, int type, vi face,
-                                         kernel_quad *q, kernel_curved_quad *out)
+SIMD_INLINE void kernel_curved_quad_take(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
+                                         vi face, kernel_quad *q, kernel_curved_quad *out)
 {
     const int count = grid_type_vertices(type);
     const vi word = kernel_face_word(h, p->lane, face);
@@ -162,7 +162,7 @@ typedef struct kernel_curved_triangle {
 } kernel_curved_triangle;
 
 /* Returns the rays on which the triangle's weights are not good enough. number: the triangle's, per ray. */
-SIMD_INLINE vm kernel_curved_triangle_weak(const kernel_placed_curved *h, vi lane, vm rays, vi number,
+SIMD_INLINE vm kernel_curved_triangle_weak(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
                                            const kernel_curved_triangle *own)
 {
     const vf weight = kernel_weight(own->e[0], own->e[1], own->e[2]);
@@ -170,7 +170,7 @@ SIMD_INLINE vm kernel_curved_triangle_weak(const kernel_placed_curved *h, vi lan
 }
 
 /* Computes edge functions in doubt, and those of weak weights, again from projected vertices. */
-static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const kernel_placed_curved *h,
+static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const kernel_transformed_curved *h,
                                                                         const kernel_lane_rays *p, vm rays, vi number,
                                                                         const vm doubt[3], kernel_curved_triangle *own)
 {
@@ -191,7 +191,7 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const ke
 
 /* Gathers the corners and edge functions of the triangle `face` for the given rays. Other lanes get valid but
  * meaningless numbers. */
-SIMD_INLINE void kernel_curved_triangle_take(const kernel_placed_curved *h, const kernel_lane_rays *p, int type,
+SIMD_INLINE void kernel_curved_triangle_take(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
                                              vm rays, vi face, kernel_curved_triangle *own)
 {
     const int size = (int)(sizeof(kernel_triangle_lines) / sizeof(float));
@@ -216,7 +216,7 @@ SIMD_INLINE vf kernel_curved_weigh(const kernel_curved_triangle *own, const vf v
     return vf_muladd(own->e[0], v[2], vf_muladd(-own->e[2], v[1], own->e[1] * v[0])) * inverse;
 }
 
-SIMD_INLINE void kernel_curved_triangle_place(const kernel_placed_curved *h, int type, vi lane,
+SIMD_INLINE void kernel_curved_triangle_place(const kernel_transformed_curved *h, int type, vi lane,
                                               const kernel_curved_triangle *own, kernel_point *out)
 {
     const int count = grid_type_vertices(type);
@@ -232,7 +232,7 @@ SIMD_INLINE void kernel_curved_triangle_place(const kernel_placed_curved *h, int
     }
 }
 
-SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel_lane_rays *p, int type, vi faces,
+SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type, vi faces,
                                      kernel_point out[2])
 {
     const vi face[2] = {faces & 7, faces >> 3 & 7};

@@ -80,7 +80,8 @@ typedef struct kernel_double_spot {
     double x, y, depth, t, value;
 } kernel_double_spot;
 
-SIMD_INLINE kernel_double_spot kernel_double_place(const kernel_frame *f, const kernel_tile *tile, const double *world)
+SIMD_INLINE kernel_double_spot kernel_double_transform(const kernel_frame *f, const kernel_tile *tile,
+                                                       const double *world)
 {
     double place[3] = {0, 0, 0};
     for (int a = 0; a < 3; a++)

@@ -50,7 +50,7 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
     kernel_double_spot spots[4];
     kernel_affine edges[KERNEL_TET_EDGES];
     for (int i = 0; i < 4; i++) {
-        spots[i] = kernel_double_place(f, tile, c->world[i]);
+        spots[i] = kernel_double_transform(f, tile, c->world[i]);
         spots[i].value = kernel_double_domain(transfer, c->values[i]);
     }
     for (int n = 0; n < KERNEL_TET_EDGES; n++)
@@ -160,7 +160,7 @@ static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, cons
 {
     double d[4][GRID_MAX_CELL_VERTICES];
     for (int i = 0; i < c->count; i++) {
-        const kernel_double_spot spot = kernel_double_place(p->frame, p->tile, c->world[i]);
+        const kernel_double_spot spot = kernel_double_transform(p->frame, p->tile, c->world[i]);
         d[0][i] = spot.x;
         d[1][i] = spot.y;
         d[2][i] = spot.t;

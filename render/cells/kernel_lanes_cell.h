@@ -13,8 +13,8 @@
 #include "simd.h"
 
 /* Transforms one vertex per lane into tile space. */
-SIMD_INLINE void kernel_lanes_place(const kernel_frame *f, const kernel_tile *tile, const kernel_whole *const world[3],
-                                    vf out[3])
+SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile *tile,
+                                        const kernel_whole *const world[3], vf out[3])
 {
     const double *eye = f->job->camera.eye;
     for (int half = 0; half < 2; half++) {

@@ -376,7 +376,7 @@ SIMD_INLINE void kernel_point_ends(const kernel_interval *i, kernel_point *in, k
 }
 
 /* Interpolates the reference coordinates between two points of each ray, at depth t. */
-SIMD_INLINE void kernel_place_between(const kernel_point *low, const kernel_point *high, vf t, vf r[3])
+SIMD_INLINE void kernel_reference_between(const kernel_point *low, const kernel_point *high, vf t, vf r[3])
 {
     const vf length = high->t - low->t;
     const vf along = vf_select(vf_lt(vf_set(0), length), (t - low->t) / length, vf_set(0));

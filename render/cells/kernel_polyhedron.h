@@ -141,10 +141,10 @@ SIMD_INLINE kernel_edge_error kernel_polyhedron_line(polyhedron *c, const kernel
     return kernel_line_error(&line, p->tile->radius, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
 }
 
-SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
+SIMD_INLINE void kernel_polyhedron_transform(polyhedron *c, const kernel_packet *p)
 {
-    for (int i = 0; i <= c->vertex_count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
-    c->is_placed = true;
+    for (int i = 0; i <= c->vertex_count; i++) kernel_transform(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    c->is_transformed = true;
     if (!p->is_pencil) return;
     kernel_edge_error most = {0, 0};
     for (int i = 0; i < c->edge_count; i++)

@@ -9,7 +9,7 @@
 #include "kernel_cell.h"
 #include "kernel_crossings.h"
 #include "kernel_packet.h"
-#include "kernel_placed.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_trace.h"
 #include "simd.h"
@@ -20,12 +20,12 @@ typedef struct kernel_tets {
     const kernel_packet *packet;
     const kernel_cell *one;
     const kernel_lane_rays *own;
-    const kernel_placed *placed;
+    const kernel_transformed_tets *transformed;
 } kernel_tets;
 
-/* Returns a number of each ray's tet: a member of kernel_cell, or one of kernel_placed. */
+/* Returns a number of each ray's tet: a member of kernel_cell, or one of kernel_transformed_tets. */
 #define KERNEL_TET_NUMBER(t, of_one, of_placed)                                                                        \
-    ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->placed->of_placed, (t)->own->lane))
+    ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->transformed->of_placed, (t)->own->lane))
 
 /* Returns a copy for a function that is not inlined, so that the original stays in registers. */
 SIMD_INLINE kernel_tets kernel_tets_copy(const kernel_tets *t, kernel_lane_rays *rays)
@@ -191,7 +191,7 @@ static __attribute__((noinline, cold)) kernel_ends kernel_tets_mend(const kernel
                                                                     const vf e[KERNEL_TET_EDGES], bool has_colour)
 {
     const kernel_tets one = {.is_one = true, .packet = t->packet, .one = t->one};
-    const kernel_tets several = {.own = t->own, .placed = t->placed};
+    const kernel_tets several = {.own = t->own, .transformed = t->transformed};
     return t->is_one ? kernel_tets_choose_exactly(&one, rays, e, has_colour)
                      : kernel_tets_choose_exactly(&several, rays, e, false);
 }
@@ -244,9 +244,10 @@ SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *
 
 /* ---- rays with a tet each ---- */
 
-SIMD_INLINE void kernel_tet_rays_interval(const kernel_placed *placed, const kernel_lane_rays *r, kernel_interval *out)
+SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
+                                          kernel_interval *out)
 {
-    const kernel_tets tets = {.own = r, .placed = placed};
+    const kernel_tets tets = {.own = r, .transformed = transformed};
     kernel_tets_interval(&tets, r->active, true, false, out);
 }
 

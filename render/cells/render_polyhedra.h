@@ -23,7 +23,7 @@ typedef struct polyhedron {
     struct polyhedron *next; /* next polyhedron in the same slot of the store's hash table */
     uint32_t index;
     int part, layer;
-    bool is_finite, is_placed, is_constant;
+    bool is_finite, is_transformed, is_constant;
     bool is_star; /* true if no tet's sign is negative: the cell is star-shaped from its centre */
     bool has_slopes;
     int vertex_count, edge_count, facet_count;

@@ -12,7 +12,7 @@
 #include "kernel_crossings.h"
 #include "kernel_curved_rays.h"
 #include "kernel_local.h"
-#include "kernel_placed_curved.h"
+#include "kernel_transformed_curved.h"
 #include "kernel_quad.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_trace.h"

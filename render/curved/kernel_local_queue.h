@@ -13,7 +13,7 @@
 #include "kernel_interest.h"
 #include "kernel_lanes_cell.h"
 #include "kernel_local.h"
-#include "kernel_placed_curved.h"
+#include "kernel_transformed_curved.h"
 #include "kernel_tile.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
@@ -179,8 +179,8 @@ SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigne
 /* Transforms the fetched cells into tile space. lists[0] to lists[2] get the vertices' positions, lists[3] the field;
  * all list_count rows are then sorted by the vertices' canonical order. Returns a mask of the visible cells. *lanes:
  * mask of those that can be processed in lanes. */
-SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local_lanes *l, vf (*lists)[8],
-                                        int list_count, float most_bent, unsigned *lanes, int type)
+SIMD_INLINE unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_local_lanes *l, vf (*lists)[8],
+                                            int list_count, float most_bent, unsigned *lanes, int type)
 {
     const int count = grid_type_vertices(type);
     const vm shows = kernel_local_domain(&t->frame->volumes[l->volume], l->scalars, count, lists[3]);
@@ -189,7 +189,7 @@ SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local
         vf at[3];
         for (int a = 0; a < 3; a++) memcpy(&places[a], l->world[a][i], sizeof places[a]);
         const kernel_whole *const world[3] = {&places[0], &places[1], &places[2]};
-        kernel_lanes_place(t->frame, &t->tile, world, at);
+        kernel_lanes_transform(t->frame, &t->tile, world, at);
         for (int a = 0; a < 3; a++) lists[a][i] = at[a];
     }
     kernel_local_turn(type, lists, list_count);

@@ -168,16 +168,16 @@ SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_curv
 }
 
 /* Reads the vertices' positions and rotates them into the camera's axes. */
-SIMD_INLINE void kernel_curved_lanes_place(const kernel_finder *s, const kernel_cells *c, int count,
-                                           kernel_curved_lanes *l)
+SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const kernel_cells *c, int count,
+                                               kernel_curved_lanes *l)
 {
     l->count = count;
     l->usual = vm_all_lanes();
     for (int i = 0; i < count; i++) {
         vf from_eye[3];
-        kernel_found_place(s, kernel_cells_vertex(c, i), from_eye);
+        kernel_found_positions(s, kernel_cells_vertex(c, i), from_eye);
         l->usual = kernel_usual_place(l->usual, from_eye);
-        kernel_place_turn(s, from_eye, l->at[i]);
+        kernel_rotate_to_camera(s, from_eye, l->at[i]);
     }
 }
 
@@ -220,7 +220,7 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
     kernel_curved_lanes l;
     kernel_taken v[4];
     for (int i = 0; i < 4; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
-    kernel_curved_lanes_place(s, c, 4, &l);
+    kernel_curved_lanes_transform(s, c, 4, &l);
     const vm usual = l.usual;
     for (int value = 0; value < s->surface->layer->value_count; value++) {
         const kernel_level level = kernel_level_of(s->surface->layer->values[value]);
@@ -252,7 +252,7 @@ SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int ver
     kernel_ends_lanes e;
     kernel_taken v[8];
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
-    kernel_curved_lanes_place(s, c, vertices, &l);
+    kernel_curved_lanes_transform(s, c, vertices, &l);
     const vf size = kernel_curved_lanes_values(s, v, vertices, &level, &l);
     /* `power` has the bits of the power of two that scales the largest value to near 1: its exponent is the negated
      * one. */

@@ -30,9 +30,9 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
         kernel_arrays_values(&s->arrays, vertex, c->cell, &value);
         v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_whole_narrow(&value.wide);
         usual = vm_and(usual, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
-        kernel_found_place(s, vertex, place);
+        kernel_found_positions(s, vertex, place);
         usual = kernel_usual_place(usual, place);
-        kernel_place_turn(s, place, at);
+        kernel_rotate_to_camera(s, place, at);
         kernel_ends_add(s, &e, at, vm_all_lanes());
     }
     const vm shows = kernel_interest_meets_values(s->interest, v, c->vertices);

@@ -247,7 +247,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
         double world[3];
         float place[3];
         grid_vertex(g, vertex, world);
-        kernel_place_in(s->frame, &s->picture, world, &place[0], &place[1], &place[2]);
+        kernel_transform_in_tile(s->frame, &s->picture, world, &place[0], &place[1], &place[2]);
         for (int a = 0; a < 3; a++) {
             low[a] = simd_min(place[a], low[a]);
             high[a] = simd_max(place[a], high[a]);
@@ -265,7 +265,7 @@ static __attribute__((noinline)) void kernel_find_whole(kernel_finder *s, kernel
 {
     kernel_outline o;
     kernel_candidate candidate = {.cell = c->index, .source = source};
-    if (!c->is_placed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
+    if (!c->is_transformed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
     kernel_vertex_outline(c, &o);
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
@@ -292,7 +292,7 @@ typedef struct kernel_ends_lanes {
 } kernel_ends_lanes;
 
 /* Reads each lane's vertex as a position relative to the eye, multiplied by the space's scale. */
-SIMD_INLINE void kernel_found_place(const kernel_finder *s, vi vertex, vf out[3])
+SIMD_INLINE void kernel_found_positions(const kernel_finder *s, vi vertex, vf out[3])
 {
     const render_job *job = s->frame->job;
     for (int a = 0; a < 3; a++) {
@@ -312,7 +312,7 @@ SIMD_INLINE vm kernel_usual_place(vm usual, const vf place[3])
 }
 
 /* Rotates positions relative to the eye into the camera's axes: right, up and forward. */
-SIMD_INLINE void kernel_place_turn(const kernel_finder *s, const vf place[3], vf at[3])
+SIMD_INLINE void kernel_rotate_to_camera(const kernel_finder *s, const vf place[3], vf at[3])
 {
     const render_camera *camera = &s->frame->job->camera;
     const double *axes[3] = {camera->right, camera->up, camera->forward};

@@ -54,7 +54,7 @@ static void kernel_smooth_setup(const kernel_packet *p, const render_surface_lay
     out->part = part;
     out->index = index;
     kernel_cell_fetch(c, g, &layer->field.fields[part], (uint32_t)index);
-    kernel_cell_place_in(c, p->frame, p->tile, g);
+    kernel_cell_transform_in_tile(c, p->frame, p->tile, g);
     for (int i = 0; i < c->count; i++) {
         double gradient[3];
         kernel_vertex_gradient(p->frame, &layer->gradients[part], c->vertices[i], gradient);

@@ -17,7 +17,7 @@
 #include "kernel_cell_values.h"
 #include "kernel_crossings.h"
 #include "kernel_map.h"
-#include "kernel_placed.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_shapes.h"
 #include "kernel_surface.h"
 #include "kernel_surface_cells.h"
@@ -36,7 +36,7 @@ _Static_assert(SIMD_WIDTH *KERNEL_BATCH_PIXELS <= KERNEL_LIST_PIXELS, "a batch's
 
 typedef struct kernel_batch {
     const kernel_surface_cells *own; /* the cells being traced */
-    kernel_placed tets;              /* transformed cells; f is the field minus the isovalue, scaled */
+    kernel_transformed_tets tets;    /* transformed cells; f is the field minus the isovalue, scaled */
     bool is_of_faces;                /* copy of the layer's is_of_faces */
     bool has_normals;
     vf normal[3];
@@ -79,12 +79,12 @@ static __attribute__((noinline)) void kernel_batch_cell(const kernel_tile_trace 
                                                         kernel_cell *c)
 {
     const render_surface_layer *layer = t->surface->layer;
-    kernel_placed_cell(&b->tets, n, c);
+    kernel_transformed_tets_cell(&b->tets, n, c);
     c->part = b->own->part;
     c->index = b->own->cell[n];
     c->has_normal = true;
     for (int a = 0; a < 3; a++) c->normal[a] = b->normal[a][n];
-    if (layer->normal == RENDER_DIFFERENCES || layer->lines) kernel_placed_exactly(&b->tets, n, c);
+    if (layer->normal == RENDER_DIFFERENCES || layer->lines) kernel_transformed_tets_double(&b->tets, n, c);
     if (!layer->colour_map && !layer->lines) return;
     for (int i = 0; i < 4; i++) c->vertices[i] = b->tets.vertex[i][n];
     if (layer->colour_map) kernel_values_colours(t->surface, c->part, c->index, c->vertices, 4, c->g);
@@ -157,7 +157,7 @@ static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, ker
     const bool by_ray = kernel_tile_layer_batches(t) && !layer->colour_map && !layer->lines;
     const int most = by_ray ? KERNEL_BATCH_PIXELS : 0;
     kernel_surface_cells_close(own);
-    kernel_place_tets(&b->tets, &own->arrays, t->frame, &t->tile, own->vertex, own->count);
+    kernel_transform_tets(&b->tets, &own->arrays, t->frame, &t->tile, own->vertex, own->count);
     kernel_lanes_relative(b->tets.values, 4, own->isovalue, b->tets.f);
     b->own = own;
     b->is_of_faces = layer->is_of_faces;

@@ -29,7 +29,7 @@
 #include "kernel_lines.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
-#include "kernel_placed_curved.h"
+#include "kernel_transformed_curved.h"
 #include "kernel_roots.h"
 #include "kernel_shapes.h"
 #include "kernel_surface.h"
@@ -45,7 +45,7 @@ enum { KERNEL_CURVED_PIXELS = 64 };
 
 typedef struct kernel_curved_batch {
     const kernel_surface_cells *own; /* the cells being traced */
-    kernel_placed_curved placed;
+    kernel_transformed_curved transformed;
     /* colour field by vertex and lane, as in kernel_cell.g; set only if the layer has one */
     float colours[8][SIMD_WIDTH];
     float lines[8][SIMD_WIDTH]; /* field of the contour lines by vertex and lane; set only if the layer has lines */
@@ -68,7 +68,7 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
 SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h)
 {
     return (kernel_curved){.type = h->own->type,
-                           .at = (const float(*)[8][SIMD_WIDTH])h->placed.at,
+                           .at = (const float(*)[8][SIMD_WIDTH])h->transformed.at,
                            .colours = (const float(*)[SIMD_WIDTH])h->colours,
                            .bounds = &h->bounds};
 }
@@ -80,12 +80,12 @@ SIMD_INLINE void kernel_curved_ready(const kernel_tile_trace *t, kernel_curved_b
 {
     if (h->ready >> n & 1) return;
     h->ready |= 1u << n;
-    kernel_placed_curved_cell(&h->placed, h->own->type, n, &h->cells[n]);
+    kernel_transformed_curved_cell(&h->transformed, h->own->type, n, &h->cells[n]);
     kernel_cell_lines(&h->cells[n], t->frame, &t->tile);
     h->cells[n].part = h->own->part;
     h->cells[n].index = h->own->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
-    for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->placed.vertex[i][n];
+    for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->transformed.vertex[i][n];
 }
 
 /* Traces the rays in `wanted` one by one in their cells; rays of one cell and packet are traced together. Returns the
@@ -183,7 +183,7 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         if (!vm_any(p.active)) continue;
         kernel_contraction_of(&h->bounds, p.lane, type, &c);
         kernel_contract(&c, &ray, p.active, &at, type);
-        const vf depth = at.t + kernel_take(h->placed.at[2][0], p.lane);
+        const vf depth = at.t + kernel_take(h->transformed.at[2][0], p.lane);
         kept = kernel_curved_batch_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))), kept);
     }
     h->rays.count = kept;
@@ -210,7 +210,7 @@ SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_cu
         p.far = kernel_batch_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_take(h->own->near, p.lane), p.far));
         if (!vm_any(p.active)) continue;
-        kernel_curved_faces(&h->placed, &p, type, &crossed);
+        kernel_curved_faces(&h->transformed, &p, type, &crossed);
         const vi both = crossed.first | crossed.last << 3;
         for (int i = 0; i < SIMD_WIDTH; i++) faces[i] = (uint8_t)both[i];
         for (unsigned bits = vm_bits(crossed.two); bits; bits &= bits - 1) {
@@ -245,7 +245,7 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
         const vi faces = kernel_bytes(h->faces + n);
         kernel_lane_rays_begin(&p, t, &h->met, n);
         p.far = kernel_batch_far(t, p.at);
-        kernel_curved_cross(&h->placed, &p, type, faces, ends);
+        kernel_curved_cross(&h->transformed, &p, type, faces, ends);
         vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(vf_set(t->t_near), ends[1].t));
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
         const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
@@ -268,7 +268,7 @@ SIMD_INLINE void kernel_curved_batch_along(const kernel_tile_trace *t, const ker
 {
     kernel_map map;
     vf c[8];
-    kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->placed.at, lane, &map, type);
+    kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, lane, &map, type);
     kernel_maps_polynomial((const float(*)[SIMD_WIDTH])h->lines, lane, c, type);
     kernel_map_along(&t->tile, &map, c, r, out);
 }
@@ -282,7 +282,7 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const ke
     const int count = grid_type_vertices(h->own->type);
     for (int n = 0; n < h->own->count; n++)
         for (int i = 0; i < count; i++) {
-            const int64_t vertex = h->placed.vertex[i][n];
+            const int64_t vertex = h->transformed.vertex[i][n];
             const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->own->cell[n] : vertex);
             h->colours[i][n] = (float)((v - s->colour.low) * s->colour.inverse_width);
         }
@@ -301,7 +301,7 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kern
     const grid_field *field = &t->surface->layer->lines->field.fields[h->own->part];
     for (int n = 0; n < h->own->count; n++)
         for (int i = 0; i < grid_type_vertices(h->own->type); i++)
-            h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->placed.vertex[i][n]);
+            h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->transformed.vertex[i][n]);
 }
 
 /* Computes the colours of hits if the surface has a colour field or contour lines. */
@@ -397,7 +397,7 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
             ends[e].value = vf_load(found->v[e] + n);
             for (int a = 0; a < 3; a++) ends[e].r[a] = vf_load(found->r[e][a] + n);
         }
-        kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->placed.at, p.lane, &map, type);
+        kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, p.lane, &map, type);
         if (is_contracted) {
             at = ends[0];
             kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
@@ -493,16 +493,16 @@ SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved
 
 /* Transforms the queued cells, and lists their rays; cells whose rays are not traced in lanes go to packets one by one.
  */
-static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                                kernel_surface_cells *own)
+static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                    kernel_surface_cells *own)
 {
     const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
     const bool by_ray = kernel_tile_layer_batches(t);
     kernel_surface_cells_close(own);
     h->own = own;
-    const vm collapsed =
-        kernel_place_curved(&h->placed, &own->arrays, t->frame, &t->tile, own->vertex, own->isovalue, own->type);
-    kernel_bounds_of(own->type, (const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
+    const vm collapsed = kernel_transform_curved(&h->transformed, &own->arrays, t->frame, &t->tile, own->vertex,
+                                                 own->isovalue, own->type);
+    kernel_bounds_of(own->type, (const float(*)[8][SIMD_WIDTH])h->transformed.at, &beam, &h->bounds);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
     h->ready = 0;
@@ -526,7 +526,7 @@ static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trac
 static __attribute__((noinline)) void kernel_curved_batch_run(kernel_tile_trace *t, kernel_curved_batch *h,
                                                               kernel_surface_cells *own)
 {
-    kernel_curved_batch_place(t, h, own);
+    kernel_curved_batch_transform(t, h, own);
     if (h->rays.count) kernel_curved_batch_trace(t, h);
     own->count = 0;
 }

@@ -100,8 +100,8 @@ static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uin
     for (int n = 0; n < count; n++) {
         kernel_cell *c = kernel_cell_find(p, probe->layer, part, &field->fields[part], cells[n]);
         if (!c->is_finite || kernel_has_own_faces(c->type)) continue;
-        const bool is_fresh = !c->is_placed;
-        if (is_fresh) kernel_cell_place(c, p, p->frame->job->parts[part].cells);
+        const bool is_fresh = !c->is_transformed;
+        if (is_fresh) kernel_cell_transform(c, p, p->frame->job->parts[part].cells);
         if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_values(probe, c);
         const vm near = kernel_probe_in_box(p, probe, c, rays);
         if (vm_any(near)) kernel_probe_cell(p, probe, c, near);

@@ -45,7 +45,8 @@ enum {
     KERNEL_SLAB_ROWS
 };
 
-/* A hex's record: 8 vertices with their values less the isovalue, corners as in kernel_placed_curved, and no more. */
+/* A hex's record: 8 vertices with their values less the isovalue, corners as in kernel_transformed_curved, and no more.
+ */
 enum { KERNEL_CURVED_RECORD_QUADS = 32, KERNEL_CURVED_RECORD_WORDS = 40 };
 
 /* A cell, and one of the isovalues that cross it. */

@@ -148,22 +148,22 @@ static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, co
                                                &o->surface->layer->field.fields[part], part, o->layer, occluder->cell);
     if (!c) p->thread->out_of_memory = true;
     if (!c || !c->is_finite) return;
-    c->has_slopes = c->is_placed = false;
+    c->has_slopes = c->is_transformed = false;
     o->world = c->world;
     o->vertex_count = c->vertex_count;
     if (!kernel_values_straddle(c->values, c->vertex_count, value)) return;
-    kernel_polyhedron_place(c, p);
+    kernel_polyhedron_transform(c, p);
     c->scale = kernel_values_relative(c->values, c->vertex_count + 1, value, c->f);
     kernel_occlusion_polyhedron(p, o, c, p->active);
 }
 
-SIMD_INLINE void kernel_occlusion_place(const kernel_packet *p, kernel_cell *c, int part)
+SIMD_INLINE void kernel_occlusion_transform(const kernel_packet *p, kernel_cell *c, int part)
 {
-    if (!c->is_placed) {
-        kernel_cell_place_in(c, p->frame, p->tile, p->frame->job->parts[part].cells);
+    if (!c->is_transformed) {
+        kernel_cell_transform_in_tile(c, p->frame, p->tile, p->frame->job->parts[part].cells);
         return;
     }
-    for (int i = 0; i < c->count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    for (int i = 0; i < c->count; i++) kernel_transform(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->has_lines = c->has_normal = false;
 }
 
@@ -180,7 +180,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
     if (!c->is_finite) return;
     o->world = c->world;
     o->vertex_count = c->count;
-    kernel_occlusion_place(p, c, occluder->part);
+    kernel_occlusion_transform(p, c, occluder->part);
     kernel_cell_relative(c, layer->values[occluder->value]);
     if (kernel_is_linear(c->type))
         kernel_occlusion_tet(p, o, c, p->active);

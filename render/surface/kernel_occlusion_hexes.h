@@ -11,7 +11,7 @@
 #include "kernel_curved_rays.h"
 #include "kernel_map.h"
 #include "kernel_occluders.h"
-#include "kernel_placed_curved.h"
+#include "kernel_transformed_curved.h"
 #include "kernel_shapes.h"
 #include "kernel_wide.h"
 #include "simd.h"
@@ -20,7 +20,7 @@ typedef struct kernel_curved_pairs {
     int count;
     int32_t ray[SIMD_WIDTH], occluder[SIMD_WIDTH];
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
-    kernel_placed_curved placed;
+    kernel_transformed_curved transformed;
 } kernel_curved_pairs;
 
 SIMD_INLINE bool kernel_doubts_add(kernel_straights *s, int32_t ray, int32_t occluder)
@@ -60,9 +60,9 @@ SIMD_INLINE vi kernel_load_ints(const int32_t *from)
 
 /* Computes the vertices as seen by their rays: x and y across the ray, which is at the origin, and the distance along
  * it. */
-SIMD_INLINE void kernel_pairs_place(kernel_curved_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays)
+SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays)
 {
-    kernel_placed_curved *h = &pairs->placed;
+    kernel_transformed_curved *h = &pairs->transformed;
     const vm along_x = vf_eq(vf_load(rays->axis), vf_set(0)), along_y = vf_eq(vf_load(rays->axis), vf_set(1));
     vf words[2][4];
     for (int i = 0; i < 8; i++) {
@@ -110,7 +110,7 @@ static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pa
 {
     static const kernel_beam beam = {.spread = 0};
     kernel_bounds bounds;
-    kernel_bounds_of(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->placed.at, &beam, &bounds);
+    kernel_bounds_of(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->transformed.at, &beam, &bounds);
     const vf jump = vf_load(bounds.jump);
     return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].value), vf_abs(ends[1].value))));
 }
@@ -124,11 +124,11 @@ SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pa
     int32_t lanes[SIMD_WIDTH];
     for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = i;
     p.lane = kernel_load_ints(lanes);
-    kernel_curved_faces(&pairs->placed, &p, GRID_HEX, &crossed);
+    kernel_curved_faces(&pairs->transformed, &p, GRID_HEX, &crossed);
     kernel_pair_verdict out = {vm_none(), crossed.alone};
     if (!vm_any(crossed.two)) return out;
     p.active = crossed.two;
-    kernel_curved_cross(&pairs->placed, &p, GRID_HEX, crossed.first | crossed.last << 3, ends);
+    kernel_curved_cross(&pairs->transformed, &p, GRID_HEX, crossed.first | crossed.last << 3, ends);
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
     const vm near = vm_and(crossed.two, vf_le(from, to));
     const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
@@ -155,7 +155,7 @@ static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o
         const int from = i < pairs->count ? i : 0;
         kernel_pair_ray(&s->rays[pairs->ray[from]], o->cells[pairs->occluder[from]].record, i, &rays);
     }
-    kernel_pairs_place(pairs, o->hexes, &rays);
+    kernel_pairs_transform(pairs, o->hexes, &rays);
     const vm active = vm_from_bits((1u << pairs->count) - 1);
     const kernel_pair_verdict verdict = kernel_pairs_judge(pairs, active, vf_load(rays.far));
     for (unsigned bits = vm_bits(verdict.blocked); bits; bits &= bits - 1)

@@ -293,7 +293,7 @@ SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_poi
     *to = s->end;
     if (!vm_any(inner)) return;
     kernel_point at = {.t = vf_select(inner, i->t_in + (i->t_out - i->t_in) * u, i->t_out)};
-    kernel_place_between(&s->from, &s->end, at.t, at.r);
+    kernel_reference_between(&s->from, &s->end, at.t, at.r);
     at.value = kernel_solve_lanes(&s->rays, &s->map, i, inner, at.t, at.r, s->failures);
     kernel_point_move(inner, &at, to);
 }
@@ -376,7 +376,7 @@ SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *o
     for (int n = 0; n < KERNEL_BRACKET_STEPS && vm_any(rays); n++) {
         kernel_point at = {.t = kernel_secant(low.t, low.value, high.t, high.value)};
         if (n % 3 == 2) at.t = low.t + (high.t - low.t) * 0.5f;
-        kernel_place_between(&low, &high, at.t, at.r);
+        kernel_reference_between(&low, &high, at.t, at.r);
         at.value = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at.t, at.r, s->failures);
         const vm same = vf_eq(kernel_side(at.value), kernel_side(low.value));
         kernel_point_move(rays, &at, out);

@@ -684,9 +684,9 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *s
     if (!c || !c->is_finite) return;
     for (int value = 0; value < layer->value_count; value++) {
         if (!kernel_values_straddle(c->values, c->vertex_count, layer->values[value])) continue;
-        const bool is_fresh = !c->is_placed;
+        const bool is_fresh = !c->is_transformed;
         if (is_fresh) {
-            kernel_polyhedron_place(c, p);
+            kernel_polyhedron_transform(c, p);
             if (layer->colour_map)
                 c->g[c->vertex_count] =
                     (float)kernel_values_colours(state->surface, part, c->index, c->vertices, c->vertex_count, c->g);

@@ -251,7 +251,7 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
 }
 
-/* Faces' corners as kernel_placed_curved has them. */
+/* Faces' corners as kernel_transformed_curved has them. */
 static void fill_faces(const kernel_cell *c, hex_record *out)
 {
     for (int face = 0; face < 6; face++) {

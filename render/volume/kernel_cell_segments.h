@@ -700,8 +700,8 @@ static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int par
                                                p->frame->surface_count + volume, index);
     if (!c) p->thread->out_of_memory = true;
     if (!c || !c->is_finite || !kernel_values_show(c->values, c->vertex_count, transfer)) return NULL;
-    if (!c->is_placed) {
-        kernel_polyhedron_place(c, p);
+    if (!c->is_transformed) {
+        kernel_polyhedron_transform(c, p);
         kernel_polyhedron_domain(c, transfer);
     }
     return c;

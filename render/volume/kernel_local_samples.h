@@ -21,7 +21,7 @@
 #include "kernel_local_run.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
-#include "kernel_placed.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_samples.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_cells.h"
@@ -188,13 +188,13 @@ static __attribute__((noinline)) void kernel_local_cast(kernel_tile_trace *t, ke
 
 /* ---- cells ---- */
 
-static unsigned kernel_local_place_lanes(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes)
+static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes)
 {
     vf lists[4][8];
-    return KERNEL_OF_TYPE(type, kernel_local_place, t, l, lists, 4, KERNEL_LOCAL_BENT, lanes);
+    return KERNEL_OF_TYPE(type, kernel_local_transform, t, l, lists, 4, KERNEL_LOCAL_BENT, lanes);
 }
 
-static const kernel_local_stages kernel_sample_stages = {true, kernel_local_place_lanes, kernel_local_cast,
+static const kernel_local_stages kernel_sample_stages = {true, kernel_local_transform_lanes, kernel_local_cast,
                                                          kernel_local_fill};
 
 /* Begins the samples of a volume in a window. The packets of the given blocks must be set up. */

@@ -349,12 +349,12 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 
 /* Transforms the queue's cells into tile space; returns the visible ones, and stores in *lanes those that can be
  * processed in lanes. */
-SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, kernel_local_segment_batch *b,
-                                                    unsigned *lanes, int type)
+SIMD_INLINE unsigned kernel_local_segments_transform_of_type(const kernel_tile_trace *t, kernel_local_segment_batch *b,
+                                                             unsigned *lanes, int type)
 {
     vf lists[5][8];
     kernel_local_rank((double(*const)[8][SIMD_WIDTH])b->lanes.world, grid_type_vertices(type), lists[4]);
-    const unsigned showing = kernel_local_place(t, &b->lanes, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes, type);
+    const unsigned showing = kernel_local_transform(t, &b->lanes, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes, type);
     kernel_local_faces_of(&t->tile, lists, b->lanes.ends, type, &b->faces);
     kernel_local_nonlinear_of(&b->lanes.cells, type, &b->budget.nonlinear);
     return showing;
@@ -370,11 +370,11 @@ SIMD_INLINE vm kernel_local_is_steep(const kernel_local_budget *b)
                  kernel_cell_interval_steps(&state, &all, low, high));
 }
 
-static __attribute__((noinline)) unsigned kernel_local_segments_place(kernel_tile_trace *t, kernel_local_lanes *l,
-                                                                      int type, unsigned *lanes)
+static __attribute__((noinline)) unsigned kernel_local_segments_transform(kernel_tile_trace *t, kernel_local_lanes *l,
+                                                                          int type, unsigned *lanes)
 {
     kernel_local_segment_batch *b = (kernel_local_segment_batch *)l;
-    const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_place_of, t, b, lanes);
+    const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_transform_of_type, t, b, lanes);
     const float(*values)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])b->faces.at[3];
     KERNEL_OF_TYPE(type, kernel_local_bound, &b->budget, values);
     *lanes &= ~vm_bits(kernel_local_is_steep(&b->budget));
@@ -415,7 +415,7 @@ static void kernel_local_segments_finish(kernel_tile_trace *t, kernel_local_lane
     kernel_local_segments_shorten(t, (kernel_local_segment_batch *)l);
 }
 
-static const kernel_local_stages kernel_segment_stages = {false, kernel_local_segments_place,
+static const kernel_local_stages kernel_segment_stages = {false, kernel_local_segments_transform,
                                                           kernel_local_segments_cast, kernel_local_segments_finish};
 
 /* Copies the packets' windows and the limits of their rays into arrays per pixel. */

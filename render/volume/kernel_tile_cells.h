@@ -22,7 +22,7 @@
 #include "kernel_map.h"
 #include "kernel_outline.h"
 #include "kernel_packet.h"
-#include "kernel_placed.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_prefetch.h"
 #include "kernel_tile.h"
 #include "kernel_tile_blocks.h"
@@ -50,7 +50,7 @@ typedef struct kernel_tile_cells {
     kernel_map map;       /* inverse map of that cell */
     kernel_arrays arrays; /* arrays of the volume's field on the current mesh part */
     int plain_volume, plain_part;
-    kernel_placed placed;
+    kernel_transformed_tets transformed;
     kernel_block_rays block_rays;
     kernel_local_queue tets;          /* tets that are transformed SIMD_WIDTH at a time */
     kernel_tile_take_tets *take_tets; /* NULL if each tet is processed on its own */
@@ -130,25 +130,26 @@ SIMD_INLINE unsigned kernel_tile_box(unsigned blocks, int box)
 /* ---- SIMD_WIDTH tets at once ---- */
 
 /* Converts the values to the domain of the transfer function. */
-SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transfer *t)
+SIMD_INLINE void kernel_transformed_domain(kernel_transformed_tets *transformed, const kernel_transfer *t)
 {
     for (int half = 0; half < 2; half++)
         for (int i = 0; i < 4; i++) {
-            const kernel_half f = (placed->values[i].half[half] - t->low) * t->inverse_width;
-            kernel_half_put(&placed->f[i], half, kernel_half_hold(f, 1e18));
+            const kernel_half f = (transformed->values[i].half[half] - t->low) * t->inverse_width;
+            kernel_half_put(&transformed->f[i], half, kernel_half_hold(f, 1e18));
         }
 }
 
 /* Returns the lanes whose cells are visible and reach into the window; stores the least depth of each cell. */
-SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const kernel_placed *placed,
-                                           const kernel_interest *interest, float near[SIMD_WIDTH])
+SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
+                                                     const kernel_transformed_tets *transformed,
+                                                     const kernel_interest *interest, float near[SIMD_WIDTH])
 {
-    const vf *z = placed->at[2];
+    const vf *z = transformed->at[2];
     vf v[4], odd = vf_set(0);
     vm is_finite = vm_all_lanes();
     for (int i = 0; i < 4; i++) {
         for (int half = 0; half < 2; half++) {
-            const kernel_half own = placed->values[i].half[half];
+            const kernel_half own = transformed->values[i].half[half];
             kernel_half_put(&odd, half, own - own);
             kernel_half_put(&v[i], half, kernel_half_hold(own, 3e38));
         }
@@ -164,7 +165,7 @@ SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const ker
 
 /* Transforms the first `count` pending tets. Returns the lanes of those that are visible in a block in which some ray
  * has no nearer end. */
-SIMD_INLINE unsigned kernel_tile_place_pending(kernel_tile_trace *t, kernel_tile_cells *cells, int count)
+SIMD_INLINE unsigned kernel_tile_transform_pending(kernel_tile_trace *t, kernel_tile_cells *cells, int count)
 {
     t->thread->volume_cells += count;
     const kernel_transfer *transfer = &t->frame->volumes[cells->plain_volume];
@@ -173,9 +174,10 @@ SIMD_INLINE unsigned kernel_tile_place_pending(kernel_tile_trace *t, kernel_tile
     unsigned lanes = 0;
     kernel_local_learn(&cells->arrays, &cells->tets, count, GRID_TET);
     for (int i = 0; i < 4; i++) memcpy(vertices[i], cells->tets.vertex[i], sizeof vertices[i]);
-    kernel_place_tets(&cells->placed, &cells->arrays, t->frame, &t->tile, vertices, count);
-    kernel_placed_domain(&cells->placed, transfer);
-    unsigned candidates = kernel_placed_showing(t, &cells->placed, &transfer->interest, near) & ((1u << count) - 1);
+    kernel_transform_tets(&cells->transformed, &cells->arrays, t->frame, &t->tile, vertices, count);
+    kernel_transformed_domain(&cells->transformed, transfer);
+    unsigned candidates =
+        kernel_transformed_tets_visible(t, &cells->transformed, &transfer->interest, near) & ((1u << count) - 1);
     candidates = kernel_arrays_drawn(&cells->arrays, cells->tets.cell, candidates);
     for (; candidates; candidates &= candidates - 1) {
         const int n = __builtin_ctz(candidates);
@@ -191,12 +193,12 @@ static __attribute__((noinline)) void kernel_tile_take_some(kernel_tile_trace *t
 {
     const int count = cells->tets.count < SIMD_WIDTH ? cells->tets.count : SIMD_WIDTH;
     const bool is_double = t->frame->is_double;
-    unsigned lanes = kernel_tile_place_pending(t, cells, count);
+    unsigned lanes = kernel_tile_transform_pending(t, cells, count);
     if (cells->take_tets && lanes) lanes = cells->take_tets(t, lanes);
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        kernel_placed_cell(&cells->placed, n, &cells->cell);
-        if (is_double) kernel_placed_exactly(&cells->placed, n, &cells->cell);
+        kernel_transformed_tets_cell(&cells->transformed, n, &cells->cell);
+        if (is_double) kernel_transformed_tets_double(&cells->transformed, n, &cells->cell);
         const unsigned blocks = cells->tets.blocks[n] & kernel_tet_blocks(&cells->block_rays, &cells->cell);
         cells->cell.index = cells->tets.cell[n];
         if (blocks) take(t, cells->plain_part, &cells->cell, NULL, blocks);

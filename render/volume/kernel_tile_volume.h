@@ -168,7 +168,7 @@ static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_t
         kernel_lane_rays_begin(&r, t, &b->lanes.rays, n);
         const vi at = r.at;
         r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, at)));
-        kernel_tet_rays_interval(&t->thread->tile_cells->placed, &r, &i);
+        kernel_tet_rays_interval(&t->thread->tile_cells->transformed, &r, &i);
         if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, at);
     }
     b->lanes.rays.count = 0;

@@ -1,10 +1,10 @@
 /* Hexes, wedges or pyramids, one a lane, placed for a tile, with lines for the triangles among their faces: the
- * operations of kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and kernel_curved_lines(), and so the
- * same bits, for as many cells of one type at once as a vector has lanes. Vertices are turned into the order of
+ * operations of kernel_cell_relative(), kernel_transform_in_tile(), kernel_cell_order() and kernel_curved_lines(), and
+ * so the same bits, for as many cells of one type at once as a vector has lanes. Vertices are turned into the order of
  * coordinates first, so that all else comes in order. What is computed in double is computed in two halves. A
  * function's type is a constant where it is called from, so that its loops have known lengths. */
-#ifndef RENDER_KERNEL_PLACED_CURVED_H
-#define RENDER_KERNEL_PLACED_CURVED_H
+#ifndef RENDER_KERNEL_TRANSFORMED_CURVED_H
+#define RENDER_KERNEL_TRANSFORMED_CURVED_H
 
 #include <math.h>
 #include <string.h>
@@ -31,7 +31,7 @@ typedef struct kernel_triangle_lines {
 } kernel_triangle_lines;
 
 /* Cells of one type in lanes. */
-typedef struct kernel_placed_curved {
+typedef struct kernel_transformed_curved {
     float at[4][8][SIMD_WIDTH]; /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex */
     /* Per face, a word that lists its corners, four bits each, in the order of kernel_quad_corners() or
      * kernel_triangle_order(). */
@@ -40,10 +40,10 @@ typedef struct kernel_placed_curved {
     kernel_triangle_lines triangles[KERNEL_MAX_TRIANGLES];
     /* least sum of weights of each triangle that is accurate enough (kernel_triangle_least()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
-    /* The following members are used only by kernel_placed_curved_cell(), which extracts one lane's cell. */
+    /* The following members are used only by kernel_transformed_curved_cell(), which extracts one lane's cell. */
     kernel_whole world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
-} kernel_placed_curved;
+} kernel_transformed_curved;
 
 /* Returns the number of a type's first triangular face; its other triangles follow in the shape. */
 SIMD_INLINE int kernel_first_triangle(int type)
@@ -190,14 +190,14 @@ SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_curved *h, bool is_na
 
 /* Reads the vertices and permutes them into canonical order; stores vertex indices, coordinates and ranks. Returns the
  * lanes with an edge of length zero. */
-SIMD_INLINE vm kernel_turned_fetch(kernel_placed_curved *out, const kernel_arrays *p, bool is_narrow, int type,
+SIMD_INLINE vm kernel_turned_fetch(kernel_transformed_curved *out, const kernel_arrays *p, bool is_narrow, int type,
                                    int32_t (*const vertices)[SIMD_WIDTH], vf rank[8])
 {
     const int count = grid_type_vertices(type);
     kernel_turned_curved h;
     for (int i = 0; i < count; i++) {
         memcpy(&h.vertex[i], vertices[i], sizeof h.vertex[i]);
-        kernel_arrays_place(p, is_narrow, h.vertex[i], h.at[i]);
+        kernel_arrays_positions(p, is_narrow, h.vertex[i], h.at[i]);
     }
     kernel_turned_rank(&h, is_narrow, count);
     kernel_turned_turn(&h, is_narrow, type);
@@ -272,13 +272,13 @@ typedef struct kernel_lanes_lines {
     vf line[KERNEL_CURVED_EDGES][4], error[KERNEL_CURVED_EDGES], extent[KERNEL_CURVED_EDGES];
 } kernel_lanes_lines;
 
-SIMD_INLINE void kernel_lanes_lines_of(const kernel_placed_curved *placed, const kernel_frame *f,
+SIMD_INLINE void kernel_lanes_lines_of(const kernel_transformed_curved *transformed, const kernel_frame *f,
                                        const kernel_tile *tile, int type, kernel_lanes_lines *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf at[8][3], size[8];
     for (int i = 0; i < grid_type_vertices(type); i++) {
-        for (int a = 0; a < 3; a++) at[i][a] = vf_load(placed->at[a][i]);
+        for (int a = 0; a < 3; a++) at[i][a] = vf_load(transformed->at[a][i]);
         size[i] = kernel_lanes_size(f, tile, at[i]);
     }
     for (int n = 0; n < shape->edge_count; n++) {
@@ -290,8 +290,8 @@ SIMD_INLINE void kernel_lanes_lines_of(const kernel_placed_curved *placed, const
 }
 
 /* Stores a triangle's corners in the order, its edges' lines, and the least sum of weights that is good enough. */
-SIMD_INLINE void kernel_placed_triangle(kernel_placed_curved *out, int type, int face, const vf rank[8],
-                                        const kernel_lanes_lines *lines)
+SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int type, int face, const vf rank[8],
+                                             const kernel_lanes_lines *lines)
 {
     const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
     const signed char(*sides)[2] = kernel_cell_shape(type)->faces[face].sides;
@@ -321,15 +321,15 @@ SIMD_INLINE void kernel_placed_triangle(kernel_placed_curved *out, int type, int
 }
 
 /* Computes the faces' corners, and the triangles' lines. */
-SIMD_INLINE void kernel_placed_faces(kernel_placed_curved *out, const kernel_frame *f, const kernel_tile *tile,
-                                     int type, const vf rank[8])
+SIMD_INLINE void kernel_transformed_faces(kernel_transformed_curved *out, const kernel_frame *f,
+                                          const kernel_tile *tile, int type, const vf rank[8])
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     kernel_lanes_lines lines;
     if (kernel_has_triangles(type)) kernel_lanes_lines_of(out, f, tile, type, &lines);
     for (int face = 0; face < shape->face_count; face++) {
         if (kernel_has_triangles(type) && shape->faces[face].count == 3) {
-            kernel_placed_triangle(out, type, face, rank, &lines);
+            kernel_transformed_triangle(out, type, face, rank, &lines);
             continue;
         }
         const vi word = kernel_curved_quad_word(shape->faces[face].vertices, rank);
@@ -339,9 +339,10 @@ SIMD_INLINE void kernel_placed_faces(kernel_placed_curved *out, const kernel_fra
 
 /* ---- whole cells ---- */
 
-SIMD_INLINE vm kernel_place_curved_of(kernel_placed_curved *out, const kernel_arrays *p, const kernel_frame *f,
-                                      const kernel_tile *tile, int32_t vertices[8][SIMD_WIDTH],
-                                      const double isovalues[SIMD_WIDTH], int type)
+SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, const kernel_arrays *p,
+                                               const kernel_frame *f, const kernel_tile *tile,
+                                               int32_t vertices[8][SIMD_WIDTH], const double isovalues[SIMD_WIDTH],
+                                               int type)
 {
     const int count = grid_type_vertices(type);
     kernel_whole values[8];
@@ -355,34 +356,34 @@ SIMD_INLINE vm kernel_place_curved_of(kernel_placed_curved *out, const kernel_ar
         memcpy(&vertex, out->vertex[i], sizeof vertex);
         values[i] = kernel_numbers_take(&p->values, vertex);
         for (int a = 0; a < 3; a++) world[a] = &out->world[a][i];
-        kernel_lanes_place(f, tile, world, at);
+        kernel_lanes_transform(f, tile, world, at);
         for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);
     }
     kernel_lanes_relative(values, count, isovalues, relative);
     for (int i = 0; i < count; i++) vf_store(out->at[3][i], relative[i]);
-    kernel_placed_faces(out, f, tile, type, rank);
+    kernel_transformed_faces(out, f, tile, type, rank);
     return collapsed;
 }
 
 /* Fetches, permutes and transforms cells of one type, given their vertex indices by vertex and lane. Returns the lanes
  * with an edge of length zero. */
-static __attribute__((noinline)) vm kernel_place_curved(kernel_placed_curved *out, const kernel_arrays *p,
-                                                        const kernel_frame *f, const kernel_tile *tile,
-                                                        int32_t vertices[8][SIMD_WIDTH],
-                                                        const double isovalues[SIMD_WIDTH], int type)
+static __attribute__((noinline)) vm kernel_transform_curved(kernel_transformed_curved *out, const kernel_arrays *p,
+                                                            const kernel_frame *f, const kernel_tile *tile,
+                                                            int32_t vertices[8][SIMD_WIDTH],
+                                                            const double isovalues[SIMD_WIDTH], int type)
 {
-    return KERNEL_OF_TYPE(type, kernel_place_curved_of, out, p, f, tile, vertices, isovalues);
+    return KERNEL_OF_TYPE(type, kernel_transform_curved_of_type, out, p, f, tile, vertices, isovalues);
 }
 
 /* ---- extracting one cell ---- */
 
 /* Copies the cell in lane n, without lines. */
-static __attribute__((noinline)) void kernel_placed_curved_cell(const kernel_placed_curved *h, int type, int n,
-                                                                kernel_cell *c)
+static __attribute__((noinline)) void kernel_transformed_curved_cell(const kernel_transformed_curved *h, int type,
+                                                                     int n, kernel_cell *c)
 {
     c->type = type;
     c->count = grid_type_vertices(type);
-    c->is_finite = c->is_placed = true;
+    c->is_finite = c->is_transformed = true;
     c->has_lines = c->has_normal = false;
     for (int i = 0; i < c->count; i++) {
         c->x[i] = h->at[0][i][n];

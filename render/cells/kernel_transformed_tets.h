@@ -1,8 +1,8 @@
 /* Tets, one a lane, placed for a tile and given their lines: the operations of kernel_cell_move(), kernel_cell_order()
  * and kernel_tet_lines(), and so the same bits, for as many tets at once as a vector has lanes. Vertices are put in
  * order first, so that all else comes in order. What is computed in double is computed in two halves. */
-#ifndef RENDER_KERNEL_PLACED_H
-#define RENDER_KERNEL_PLACED_H
+#ifndef RENDER_KERNEL_TRANSFORMED_TETS_H
+#define RENDER_KERNEL_TRANSFORMED_TETS_H
 
 #include <math.h>
 #include <string.h>
@@ -17,13 +17,13 @@
 #include "simd.h"
 
 /* The data of a kernel_cell for one tet per lane; the caller sets f. */
-typedef struct kernel_placed {
+typedef struct kernel_transformed_tets {
     kernel_whole world[3][4], values[4]; /* coordinates and values as the caller of the library passed them */
     vf at[3][4], f[4];
     vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
     vf doubt, least[4];
     vi vertex[4];
-} kernel_placed;
+} kernel_transformed_tets;
 
 /* A vertex of each lane's tet while the vertices are sorted: coordinates and vertex index. */
 typedef struct kernel_ordered {
@@ -43,13 +43,13 @@ SIMD_INLINE void kernel_ordered_swap(bool is_narrow, kernel_ordered *a, kernel_o
 
 /* Reads the vertices and sorts them by coordinates. It is a bubble sort, which only exchanges neighbours that differ;
  * so vertices with equal coordinates keep their order. */
-SIMD_INLINE void kernel_ordered_fetch(kernel_placed *out, const kernel_arrays *p, bool is_narrow,
+SIMD_INLINE void kernel_ordered_fetch(kernel_transformed_tets *out, const kernel_arrays *p, bool is_narrow,
                                       int32_t (*const vertices)[SIMD_WIDTH])
 {
     kernel_ordered spots[4];
     for (int i = 0; i < 4; i++) {
         memcpy(&spots[i].vertex, vertices[i], sizeof spots[i].vertex);
-        kernel_arrays_place(p, is_narrow, spots[i].vertex, spots[i].at);
+        kernel_arrays_positions(p, is_narrow, spots[i].vertex, spots[i].at);
     }
     for (int last = 3; last > 0; last--)
         for (int i = 0; i < last; i++) kernel_ordered_swap(is_narrow, &spots[i], &spots[i + 1]);
@@ -60,19 +60,20 @@ SIMD_INLINE void kernel_ordered_fetch(kernel_placed *out, const kernel_arrays *p
     }
 }
 
-SIMD_INLINE void kernel_placed_spots(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile)
+SIMD_INLINE void kernel_transformed_positions(kernel_transformed_tets *out, const kernel_frame *f,
+                                              const kernel_tile *tile)
 {
     for (int i = 0; i < 4; i++) {
         const kernel_whole *const world[3] = {&out->world[0][i], &out->world[1][i], &out->world[2][i]};
         vf at[3];
-        kernel_lanes_place(f, tile, world, at);
+        kernel_lanes_transform(f, tile, world, at);
         for (int a = 0; a < 3; a++) out->at[a][i] = at[a];
     }
 }
 
 /* Computes the edge functions, and for each face the least sum of weights that is accurate enough
  * (kernel_least_weight()). */
-SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile)
+SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const kernel_frame *f, const kernel_tile *tile)
 {
     vf size[4], at[4][3], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];
     for (int i = 0; i < 4; i++) {
@@ -100,9 +101,9 @@ SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, 
 
 /* Fetches, sorts and transforms `count` tets, given their vertex indices by vertex and lane. The remaining lanes get
  * the vertices of the first tet. */
-static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, const kernel_arrays *p,
-                                                        const kernel_frame *f, const kernel_tile *tile,
-                                                        int32_t vertices[4][SIMD_WIDTH], int count)
+static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_tets *out, const kernel_arrays *p,
+                                                            const kernel_frame *f, const kernel_tile *tile,
+                                                            int32_t vertices[4][SIMD_WIDTH], int count)
 {
     for (int i = 0; i < 4; i++)
         for (int n = count; n < SIMD_WIDTH; n++) vertices[i][n] = vertices[i][0];
@@ -110,34 +111,35 @@ static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, cons
         kernel_ordered_fetch(out, p, true, vertices);
     else
         kernel_ordered_fetch(out, p, false, vertices);
-    kernel_placed_spots(out, f, tile);
-    kernel_placed_lines(out, f, tile);
+    kernel_transformed_positions(out, f, tile);
+    kernel_transformed_lines(out, f, tile);
 }
 
 /* Copies the tet in lane n, with all that rays need of a tet in float32. */
-SIMD_INLINE void kernel_placed_cell(const kernel_placed *placed, int n, kernel_cell *c)
+SIMD_INLINE void kernel_transformed_tets_cell(const kernel_transformed_tets *transformed, int n, kernel_cell *c)
 {
     c->type = GRID_TET;
     c->count = 4;
-    c->is_finite = c->is_placed = c->has_lines = true;
+    c->is_finite = c->is_transformed = c->has_lines = true;
     for (int i = 0; i < 4; i++) {
-        c->x[i] = placed->at[0][i][n];
-        c->y[i] = placed->at[1][i][n];
-        c->z[i] = placed->at[2][i][n];
-        c->f[i] = placed->f[i][n];
-        c->least[i] = placed->least[i][n];
+        c->x[i] = transformed->at[0][i][n];
+        c->y[i] = transformed->at[1][i][n];
+        c->z[i] = transformed->at[2][i][n];
+        c->f[i] = transformed->f[i][n];
+        c->least[i] = transformed->least[i][n];
     }
     for (int i = 0; i < KERNEL_TET_EDGES; i++)
-        c->lines[i] = (kernel_line){placed->c[i][n], placed->cu[i][n], placed->cv[i][n], placed->bound[i][n]};
-    c->doubt = placed->doubt[n];
+        c->lines[i] =
+            (kernel_line){transformed->c[i][n], transformed->cu[i][n], transformed->cv[i][n], transformed->bound[i][n]};
+    c->doubt = transformed->doubt[n];
 }
 
 /* Sets the cell's places and values in double. */
-SIMD_INLINE void kernel_placed_exactly(const kernel_placed *placed, int n, kernel_cell *c)
+SIMD_INLINE void kernel_transformed_tets_double(const kernel_transformed_tets *transformed, int n, kernel_cell *c)
 {
     for (int i = 0; i < 4; i++) {
-        c->values[i] = kernel_whole_lane(&placed->values[i], n);
-        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_whole_lane(&placed->world[a][i], n);
+        c->values[i] = kernel_whole_lane(&transformed->values[i], n);
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_whole_lane(&transformed->world[a][i], n);
     }
 }
 
