@@ -68,36 +68,36 @@ bool render_differences_meet(const render_job *job, const render_pending_hit *hi
 
 /* ---- order ----------------------------------------------------------------------------------------------------- */
 
-typedef struct place_of_hit {
+typedef struct hit_location {
     uint64_t tile; /* number of the tile, and of the block in the tile */
     uint32_t kind, within;
     int64_t index;
-} place_of_hit;
+} hit_location;
 
-static int by_place(const void *a, const void *b)
+static int compare_locations(const void *a, const void *b)
 {
-    const place_of_hit *x = a, *y = b;
+    const hit_location *x = a, *y = b;
     if (x->tile != y->tile) return x->tile < y->tile ? -1 : 1;
     if (x->kind != y->kind) return x->kind < y->kind ? -1 : 1;
     if (x->within != y->within) return x->within < y->within ? -1 : 1;
     return (x->index > y->index) - (x->index < y->index);
 }
 
-static place_of_hit place_of(const render_camera *camera, const render_pending_hit *hit, int64_t index)
+static hit_location place_of(const render_camera *camera, const render_pending_hit *hit, int64_t index)
 {
     const uint32_t x = hit->pixel % (uint32_t)camera->width, y = hit->pixel / (uint32_t)camera->width;
     const uint64_t tile = (uint64_t)(y / KERNEL_TILE) << 16 | x / KERNEL_TILE;
     const uint32_t block = y % KERNEL_TILE / KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_TILE / KERNEL_BLOCK;
-    return (place_of_hit){tile << 8 | block, hit->kind, y % KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_BLOCK, index};
+    return (hit_location){tile << 8 | block, hit->kind, y % KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_BLOCK, index};
 }
 
 static void put_in_order(const render_camera *camera, render_pending_list *list, int64_t first, int64_t count,
-                         place_of_hit *places, render_pending_list *room)
+                         hit_location *places, render_pending_list *room)
 {
     for (int64_t i = 0; i < count; i++) places[i] = place_of(camera, &list->items[first + i], i);
     memcpy(room->items, list->items + first, (size_t)count * sizeof *room->items);
     memcpy(room->shadings, list->shadings + first, (size_t)count * sizeof *room->shadings);
-    qsort(places, (size_t)count, sizeof *places, by_place);
+    qsort(places, (size_t)count, sizeof *places, compare_locations);
     for (int64_t i = 0; i < count; i++) {
         list->items[first + i] = room->items[places[i].index];
         list->shadings[first + i] = room->shadings[places[i].index];
@@ -107,7 +107,7 @@ static void put_in_order(const render_camera *camera, render_pending_list *list,
 bool render_differences_sort(const render_job *job, render_pending_list *list)
 {
     const int64_t most = list->count < SORTED_HITS ? list->count : SORTED_HITS;
-    place_of_hit *places = base_alloc((size_t)(most + 1) * sizeof *places);
+    hit_location *places = base_alloc((size_t)(most + 1) * sizeof *places);
     render_pending_list room = {.items = base_alloc((size_t)(most + 1) * sizeof *room.items),
                                 .shadings = base_alloc((size_t)(most + 1) * sizeof *room.shadings)};
     const bool has_room = places && room.items && room.shadings;

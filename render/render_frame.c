@@ -103,7 +103,7 @@ static bool append_pending(render_pending_list *to, const render_pending_list *f
 }
 
 /* Removes the placeholder fragments of hits that still need samples of other ranks. */
-static void drop_places(fragment_list *list, int64_t first)
+static void drop_placeholders(fragment_list *list, int64_t first)
 {
     fragment *to = list->items + first;
     for (int64_t i = first; i < list->count; i++)
@@ -204,7 +204,7 @@ static bool trace_to_list(kernel_frame *frame, fragment_writer *writers, int thr
     const bool is_traced = trace_frame(frame, &(frame_end){.writers = writers}, threads, statistics);
     const int64_t first = out->count;
     const bool is_whole = fragment_pieces_end(&pieces, writers, threads);
-    if (frame->job->waiting) drop_places(out, first);
+    if (frame->job->waiting) drop_placeholders(out, first);
     return is_whole && is_traced;
 }
 

@@ -20,9 +20,9 @@
 
 /* ---- one hit ------------------------------------------------------------------------------------------------- */
 
-static hit_place place_of(const render_job *job, const render_hit *hit)
+static hit_frame place_of(const render_job *job, const render_hit *hit)
 {
-    return hit_place_of(job, hit->pixel, hit->t, hit->normal, RENDER_LIFT);
+    return hit_frame_of(job, hit->pixel, hit->t, hit->normal, RENDER_LIFT);
 }
 
 /* Returns the surface layer to which the fragment belongs, by the number of its isovalue. */
@@ -55,7 +55,7 @@ bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, re
 void render_hit_samples(const render_job *job, const render_hit *hit, double start[3],
                         double directions[RENDER_MAX_SAMPLES][3])
 {
-    const hit_place p = place_of(job, hit);
+    const hit_frame p = place_of(job, hit);
     memcpy(start, p.start, sizeof p.start);
     hit_directions(job, hit->pixel, &p.a, directions);
 }
@@ -128,7 +128,7 @@ static void add_ray(tracer *t, int hit, int number, const double start[3], const
 static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_rays *rays)
 {
     const render_occlusion *o = t->job->occlusion;
-    const hit_place p = place_of(t->job, hit);
+    const hit_frame p = place_of(t->job, hit);
     double samples[RENDER_MAX_SAMPLES][3];
     if (rays->samples) hit_directions(t->job, hit->pixel, &p.a, samples);
     for (uint64_t left = rays->samples; left; left &= left - 1) {
@@ -163,7 +163,7 @@ static void set_hemisphere_rays(tracer *t, const render_hit *hit)
 {
     const render_occlusion *o = t->job->occlusion;
     const render_space *space = &t->job->space;
-    const hit_place p = place_of(t->job, hit);
+    const hit_frame p = place_of(t->job, hit);
     kernel_bundle *b = &t->bundle;
     double directions[RENDER_MAX_SAMPLES][3];
     hit_hemisphere(t->job, hit->pixel, directions);
@@ -190,7 +190,7 @@ static void set_light_ray(tracer *t, const render_hit *hit, int light)
 {
     const hit_axes a = hit_axes_around(t->job->lights[light].direction);
     const render_space *space = &t->job->space;
-    const hit_place p = place_of(t->job, hit);
+    const hit_frame p = place_of(t->job, hit);
     kernel_bundle *b = &t->bundle;
     double from[3];
     for (int k = 0; k < 3; k++) from[k] = (p.start[k] - space->origin[k]) * space->scale;
@@ -457,7 +457,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
                           const render_box *boxes, int count, render_box_taker *take, void *state)
 {
     const render_occlusion *o = job->occlusion;
-    const hit_place p = place_of(job, hit);
+    const hit_frame p = place_of(job, hit);
     const double margin = box_margin / job->space.scale;
     double samples[RENDER_MAX_SAMPLES][3];
     if (rays->samples) hit_directions(job, hit->pixel, &p.a, samples);
@@ -480,7 +480,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 /* ---- colours ------------------------------------------------------------------------------------------------- */
 
 /* Computes the sums of diffuse and specular light of kernel_shade() over the lights in `lights` only, in double. */
-static void shade(const render_job *job, const render_material *m, const hit_place *p, uint32_t lights,
+static void shade(const render_job *job, const render_material *m, const hit_frame *p, uint32_t lights,
                   double diffuse[3], double specular[3])
 {
     const double *n = p->a.forward;
@@ -512,7 +512,7 @@ void render_light_fragment(const render_job *job, const render_hit_rays *open, f
     f->t_out = f->t_in;
     f->transmittance = layer->opacity >= 1 ? 0 : 1 - layer->opacity;
     const render_occlusion *o = job->occlusion;
-    const hit_place p = place_of(job, &hit);
+    const hit_frame p = place_of(job, &hit);
     const double sky = o->samples ? (double)__builtin_popcountll(open->samples) / o->samples : 1;
     shade(job, &layer->material, &p, open->lights | ~o->lights, diffuse, specular);
     const double opacity = layer->opacity >= 1 ? 1 : (double)layer->opacity;

@@ -90,9 +90,9 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
                                 .shift = (float)((begin - low) * slope)};
 }
 
-/* Returns the position in the colour table of a value at which an opacity is given, as kernel_colour_place() computes
- * it. */
-static double ramp_place(const kernel_transfer *out, const render_transfer *t, double value)
+/* Returns the position in the colour table of a value at which an opacity is given, as kernel_colour_position()
+ * computes it. */
+static double ramp_position(const kernel_transfer *out, const render_transfer *t, double value)
 {
     if (t->scale == RENDER_LINEAR) return (value - out->low) * out->inverse_width;
     const double low = render_scaled(t->scale, t->threshold, t->low);
@@ -112,8 +112,8 @@ static void prepare_transfer(kernel_transfer *out, const render_transfer *t, dou
     out->ramp_count = t->opacity_count - 1;
     out->base_opacity = t->opacities[0];
     for (int i = 0; i < out->ramp_count; i++) {
-        const double start = ramp_place(out, t, t->opacity_values[i]);
-        const double along = ramp_place(out, t, t->opacity_values[i + 1]) - start;
+        const double start = ramp_position(out, t, t->opacity_values[i]);
+        const double along = ramp_position(out, t, t->opacity_values[i + 1]) - start;
         out->ramp_start[i] = (float)start;
         out->ramp_inverse[i] = along > 1e-38 ? (float)(1 / along) : 3e38f;
         out->ramp_rise[i] = t->opacities[i + 1] - t->opacities[i];

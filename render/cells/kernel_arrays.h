@@ -30,11 +30,11 @@ SIMD_INLINE bool kernel_numbers_are_narrow(const kernel_numbers *c)
 }
 
 typedef struct kernel_arrays {
-    bool has_lanes;         /* set if indices fit in 32 bits, so that cells can be processed in lanes */
-    bool is_narrow;         /* set if all numbers are float32 and can be gathered */
-    bool has_narrow_places; /* set if the coordinates are float32 and can be gathered */
-    const grid *cells;      /* the mesh */
-    int type;               /* type of all cells, or GRID_NO_TYPE if the mesh has several types */
+    bool has_lanes;            /* set if indices fit in 32 bits, so that cells can be processed in lanes */
+    bool is_narrow;            /* set if all numbers are float32 and can be gathered */
+    bool has_narrow_positions; /* set if the coordinates are float32 and can be gathered */
+    const grid *cells;         /* the mesh */
+    int type;                  /* type of all cells, or GRID_NO_TYPE if the mesh has several types */
     /* field that is not finite for cells without a value of their own; NULL if all cells have one */
     const grid_field *own;
     bool is_by_cell; /* set if values belong to cells, not to vertices */
@@ -75,15 +75,15 @@ static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const gr
     p->values = kernel_numbers_of(&values, count);
     if (field->component < 0) p->values.data = NULL;
     p->values.field = field;
-    p->has_narrow_places = true;
+    p->has_narrow_positions = true;
     for (int a = 0; a < 3; a++) {
         const grid_array *c = &g->coordinates[a];
         p->coordinates[a] = kernel_numbers_of(c, g->vertex_count);
-        p->has_narrow_places = p->has_narrow_places && kernel_numbers_are_narrow(&p->coordinates[a]);
+        p->has_narrow_positions = p->has_narrow_positions && kernel_numbers_are_narrow(&p->coordinates[a]);
         p->asked[a].data = c->data;
         p->asked[a].stride = c->stride;
     }
-    p->is_narrow = p->has_narrow_places && kernel_numbers_are_narrow(&p->values);
+    p->is_narrow = p->has_narrow_positions && kernel_numbers_are_narrow(&p->values);
     p->asked[3].data = p->is_by_cell ? p->asked[0].data : values.data;
     p->asked[3].stride = p->is_by_cell ? p->asked[0].stride : values.stride;
 }

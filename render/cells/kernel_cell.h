@@ -66,13 +66,13 @@ typedef struct kernel_line {
 } kernel_line;
 
 /* The position of a vertex in tile space. */
-typedef struct kernel_spot {
+typedef struct kernel_tile_position {
     float x, y, z;
-} kernel_spot;
+} kernel_tile_position;
 
 /* Returns the measure N of a vertex's size in the tile's projection, from which the error bounds of edge functions are
  * computed. */
-SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *tile, kernel_spot a)
+SIMD_INLINE float kernel_position_size(const kernel_frame *f, const kernel_tile *tile, kernel_tile_position a)
 {
     const float depth = f->job->camera.is_orthographic ? 1 : fabsf(a.z) + fabsf((float)f->depth_shift);
     const float x = fabsf(a.x), y = fabsf(a.y);
@@ -80,9 +80,9 @@ SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *til
 }
 
 /* Computes the edge function of the edge from a to b, where a is before b in the order of coordinates. size_a, size_b:
- * kernel_spot_size() of the vertices. */
-SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a, kernel_spot b, float size_a,
-                                            float size_b)
+ * kernel_position_size() of the vertices. */
+SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_tile_position a, kernel_tile_position b,
+                                            float size_a, float size_b)
 {
     const bool flat = f->job->camera.is_orthographic;
     const double da = flat ? 1 : (double)a.z + f->depth_shift, db = flat ? 1 : (double)b.z + f->depth_shift;
@@ -103,7 +103,8 @@ typedef struct kernel_edge_error {
     float error, extent;
 } kernel_edge_error;
 
-SIMD_INLINE kernel_edge_error kernel_line_error(const kernel_line *l, float radius, kernel_spot a, kernel_spot b)
+SIMD_INLINE kernel_edge_error kernel_line_error(const kernel_line *l, float radius, kernel_tile_position a,
+                                                kernel_tile_position b)
 {
     const float x = fabsf(a.x - b.x), y = fabsf(a.y - b.y), z = fabsf(a.z - b.z);
     return (kernel_edge_error){6e-8f * (3 * fabsf(l->c) + radius * (4 * fabsf(l->cu) + 3 * fabsf(l->cv))),
@@ -378,9 +379,9 @@ SIMD_INLINE void kernel_cell_transform_in_tile(kernel_cell *c, const kernel_fram
     kernel_cell_order(c);
 }
 
-SIMD_INLINE kernel_spot kernel_cell_spot(const kernel_cell *c, int i)
+SIMD_INLINE kernel_tile_position kernel_cell_position(const kernel_cell *c, int i)
 {
-    return (kernel_spot){c->x[i], c->y[i], c->z[i]};
+    return (kernel_tile_position){c->x[i], c->y[i], c->z[i]};
 }
 
 /* Computes a quad's corners in cyclic order, from the smallest vertex towards its smaller neighbour. */
@@ -410,11 +411,11 @@ SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const k
 {
     kernel_edge_error error_bound[KERNEL_TET_EDGES];
     float size[4];
-    for (int i = 0; i < 4; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    for (int i = 0; i < 4; i++) size[i] = kernel_position_size(f, tile, kernel_cell_position(c, i));
     c->doubt = 0;
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        const kernel_spot from = kernel_cell_spot(c, i), to = kernel_cell_spot(c, j);
+        const kernel_tile_position from = kernel_cell_position(c, i), to = kernel_cell_position(c, j);
         c->lines[n] = kernel_line_between(f, from, to, size[i], size[j]);
         error_bound[n] = kernel_line_error(&c->lines[n], tile->radius, from, to);
         c->doubt = c->doubt < c->lines[n].bound ? c->lines[n].bound : c->doubt;
@@ -442,11 +443,11 @@ SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, cons
         ends[shape->edge_count + face][0] = (signed char)corner[0];
         ends[shape->edge_count + face][1] = (signed char)corner[2];
     }
-    for (int i = 0; i < c->count; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    for (int i = 0; i < c->count; i++) size[i] = kernel_position_size(f, tile, kernel_cell_position(c, i));
     kernel_edge_error most = {0, 0};
     for (int n = 0; n < count; n++) {
         const int i = ends[n][0], j = ends[n][1], a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
-        const kernel_spot from = kernel_cell_spot(c, a), to = kernel_cell_spot(c, b);
+        const kernel_tile_position from = kernel_cell_position(c, a), to = kernel_cell_position(c, b);
         c->lines[n] = kernel_line_between(f, from, to, size[a], size[b]);
         if (kernel_has_triangles(c->type))
             most = kernel_edge_error_max(most, kernel_line_error(&c->lines[n], tile->radius, from, to));

@@ -142,8 +142,8 @@ SIMD_INLINE void kernel_curved_quad_take(const kernel_transformed_curved *h, con
     }
 }
 
-SIMD_INLINE void kernel_curved_quad_place(int type, const kernel_curved_quad *own, const kernel_quad_place *place,
-                                          kernel_point *out)
+SIMD_INLINE void kernel_curved_quad_reference(int type, const kernel_curved_quad *own, const kernel_quad_point *place,
+                                              kernel_point *out)
 {
     out->t = place->t;
     out->value = kernel_bilinear(own->f, place->s, place->r);
@@ -216,8 +216,8 @@ SIMD_INLINE vf kernel_curved_weigh(const kernel_curved_triangle *own, const vf v
     return vf_muladd(own->e[0], v[2], vf_muladd(-own->e[2], v[1], own->e[1] * v[0])) * inverse;
 }
 
-SIMD_INLINE void kernel_curved_triangle_place(const kernel_transformed_curved *h, int type, vi lane,
-                                              const kernel_curved_triangle *own, kernel_point *out)
+SIMD_INLINE void kernel_curved_triangle_reference(const kernel_transformed_curved *h, int type, vi lane,
+                                                  const kernel_curved_triangle *own, kernel_point *out)
 {
     const int count = grid_type_vertices(type);
     const vf inverse = 1.0f / kernel_weight(own->e[0], own->e[1], own->e[2]);
@@ -243,11 +243,11 @@ SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const k
     if (kernel_is_box(type) || vm_any(vm_or(once[0], once[1]))) {
         kernel_quad own[2];
         kernel_curved_quad corners[2];
-        kernel_quad_place places[2];
+        kernel_quad_point places[2];
         for (int n = 0; n < quads; n++) kernel_curved_quad_take(h, p, type, face[n], &own[n], &corners[n]);
         /* these rays' edge functions have certain signs, so no ray meets an edge */
         kernel_quads_cross(own, quads, once, true, places);
-        for (int n = 0; n < quads; n++) kernel_curved_quad_place(type, &corners[n], &places[n], &out[n]);
+        for (int n = 0; n < quads; n++) kernel_curved_quad_reference(type, &corners[n], &places[n], &out[n]);
     }
     for (int n = 0; n < 2 && kernel_has_triangles(type); n++) {
         const vm on_triangle = vm_andnot(p->active, on_quad[n]);
@@ -255,7 +255,7 @@ SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const k
         kernel_point place;
         if (!vm_any(on_triangle)) continue;
         kernel_curved_triangle_take(h, p, type, on_triangle, face[n], &own);
-        kernel_curved_triangle_place(h, type, p->lane, &own, &place);
+        kernel_curved_triangle_reference(h, type, p->lane, &own, &place);
         kernel_point_move(on_triangle, &place, &out[n]);
     }
     kernel_points_order(out);

@@ -76,21 +76,21 @@ SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_double_ray
 
 /* A vertex in tile space before it is rounded to float32. `depth` is the factor of u and v in the vertex's projection;
  * t and value are the depth and the field. */
-typedef struct kernel_double_spot {
+typedef struct kernel_double_vertex {
     double x, y, depth, t, value;
-} kernel_double_spot;
+} kernel_double_vertex;
 
-SIMD_INLINE kernel_double_spot kernel_double_transform(const kernel_frame *f, const kernel_tile *tile,
-                                                       const double *world)
+SIMD_INLINE kernel_double_vertex kernel_double_transform(const kernel_frame *f, const kernel_tile *tile,
+                                                         const double *world)
 {
     double place[3] = {0, 0, 0};
     for (int a = 0; a < 3; a++)
         for (int b = 0; b < 3; b++) place[a] += f->scaled_axes[a][b] * (world[b] - f->job->camera.eye[b]);
     const double depth = f->job->camera.is_orthographic ? f->job->space.scale : place[2];
-    return (kernel_double_spot){.x = place[0] - tile->centre_x * depth,
-                                .y = place[1] - tile->centre_y * depth,
-                                .depth = depth,
-                                .t = place[2] - tile->depth_shift};
+    return (kernel_double_vertex){.x = place[0] - tile->centre_x * depth,
+                                  .y = place[1] - tile->centre_y * depth,
+                                  .depth = depth,
+                                  .t = place[2] - tile->depth_shift};
 }
 
 /* Returns the value in the transfer function's domain, clamped to +-1e18. */

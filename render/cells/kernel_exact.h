@@ -19,7 +19,7 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-SIMD_INLINE kernel_affine kernel_double_edge(const kernel_double_spot *a, const kernel_double_spot *b)
+SIMD_INLINE kernel_affine kernel_double_edge(const kernel_double_vertex *a, const kernel_double_vertex *b)
 {
     return (kernel_affine){
         {a->x * b->y - b->x * a->y, b->depth * a->y - a->depth * b->y, a->depth * b->x - b->depth * a->x}};
@@ -27,10 +27,10 @@ SIMD_INLINE kernel_affine kernel_double_edge(const kernel_double_spot *a, const 
 
 /* Computes the affine sums of one face (a row of kernel_tet_face) from the tet's vertices and edge functions. radius:
  * upper bound of the rays' |u| and |v|. */
-SIMD_INLINE void kernel_double_sums(const kernel_double_spot *spots, const kernel_affine *edges,
+SIMD_INLINE void kernel_double_sums(const kernel_double_vertex *spots, const kernel_affine *edges,
                                     const signed char *face, double radius, kernel_double_face *out)
 {
-    const kernel_double_spot *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
+    const kernel_double_vertex *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
     const kernel_affine *ij = &edges[face[3]], *jk = &edges[face[4]], *ik = &edges[face[5]];
     for (int n = 0; n < 3; n++) {
         out->depth.c[n] = (jk->c[n] * i->t - ik->c[n] * j->t) + ij->c[n] * k->t;
@@ -47,7 +47,7 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
                                                           const kernel_cell *c, const kernel_transfer *transfer,
                                                           kernel_double_cell *out)
 {
-    kernel_double_spot spots[4];
+    kernel_double_vertex spots[4];
     kernel_affine edges[KERNEL_TET_EDGES];
     for (int i = 0; i < 4; i++) {
         spots[i] = kernel_double_transform(f, tile, c->world[i]);
@@ -160,7 +160,7 @@ static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, cons
 {
     double d[4][GRID_MAX_CELL_VERTICES];
     for (int i = 0; i < c->count; i++) {
-        const kernel_double_spot spot = kernel_double_transform(p->frame, p->tile, c->world[i]);
+        const kernel_double_vertex spot = kernel_double_transform(p->frame, p->tile, c->world[i]);
         d[0][i] = spot.x;
         d[1][i] = spot.y;
         d[2][i] = spot.t;

@@ -129,16 +129,17 @@ static bool kernel_poly_open(const kernel_packet *p, const polyhedron *c, kernel
     return true;
 }
 
-SIMD_INLINE kernel_spot kernel_polyhedron_spot(const polyhedron *c, int i)
+SIMD_INLINE kernel_tile_position kernel_polyhedron_position(const polyhedron *c, int i)
 {
-    return (kernel_spot){c->x[i], c->y[i], c->z[i]};
+    return (kernel_tile_position){c->x[i], c->y[i], c->z[i]};
 }
 
 SIMD_INLINE kernel_edge_error kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
 {
-    const kernel_line line = kernel_line_of(p, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
+    const kernel_line line = kernel_line_of(p, kernel_polyhedron_position(c, a), kernel_polyhedron_position(c, b));
     memcpy(c->lines[n], &line, sizeof line);
-    return kernel_line_error(&line, p->tile->radius, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
+    return kernel_line_error(&line, p->tile->radius, kernel_polyhedron_position(c, a),
+                             kernel_polyhedron_position(c, b));
 }
 
 SIMD_INLINE void kernel_polyhedron_transform(polyhedron *c, const kernel_packet *p)
@@ -171,14 +172,14 @@ SIMD_INLINE void kernel_poly_edge(kernel_poly_crossings *r, int number, int a, i
     const polyhedron *c = r->cell;
     kernel_line line;
     memcpy(&line, c->lines[number], sizeof line);
-    r->edge[number] = kernel_edge(r->packet, &line, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
+    r->edge[number] = kernel_edge(r->packet, &line, kernel_polyhedron_position(c, a), kernel_polyhedron_position(c, b));
 }
 
 SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, kernel_weights *w)
 {
     const polyhedron *c = r->cell;
-    kernel_weights_mend(r->packet, c->least, hit, kernel_polyhedron_spot(c, w->i), kernel_polyhedron_spot(c, w->j),
-                        kernel_polyhedron_spot(c, w->k), w);
+    kernel_weights_mend(r->packet, c->least, hit, kernel_polyhedron_position(c, w->i),
+                        kernel_polyhedron_position(c, w->j), kernel_polyhedron_position(c, w->k), w);
 }
 
 /* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the unmended weights, which
@@ -225,7 +226,7 @@ SIMD_INLINE void kernel_quad_of_facets(const kernel_poly_crossings *r, const pol
 
 /* Stores a point of the quad's patch as the face's point of a surface triangle's crossing, for the rays in `mine`. Rays
  * that do not cross the triangle itself use the patch's point for both. */
-SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_place *at, vm mine,
+SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_point *at, vm mine,
                                    bool has_colour, kernel_meeting *m)
 {
     vf f[4], g[4];
@@ -241,11 +242,12 @@ SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], con
 
 /* For rays that cross the patch twice and both triangles, exchanges the two points if necessary, so that the nearer
  * point belongs to the nearer triangle. */
-static __attribute__((noinline, cold)) void kernel_places_pair(kernel_meeting *const m[2], kernel_quad_place places[2])
+static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_meeting *const m[2],
+                                                                    kernel_quad_point places[2])
 {
     const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
     const vm swap = vm_and(both, vm_xor(vf_lt(places[0].t, places[1].t), vf_lt(m[0]->t, m[1]->t)));
-    const kernel_quad_place own = places[0];
+    const kernel_quad_point own = places[0];
     places[0].s = vf_select(swap, places[1].s, own.s);
     places[0].r = vf_select(swap, places[1].r, own.r);
     places[0].t = vf_select(swap, places[1].t, own.t);
@@ -264,7 +266,7 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
     kernel_cell ranks;
     kernel_weights w;
     kernel_quad quad;
-    kernel_quad_place places[2];
+    kernel_quad_point places[2];
     int corner[4];
     for (int i = 0; i < 4; i++) ranks.rank[i] = around[i]; /* vertex numbers are ranks, because vertices are sorted */
     kernel_quad_corners(&ranks, loop, corner);
@@ -277,8 +279,8 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
     kernel_quad_of_facets(r, t, corner, &quad);
     const vm once = vm_xor(m[0]->mask, m[1]->mask);
     const vm twice = kernel_quad_sides(r->rays, quad.e01, quad.e32, quad.e03, quad.e12);
-    const int count = kernel_quad_places(&quad, once, twice, places);
-    if (count == 2) kernel_places_pair(m, places);
+    const int count = kernel_quad_points(&quad, once, twice, places);
+    if (count == 2) kernel_quad_points_pair(m, places);
     r->uneven = vm_or(r->uneven, vm_xor(vm_and(m[0]->mask, m[1]->mask), count == 2 ? places[1].mask : vm_none()));
     for (int half = 0; half < 2; half++) {
         vm left = count ? vm_and(once, m[half]->mask) : vm_none();
@@ -299,8 +301,8 @@ static bool kernel_poly_cross(kernel_poly_crossings *r, vm rays, bool has_colour
     r->rays = rays;
     r->has_colour = has_colour;
     for (int i = 0; i <= c->vertex_count; i++) {
-        r->x[i] = kernel_project_x(r->packet, kernel_polyhedron_spot(c, i));
-        r->y[i] = kernel_project_y(r->packet, kernel_polyhedron_spot(c, i));
+        r->x[i] = kernel_project_x(r->packet, kernel_polyhedron_position(c, i));
+        r->y[i] = kernel_project_y(r->packet, kernel_polyhedron_position(c, i));
     }
     for (int i = 0; i < c->edge_count; i++) kernel_poly_edge(r, i, c->edges[i][0], c->edges[i][1]);
     for (int i = 0; i < c->facet_count; i++) {

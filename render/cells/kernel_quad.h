@@ -47,10 +47,10 @@ typedef struct kernel_quad {
 
 /* The points at which rays meet a quad's bilinear patch: parameter s from corner 0 to corner 1, parameter r from corner
  * 0 to corner 3, and depth t. */
-typedef struct kernel_quad_place {
+typedef struct kernel_quad_point {
     vm mask;
     vf s, r, t;
-} kernel_quad_place;
+} kernel_quad_point;
 
 SIMD_INLINE vf kernel_bilinear(const vf f[4], vf s, vf r)
 {
@@ -134,8 +134,8 @@ static inline double kernel_flat_limit(const kernel_flat_quad *q, int i, int i2,
 
 /* Computes the point of the patch (parameters s and r, and depth) at which the patch's Jacobian has the sign of `root`.
  * The magnitude of root is the square root of the discriminant D. */
-static inline void kernel_flat_place(const kernel_flat_quad *q, const kernel_flat_quadratic *a,
-                                     const kernel_flat_quadratic *b, double root, double place[3])
+static inline void kernel_scalar_point(const kernel_flat_quad *q, const kernel_flat_quadratic *a,
+                                       const kernel_flat_quadratic *b, double root, double place[3])
 {
     const double s = kernel_flat_vanishes(a) ? kernel_flat_limit(q, 0, 3, 1, 2) : kernel_flat_root(a, root);
     const double r = kernel_flat_vanishes(b) ? kernel_flat_limit(q, 0, 1, 3, 2) : kernel_flat_root(b, -root);
@@ -151,7 +151,7 @@ static inline void kernel_flat_once(const kernel_flat_quad *q, double place[3])
     const bool by_b = kernel_flat_turns(&b);
     const double root = __builtin_sqrt(kernel_flat_discriminant(by_b ? &b : &a));
     const bool is_rising = by_b ? b.is_negative0 : a.is_negative0;
-    kernel_flat_place(q, &a, &b, by_b != is_rising ? root : -root, place);
+    kernel_scalar_point(q, &a, &b, by_b != is_rising ? root : -root, place);
 }
 
 /* Returns whether the quadratic may have two roots in (0, 1): its ends have one sign, and its middle coefficient has
@@ -168,8 +168,8 @@ static inline bool kernel_flat_twice(const kernel_flat_quad *q, double places[2]
     if (!kernel_flat_bends(&a) || !kernel_flat_bends(&b)) return false;
     const double root = __builtin_sqrt(kernel_flat_discriminant(&b));
     if (!(root > 0)) return false;
-    kernel_flat_place(q, &a, &b, root, places[0]);
-    kernel_flat_place(q, &a, &b, -root, places[1]);
+    kernel_scalar_point(q, &a, &b, root, places[0]);
+    kernel_scalar_point(q, &a, &b, -root, places[1]);
     return true;
 }
 
@@ -192,7 +192,7 @@ static inline kernel_flat_quad kernel_flat_of(const kernel_quad *q, int lane)
     return flat;
 }
 
-static inline void kernel_quad_put(kernel_quad_place *out, int lane, const double place[3])
+static inline void kernel_quad_put(kernel_quad_point *out, int lane, const double place[3])
 {
     out->s[lane] = (float)place[0];
     out->r[lane] = (float)place[1];
@@ -235,7 +235,7 @@ SIMD_INLINE kernel_half kernel_half_root(const kernel_half_quadratic *c, kernel_
 
 /* Computes the patch's point for the wanted rays in one half of the lanes. Each of these rays crosses one triangle.
  * Returns the rays for which one of the quadratics A and B vanishes, whose points must be computed one by one. */
-SIMD_INLINE kernel_half_mask kernel_half_once(const kernel_quad *quad, vm wanted, int half, kernel_quad_place *out)
+SIMD_INLINE kernel_half_mask kernel_half_once(const kernel_quad *quad, vm wanted, int half, kernel_quad_point *out)
 {
     const kernel_half zero = {0}, one = zero + 1;
     kernel_half_quad q;
@@ -270,7 +270,7 @@ SIMD_INLINE kernel_half_mask kernel_half_once(const kernel_quad *quad, vm wanted
     return rays & (kernel_half_vanishes(&a) | kernel_half_vanishes(&b));
 }
 
-static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad *q, vm wanted, kernel_quad_place *out)
+static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad *q, vm wanted, kernel_quad_point *out)
 {
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
@@ -281,7 +281,7 @@ static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad 
     }
 }
 
-static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm wanted, kernel_quad_place *out)
+static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm wanted, kernel_quad_point *out)
 {
     unsigned vanishing = 0;
     for (int half = 0; half < 2; half++) {
@@ -299,7 +299,7 @@ static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm 
 
 /* Computes the points of the wanted rays that meet the patch twice: one in out[0], the other in out[1]. Returns these
  * rays. */
-static __attribute__((noinline, cold)) vm kernel_quad_twice(const kernel_quad *q, vm wanted, kernel_quad_place out[2])
+static __attribute__((noinline, cold)) vm kernel_quad_twice(const kernel_quad *q, vm wanted, kernel_quad_point out[2])
 {
     unsigned found = 0;
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
@@ -387,7 +387,7 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
 }
 
 /* Computes the points of rays that meet no edge. The edge functions are computed from the projected corners. */
-static __attribute__((noinline)) void kernel_quad_once_beside(const kernel_quad *q, vm wanted, kernel_quad_place *out)
+static __attribute__((noinline)) void kernel_quad_once_beside(const kernel_quad *q, vm wanted, kernel_quad_point *out)
 {
     kernel_quad own = *q;
     own.e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
@@ -401,7 +401,7 @@ static __attribute__((noinline)) void kernel_quad_once_beside(const kernel_quad 
  * triangle of quad n. Quads are processed together because each step of Newton's method depends on the one before.
  * are_beside: no ray meets an edge, and the quads' edge functions are not set. */
 SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], bool are_beside,
-                                    kernel_quad_place *out)
+                                    kernel_quad_point *out)
 {
     kernel_patch patch[2];
     vf s[2], r[2];
@@ -414,7 +414,7 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
         for (int n = 0; n < count; n++) kernel_patch_step(&patch[n], &s[n], &r[n]);
     for (int n = 0; n < count; n++) {
         const vm left = vm_andnot(once[n], kernel_patch_arrived(&patch[n], s[n], r[n]));
-        out[n] = (kernel_quad_place){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
+        out[n] = (kernel_quad_point){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
         if (__builtin_expect(!vm_any(left), 1)) continue;
         if (are_beside)
             kernel_quad_once_beside(&q[n], left, &out[n]);
@@ -423,7 +423,7 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
     }
 }
 
-SIMD_INLINE void kernel_quads_meet(const kernel_quad *q, int count, vm once, kernel_quad_place *out)
+SIMD_INLINE void kernel_quads_meet(const kernel_quad *q, int count, vm once, kernel_quad_point *out)
 {
     const vm all[2] = {once, once};
     kernel_quads_cross(q, count, all, false, out);
@@ -492,7 +492,7 @@ SIMD_INLINE vm kernel_curved_bends(const vf x[8], const vf y[8], const signed ch
 
 /* Computes the points at which rays meet the patch. Rays in `once` meet it once; rays in `twice` meet it twice or
  * never. Returns how many entries of out are set, 0 to 2. */
-SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, kernel_quad_place out[2])
+SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kernel_quad_point out[2])
 {
     const vf zero = vf_set(0);
     int count = 0;
@@ -503,8 +503,8 @@ SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, kern
     if (!vm_any(twice)) return count;
     const vm bends = kernel_quad_bends(q, twice);
     if (__builtin_expect(!vm_any(bends), 1)) return count;
-    if (!count) out[0] = (kernel_quad_place){vm_none(), zero, zero, zero};
-    out[1] = (kernel_quad_place){vm_none(), zero, zero, zero};
+    if (!count) out[0] = (kernel_quad_point){vm_none(), zero, zero, zero};
+    out[1] = (kernel_quad_point){vm_none(), zero, zero, zero};
     out[1].mask = kernel_quad_twice(q, bends, out);
     out[0].mask = vm_or(out[0].mask, out[1].mask);
     return vm_any(out[1].mask) ? 2 : count;

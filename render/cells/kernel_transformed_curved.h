@@ -347,8 +347,8 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
     const int count = grid_type_vertices(type);
     kernel_whole values[8];
     vf relative[8], rank[8];
-    const vm collapsed = p->has_narrow_places ? kernel_turned_fetch(out, p, true, type, vertices, rank)
-                                              : kernel_turned_fetch(out, p, false, type, vertices, rank);
+    const vm collapsed = p->has_narrow_positions ? kernel_turned_fetch(out, p, true, type, vertices, rank)
+                                                 : kernel_turned_fetch(out, p, false, type, vertices, rank);
     for (int i = 0; i < count; i++) {
         const kernel_whole *world[3];
         vi vertex;

@@ -107,7 +107,7 @@ static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_t
 {
     for (int i = 0; i < 4; i++)
         for (int n = count; n < SIMD_WIDTH; n++) vertices[i][n] = vertices[i][0];
-    if (p->has_narrow_places)
+    if (p->has_narrow_positions)
         kernel_ordered_fetch(out, p, true, vertices);
     else
         kernel_ordered_fetch(out, p, false, vertices);

@@ -244,7 +244,7 @@ SIMD_INLINE void kernel_local_quad_of(const kernel_local_corners *c, kernel_quad
     }
 }
 
-SIMD_INLINE void kernel_local_quad_end(const kernel_local_corners *c, int type, const kernel_quad_place *place,
+SIMD_INLINE void kernel_local_quad_end(const kernel_local_corners *c, int type, const kernel_quad_point *place,
                                        kernel_point *out)
 {
     const vf f[4] = {c->at[0][3], c->at[1][3], c->at[2][3], c->at[3][3]};
@@ -285,7 +285,7 @@ SIMD_INLINE void kernel_local_cross_quads(const kernel_local_corners corners[2],
 {
     const int count = kernel_has_apex(type) ? 1 : 2;
     kernel_quad quads[2];
-    kernel_quad_place places[2];
+    kernel_quad_point places[2];
     for (int n = 0; n < count; n++) kernel_local_quad_of(&corners[n], &quads[n]);
     kernel_quads_cross(quads, count, on_quad, true, places);
     for (int n = 0; n < count; n++) kernel_local_quad_end(&corners[n], type, &places[n], &ends[n]);

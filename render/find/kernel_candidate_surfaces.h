@@ -176,7 +176,7 @@ SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const ker
     for (int i = 0; i < count; i++) {
         vf from_eye[3];
         kernel_found_positions(s, kernel_cells_vertex(c, i), from_eye);
-        l->usual = kernel_usual_place(l->usual, from_eye);
+        l->usual = kernel_usual_position(l->usual, from_eye);
         kernel_rotate_to_camera(s, from_eye, l->at[i]);
     }
 }

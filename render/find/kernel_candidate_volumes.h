@@ -31,7 +31,7 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
         v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_whole_narrow(&value.wide);
         usual = vm_and(usual, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
         kernel_found_positions(s, vertex, place);
-        usual = kernel_usual_place(usual, place);
+        usual = kernel_usual_position(usual, place);
         kernel_rotate_to_camera(s, place, at);
         kernel_ends_add(s, &e, at, vm_all_lanes());
     }

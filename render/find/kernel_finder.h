@@ -305,7 +305,7 @@ SIMD_INLINE void kernel_found_positions(const kernel_finder *s, vi vertex, vf ou
 
 /* Returns the lanes of `usual` whose coordinates are small enough for float32 lanes and not NaN. Other cells are tested
  * one by one. */
-SIMD_INLINE vm kernel_usual_place(vm usual, const vf place[3])
+SIMD_INLINE vm kernel_usual_position(vm usual, const vf place[3])
 {
     for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
     return usual;

@@ -36,13 +36,13 @@ void hit_normal(const float folded[2], double n[3])
     normalize(n);
 }
 
-hit_place hit_place_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift)
+hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift)
 {
     const render_camera *c = &job->camera;
     const uint32_t width = (uint32_t)c->width;
     const double z = (double)t / job->space.scale + job->space.depth_origin, above = lift / job->space.scale;
     double base[3], direction[3], n[3];
-    hit_place out;
+    hit_frame out;
     render_camera_ray(c, (int)(pixel % width), (int)(pixel / width), base, direction);
     hit_normal(normal, n);
     out.a = hit_axes_around(n);

@@ -290,9 +290,9 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const ke
 
 /* Hits of a vector of rays: r, the reference coordinates, is used for colours; `normal` is a normal or r, as in
  * kernel_hits. */
-typedef struct kernel_curved_batch_places {
+typedef struct kernel_curved_batch_points {
     vf t, normal[3], r[3];
-} kernel_curved_batch_places;
+} kernel_curved_batch_points;
 
 /* Reads the field of the contour lines at the vertices of the lanes' cells. */
 static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kernel_tile_trace *t,
@@ -307,7 +307,7 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kern
 /* Computes the colours of hits if the surface has a colour field or contour lines. */
 static __attribute__((noinline)) void
 kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batch *h, const uint8_t *lanes,
-                            const kernel_lane_rays *p, const kernel_curved_batch_places *places, vf colours[3])
+                            const kernel_lane_rays *p, const kernel_curved_batch_points *places, vf colours[3])
 {
     const render_surface_layer *layer = t->surface->layer;
     if (layer->colour_map) {
@@ -329,7 +329,7 @@ kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batc
 static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
                                                                      const kernel_pixel_list *rays, int first,
                                                                      const kernel_lane_rays *p, unsigned hit,
-                                                                     const kernel_curved_batch_places *places)
+                                                                     const kernel_curved_batch_points *places)
 {
     const render_surface_layer *layer = t->surface->layer;
     const bool has_own = layer->colour_map || layer->lines;
@@ -371,7 +371,7 @@ SIMD_INLINE unsigned kernel_curved_batch_take(kernel_tile_trace *t, kernel_curve
                                               const kernel_lane_rays *p, const kernel_map *map, const kernel_point *at,
                                               vm hit)
 {
-    kernel_curved_batch_places places;
+    kernel_curved_batch_points places;
     places.t = at->t;
     kernel_curved_batch_normal(t, map, at->r, places.normal);
     memcpy(places.r, at->r, sizeof places.r);
@@ -430,7 +430,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
     const kernel_curved_ends *ends = &h->other_ends;
     kernel_lane_rays p;
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
-    kernel_curved_batch_places places = {.t = vf_set(0)};
+    kernel_curved_batch_points places = {.t = vf_set(0)};
     kernel_search s;
     vm hits = vm_none();
     kernel_lane_rays_begin(&p, t, &h->others, n);

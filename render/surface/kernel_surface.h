@@ -109,7 +109,7 @@ SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_stat
 /* Draws contour lines over the hits' colours, unless numbers are painted. Returns the visible hits: if only lines are
  * drawn, those that a line covers. */
 static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, const kernel_surface *s, vm hit,
-                                                        const kernel_hit_places *at, kernel_accepted *h)
+                                                        const kernel_hit_points *at, kernel_accepted *h)
 {
     const kernel_rays rays = kernel_packet_rays(p);
     const bool is_alone = s->layer->lines->is_alone, are_numbers = p->frame->job->paint == RENDER_VALUES;
@@ -127,7 +127,7 @@ static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, 
 /* Accepts hits: those of an opaque surface are kept as the nearest ones; those of a transparent surface are emitted at
  * once. c: the cell; NULL for polyhedra. */
 SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
-                               const kernel_hit_places *at)
+                               const kernel_hit_points *at)
 {
     const kernel_surface *s = state->surface;
     kernel_accepted h = {.value = value, .t = at->t};
@@ -162,7 +162,7 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
     const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
     const vm hit = kernel_visible(p, state->surface, change, t);
     if (!vm_any(hit)) return;
-    kernel_hit_places at = {.t = t, .w = vf_set(0)};
+    kernel_hit_points at = {.t = t, .w = vf_set(0)};
     kernel_tet_normal(p, c, at.normal);
     if (has_colour) {
         const vf length = i.t_out - i.t_in;
@@ -192,7 +192,7 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *stat
 {
     const vm hit = kernel_visible(p, state->surface, found, at->t);
     if (!vm_any(hit)) return hit;
-    kernel_hit_places places = {.t = at->t, .w = vf_set(0)};
+    kernel_hit_points places = {.t = at->t, .w = vf_set(0)};
     if (state->surface->layer->normal == RENDER_VERTEX) {
         memcpy(places.normal, at->r, sizeof places.normal);
     } else {
@@ -630,7 +630,7 @@ static __attribute__((noinline)) void kernel_polyhedron_along(const kernel_packe
 static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, int value, kernel_poly_crossings *r,
                                      vm hit, const kernel_profile_walk *walk)
 {
-    kernel_hit_places at = {.t = walk->t, .w = walk->w};
+    kernel_hit_points at = {.t = walk->t, .w = walk->w};
     if (!vm_any(hit)) return;
     kernel_poly_segments(r);
     if (state->surface->layer->normal == RENDER_VERTEX)

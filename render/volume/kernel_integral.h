@@ -111,20 +111,20 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_of(vf length, vf v_in, vf v_
 
 /* The piece of the transfer function that each ray is in. If all rays are in the same piece, `common` points to it,
  * which saves gathers. */
-typedef struct kernel_piece_place {
+typedef struct kernel_piece_index {
     vi at;
     const kernel_piece *common;
-} kernel_piece_place;
+} kernel_piece_index;
 
-SIMD_INLINE kernel_piece_place kernel_piece_place_of(const kernel_pieces *t, vm rays, vf piece)
+SIMD_INLINE kernel_piece_index kernel_piece_index_of(const kernel_pieces *t, vm rays, vf piece)
 {
     const int lane = __builtin_ctz(vm_bits(rays));
     const int first = (int)piece[lane];
     const bool is_common = !vm_any(vm_andnot(rays, vf_eq(piece, vf_set((kernel_real)first))));
-    return (kernel_piece_place){vi_from_vf(vf_select(rays, piece, vf_set(0))), is_common ? &t->pieces[first] : NULL};
+    return (kernel_piece_index){vi_from_vf(vf_select(rays, piece, vf_set(0))), is_common ? &t->pieces[first] : NULL};
 }
 
-SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_place *place, int entry)
+SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_index *place, int entry)
 {
     if (place->common) return vf_set(place->common->entry[entry]);
     return vf_gather(t->pieces[0].entry + entry, place->at * KERNEL_PIECE_ENTRIES);
@@ -135,7 +135,7 @@ typedef struct kernel_piece_ends {
     vf low, high, low_rest, high_rest;
 } kernel_piece_ends;
 
-SIMD_INLINE kernel_piece_ends kernel_piece_ends_of(const kernel_pieces *t, const kernel_piece_place *at)
+SIMD_INLINE kernel_piece_ends kernel_piece_ends_of(const kernel_pieces *t, const kernel_piece_index *at)
 {
     kernel_piece_ends out = {kernel_piece_entry(t, at, KERNEL_PIECE_LOW), kernel_piece_entry(t, at, KERNEL_PIECE_HIGH),
                              vf_set(0), vf_set(0)};
@@ -153,7 +153,7 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
     const vf spot = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
     vf piece = vf_gather(t->bin_first, vi_from_vf(spot));
     for (vm open = rays; vm_any(open);) {
-        const kernel_piece_place at = kernel_piece_place_of(t, open, piece);
+        const kernel_piece_index at = kernel_piece_index_of(t, open, piece);
         const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
         vf below = x - ends.low, above = ends.high - x;
         if (__builtin_expect(t->has_rests, 0)) {
@@ -238,7 +238,7 @@ typedef struct kernel_integration_step {
     vm is_opaque;
 } kernel_integration_step;
 
-SIMD_INLINE kernel_integration_step kernel_integration_step_begin(const kernel_pieces *t, const kernel_piece_place *at,
+SIMD_INLINE kernel_integration_step kernel_integration_step_begin(const kernel_pieces *t, const kernel_piece_index *at,
                                                                   const kernel_piece_state *way, vf turn)
 {
     const vf inverse = kernel_piece_entry(t, at, KERNEL_PIECE_INVERSE);
@@ -294,7 +294,7 @@ SIMD_INLINE vf kernel_integration_step_sum(const kernel_integration_step *st, vf
 
 /* Adds the light of one integration step, over which the value changes by `move`. `below` is the distance of the value
  * at the step's begin from the piece's low end. */
-SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_place *at, vm open, vf below, vf move,
+SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_index *at, vm open, vf below, vf move,
                                    const kernel_integration_step *st, kernel_light *light)
 {
     vf e0, e1;
@@ -319,7 +319,7 @@ SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_
     vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, leg.falling);
     vm open = rays, fresh = rays;
     while (vm_any(open)) {
-        const kernel_piece_place at = kernel_piece_place_of(t, open, piece);
+        const kernel_piece_index at = kernel_piece_index_of(t, open, piece);
         if (vm_any(fresh)) {
             const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
             kernel_piece_state_enter(&way, &leg, fresh, &ends);

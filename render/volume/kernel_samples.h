@@ -218,7 +218,7 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
         const vf value = s->value[v][n];
         const vm has = vf_eq(value, value);
         vf absorbed, c[3];
-        const vf place = kernel_colour_place(&f->volumes[v], value);
+        const vf place = kernel_colour_position(&f->volumes[v], value);
         const vf opacity = vf_select(has, kernel_opacity_at(&f->volumes[v], place), vf_set(0));
         if (!vm_any(vf_lt(vf_set(0), opacity))) continue;
         const vf left = kernel_transmittance(opacity, f->volumes[v].exponent, &absorbed);

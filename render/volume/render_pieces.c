@@ -154,8 +154,8 @@ static int collect_cuts(const render_transfer *t, double tolerance, kernel_real 
 {
     int count = cut_ramps(t, tolerance, cuts), active = 0;
     for (int i = 0; i < t->colour_count - 1; i = next_entry(t, i, tolerance))
-        entries[active++] = (kept_entry){i, render_entry_place(t, i)};
-    entries[active++] = (kept_entry){t->colour_count - 1, render_entry_place(t, t->colour_count - 1)};
+        entries[active++] = (kept_entry){i, render_entry_position(t, i)};
+    entries[active++] = (kept_entry){t->colour_count - 1, render_entry_position(t, t->colour_count - 1)};
     for (int i = 0; i < active; i++) cuts[count++] = (kernel_real)entries[i].place;
     for (int i = 0; i < t->opacity_count; i++) cuts[count++] = (kernel_real)render_domain_of(t, t->opacity_values[i]);
     qsort(cuts, (size_t)count, sizeof *cuts, compare_cuts);

@@ -223,7 +223,7 @@ static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
         double slope = 0;
         for (int i = 0; i < t->colour_count; i++) {
             const bool is_last = i == t->colour_count - 1;
-            const double width = is_last ? 1 : render_entry_place(t, i + 1) - render_entry_place(t, i);
+            const double width = is_last ? 1 : render_entry_position(t, i + 1) - render_entry_position(t, i);
             const double change = is_last ? 0 : (double)t->colours[3 * i + 3 + c] - (double)t->colours[3 * i + c];
             bend = fmax(bend, fabs(change / width - slope));
             closest = fmin(closest, width);
