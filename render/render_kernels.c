@@ -105,7 +105,7 @@ static void kernel_tile_queue_begin(kernel_tile_queue *m)
 }
 
 /* Makes the current layer and the part those of the cells queued next. */
-SIMD_INLINE void kernel_tile_queue_turn(const kernel_tile_trace *t, kernel_tile_queue *m, int part)
+SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_tile_queue *m, int part)
 {
     if (m->layer == t->layer && m->part == part) return;
     m->layer = t->layer;
@@ -169,7 +169,7 @@ static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
 SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *m,
                                        const kernel_tile_candidate *candidate, int part, int value)
 {
-    kernel_tile_queue_turn(t, m, part);
+    kernel_tile_queue_set_part(t, m, part);
     const int type = kernel_arrays_type(&m->arrays, candidate->cell);
     if (kernel_is_for_vectors(m, candidate, type)) {
         kernel_tile_queue_put(t, m, &m->pending[kernel_found_number(type)], candidate, value);
@@ -230,7 +230,7 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
     for (int n = 0; n < w->count; n++) {
         int part;
         kernel_tile_source(t, w->items[n]->source, &part);
-        if (m->layer < 0) kernel_tile_queue_turn(t, m, part);
+        if (m->layer < 0) kernel_tile_queue_set_part(t, m, part);
         if (m->layer == t->layer && m->part == part &&
             kernel_is_for_vectors(m, w->items[n], kernel_arrays_type(&m->arrays, w->items[n]->cell)))
             continue; /* vectors prefetch their own cells */
@@ -300,7 +300,7 @@ static bool kernel_tile_find_take(kernel_candidate_list *list)
 }
 
 /* Makes another mesh part current for the search; the cells pending from the previous part are processed first. */
-static void kernel_tile_find_turn(kernel_tile_trace *t, kernel_tile_search *s, int part)
+static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *s, int part)
 {
     kernel_finder *finder = t->thread->finder;
     if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
@@ -317,7 +317,7 @@ static void kernel_tile_find_turn(kernel_tile_trace *t, kernel_tile_search *s, i
 
 static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count)
 {
-    kernel_tile_find_turn(t, (kernel_tile_search *)t->search, part);
+    kernel_tile_find_set_part(t, (kernel_tile_search *)t->search, part);
     kernel_find_leaf(t->thread->finder, cells, count);
 }
 
@@ -355,9 +355,9 @@ typedef struct kernel_memory {
     kernel_tile_search search;
 } kernel_memory;
 
-static int volume_turns(const kernel_frame *f)
+static int volume_intervals(const kernel_frame *f)
 {
-    return f->volume_turns ? f->volume_turns : 1;
+    return f->volume_intervals ? f->volume_intervals : 1;
 }
 
 /* Returns whether one of the rectangle's pixels must be traced. */
@@ -399,14 +399,14 @@ static void trace_tile_surfaces(kernel_tile_trace *t)
 static void trace_tile_segments(kernel_tile_trace *t)
 {
     const double start = t->thread->now();
-    for (t->turn = 0; t->turn < volume_turns(t->frame); t->turn++) kernel_tile_segments_trace(t);
+    for (t->turn = 0; t->turn < volume_intervals(t->frame); t->turn++) kernel_tile_segments_trace(t);
     t->thread->volume_seconds += t->thread->now() - start;
 }
 
 static void trace_tile_samples(kernel_tile_trace *t)
 {
     const double start = t->thread->now();
-    for (t->turn = 0; t->turn < volume_turns(t->frame); t->turn++) kernel_tile_volumes(t);
+    for (t->turn = 0; t->turn < volume_intervals(t->frame); t->turn++) kernel_tile_volumes(t);
     t->thread->volume_seconds += t->thread->now() - start;
 }
 

@@ -197,7 +197,7 @@ static void prepare_clips(kernel_frame *f)
     if (job->volume_count) f->common_clips &= job->volume_clips;
     if (!job->clip_count) f->common_clips = 0;
     if (job->volume_count && job->volume_clips & ~f->common_clips)
-        f->volume_turns = 1 + __builtin_popcount(job->volume_clips & outside);
+        f->volume_intervals = 1 + __builtin_popcount(job->volume_clips & outside);
 }
 
 /* Opaque layers come first; kinds number the isovalues in the job's order. */
@@ -388,7 +388,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     const bool bins = job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
     /* A tile's list of cells can be used by one turn only, because tracing consumes it. */
-    frame->bins_volume =
-        bins && job->volume_count == 1 && frame->volume_turns <= 1 && !(frame->has_segments && job->separate_samples);
+    frame->bins_volume = bins && job->volume_count == 1 && frame->volume_intervals <= 1 &&
+                         !(frame->has_segments && job->separate_samples);
     return segments;
 }

@@ -258,7 +258,7 @@ SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
 /* Computes the canonical order of a cell's vertices: it begins at the vertex of least rank and continues along its
  * edges in the order of ranks. from[i] is the vertex at position i. The order may mirror the cell, because orientation
  * does not matter here. */
-SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
+SIMD_INLINE void kernel_cell_canonical_order(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
 {
     /* maps a hex's vertex number to the bits of its reference coordinates x, y, z, and back */
     static const signed char corner[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -329,8 +329,8 @@ SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int 
 }
 
 /* Puts a cell's vertices in their canonical order. The vertices of a tet, which is symmetric, are sorted by
- * coordinates. Other cells get ranks, and their vertices are permuted by kernel_cell_turn(). Then nothing depends on
- * how the simulation numbers a cell's vertices, not even if its map is folded and has several solutions. */
+ * coordinates. Other cells get ranks, and their vertices are permuted by kernel_cell_canonical_order(). Then nothing
+ * depends on how the simulation numbers a cell's vertices, not even if its map is folded and has several solutions. */
 static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
 {
     int from[GRID_MAX_CELL_VERTICES], rank[GRID_MAX_CELL_VERTICES];
@@ -341,7 +341,7 @@ static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
         return;
     }
     kernel_rank_positions(c->world, c->count, c->rank);
-    kernel_cell_turn(c, from);
+    kernel_cell_canonical_order(c, from);
     kernel_cell_permute(c, from, c->count);
     for (int i = 0; i < c->count; i++) rank[i] = c->rank[from[i]];
     for (int i = 0; i < c->count; i++) c->rank[i] = rank[i];

@@ -147,9 +147,9 @@ SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
 /* ---- the order of vertices ----
  * The rounding of terms depends on the order of a cell's vertices, which differs between simulation codes and ranks. So
  * vertices are permuted into a canonical order: first the vertex with the smallest position, then along its edges in
- * the order of positions. kernel_cell_turn() does the same by the caller's coordinates. Positions in tile space are the
- * same on all ranks. Vertices with the same position keep their order; cells with such vertices are not processed in
- * lanes. */
+ * the order of positions. kernel_cell_canonical_order() does the same by the caller's coordinates. Positions in tile
+ * space are the same on all ranks. Vertices with the same position keep their order; cells with such vertices are not
+ * processed in lanes. */
 
 SIMD_INLINE vm kernel_local_before(const vf a[3], const vf b[3])
 {
@@ -189,7 +189,7 @@ SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertic
     }
 }
 
-SIMD_INLINE void kernel_hex_turn(vf (*at)[8], int lists)
+SIMD_INLINE void kernel_hex_sort_vertices(vf (*at)[8], int lists)
 {
     /* vertex number for the bits of its reference coordinates x, y, z */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -211,7 +211,7 @@ SIMD_INLINE void kernel_hex_turn(vf (*at)[8], int lists)
     }
 }
 
-SIMD_INLINE void kernel_wedge_turn(vf (*at)[8], int lists)
+SIMD_INLINE void kernel_wedge_sort_vertices(vf (*at)[8], int lists)
 {
     static const signed char vertex[6] = {0, 1, 2, 3, 4, 5};
     vm is_least[8];
@@ -228,7 +228,7 @@ SIMD_INLINE void kernel_wedge_turn(vf (*at)[8], int lists)
     kernel_local_swap(at, lists, swap, 4, 5);
 }
 
-SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], int lists)
+SIMD_INLINE void kernel_pyramid_sort_vertices(vf (*at)[8], int lists)
 {
     static const signed char vertex[4] = {0, 1, 2, 3};
     vm is_least[8];
@@ -243,14 +243,14 @@ SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], int lists)
 
 /* Permutes the vertices of a hex, wedge or pyramid in each lane into the canonical order of their positions. at[0] to
  * at[2] are the positions; all lists are permuted with them. */
-SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], int lists)
+SIMD_INLINE void kernel_local_sort_vertices(int type, vf (*at)[8], int lists)
 {
     if (kernel_is_box(type))
-        kernel_hex_turn(at, lists);
+        kernel_hex_sort_vertices(at, lists);
     else if (kernel_is_prism(type))
-        kernel_wedge_turn(at, lists);
+        kernel_wedge_sort_vertices(at, lists);
     else
-        kernel_pyramid_turn(at, lists);
+        kernel_pyramid_sort_vertices(at, lists);
 }
 
 /* Returns the distance of r from the cell's border, in reference coordinates; it is negative outside. */

@@ -438,7 +438,7 @@ SIMD_INLINE vm kernel_quad_sides(vm rays, vf e01, vf e32, vf e03, vf e12)
 }
 
 /* Returns v, negated in lanes in which `other` is negative. */
-SIMD_INLINE vf kernel_turned(vf v, vf other)
+SIMD_INLINE vf kernel_flip_sign(vf v, vf other)
 {
     return vf_from_bits(vi_from_bits(v) ^ (vi_from_bits(other) & vi_set((int32_t)0x80000000u)));
 }
@@ -450,8 +450,8 @@ SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
     const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
     const vf other = vf_diff_of_products(q->x[3], q->y[1], q->x[1], q->y[3]);
     const vf slack = 1e-6f * (vf_abs(across) + vf_abs(other));
-    const vm b = vf_le(kernel_turned(across + other, q->e01), slack);
-    const vm a = vf_le(kernel_turned(across - other, q->e03), slack);
+    const vm b = vf_le(kernel_flip_sign(across + other, q->e01), slack);
+    const vm a = vf_le(kernel_flip_sign(across - other, q->e03), slack);
     return vm_and(rays, vm_and(a, b));
 }
 

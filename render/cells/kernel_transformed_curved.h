@@ -72,11 +72,11 @@ SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi l
 /* ---- order of vertices ---- */
 
 /* The vertices of each lane's cell while they are permuted: coordinates, rank and vertex index. */
-typedef struct kernel_turned_curved {
+typedef struct kernel_sorted_curved {
     kernel_taken at[8][3];
     vf rank[8];
     vi vertex[8];
-} kernel_turned_curved;
+} kernel_sorted_curved;
 
 SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
 {
@@ -85,7 +85,7 @@ SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
     *b = vf_select(lanes, was, *b);
 }
 
-SIMD_INLINE void kernel_turned_swap(kernel_turned_curved *h, bool is_narrow, vm lanes, int i, int j)
+SIMD_INLINE void kernel_sorted_curved_swap(kernel_sorted_curved *h, bool is_narrow, vm lanes, int i, int j)
 {
     const vi was = h->vertex[i];
     for (int a = 0; a < 3; a++) kernel_taken_swap(is_narrow, lanes, &h->at[i][a], &h->at[j][a]);
@@ -96,7 +96,7 @@ SIMD_INLINE void kernel_turned_swap(kernel_turned_curved *h, bool is_narrow, vm 
 
 /* Computes each vertex's rank in the order of coordinates; vertices with equal coordinates are ranked in their given
  * order. */
-SIMD_INLINE void kernel_turned_rank(kernel_turned_curved *h, bool is_narrow, int count)
+SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_curved *h, bool is_narrow, int count)
 {
     const vf zero = vf_set(0), one = vf_set(1);
     for (int i = 0; i < count; i++) h->rank[i] = vf_set((float)i);
@@ -110,7 +110,7 @@ SIMD_INLINE void kernel_turned_rank(kernel_turned_curved *h, bool is_narrow, int
 
 /* Permutes a hex's vertices: the smallest comes first, then the axes are ordered by the ranks of its three
  * neighbours. */
-SIMD_INLINE void kernel_turned_hex(kernel_turned_curved *h, bool is_narrow)
+SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_curved *h, bool is_narrow)
 {
     /* vertex number for the bits of its reference coordinates x, y, z */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -122,59 +122,59 @@ SIMD_INLINE void kernel_turned_hex(kernel_turned_curved *h, bool is_narrow)
     }
     for (int a = 0; a < 3; a++)
         for (int b = 0; b < 8; b++)
-            if (!(b >> a & 1)) kernel_turned_swap(h, is_narrow, turn[a], vertex[b], vertex[b | 1 << a]);
+            if (!(b >> a & 1)) kernel_sorted_curved_swap(h, is_narrow, turn[a], vertex[b], vertex[b | 1 << a]);
     for (int k = 0; k < 3; k++) {
         /* sorting network of three: compares axes 0 and 1, 1 and 2, 0 and 1 */
         const int at = k == 1, low = 1 << at, high = 2 << at, other = 7 & ~(low | high);
         const vm swap = vf_lt(h->rank[(int)vertex[high]], h->rank[(int)vertex[low]]);
-        kernel_turned_swap(h, is_narrow, swap, vertex[low], vertex[high]);
-        kernel_turned_swap(h, is_narrow, swap, vertex[low | other], vertex[high | other]);
+        kernel_sorted_curved_swap(h, is_narrow, swap, vertex[low], vertex[high]);
+        kernel_sorted_curved_swap(h, is_narrow, swap, vertex[low | other], vertex[high | other]);
     }
 }
 
 /* Permutes a wedge's vertices: the smallest comes first, then its smaller neighbour in its triangle. */
-SIMD_INLINE void kernel_turned_wedge(kernel_turned_curved *h, bool is_narrow)
+SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_curved *h, bool is_narrow)
 {
     vm over = vm_none();
     for (int i = 3; i < 6; i++) over = vm_or(over, vf_eq(h->rank[i], vf_set(0)));
-    for (int i = 0; i < 3; i++) kernel_turned_swap(h, is_narrow, over, i, i + 3);
+    for (int i = 0; i < 3; i++) kernel_sorted_curved_swap(h, is_narrow, over, i, i + 3);
     for (int i = 1; i < 3; i++) {
         const vm first = vf_eq(h->rank[i], vf_set(0));
-        kernel_turned_swap(h, is_narrow, first, 0, i);
-        kernel_turned_swap(h, is_narrow, first, 3, i + 3);
+        kernel_sorted_curved_swap(h, is_narrow, first, 0, i);
+        kernel_sorted_curved_swap(h, is_narrow, first, 3, i + 3);
     }
     const vm swap = vf_lt(h->rank[2], h->rank[1]);
-    kernel_turned_swap(h, is_narrow, swap, 1, 2);
-    kernel_turned_swap(h, is_narrow, swap, 4, 5);
+    kernel_sorted_curved_swap(h, is_narrow, swap, 1, 2);
+    kernel_sorted_curved_swap(h, is_narrow, swap, 4, 5);
 }
 
 /* Permutes a pyramid's vertices: the smallest vertex of the base comes first, then its smaller neighbour in the base;
  * the apex stays last. */
-SIMD_INLINE void kernel_turned_pyramid(kernel_turned_curved *h, bool is_narrow)
+SIMD_INLINE void kernel_sorted_curved_pyramid(kernel_sorted_curved *h, bool is_narrow)
 {
     const vf least = vf_min(vf_min(h->rank[0], h->rank[1]), vf_min(h->rank[2], h->rank[3]));
     const vm second = vf_eq(h->rank[1], least), third = vf_eq(h->rank[2], least), fourth = vf_eq(h->rank[3], least);
-    kernel_turned_swap(h, is_narrow, second, 0, 1);
-    kernel_turned_swap(h, is_narrow, second, 2, 3);
-    kernel_turned_swap(h, is_narrow, third, 0, 2);
-    kernel_turned_swap(h, is_narrow, fourth, 0, 3);
-    kernel_turned_swap(h, is_narrow, fourth, 1, 2);
-    kernel_turned_swap(h, is_narrow, vf_lt(h->rank[3], h->rank[1]), 1, 3);
+    kernel_sorted_curved_swap(h, is_narrow, second, 0, 1);
+    kernel_sorted_curved_swap(h, is_narrow, second, 2, 3);
+    kernel_sorted_curved_swap(h, is_narrow, third, 0, 2);
+    kernel_sorted_curved_swap(h, is_narrow, fourth, 0, 3);
+    kernel_sorted_curved_swap(h, is_narrow, fourth, 1, 2);
+    kernel_sorted_curved_swap(h, is_narrow, vf_lt(h->rank[3], h->rank[1]), 1, 3);
 }
 
-SIMD_INLINE void kernel_turned_turn(kernel_turned_curved *h, bool is_narrow, int type)
+SIMD_INLINE void kernel_sorted_curved_sort(kernel_sorted_curved *h, bool is_narrow, int type)
 {
     if (kernel_is_box(type))
-        kernel_turned_hex(h, is_narrow);
+        kernel_sorted_curved_hex(h, is_narrow);
     else if (kernel_is_prism(type))
-        kernel_turned_wedge(h, is_narrow);
+        kernel_sorted_curved_wedge(h, is_narrow);
     else
-        kernel_turned_pyramid(h, is_narrow);
+        kernel_sorted_curved_pyramid(h, is_narrow);
 }
 
 /* Returns the lanes with an edge of length zero: a face has collapsed (kernel_quad_collapses()), or a triangle has an
  * edge without length. */
-SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_curved *h, bool is_narrow, int type)
+SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_curved *h, bool is_narrow, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vm out = vm_none();
@@ -190,17 +190,17 @@ SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_curved *h, bool is_na
 
 /* Reads the vertices and permutes them into canonical order; stores vertex indices, coordinates and ranks. Returns the
  * lanes with an edge of length zero. */
-SIMD_INLINE vm kernel_turned_fetch(kernel_transformed_curved *out, const kernel_arrays *p, bool is_narrow, int type,
-                                   int32_t (*const vertices)[SIMD_WIDTH], vf rank[8])
+SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const kernel_arrays *p, bool is_narrow,
+                                          int type, int32_t (*const vertices)[SIMD_WIDTH], vf rank[8])
 {
     const int count = grid_type_vertices(type);
-    kernel_turned_curved h;
+    kernel_sorted_curved h;
     for (int i = 0; i < count; i++) {
         memcpy(&h.vertex[i], vertices[i], sizeof h.vertex[i]);
         kernel_arrays_positions(p, is_narrow, h.vertex[i], h.at[i]);
     }
-    kernel_turned_rank(&h, is_narrow, count);
-    kernel_turned_turn(&h, is_narrow, type);
+    kernel_sorted_curved_rank(&h, is_narrow, count);
+    kernel_sorted_curved_sort(&h, is_narrow, type);
     for (int i = 0; i < count; i++) {
         const vi own_rank = vi_from_vf(h.rank[i]);
         for (int a = 0; a < 3; a++) out->world[a][i] = kernel_taken_whole(is_narrow, &h.at[i][a]);
@@ -208,7 +208,7 @@ SIMD_INLINE vm kernel_turned_fetch(kernel_transformed_curved *out, const kernel_
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
         memcpy(out->vertex[i], &h.vertex[i], sizeof h.vertex[i]);
     }
-    return kernel_turned_collapsed(&h, is_narrow, type);
+    return kernel_sorted_curved_collapsed(&h, is_narrow, type);
 }
 
 /* ---- edge functions ---- */
@@ -347,8 +347,8 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
     const int count = grid_type_vertices(type);
     kernel_whole values[8];
     vf relative[8], rank[8];
-    const vm collapsed = p->has_narrow_positions ? kernel_turned_fetch(out, p, true, type, vertices, rank)
-                                                 : kernel_turned_fetch(out, p, false, type, vertices, rank);
+    const vm collapsed = p->has_narrow_positions ? kernel_sorted_curved_fetch(out, p, true, type, vertices, rank)
+                                                 : kernel_sorted_curved_fetch(out, p, false, type, vertices, rank);
     for (int i = 0; i < count; i++) {
         const kernel_whole *world[3];
         vi vertex;

@@ -74,7 +74,7 @@ SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, const kernel_lo
 }
 
 /* Makes the mesh part with index `part` the one whose cells are queued from now on. The queues must be empty. */
-SIMD_INLINE void kernel_local_lanes_turn(const kernel_tile_trace *t, kernel_local_lanes *l, int part)
+SIMD_INLINE void kernel_local_lanes_set_part(const kernel_tile_trace *t, kernel_local_lanes *l, int part)
 {
     l->part = part;
     kernel_arrays_begin(&l->arrays, t->frame->job->parts[part].cells,
@@ -192,7 +192,7 @@ SIMD_INLINE unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_l
         kernel_lanes_transform(t->frame, &t->tile, world, at);
         for (int a = 0; a < 3; a++) lists[a][i] = at[a];
     }
-    kernel_local_turn(type, lists, list_count);
+    kernel_local_sort_vertices(type, lists, list_count);
     kernel_local_pixels(t, count, (const vf(*)[8])lists, l->ends);
     *lanes = vm_bits(vm_and(shows, kernel_local_setup(type, (const vf(*)[8])lists, lists[3], most_bent, &l->cells)));
     return vm_bits(shows);

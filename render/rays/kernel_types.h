@@ -285,7 +285,7 @@ typedef struct kernel_frame {
     uint32_t common_clips; /* one bit per clip that all layers share and that leaves a single interval of a ray */
     /* Maximum number of intervals that the clips of volumes may leave of a ray; 0 if volumes have no clips of their
      * own. */
-    int volume_turns;
+    int volume_intervals;
     bool has_transparent;
     bool is_binned;     /* whether surfaces' cells are binned by tile, if that pays */
     bool bins_volume;   /* whether the cells of the only volume are binned by tile */

@@ -133,7 +133,7 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
     while (kernel_poly_next(&r, &stay)) {
         const vm changes = kernel_changes_sign(&stay.interval);
         const vm wanted =
-            vm_and(kernel_is_near(p, &stay.interval), vm_or(changes, kernel_polyhedron_turns(p, c, &r, &stay)));
+            vm_and(kernel_is_near(p, &stay.interval), vm_or(changes, kernel_polyhedron_may_cross(p, c, &r, &stay)));
         if (vm_any(wanted)) kernel_occlusion_interval(p, o, wanted, &r, &stay);
     }
 }

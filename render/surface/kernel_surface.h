@@ -489,8 +489,8 @@ SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
 /* Returns the rays that may be on the other side of the isovalue between two faces of the same sign. The bound is not
  * valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or the reverse; such rays are always
  * returned. */
-SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, const kernel_poly_crossings *r,
-                                       const kernel_polyhedron_interval *stay)
+SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c, const kernel_poly_crossings *r,
+                                           const kernel_polyhedron_interval *stay)
 {
     const kernel_interval *i = &stay->interval;
     const vm longer = vm_and(i->mask, vf_lt(i->t_in, i->t_out));
@@ -670,7 +670,7 @@ static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *st
         const vm near = kernel_is_near(p, &stay.interval);
         if (!vm_any(near)) continue;
         const vm wanted =
-            vm_and(near, vm_or(kernel_changes_sign(&stay.interval), kernel_polyhedron_turns(p, c, &r, &stay)));
+            vm_and(near, vm_or(kernel_changes_sign(&stay.interval), kernel_polyhedron_may_cross(p, c, &r, &stay)));
         if (vm_any(wanted)) kernel_polyhedron_cross(p, state, value, wanted, &r, &stay);
     }
 }

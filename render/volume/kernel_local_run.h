@@ -53,7 +53,7 @@ SIMD_INLINE void kernel_local_enqueue(kernel_tile_trace *t, kernel_local_lanes *
     const int queue = kernel_local_queue_of(type);
     if (part != l->part) {
         kernel_local_end(t, l);
-        kernel_local_lanes_turn(t, l, part);
+        kernel_local_lanes_set_part(t, l, part);
     }
     if (KERNEL_OF_TYPE(type, kernel_local_push, &l->arrays, &l->queues[queue], cell, blocks, box))
         kernel_local_run(t, l, queue);

@@ -466,7 +466,7 @@ SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, 
         kernel_block_begin(t, block);
         for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
             const int i = block * KERNEL_BLOCK_PACKETS + n;
-            if (t->frame->volume_turns) kernel_packet_clip_volumes(&t->packets[i], t->turn);
+            if (t->frame->volume_intervals) kernel_packet_clip_volumes(&t->packets[i], t->turn);
             packets[count++] = i;
         }
     }
