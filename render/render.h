@@ -373,7 +373,7 @@ insitu_status render_frame(const render_job *job, fragment_list *out, render_sta
 
 /* Draws as render_frame() does, but passes the fragments to take() tile by tile. Every pixel of the camera lies in one
  * of the tiles; tiles without fragments are passed too. take() is called by as many threads as the job has. */
-insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, void *state,
+insitu_status render_frame_tiles(const render_job *job, fragment_callback *take, void *state,
                                  render_statistics *statistics, base_error *error);
 
 /* Returns the instruction set in use: "avx512", "avx2", "sse4.2" or "plain". INSITU_ISA in the environment may select a

@@ -35,7 +35,7 @@ enum { TILE_FRAGMENTS = KERNEL_TILE * KERNEL_TILE };
 /* The destination of fragments: each writer's piece of a list, or a callback that receives them tile by tile. */
 typedef struct frame_end {
     fragment_writer *writers; /* one writer per thread */
-    fragment_taker *take;     /* callback that receives fragments; NULL: fragments stay in the writers' lists */
+    fragment_callback *take;  /* callback that receives fragments; NULL: fragments stay in the writers' lists */
     void *state;
 } frame_end;
 
@@ -208,7 +208,7 @@ static bool trace_to_list(kernel_frame *frame, fragment_writer *writers, int thr
     return is_whole && is_traced;
 }
 
-static bool trace_to_taker(kernel_frame *frame, const frame_end *end, int threads, render_statistics *statistics)
+static bool trace_to_callback(kernel_frame *frame, const frame_end *end, int threads, render_statistics *statistics)
 {
     for (int i = 0; i < threads; i++) end->writers[i] = (fragment_writer){.piece = -1};
     const bool is_traced = trace_frame(frame, end, threads, statistics);
@@ -217,7 +217,7 @@ static bool trace_to_taker(kernel_frame *frame, const frame_end *end, int thread
 }
 
 /* Draws a frame. The fragments are appended to out, or, if out is NULL, passed to take() tile by tile. */
-static insitu_status draw(const render_job *job, fragment_list *out, fragment_taker *take, void *state,
+static insitu_status draw(const render_job *job, fragment_list *out, fragment_callback *take, void *state,
                           render_statistics *statistics, base_error *error)
 {
     kernel_frame frame;
@@ -229,7 +229,7 @@ static insitu_status draw(const render_job *job, fragment_list *out, fragment_ta
     fragment_writer *writers = base_calloc((size_t)threads, sizeof *writers);
     const bool has_memory =
         writers && (out ? trace_to_list(&frame, writers, threads, out, statistics)
-                        : trace_to_taker(&frame, &(frame_end){writers, take, state}, threads, statistics));
+                        : trace_to_callback(&frame, &(frame_end){writers, take, state}, threads, statistics));
     base_free(writers);
     if (!has_memory)
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for the fragments and cells of %d x %d pixels",
@@ -246,7 +246,7 @@ insitu_status render_frame(const render_job *job, fragment_list *out, render_sta
     return status;
 }
 
-insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, void *state,
+insitu_status render_frame_tiles(const render_job *job, fragment_callback *take, void *state,
                                  render_statistics *statistics, base_error *error)
 {
     return draw(job, NULL, take, state, statistics, error);

@@ -281,7 +281,7 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
 /* ---- isosurfaces in cells that a tile finds by traversing the trees ---- */
 
 /* Queues the cells found so far for tracing, unless nearer hits hide them. */
-static bool kernel_tile_find_take(kernel_candidate_list *list)
+static bool kernel_tile_find_flush(kernel_candidate_list *list)
 {
     kernel_tile_search *s = (kernel_tile_search *)((char *)list - offsetof(kernel_tile_search, list));
     kernel_tile_trace *t = s->tile;
@@ -307,7 +307,7 @@ static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *
     if (finder->frame) kernel_find_rest(finder);
     kernel_finder_begin(finder, t->frame, &(kernel_subtree){.surface = t->layer, .part = part});
     finder->list = &s->list;
-    finder->grow = kernel_tile_find_take;
+    finder->grow = kernel_tile_find_flush;
     finder->first[0] = t->tile.x0;
     finder->first[1] = t->tile.y0;
     const render_camera *c = &t->frame->job->camera;
@@ -334,7 +334,7 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
         kernel_tile_set_layer(t, layer);
         kernel_tile_surface(t);
         if (t->thread->finder->frame) kernel_find_rest(t->thread->finder);
-        kernel_tile_find_take(&s->list);
+        kernel_tile_find_flush(&s->list);
         kernel_tile_queue_end(t, &s->queue);
     }
 }

@@ -454,7 +454,7 @@ static bool is_near_box(const double from[3], double reach, const render_box *bo
 }
 
 void render_rays_to_boxes(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
-                          const render_box *boxes, int count, render_box_taker *take, void *state)
+                          const render_box *boxes, int count, render_box_callback *take, void *state)
 {
     const render_occlusion *o = job->occlusion;
     const hit_frame p = place_of(job, hit);

@@ -188,7 +188,7 @@ SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t 
 
 /* Computes the vertices' coordinates along one axis of a rectilinear lattice from the position of each vertex on that
  * axis. It does for one vertex per lane what grid_index_along() does for one vertex. */
-static void kernel_axis_take(const grid_axis *axis, vi vertex, kernel_whole *out)
+static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_whole *out)
 {
     const grid_numbering *of = axis->vertices;
     const double outer = of->outer[axis->axis], inverse_outer = of->inverse_outer[axis->axis];
@@ -210,7 +210,7 @@ static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers
     double v[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
     if (c->array.axis) {
-        kernel_axis_take(c->array.axis, index, out);
+        kernel_axis_coordinates(c->array.axis, index, out);
         return;
     }
     memcpy(at, &index, sizeof index);
@@ -220,12 +220,12 @@ static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers
 }
 
 /* Numbers as they were read: in `narrow` if the array is float32, which saves operations, else in `wide`. */
-typedef struct kernel_taken {
+typedef struct kernel_raw_numbers {
     vf narrow;
     kernel_whole wide;
-} kernel_taken;
+} kernel_raw_numbers;
 
-SIMD_INLINE void kernel_numbers_take_raw(const kernel_numbers *c, vi index, kernel_taken *out)
+SIMD_INLINE void kernel_numbers_gather_raw(const kernel_numbers *c, vi index, kernel_raw_numbers *out)
 {
     if (kernel_numbers_are_narrow(c)) {
         out->narrow = vf_gather(c->data, index * c->stride);
@@ -236,27 +236,27 @@ SIMD_INLINE void kernel_numbers_take_raw(const kernel_numbers *c, vi index, kern
     }
 }
 
-SIMD_INLINE kernel_whole kernel_numbers_take(const kernel_numbers *c, vi index)
+SIMD_INLINE kernel_whole kernel_numbers_gather(const kernel_numbers *c, vi index)
 {
-    kernel_taken out;
-    kernel_numbers_take_raw(c, index, &out);
+    kernel_raw_numbers out;
+    kernel_numbers_gather_raw(c, index, &out);
     return kernel_numbers_are_narrow(c) ? kernel_whole_widen(out.narrow) : out.wide;
 }
 
 /* Returns a < b per lane. is_narrow: whether both are stored as float32. */
-SIMD_INLINE vm kernel_taken_lt(bool is_narrow, const kernel_taken *a, const kernel_taken *b)
+SIMD_INLINE vm kernel_raw_lt(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
     return is_narrow ? vf_lt(a->narrow, b->narrow) : kernel_whole_lt(&a->wide, &b->wide);
 }
 
-SIMD_INLINE vm kernel_taken_eq(bool is_narrow, const kernel_taken *a, const kernel_taken *b)
+SIMD_INLINE vm kernel_raw_eq(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
     return is_narrow ? vf_eq(a->narrow, b->narrow) : kernel_whole_eq(&a->wide, &b->wide);
 }
 
-SIMD_INLINE void kernel_taken_swap(bool is_narrow, vm lanes, kernel_taken *a, kernel_taken *b)
+SIMD_INLINE void kernel_raw_swap(bool is_narrow, vm lanes, kernel_raw_numbers *a, kernel_raw_numbers *b)
 {
-    const kernel_taken was = *a;
+    const kernel_raw_numbers was = *a;
     if (is_narrow) {
         a->narrow = vf_select(lanes, b->narrow, was.narrow);
         b->narrow = vf_select(lanes, was.narrow, b->narrow);
@@ -267,28 +267,28 @@ SIMD_INLINE void kernel_taken_swap(bool is_narrow, vm lanes, kernel_taken *a, ke
 }
 
 /* Returns the lanes in which position a is before b in the lexicographic order of coordinates. */
-SIMD_INLINE vm kernel_taken_before(bool is_narrow, const kernel_taken a[3], const kernel_taken b[3])
+SIMD_INLINE vm kernel_raw_before(bool is_narrow, const kernel_raw_numbers a[3], const kernel_raw_numbers b[3])
 {
-    vm before = kernel_taken_lt(is_narrow, &a[2], &b[2]);
+    vm before = kernel_raw_lt(is_narrow, &a[2], &b[2]);
     for (int axis = 1; axis >= 0; axis--)
-        before = vm_or(kernel_taken_lt(is_narrow, &a[axis], &b[axis]),
-                       vm_and(kernel_taken_eq(is_narrow, &a[axis], &b[axis]), before));
+        before = vm_or(kernel_raw_lt(is_narrow, &a[axis], &b[axis]),
+                       vm_and(kernel_raw_eq(is_narrow, &a[axis], &b[axis]), before));
     return before;
 }
 
 /* Reads the coordinates of one vertex per lane. is_narrow: whether all three arrays are float32 that can be
  * gathered. */
-SIMD_INLINE void kernel_arrays_positions(const kernel_arrays *p, bool is_narrow, vi vertex, kernel_taken out[3])
+SIMD_INLINE void kernel_arrays_positions(const kernel_arrays *p, bool is_narrow, vi vertex, kernel_raw_numbers out[3])
 {
     for (int a = 0; a < 3; a++) {
         if (is_narrow)
             out[a].narrow = vf_gather(p->coordinates[a].data, vertex * p->coordinates[a].stride);
         else
-            out[a].wide = kernel_numbers_take(&p->coordinates[a], vertex);
+            out[a].wide = kernel_numbers_gather(&p->coordinates[a], vertex);
     }
 }
 
-SIMD_INLINE kernel_whole kernel_taken_whole(bool is_narrow, const kernel_taken *v)
+SIMD_INLINE kernel_whole kernel_raw_to_double(bool is_narrow, const kernel_raw_numbers *v)
 {
     return is_narrow ? kernel_whole_widen(v->narrow) : v->wide;
 }
@@ -320,14 +320,14 @@ SIMD_INLINE kernel_level kernel_level_of(double value)
 }
 
 /* Returns the lanes in which the number v is below the level. The comparison is exact. */
-SIMD_INLINE vm kernel_taken_below(const kernel_numbers *c, const kernel_taken *v, const kernel_level *level)
+SIMD_INLINE vm kernel_raw_below(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
 {
     const kernel_whole value = kernel_whole_set(level->value);
     return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : kernel_whole_lt(&v->wide, &value);
 }
 
 /* Returns the number v minus the level, rounded to float32. */
-SIMD_INLINE vf kernel_taken_less(const kernel_numbers *c, const kernel_taken *v, const kernel_level *level)
+SIMD_INLINE vf kernel_raw_minus(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
 {
     vf out;
     if (kernel_numbers_are_narrow(c)) return (v->narrow - level->middle) - level->rest;
@@ -336,10 +336,10 @@ SIMD_INLINE vf kernel_taken_less(const kernel_numbers *c, const kernel_taken *v,
 }
 
 /* Reads the field for one vertex per lane; a cell-centred field is read by the lanes' cells instead. */
-SIMD_INLINE void kernel_arrays_values(const kernel_arrays *p, vi vertex, const uint32_t *cells, kernel_taken *out)
+SIMD_INLINE void kernel_arrays_values(const kernel_arrays *p, vi vertex, const uint32_t *cells, kernel_raw_numbers *out)
 {
     if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, cells, sizeof vertex);
-    kernel_numbers_take_raw(&p->values, vertex, out);
+    kernel_numbers_gather_raw(&p->values, vertex, out);
 }
 
 #endif

@@ -238,7 +238,7 @@ SIMD_INLINE vf kernel_corner_edge(const kernel_cell *c, const kernel_edges *edge
     return c->rank[from] < c->rank[to] ? edges->e[from][to] : -edges->e[to][from];
 }
 
-SIMD_INLINE void kernel_quad_take(const kernel_projected *q, const float *z, const int corner[4], kernel_quad *out)
+SIMD_INLINE void kernel_quad_set(const kernel_projected *q, const float *z, const int corner[4], kernel_quad *out)
 {
     for (int i = 0; i < 4; i++) {
         out->x[i] = q->x[corner[i]];
@@ -340,7 +340,7 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
     const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
     if (!vm_any(vm_or(once, twice))) return 0;
     if (kernel_quad_collapses(c, corner)) return kernel_collapsed_crossings(s, corner, out);
-    kernel_quad_take(s->projected, c->z, corner, &quad);
+    kernel_quad_set(s->projected, c->z, corner, &quad);
     const int n = kernel_quad_points(&quad, once, twice, places);
     for (int i = 0; i < n; i++) kernel_quad_values(s, corner, &places[i], &out[i]);
     return n;

@@ -34,9 +34,9 @@ SIMD_INLINE void kernel_curved_project(const float (*at)[8][SIMD_WIDTH], const k
                                        kernel_projected *out)
 {
     for (int i = 0; i < grid_type_vertices(type); i++) {
-        const vf z = kernel_take(at[2][i], r->lane);
-        out->x[i] = (kernel_take(at[0][i], r->lane) - r->rays.origin_x) - r->rays.slope_x * z;
-        out->y[i] = (kernel_take(at[1][i], r->lane) - r->rays.origin_y) - r->rays.slope_y * z;
+        const vf z = kernel_gather_lane(at[2][i], r->lane);
+        out->x[i] = (kernel_gather_lane(at[0][i], r->lane) - r->rays.origin_x) - r->rays.slope_x * z;
+        out->y[i] = (kernel_gather_lane(at[1][i], r->lane) - r->rays.origin_y) - r->rays.slope_y * z;
     }
 }
 
@@ -127,8 +127,8 @@ SIMD_INLINE vi kernel_face_word(const kernel_transformed_curved *h, vi lane, vi 
     return vi_from_bits(vf_gather((const float *)(const void *)h->corners, face * SIMD_WIDTH + lane));
 }
 
-SIMD_INLINE void kernel_curved_quad_take(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
-                                         vi face, kernel_quad *q, kernel_curved_quad *out)
+SIMD_INLINE void kernel_curved_quad_gather(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
+                                           vi face, kernel_quad *q, kernel_curved_quad *out)
 {
     const int count = grid_type_vertices(type);
     const vi word = kernel_face_word(h, p->lane, face);
@@ -191,8 +191,8 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const ke
 
 /* Gathers the corners and edge functions of the triangle `face` for the given rays. Other lanes get valid but
  * meaningless numbers. */
-SIMD_INLINE void kernel_curved_triangle_take(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
-                                             vm rays, vi face, kernel_curved_triangle *own)
+SIMD_INLINE void kernel_curved_triangle_gather(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
+                                               vm rays, vi face, kernel_curved_triangle *own)
 {
     const int size = (int)(sizeof(kernel_triangle_lines) / sizeof(float));
     const vi number = vi_select(rays, face - kernel_first_triangle(type), vi_set(0)), at = number * size + p->lane;
@@ -244,7 +244,7 @@ SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const k
         kernel_quad own[2];
         kernel_curved_quad corners[2];
         kernel_quad_point places[2];
-        for (int n = 0; n < quads; n++) kernel_curved_quad_take(h, p, type, face[n], &own[n], &corners[n]);
+        for (int n = 0; n < quads; n++) kernel_curved_quad_gather(h, p, type, face[n], &own[n], &corners[n]);
         /* these rays' edge functions have certain signs, so no ray meets an edge */
         kernel_quads_cross(own, quads, once, true, places);
         for (int n = 0; n < quads; n++) kernel_curved_quad_reference(type, &corners[n], &places[n], &out[n]);
@@ -254,7 +254,7 @@ SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const k
         kernel_curved_triangle own;
         kernel_point place;
         if (!vm_any(on_triangle)) continue;
-        kernel_curved_triangle_take(h, p, type, on_triangle, face[n], &own);
+        kernel_curved_triangle_gather(h, p, type, on_triangle, face[n], &own);
         kernel_curved_triangle_reference(h, type, p->lane, &own, &place);
         kernel_point_move(on_triangle, &place, &out[n]);
     }

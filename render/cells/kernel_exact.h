@@ -80,7 +80,7 @@ SIMD_INLINE kernel_double_end kernel_double_meet(const kernel_double_face *face,
                                (kernel_half_mask)(weight * weight > face->least * face->least)};
 }
 
-SIMD_INLINE void kernel_double_take(kernel_half_mask m, const kernel_double_end *from, kernel_double_end *to)
+SIMD_INLINE void kernel_double_select(kernel_half_mask m, const kernel_double_end *from, kernel_double_end *to)
 {
     to->t = kernel_half_select(m, from->t, to->t);
     to->v = kernel_half_select(m, from->v, to->v);
@@ -110,14 +110,14 @@ SIMD_INLINE void kernel_double_half(const kernel_double_cell *cell, const kernel
     for (int n = 0; n < 4; n++) {
         const kernel_half_mask m = kernel_half_of_mask(hit[n], half);
         const kernel_double_end end = kernel_double_meet(&cell->faces[n], rays->u[half], rays->v[half]);
-        kernel_double_take(m & ~met, &end, &first);
-        kernel_double_take(m & met, &end, &last);
+        kernel_double_select(m & ~met, &end, &first);
+        kernel_double_select(m & met, &end, &last);
         met |= m;
     }
     const kernel_half_mask swap = (kernel_half_mask)(last.t < first.t);
     const kernel_double_end nearer = first;
-    kernel_double_take(swap, &last, &first);
-    kernel_double_take(swap, &nearer, &last);
+    kernel_double_select(swap, &last, &first);
+    kernel_double_select(swap, &nearer, &last);
     const kernel_half_floats length = kernel_half_narrow(last.t - first.t);
     const kernel_half_floats sound = __builtin_convertvector(first.is_sound & last.is_sound, kernel_half_floats);
     memcpy(out->length + lane, &length, sizeof length);

@@ -459,15 +459,15 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
                                  kernel_local_points *p)
 {
     vf d[3];
-    for (int a = 0; a < 3; a++) d[a] = at[a] - kernel_take(cells->origin[a], lane);
+    for (int a = 0; a < 3; a++) d[a] = at[a] - kernel_gather_lane(cells->origin[a], lane);
     for (int i = 0; i < 3; i++) {
-        p->y[i] = kernel_take(cells->offset[i], lane);
-        for (int a = 0; a < 3; a++) p->y[i] = vf_muladd(kernel_take(cells->inverse[i][a], lane), d[a], p->y[i]);
+        p->y[i] = kernel_gather_lane(cells->offset[i], lane);
+        for (int a = 0; a < 3; a++) p->y[i] = vf_muladd(kernel_gather_lane(cells->inverse[i][a], lane), d[a], p->y[i]);
         p->r[i] = p->y[i];
     }
     if (kernel_is_linear(type)) return vm_all_lanes();
     for (int k = 0; k < kernel_bent_terms(type); k++)
-        for (int a = 0; a < 3; a++) p->bent[k][a] = kernel_take(cells->bent[k][a], lane);
+        for (int a = 0; a < 3; a++) p->bent[k][a] = kernel_gather_lane(cells->bent[k][a], lane);
     vf left[3];
     kernel_bend_at(type, p->r, &p->bend);
     kernel_local_left(type, p, left);
@@ -486,10 +486,10 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
 /* Returns the field at the reference coordinates r in each lane's cell. */
 SIMD_INLINE vf kernel_local_value(int type, const kernel_local_cells *cells, vi lane, const kernel_local_points *p)
 {
-    vf v = kernel_take(cells->field[0], lane);
-    for (int i = 0; i < 3; i++) v = vf_muladd(kernel_take(cells->field[1 + i], lane), p->r[i], v);
+    vf v = kernel_gather_lane(cells->field[0], lane);
+    for (int i = 0; i < 3; i++) v = vf_muladd(kernel_gather_lane(cells->field[1 + i], lane), p->r[i], v);
     for (int k = 0; k < kernel_bent_terms(type); k++)
-        v = vf_muladd(kernel_take(cells->field[4 + k], lane), p->bend.term[k], v);
+        v = vf_muladd(kernel_gather_lane(cells->field[4 + k], lane), p->bend.term[k], v);
     return v;
 }
 

@@ -168,7 +168,7 @@ SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kerne
     out->tolerance = KERNEL_MAP_TOLERANCE;
     for (int n = 0; n < 4; n++) {
         vf v[8], *const c = n < 3 ? out->position[n] : out->field;
-        for (int i = 0; i < count; i++) v[i] = kernel_take(at[n][i], lane);
+        for (int i = 0; i < count; i++) v[i] = kernel_gather_lane(at[n][i], lane);
         if (n < 3) out->origin[n] = v[0];
         for (int half = 0; half < 2; half++) {
             kernel_half d[8], *const e = out->exact[half][n];
@@ -207,7 +207,7 @@ SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi la
 {
     const int count = grid_type_vertices(type);
     vf v[8];
-    for (int i = 0; i < count; i++) v[i] = kernel_take(values[i], lane);
+    for (int i = 0; i < count; i++) v[i] = kernel_gather_lane(values[i], lane);
     for (int half = 0; half < 2; half++) {
         kernel_half d[8], e[8];
         for (int i = 0; i < count; i++) d[i] = kernel_half_of(&v[i], half);

@@ -63,7 +63,7 @@ SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi l
     vf four[4], two[2];
     for (int i = 0; 2 * i < count; i++)
         four[i] = 2 * i + 1 < count ? vf_permute_pair(vf_load(of[2 * i]), vf_load(of[2 * i + 1]), in_two)
-                                    : kernel_take(of[2 * i], lane);
+                                    : kernel_gather_lane(of[2 * i], lane);
     for (int i = 0; 4 * i < count; i++)
         two[i] = 4 * i + 2 < count ? vf_select(second, four[2 * i + 1], four[2 * i]) : four[2 * i];
     return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];
@@ -73,7 +73,7 @@ SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi l
 
 /* The vertices of each lane's cell while they are permuted: coordinates, rank and vertex index. */
 typedef struct kernel_sorted_curved {
-    kernel_taken at[8][3];
+    kernel_raw_numbers at[8][3];
     vf rank[8];
     vi vertex[8];
 } kernel_sorted_curved;
@@ -88,7 +88,7 @@ SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
 SIMD_INLINE void kernel_sorted_curved_swap(kernel_sorted_curved *h, bool is_narrow, vm lanes, int i, int j)
 {
     const vi was = h->vertex[i];
-    for (int a = 0; a < 3; a++) kernel_taken_swap(is_narrow, lanes, &h->at[i][a], &h->at[j][a]);
+    for (int a = 0; a < 3; a++) kernel_raw_swap(is_narrow, lanes, &h->at[i][a], &h->at[j][a]);
     kernel_vf_swap(lanes, &h->rank[i], &h->rank[j]);
     h->vertex[i] = vi_select(lanes, h->vertex[j], was);
     h->vertex[j] = vi_select(lanes, was, h->vertex[j]);
@@ -102,7 +102,7 @@ SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_curved *h, bool is_narr
     for (int i = 0; i < count; i++) h->rank[i] = vf_set((float)i);
     for (int i = 0; i < count; i++)
         for (int j = i + 1; j < count; j++) {
-            const vf after = vf_select(kernel_taken_before(is_narrow, h->at[j], h->at[i]), one, zero);
+            const vf after = vf_select(kernel_raw_before(is_narrow, h->at[j], h->at[i]), one, zero);
             h->rank[i] += after;
             h->rank[j] -= after;
         }
@@ -182,7 +182,7 @@ SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_curved *h, boo
         const int a = shape->edges[n][0], b = shape->edges[n][1];
         vm same = vm_all_lanes();
         for (int axis = 0; axis < 3; axis++)
-            same = vm_and(same, kernel_taken_eq(is_narrow, &h->at[a][axis], &h->at[b][axis]));
+            same = vm_and(same, kernel_raw_eq(is_narrow, &h->at[a][axis], &h->at[b][axis]));
         out = vm_or(out, same);
     }
     return out;
@@ -203,7 +203,7 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
     kernel_sorted_curved_sort(&h, is_narrow, type);
     for (int i = 0; i < count; i++) {
         const vi own_rank = vi_from_vf(h.rank[i]);
-        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_taken_whole(is_narrow, &h.at[i][a]);
+        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_raw_to_double(is_narrow, &h.at[i][a]);
         rank[i] = h.rank[i];
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
         memcpy(out->vertex[i], &h.vertex[i], sizeof h.vertex[i]);
@@ -354,7 +354,7 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
         vi vertex;
         vf at[3];
         memcpy(&vertex, out->vertex[i], sizeof vertex);
-        values[i] = kernel_numbers_take(&p->values, vertex);
+        values[i] = kernel_numbers_gather(&p->values, vertex);
         for (int a = 0; a < 3; a++) world[a] = &out->world[a][i];
         kernel_lanes_transform(f, tile, world, at);
         for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);

@@ -27,16 +27,16 @@ typedef struct kernel_transformed_tets {
 
 /* A vertex of each lane's tet while the vertices are sorted: coordinates and vertex index. */
 typedef struct kernel_ordered {
-    kernel_taken at[3];
+    kernel_raw_numbers at[3];
     vi vertex;
 } kernel_ordered;
 
 /* Exchanges a and b in the lanes in which b is before a in the order of coordinates. */
 SIMD_INLINE void kernel_ordered_swap(bool is_narrow, kernel_ordered *a, kernel_ordered *b)
 {
-    const vm before = kernel_taken_before(is_narrow, b->at, a->at);
+    const vm before = kernel_raw_before(is_narrow, b->at, a->at);
     const vi was = a->vertex;
-    for (int axis = 0; axis < 3; axis++) kernel_taken_swap(is_narrow, before, &a->at[axis], &b->at[axis]);
+    for (int axis = 0; axis < 3; axis++) kernel_raw_swap(is_narrow, before, &a->at[axis], &b->at[axis]);
     a->vertex = vi_select(before, b->vertex, was);
     b->vertex = vi_select(before, was, b->vertex);
 }
@@ -55,8 +55,8 @@ SIMD_INLINE void kernel_ordered_fetch(kernel_transformed_tets *out, const kernel
         for (int i = 0; i < last; i++) kernel_ordered_swap(is_narrow, &spots[i], &spots[i + 1]);
     for (int i = 0; i < 4; i++) {
         out->vertex[i] = spots[i].vertex;
-        out->values[i] = kernel_numbers_take(&p->values, spots[i].vertex);
-        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_taken_whole(is_narrow, &spots[i].at[a]);
+        out->values[i] = kernel_numbers_gather(&p->values, spots[i].vertex);
+        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_raw_to_double(is_narrow, &spots[i].at[a]);
     }
 }
 

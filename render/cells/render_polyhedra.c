@@ -320,7 +320,7 @@ static polyhedron *keep(polyhedron_store *store, work *w, int64_t cell)
     return c;
 }
 
-static polyhedron *take_apart(polyhedron_store *store, const grid *g, const grid_field *field, uint32_t index)
+static polyhedron *decompose_polyhedron(polyhedron_store *store, const grid *g, const grid_field *field, uint32_t index)
 {
     work w = {.g = g, .field = field};
     if (!closed_faces_count(&w.faces, g, index)) return NULL;
@@ -342,7 +342,7 @@ polyhedron *polyhedra_find(polyhedron_store *store, const grid *g, const grid_fi
     for (polyhedron *c = store->table[slot]; c; c = c->next)
         if (c->index == index && c->part == part && c->layer == layer) return c;
     if (store->bytes > STORE_LIMIT) polyhedra_reset(store);
-    polyhedron *c = take_apart(store, g, field, index);
+    polyhedron *c = decompose_polyhedron(store, g, field, index);
     if (!c) return NULL;
     c->index = index;
     c->part = part;

@@ -142,7 +142,7 @@ static __attribute__((noinline)) void kernel_local_find_dented(const kernel_loca
 SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kernel_lane_rays *own, vm rays, int type,
                                          kernel_curved_crossed *out)
 {
-    const vi dents = vi_from_bits(kernel_take(f->dents, own->lane));
+    const vi dents = vi_from_bits(kernel_gather_lane(f->dents, own->lane));
     if (vm_any(vm_and(rays, vm_sign(-dents))))
         kernel_local_find_dented(f, own, &dents, rays, type, out);
     else
@@ -183,8 +183,8 @@ SIMD_INLINE bool kernel_local_pair_of(const kernel_local_faces *f, vm rays, vi l
 }
 
 /* Gathers the corners of each ray's face. pair: NULL if the rays have more than two different cells. */
-SIMD_INLINE void kernel_local_corners_take(const kernel_local_faces *f, const kernel_local_pair *pair, int type,
-                                           vi lane, vi face, kernel_local_corners *out)
+SIMD_INLINE void kernel_local_corners_gather(const kernel_local_faces *f, const kernel_local_pair *pair, int type,
+                                             vi lane, vi face, kernel_local_corners *out)
 {
     enum { WORDS = 2, HALF = KERNEL_LOCAL_ROW / 2 };
     const float *const first = pair ? pair->rows[0][0] : NULL, *const last = pair ? pair->rows[1][0] : NULL;
@@ -207,9 +207,9 @@ SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kern
 {
     kernel_local_pair pair;
     if (__builtin_expect(kernel_local_pair_of(f, active, rays->lane, &pair), 1))
-        for (int n = 0; n < 2; n++) kernel_local_corners_take(f, &pair, type, rays->lane, face[n], &out[n]);
+        for (int n = 0; n < 2; n++) kernel_local_corners_gather(f, &pair, type, rays->lane, face[n], &out[n]);
     else
-        for (int n = 0; n < 2; n++) kernel_local_corners_take(f, NULL, type, rays->lane, face[n], &out[n]);
+        for (int n = 0; n < 2; n++) kernel_local_corners_gather(f, NULL, type, rays->lane, face[n], &out[n]);
     for (int n = 0; n < 2; n++)
         for (int i = 0; i < 4; i++) {
             vf *at = out[n].at[i];

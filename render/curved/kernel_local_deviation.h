@@ -136,11 +136,11 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
     for (int k = 0; k < kernel_bent_terms(type); k++) {
         out->mean[k] = 0.5f * (first[k] + last[k]);
         out->rise[k] = last[k] - first[k];
-        out->own[k] = kernel_take(nonlinear->terms[k], lane);
-        for (int a = 0; a < 3; a++) out->bent[k][a] = kernel_take(cells->bent[k][a], lane);
+        out->own[k] = kernel_gather_lane(nonlinear->terms[k], lane);
+        for (int a = 0; a < 3; a++) out->bent[k][a] = kernel_gather_lane(cells->bent[k][a], lane);
     }
-    out->tolerance = kernel_take(nonlinear->tolerance, lane);
-    out->residual_limit = kernel_take(nonlinear->residual_limit, lane);
+    out->tolerance = kernel_gather_lane(nonlinear->tolerance, lane);
+    out->residual_limit = kernel_gather_lane(nonlinear->residual_limit, lane);
 }
 
 /* Computes the residual of the reference coordinates r at position u on the ray, and the field's deviation from its

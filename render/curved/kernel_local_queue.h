@@ -49,7 +49,7 @@ typedef struct kernel_local_stages {
 
 struct kernel_local_lanes {
     const kernel_local_stages *stages;
-    kernel_tile_take *take; /* callback that traces cells that cannot be processed in lanes */
+    kernel_tile_trace_cell *take; /* callback that traces cells that cannot be processed in lanes */
     int volume, part;
     kernel_arrays arrays; /* the arrays of the current mesh part */
     kernel_local_queue queues[KERNEL_CURVED_TYPES];
@@ -64,7 +64,7 @@ struct kernel_local_lanes {
 };
 
 SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, const kernel_local_stages *stages, int volume,
-                                          kernel_tile_take *take)
+                                          kernel_tile_trace_cell *take)
 {
     l->stages = stages;
     l->take = take;
@@ -99,11 +99,11 @@ SIMD_INLINE void kernel_local_fetch(kernel_local_lanes *l, const kernel_local_qu
         vi vertex;
         memcpy(&vertex, q->vertex[i], sizeof vertex);
         for (int a = 0; a < 3; a++) {
-            const kernel_whole place = kernel_numbers_take(&p->coordinates[a], vertex);
+            const kernel_whole place = kernel_numbers_gather(&p->coordinates[a], vertex);
             memcpy(l->world[a][i], &place, sizeof place);
         }
         if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, q->cell, sizeof vertex);
-        kernel_whole value = kernel_numbers_take(&p->values, vertex);
+        kernel_whole value = kernel_numbers_gather(&p->values, vertex);
         if (__builtin_expect(p->own != NULL, 0)) value = kernel_whole_select(drawn, &value, &none);
         memcpy(l->scalars[i], &value, sizeof value);
     }
@@ -252,18 +252,19 @@ SIMD_INLINE bool kernel_local_push(const kernel_arrays *p, kernel_local_queue *q
 SIMD_INLINE void kernel_local_slab_interval(const kernel_local_cells *cells, const kernel_lane_rays *rays, vf depth,
                                             vf *near, vf *far)
 {
-    const vf d[2] = {(rays->rays.origin_x + rays->rays.slope_x * depth) - kernel_take(cells->origin[0], rays->lane),
-                     (rays->rays.origin_y + rays->rays.slope_y * depth) - kernel_take(cells->origin[1], rays->lane)};
+    const vf d[2] = {
+        (rays->rays.origin_x + rays->rays.slope_x * depth) - kernel_gather_lane(cells->origin[0], rays->lane),
+        (rays->rays.origin_y + rays->rays.slope_y * depth) - kernel_gather_lane(cells->origin[1], rays->lane)};
     *near = vf_set(-INFINITY);
     *far = vf_set(INFINITY);
     for (int i = 0; i < 3; i++) {
         vf row[3];
-        for (int a = 0; a < 3; a++) row[a] = kernel_take(cells->inverse[i][a], rays->lane);
-        const vf offset = kernel_take(cells->offset[i], rays->lane);
+        for (int a = 0; a < 3; a++) row[a] = kernel_gather_lane(cells->inverse[i][a], rays->lane);
+        const vf offset = kernel_gather_lane(cells->offset[i], rays->lane);
         const vf at = vf_muladd(row[0], d[0], vf_muladd(row[1], d[1], offset));
         const vf inverse = 1.0f / vf_muladd(row[0], rays->rays.slope_x, vf_muladd(row[1], rays->rays.slope_y, row[2]));
-        const vf low = (kernel_take(cells->low[i], rays->lane) - at) * inverse;
-        const vf high = (kernel_take(cells->high[i], rays->lane) - at) * inverse;
+        const vf low = (kernel_gather_lane(cells->low[i], rays->lane) - at) * inverse;
+        const vf high = (kernel_gather_lane(cells->high[i], rays->lane) - at) * inverse;
         /* A ray parallel to a slab may give NaN here; max() and min() then keep the bounds of the other slabs. */
         *near = vf_max(vf_min(low, high), *near);
         *far = vf_min(vf_max(low, high), *far);

@@ -183,12 +183,12 @@ SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const ker
 
 /* Sets f to the values minus the isovalue, and removes lanes whose values are too large, too small or NaN from `usual`.
  * Returns the largest |f| of each lane. */
-SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_taken *v, int count,
+SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_raw_numbers *v, int count,
                                           const kernel_level *level, kernel_curved_lanes *l)
 {
     vf size = vf_set(0);
     for (int i = 0; i < count; i++) {
-        l->f[i] = kernel_taken_less(&s->arrays.values, &v[i], level);
+        l->f[i] = kernel_raw_minus(&s->arrays.values, &v[i], level);
         size = vf_max(vf_abs(l->f[i]), size);
         l->usual = vm_and(l->usual, vf_lt(vf_abs(l->f[i]), vf_set(1e30f)));
     }
@@ -218,7 +218,7 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 {
     const unsigned all = (1u << c->count) - 1;
     kernel_curved_lanes l;
-    kernel_taken v[4];
+    kernel_raw_numbers v[4];
     for (int i = 0; i < 4; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     kernel_curved_lanes_transform(s, c, 4, &l);
     const vm usual = l.usual;
@@ -229,7 +229,7 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
         l.usual = usual;
         kernel_curved_lanes_values(s, v, 4, &level, &l);
         for (int i = 0; i < 4; i++) {
-            negative[i] = kernel_taken_below(&s->arrays.values, &v[i], &level);
+            negative[i] = kernel_raw_below(&s->arrays.values, &v[i], &level);
             any = vm_or(any, negative[i]);
             every = vm_and(every, negative[i]);
         }
@@ -250,7 +250,7 @@ SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int ver
     kernel_curved_lanes l;
     kernel_curved_slab slab;
     kernel_ends_lanes e;
-    kernel_taken v[8];
+    kernel_raw_numbers v[8];
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     kernel_curved_lanes_transform(s, c, vertices, &l);
     const vf size = kernel_curved_lanes_values(s, v, vertices, &level, &l);
@@ -299,13 +299,13 @@ SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c,
 {
     const render_surface_layer *layer = s->surface->layer;
     const unsigned all = (1u << c->count) - 1;
-    kernel_taken v[8];
+    kernel_raw_numbers v[8];
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     for (int value = 0; value < layer->value_count; value++) {
         const kernel_level level = kernel_level_of(layer->values[value]);
         vm any = vm_none(), every = vm_all_lanes();
         for (int i = 0; i < vertices; i++) {
-            const vm below = kernel_taken_below(&s->arrays.values, &v[i], &level);
+            const vm below = kernel_raw_below(&s->arrays.values, &v[i], &level);
             any = vm_or(any, below);
             every = vm_and(every, below);
         }

@@ -25,7 +25,7 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
     vf v[8] = {vf_set(0)};
     for (int i = 0; i < c->vertices; i++) {
         const vi vertex = kernel_cells_vertex(c, i);
-        kernel_taken value;
+        kernel_raw_numbers value;
         vf place[3], at[3];
         kernel_arrays_values(&s->arrays, vertex, c->cell, &value);
         v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_whole_narrow(&value.wide);

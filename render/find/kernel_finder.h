@@ -297,9 +297,9 @@ SIMD_INLINE void kernel_found_positions(const kernel_finder *s, vi vertex, vf ou
     const render_job *job = s->frame->job;
     for (int a = 0; a < 3; a++) {
         const kernel_numbers *c = &s->arrays.coordinates[a];
-        kernel_taken world;
-        kernel_numbers_take_raw(c, vertex, &world);
-        out[a] = kernel_taken_less(c, &world, &s->eye[a]) * (float)job->space.scale;
+        kernel_raw_numbers world;
+        kernel_numbers_gather_raw(c, vertex, &world);
+        out[a] = kernel_raw_minus(c, &world, &s->eye[a]) * (float)job->space.scale;
     }
 }
 

@@ -168,8 +168,8 @@ struct kernel_map;
 
 /* Callback for a cell that is ready for tracing; for a polyhedron only the cell's index is set. map is NULL if the cell
  * needs no inverse map. */
-typedef void kernel_tile_take(kernel_tile_trace *t, int part, const struct kernel_cell *c, const struct kernel_map *map,
-                              unsigned blocks);
+typedef void kernel_tile_trace_cell(kernel_tile_trace *t, int part, const struct kernel_cell *c,
+                                    const struct kernel_map *map, unsigned blocks);
 
 /* Returns the node's placement with those of the given blocks that it may meet; none if its values are invisible.
  * interest is NULL if all values are visible. */

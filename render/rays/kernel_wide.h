@@ -14,7 +14,7 @@ typedef int64_t kernel_half_mask __attribute__((vector_size(8 * KERNEL_HALF)));
 typedef float kernel_half_floats __attribute__((vector_size(4 * KERNEL_HALF)));
 
 /* Returns of[lane] for each ray, where `lane` is the lane that holds the ray's cell. */
-SIMD_INLINE vf kernel_take(const float *of, vi lane)
+SIMD_INLINE vf kernel_gather_lane(const float *of, vi lane)
 {
     return vf_permute(vf_load(of), lane);
 }

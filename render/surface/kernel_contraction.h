@@ -65,32 +65,32 @@ SIMD_INLINE void kernel_sight_of(const kernel_curved *c, const kernel_rays *rays
 {
     vf origin[3], normal[3], g[3];
     for (int a = 0; a < 3; a++) {
-        origin[a] = kernel_take(c->at[a][0], lane);
-        g[a] = kernel_take(c->bounds->gradient[a], lane);
+        origin[a] = kernel_gather_lane(c->at[a][0], lane);
+        g[a] = kernel_gather_lane(c->bounds->gradient[a], lane);
     }
     const vf x = (rays->origin_x + rays->slope_x * origin[2]) - origin[0];
     const vf y = (rays->origin_y + rays->slope_y * origin[2]) - origin[1];
     for (int i = 0; i < 3; i++) {
-        for (int a = 0; a < 3; a++) normal[a] = kernel_take(c->bounds->normal[i][a], lane);
+        for (int a = 0; a < 3; a++) normal[a] = kernel_gather_lane(c->bounds->normal[i][a], lane);
         out->y[i] = normal[0] * x + normal[1] * y;
         out->w[i] = (normal[0] * rays->slope_x + normal[1] * rays->slope_y) + normal[2];
     }
-    out->level = kernel_take(c->bounds->level, lane) + (g[0] * x + g[1] * y);
+    out->level = kernel_gather_lane(c->bounds->level, lane) + (g[0] * x + g[1] * y);
     out->rise = (g[0] * rays->slope_x + g[1] * rays->slope_y) + g[2];
 }
 
 SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type, kernel_contraction *out)
 {
     const kernel_contractions *c = &b->contractions;
-    for (int i = 0; i < 3; i++) out->offset[i] = kernel_take(c->offset[i], lane);
+    for (int i = 0; i < 3; i++) out->offset[i] = kernel_gather_lane(c->offset[i], lane);
     for (int k = 0; k < kernel_bent_terms(type); k++) {
-        for (int i = 0; i < 3; i++) out->bent[k][i] = kernel_take(c->bent[k][i], lane);
-        out->field[k] = kernel_take(c->field[k], lane);
+        for (int i = 0; i < 3; i++) out->bent[k][i] = kernel_gather_lane(c->bent[k][i], lane);
+        out->field[k] = kernel_gather_lane(c->field[k], lane);
     }
-    out->middle = kernel_take(c->middle, lane);
-    out->grow = kernel_take(c->grow, lane);
-    out->error_bound = kernel_take(c->error_bound, lane);
-    out->rim = kernel_take(c->rim, lane);
+    out->middle = kernel_gather_lane(c->middle, lane);
+    out->grow = kernel_gather_lane(c->grow, lane);
+    out->error_bound = kernel_gather_lane(c->error_bound, lane);
+    out->rim = kernel_gather_lane(c->rim, lane);
 }
 
 /* Moves the reference coordinates r to the nearest point of the domain D, which for hexes and wedges is widened by

@@ -130,12 +130,12 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_
  * vertex 0. */
 SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_sight *ray)
 {
-    const vf thick = kernel_take(h->bounds.thickness, lane);
+    const vf thick = kernel_gather_lane(h->bounds.thickness, lane);
     vf from = vf_set(-INFINITY), to = vf_set(INFINITY);
     for (int i = 0; i < 3; i++) {
         const vf inverse = 1.0f / ray->w[i];
-        const vf low = (kernel_take(h->bounds.low[i], lane) - ray->y[i]) * inverse;
-        const vf high = (kernel_take(h->bounds.high[i], lane) - ray->y[i]) * inverse;
+        const vf low = (kernel_gather_lane(h->bounds.low[i], lane) - ray->y[i]) * inverse;
+        const vf high = (kernel_gather_lane(h->bounds.high[i], lane) - ray->y[i]) * inverse;
         from = vf_max(vf_min(low, high), from);
         to = vf_min(vf_max(low, high), to);
     }
@@ -177,13 +177,13 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         kernel_contracted at;
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_batch_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_take(h->own->near, p.lane), p.far));
+        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->own->near, p.lane), p.far));
         kernel_sight_of(&cells, &p.rays, p.lane, &ray);
         p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &ray));
         if (!vm_any(p.active)) continue;
         kernel_contraction_of(&h->bounds, p.lane, type, &c);
         kernel_contract(&c, &ray, p.active, &at, type);
-        const vf depth = at.t + kernel_take(h->transformed.at[2][0], p.lane);
+        const vf depth = at.t + kernel_gather_lane(h->transformed.at[2][0], p.lane);
         kept = kernel_curved_batch_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))), kept);
     }
     h->rays.count = kept;
@@ -208,7 +208,7 @@ SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_cu
         uint8_t faces[SIMD_WIDTH];
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_batch_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_take(h->own->near, p.lane), p.far));
+        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->own->near, p.lane), p.far));
         if (!vm_any(p.active)) continue;
         kernel_curved_faces(&h->transformed, &p, type, &crossed);
         const vi both = crossed.first | crossed.last << 3;
@@ -367,9 +367,9 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
 }
 
 /* Accepts hits of the rays in `found` from index n on. Returns the mask of blocks with a nearer hit. */
-SIMD_INLINE unsigned kernel_curved_batch_take(kernel_tile_trace *t, kernel_curved_batch *h, int n,
-                                              const kernel_lane_rays *p, const kernel_map *map, const kernel_point *at,
-                                              vm hit)
+SIMD_INLINE unsigned kernel_curved_batch_accept_hits(kernel_tile_trace *t, kernel_curved_batch *h, int n,
+                                                     const kernel_lane_rays *p, const kernel_map *map,
+                                                     const kernel_point *at, vm hit)
 {
     kernel_curved_batch_points places;
     places.t = at->t;
@@ -407,7 +407,7 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (__builtin_expect(vm_any(open), 0))
             nearer |= kernel_curved_batch_alone(t, h, &h->found, n, p.at, vm_bits(open));
-        if (vm_any(hit)) nearer |= kernel_curved_batch_take(t, h, n, &p, &map, &at, hit);
+        if (vm_any(hit)) nearer |= kernel_curved_batch_accept_hits(t, h, n, &p, &map, &at, hit);
     }
     return nearer;
 }

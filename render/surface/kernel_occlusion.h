@@ -61,7 +61,7 @@ static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_pac
 }
 
 /* Ends the rays whose roots at t block them, and returns these rays. */
-SIMD_INLINE vm kernel_occlusion_take(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
+SIMD_INLINE vm kernel_occlusion_block(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
 {
     vm hit = vm_and(found, vm_and(vf_le(p->t_near, t), vf_lt(t, p->t_far)));
     if (!vm_any(hit)) return hit;
@@ -77,7 +77,7 @@ SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *
     kernel_interval i;
     kernel_tet_interval(p, c, rays, false, &i);
     const vm change = vm_and(kernel_is_near(p, &i), kernel_changes_sign(&i));
-    if (vm_any(change)) kernel_occlusion_take(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
+    if (vm_any(change)) kernel_occlusion_block(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
 }
 
 /* Finds the roots of the interval one after the other, until each ray is blocked or has no more roots. */
@@ -91,7 +91,7 @@ SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion
         kernel_point at;
         if (!vm_any(s.found)) continue;
         kernel_polish(&s, &at);
-        kernel_search_close(&s, kernel_occlusion_take(p, o, s.found, at.t));
+        kernel_search_close(&s, kernel_occlusion_block(p, o, s.found, at.t));
     } while (kernel_search_on(&s));
 }
 
@@ -121,7 +121,7 @@ static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *
     kernel_profile_walk_begin(stay, wanted, &walk);
     do {
         const vm found = kernel_profile_walk_next(r, stay, &walk);
-        walk.open = vm_andnot(walk.open, kernel_occlusion_take(p, o, found, walk.t));
+        walk.open = vm_andnot(walk.open, kernel_occlusion_block(p, o, found, walk.t));
     } while (vm_any(walk.open));
 }
 

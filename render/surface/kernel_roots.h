@@ -66,17 +66,17 @@ SIMD_INLINE void kernel_limits_of(const kernel_bounds *b, vi lane, kernel_limits
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++) {
             out->bent[i][j] = vf_set(0);
-            out->bent[i][4 + j] = kernel_take(b->bent[i][j], lane);
+            out->bent[i][4 + j] = kernel_gather_lane(b->bent[i][j], lane);
         }
     for (int i = 0; i < 3; i++)
-        for (int a = 0; a < 3; a++) out->inverse[i][a] = kernel_take(b->normal[i][a], lane);
-    out->stretch = kernel_take(b->stretch, lane);
-    out->slope = kernel_take(b->slope, lane);
-    out->curve = kernel_take(b->curve, lane);
-    out->twist = kernel_take(b->twist, lane);
-    const vm is_proved = vf_lt(kernel_take(b->thickness, lane), vf_set(INFINITY));
+        for (int a = 0; a < 3; a++) out->inverse[i][a] = kernel_gather_lane(b->normal[i][a], lane);
+    out->stretch = kernel_gather_lane(b->stretch, lane);
+    out->slope = kernel_gather_lane(b->slope, lane);
+    out->curve = kernel_gather_lane(b->curve, lane);
+    out->twist = kernel_gather_lane(b->twist, lane);
+    const vm is_proved = vf_lt(kernel_gather_lane(b->thickness, lane), vf_set(INFINITY));
     out->coarsest = vf_select(is_proved, vf_set(1), vf_set(0.125f));
-    out->is_monotone = vf_le(vf_set(0), kernel_take(b->jump, lane));
+    out->is_monotone = vf_le(vf_set(0), kernel_gather_lane(b->jump, lane));
 }
 
 /* The chord between two points in reference coordinates, and the map's product m at both. */
@@ -215,11 +215,11 @@ SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays,
 {
     vf g[3], at[3];
     for (int a = 0; a < 3; a++) {
-        g[a] = kernel_take(c->bounds->gradient[a], lane);
-        at[a] = kernel_take(c->at[a][0], lane);
+        g[a] = kernel_gather_lane(c->bounds->gradient[a], lane);
+        at[a] = kernel_gather_lane(c->at[a][0], lane);
     }
     const vf x = (rays->origin_x + rays->slope_x * t) - at[0], y = (rays->origin_y + rays->slope_y * t) - at[1];
-    return (kernel_take(c->bounds->level, lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
+    return (kernel_gather_lane(c->bounds->level, lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
 }
 
 /* Decides rays by the values at the ends of their intervals and the bounds of their cells. *found: rays with exactly
@@ -227,14 +227,14 @@ SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays,
 SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
                                   const kernel_point *in, const kernel_point *out, vm *found)
 {
-    const vf zero = vf_set(0), jump = kernel_take(c->bounds->jump, lane), side = kernel_side(in->value);
+    const vf zero = vf_set(0), jump = kernel_gather_lane(c->bounds->jump, lane), side = kernel_side(in->value);
     const vm change = vm_xor(vf_lt(in->value, zero), vf_lt(out->value, zero)), monotone = vf_le(zero, jump);
     *found = vm_and(wanted, vm_and(monotone, change));
     vm left = vm_andnot(wanted, *found);
     left = vm_andnot(left, vm_and(monotone, vf_lt(jump, vf_min(vf_abs(in->value), vf_abs(out->value)))));
     const vm searched = vm_andnot(vm_andnot(left, monotone), change);
     if (!vm_any(searched)) return left;
-    const vf thick = kernel_take(c->bounds->thickness, lane);
+    const vf thick = kernel_gather_lane(c->bounds->thickness, lane);
     const vm far = vm_and(vf_lt(thick, side * kernel_linear_at(c, rays, lane, in->t)),
                           vf_lt(thick, side * kernel_linear_at(c, rays, lane, out->t)));
     return vm_andnot(left, vm_and(searched, far));

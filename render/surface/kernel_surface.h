@@ -235,7 +235,7 @@ SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays 
     kernel_sight_of(c, rays, lane, &ray);
     kernel_contraction_of(c->bounds, lane, type, &contraction);
     kernel_contract(&contraction, &ray, wanted, out, type);
-    out->t += kernel_take(c->at[2][0], lane);
+    out->t += kernel_gather_lane(c->at[2][0], lane);
 }
 
 /* Decides the rays of a packet in one cell by contraction (kernel_contraction.h), without its faces. */
@@ -531,7 +531,7 @@ static void kernel_profile_walk_begin(const kernel_polyhedron_interval *stay, vm
     walk->piece = kernel_profile_begin(stay, stay->u_in);
 }
 
-SIMD_INLINE void kernel_piece_take(vm rays, const kernel_profile_piece *from, kernel_profile_piece *to)
+SIMD_INLINE void kernel_piece_select(vm rays, const kernel_profile_piece *from, kernel_profile_piece *to)
 {
     to->t0 = vf_select(rays, from->t0, to->t0);
     to->t1 = vf_select(rays, from->t1, to->t1);
@@ -555,7 +555,7 @@ SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, const
     const vm rounding =
         vm_and(kernel_profile_open(stay, &next, inside), vf_le(vf_abs(next.v1), vf_set(KERNEL_ROOT_BAND)));
     next.v1 = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v1);
-    kernel_piece_take(left, &next, &walk->piece);
+    kernel_piece_select(left, &next, &walk->piece);
     return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(stay, &next, inside)));
 }
 

@@ -301,7 +301,7 @@ static void add_slab(subject *s, const kernel_cell *c, double isovalue)
 /* ---- collecting -------------------------------------------------------------------------------------------------- */
 
 /* Lists the vertices of a cell that is not a polyhedron, in the canonical order that kernels use. */
-static bool take_vertices(subject *s, kernel_cell *c, const grid *g)
+static bool list_cell_vertices(subject *s, kernel_cell *c, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
     kernel_cell_order(c);
@@ -310,7 +310,7 @@ static bool take_vertices(subject *s, kernel_cell *c, const grid *g)
     return true;
 }
 
-static bool take_polyhedron(subject *s, const grid *g, const grid_field *field)
+static bool list_polyhedron_vertices(subject *s, const grid *g, const grid_field *field)
 {
     grid_walk walk = grid_walk_cell(g, s->index);
     int64_t vertex;
@@ -333,7 +333,7 @@ static void find_in_cell(subject *s)
     if (!is_polyhedron && !c.is_finite) return;
     s->count = 0;
     s->places.count = s->values.count = 0;
-    if (is_polyhedron ? !take_polyhedron(s, g, field) : !take_vertices(s, &c, g)) return;
+    if (is_polyhedron ? !list_polyhedron_vertices(s, g, field) : !list_cell_vertices(s, &c, g)) return;
     s->reach = reach_of(s, (double)layer->contact);
     for (s->value = 0; s->value < layer->value_count; s->value++) {
         const double isovalue = layer->values[s->value];

@@ -135,8 +135,8 @@ SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_lo
 {
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_lift(p);
     const vf low = vf_min(v0, v1) + lift, high = vf_max(v0, v1) + lift;
-    return vm_or(vf_lt(low, kernel_take(b->bounds.low, p->rays.lane)),
-                 vf_lt(kernel_take(b->bounds.high, p->rays.lane), high));
+    return vm_or(vf_lt(low, kernel_gather_lane(b->bounds.low, p->rays.lane)),
+                 vf_lt(kernel_gather_lane(b->bounds.high, p->rays.lane), high));
 }
 
 /* Error terms, per ray, if one segment replaces the ray's whole interval in its cell. */
@@ -156,15 +156,15 @@ SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kerne
     const vi lane = p->rays.lane;
     const vf *d = p->off_chord.field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
-    const vf bend = kernel_take(b->nonlinear.bend, lane);
-    const vf unseen = p->unseen * kernel_take(b->nonlinear.unseen, lane);
+    const vf bend = kernel_gather_lane(b->nonlinear.bend, lane);
+    const vf unseen = p->unseen * kernel_gather_lane(b->nonlinear.unseen, lane);
     const vf least = vf_muladd(0.01f * bend, parabola + cubic, unseen);
-    const vf depth = vf_min(kernel_take(b->bounds.extinction, lane) * length, vf_set(1));
+    const vf depth = vf_min(kernel_gather_lane(b->bounds.extinction, lane) * length, vf_set(1));
     out->quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), least);
     out->mean = 0.26f * parabola + (1.09f * cubic + 4.0f * out->quartic);
-    out->unknown = kernel_take(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
+    out->unknown = kernel_gather_lane(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
     out->length = length;
-    out->fade = kernel_take(b->bounds.fade, lane) * depth;
+    out->fade = kernel_gather_lane(b->bounds.fade, lane) * depth;
 }
 
 /* Returns the error of light per unit distance if the interval becomes one segment: the part that varies along the
@@ -221,7 +221,8 @@ SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local
     kernel_local_wrong wrong;
     kernel_local_wrong_of(b, p, &wrong);
     const vf one = vf_set(1), allowed = vf_set(b->allowance * (1 / b->reach));
-    const vf sway = kernel_take(b->bounds.sway, p->rays.lane), cost = kernel_take(b->bounds.cost, p->rays.lane);
+    const vf sway = kernel_gather_lane(b->bounds.sway, p->rays.lane),
+             cost = kernel_gather_lane(b->bounds.cost, p->rays.lane);
     const vm strays = kernel_local_strays(b, p);
     const vm enough = vm_andnot(vf_le(kernel_local_wrong_by_one(&wrong, sway, cost), allowed), strays);
     p->count = one;

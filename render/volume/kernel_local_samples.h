@@ -103,7 +103,7 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batc
                          depth};
     const vm known = kernel_local_find(type, &b->lanes.cells, rays.lane, place, &points);
     const vf inside = kernel_local_inside(type, points.r),
-             error_bound = kernel_take(b->lanes.cells.error_bound, rays.lane);
+             error_bound = kernel_gather_lane(b->lanes.cells.error_bound, rays.lane);
     const vm own = vm_and(vm_and(active, known), vf_lt(error_bound, inside));
     const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -error_bound)));
     vf_store(values, kernel_local_value(type, &b->lanes.cells, rays.lane, &points));
@@ -161,7 +161,7 @@ SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batc
     kernel_lane_rays rays;
     vf base, step, near, far;
     kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_bytes(b->lanes.rays.lane + n));
-    const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
+    const vf depth = kernel_gather_lane(b->lanes.cells.origin[2], rays.lane);
     kernel_local_slab_interval(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
     const vf inverse = 1.0f / step, begin = depth - base, end = vf_min(depth + far, vf_gather(b->far, rays.at)) - base;
@@ -200,7 +200,7 @@ static const kernel_local_stages kernel_sample_stages = {true, kernel_local_tran
 /* Begins the samples of a volume in a window. The packets of the given blocks must be set up. */
 SIMD_INLINE void kernel_local_samples_begin(const kernel_tile_trace *t, kernel_local_batch *b,
                                             kernel_tile_ray_samples *packets, unsigned blocks, int volume,
-                                            kernel_tile_take *take)
+                                            kernel_tile_trace_cell *take)
 {
     b->packets = packets;
     b->pad = 0;

@@ -37,8 +37,8 @@ typedef struct kernel_tile_ray_segments {
 } kernel_tile_ray_segments;
 
 /* Callback that adds a cell's segments on the packet's active rays. map is NULL for a constant field. */
-typedef void kernel_ray_segments_take(kernel_packet *p, kernel_segment_state *state, const kernel_cell *c,
-                                      const kernel_map *map);
+typedef void kernel_ray_segments_callback(kernel_packet *p, kernel_segment_state *state, const kernel_cell *c,
+                                          const kernel_map *map);
 
 /* A list of rays that have passed a stage, one word per ray: the pixel in the tile from bit 0 on, the lane of the cell
  * from KERNEL_LOCAL_CELL on, and the numbers of the two crossed faces from KERNEL_LOCAL_FACES on, three bits each. */
@@ -50,10 +50,10 @@ typedef struct kernel_local_list {
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
 
 typedef struct kernel_local_segment_batch {
-    kernel_local_lanes lanes;          /* must be the first member, as callbacks get it alone */
-    kernel_tile_ray_segments *packets; /* packets of the tile */
-    unsigned blocks;                   /* blocks of the current window */
-    kernel_ray_segments_take *alone;   /* callback that processes rays in a single cell */
+    kernel_local_lanes lanes;            /* must be the first member, as callbacks get it alone */
+    kernel_tile_ray_segments *packets;   /* packets of the tile */
+    unsigned blocks;                     /* blocks of the current window */
+    kernel_ray_segments_callback *alone; /* callback that processes rays in a single cell */
     kernel_local_faces faces;
     kernel_local_budget budget;
     kernel_local_list met, crossed[2];
@@ -255,7 +255,7 @@ SIMD_INLINE void kernel_local_list_add(kernel_local_list *list, vm rays, vi word
 }
 
 /* Loads the rays of a list from index n on; returns the lanes that have one. */
-SIMD_INLINE vm kernel_local_list_take(const kernel_local_list *list, const kernel_tile *tile, int n, vi *words,
+SIMD_INLINE vm kernel_local_list_load(const kernel_local_list *list, const kernel_tile *tile, int n, vi *words,
                                       kernel_lane_rays *rays)
 {
     const int left = list->count - n;
@@ -273,7 +273,7 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_
     kernel_lane_rays rays;
     kernel_curved_crossed crossed;
     vi words;
-    const vm all = kernel_local_list_take(&b->met, &t->tile, n, &words, &rays);
+    const vm all = kernel_local_list_load(&b->met, &t->tile, n, &words, &rays);
     kernel_local_find_faces(&b->faces, &rays, all, type, &crossed);
     const vm on_quad = kernel_curved_on_quad(type, 0, crossed.first);
     words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
@@ -291,7 +291,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     vi words;
     vf end, near, far;
     p.unseen = 1;
-    p.active = kernel_local_list_take(list, &t->tile, n, &words, &p.rays);
+    p.active = kernel_local_list_load(list, &t->tile, n, &words, &p.rays);
     const kernel_curved_crossed crossed = {p.active, vm_none(), words >> KERNEL_LOCAL_FACES & 7,
                                            words >> (KERNEL_LOCAL_FACES + 3) & 7};
     kernel_local_cross(&b->faces, &p.rays, &crossed, type, p.ends);
@@ -318,7 +318,7 @@ SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_l
     kernel_lane_rays rays;
     vf near, far, begin, end;
     kernel_lane_rays_of(&rays, &t->tile, pixel, lane);
-    const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
+    const vf depth = kernel_gather_lane(b->lanes.cells.origin[2], rays.lane);
     kernel_local_slab_interval(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
     const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
@@ -420,8 +420,8 @@ static const kernel_local_stages kernel_segment_stages = {false, kernel_local_se
 
 /* Copies the packets' windows and the limits of their rays into arrays per pixel. */
 static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_segment_batch *b,
-                                        kernel_tile_ray_segments *packets, unsigned blocks, kernel_tile_take *take,
-                                        kernel_ray_segments_take *alone)
+                                        kernel_tile_ray_segments *packets, unsigned blocks,
+                                        kernel_tile_trace_cell *take, kernel_ray_segments_callback *alone)
 {
     b->packets = packets;
     b->alone = alone;

@@ -36,7 +36,7 @@ enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64, KERNEL_SORT_ENDS = 48 };
 
 /* Callback that traces those of the given lanes' tets for which one ray-tet pair per lane is faster. Returns the
  * remaining lanes. */
-typedef unsigned kernel_tile_take_tets(kernel_tile_trace *t, unsigned lanes);
+typedef unsigned kernel_tile_trace_tets(kernel_tile_trace *t, unsigned lanes);
 
 /* The cells of a volume in the tile. The first open_count items begin before the end of the last window and end behind
  * its begin; `next` is the first item that no window has reached. Only the first `sorted` items are sorted, because a
@@ -52,8 +52,8 @@ typedef struct kernel_tile_cells {
     int plain_volume, plain_part;
     kernel_transformed_tets transformed;
     kernel_block_rays block_rays;
-    kernel_local_queue tets;          /* tets that are transformed SIMD_WIDTH at a time */
-    kernel_tile_take_tets *take_tets; /* NULL if each tet is processed on its own */
+    kernel_local_queue tets;            /* tets that are transformed SIMD_WIDTH at a time */
+    kernel_tile_trace_tets *trace_tets; /* NULL if each tet is processed on its own */
 } kernel_tile_cells;
 
 /* Transforms the fetched cell and prepares it for the rays of the blocks. Returns the blocks in which it may be
@@ -93,7 +93,7 @@ static __attribute__((noinline, cold)) bool kernel_tile_ready_alone(kernel_tile_
 }
 
 SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int part, uint32_t index, bool is_pencil,
-                                       unsigned blocks, kernel_tile_take *take)
+                                       unsigned blocks, kernel_tile_trace_cell *take)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_cell *c = &cells->cell;
@@ -187,14 +187,14 @@ SIMD_INLINE unsigned kernel_tile_transform_pending(kernel_tile_trace *t, kernel_
     return lanes;
 }
 
-/* Transforms the first vector of pending tets, and passes them to take_tets or, one by one, to take(). */
-static __attribute__((noinline)) void kernel_tile_take_some(kernel_tile_trace *t, kernel_tile_cells *cells,
-                                                            kernel_tile_take *take)
+/* Transforms the first vector of pending tets, and passes them to trace_tets or, one by one, to take(). */
+static __attribute__((noinline)) void kernel_tile_process_vector(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                                                 kernel_tile_trace_cell *take)
 {
     const int count = cells->tets.count < SIMD_WIDTH ? cells->tets.count : SIMD_WIDTH;
     const bool is_double = t->frame->is_double;
     unsigned lanes = kernel_tile_transform_pending(t, cells, count);
-    if (cells->take_tets && lanes) lanes = cells->take_tets(t, lanes);
+    if (cells->trace_tets && lanes) lanes = cells->trace_tets(t, lanes);
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         kernel_transformed_tets_cell(&cells->transformed, n, &cells->cell);
@@ -206,19 +206,20 @@ static __attribute__((noinline)) void kernel_tile_take_some(kernel_tile_trace *t
     kernel_local_pop(&cells->tets);
 }
 
-SIMD_INLINE void kernel_tile_take_pending(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_tile_take *take)
+SIMD_INLINE void kernel_tile_process_pending(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                             kernel_tile_trace_cell *take)
 {
-    while (cells->tets.count) kernel_tile_take_some(t, cells, take);
+    while (cells->tets.count) kernel_tile_process_vector(t, cells, take);
 }
 
 /* Makes the volume and mesh part those of the pending tets; tets of another part are processed first. Returns whether
  * the part's tets are processed in lanes: they are not if the field is constant per cell, because it is not
  * interpolated then. */
 SIMD_INLINE bool kernel_tile_set_tet_part(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
-                                          kernel_tile_take *take)
+                                          kernel_tile_trace_cell *take)
 {
     if (part != cells->plain_part || volume != cells->plain_volume) {
-        kernel_tile_take_pending(t, cells, take);
+        kernel_tile_process_pending(t, cells, take);
         kernel_arrays_begin(&cells->arrays, t->frame->job->parts[part].cells,
                             &t->frame->job->volumes[volume].field.fields[part]);
         cells->plain_volume = volume;
@@ -229,10 +230,10 @@ SIMD_INLINE bool kernel_tile_set_tet_part(kernel_tile_trace *t, kernel_tile_cell
 
 /* Queues a tet. If the queue is full, some tets are processed. box: its box of pixels (kernel_tile_box()). */
 SIMD_INLINE void kernel_tile_enqueue_tet(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
-                                         unsigned box, kernel_tile_take *take)
+                                         unsigned box, kernel_tile_trace_cell *take)
 {
     if (kernel_local_push(&cells->arrays, &cells->tets, cell, blocks, box, GRID_TET))
-        kernel_tile_take_some(t, cells, take);
+        kernel_tile_process_vector(t, cells, take);
 }
 
 /* ---- cells found by traversing trees ---- */
@@ -240,7 +241,7 @@ SIMD_INLINE void kernel_tile_enqueue_tet(kernel_tile_trace *t, kernel_tile_cells
 /* Callbacks that process a volume's cells. */
 typedef struct kernel_cell_visitor {
     bool is_pencil;
-    kernel_tile_take *take;
+    kernel_tile_trace_cell *take;
     /* Queues a cell if its type is processed in lanes; else returns false. box: its pixels, in a candidate's format, or
      * KERNEL_ALL_PIXELS for all of the blocks. */
     bool (*queue)(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box);
@@ -276,14 +277,14 @@ SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, cons
 
 /* Traverses the trees of all mesh parts, or the tree over the parts if there is one. take() receives their cells. */
 SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, kernel_tile_visit *parts,
-                                       kernel_tile_take *take)
+                                       kernel_tile_trace_cell *take)
 {
     const render_job *job = t->frame->job;
     if (job->parent)
         kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, parts);
     else
         for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) parts(t, 0, &part, 1, blocks);
-    kernel_tile_take_pending(t, t->thread->tile_cells, take);
+    kernel_tile_process_pending(t, t->thread->tile_cells, take);
 }
 
 /* Processes a leaf's cells: queues those whose types are processed in lanes, and transforms the others. */
@@ -355,12 +356,12 @@ static __attribute__((noinline)) void kernel_tile_cells_sort(kernel_tile_cells *
 }
 
 /* Begins a tile, before its first window. Returns false if the tile is known to have no cells. */
-SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_take_tets *take_tets)
+SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_trace_tets *trace_tets)
 {
     const kernel_frame *f = t->frame;
     kernel_tile_cells *cells = t->thread->tile_cells;
     cells->tets.count = cells->tets.known = 0;
-    cells->take_tets = take_tets;
+    cells->trace_tets = trace_tets;
     cells->plain_part = -1;
     if (!f->volume_candidates) return true;
     cells->items = t->thread->volume_bin.items;
@@ -391,7 +392,7 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
 /* Processes one of the cells that overlap the window. */
 SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *cells,
                                        const kernel_tile_candidate *item, bool is_pencil, unsigned blocks,
-                                       kernel_tile_take *take)
+                                       kernel_tile_trace_cell *take)
 {
     const int part = (int)item->source;
     if (kernel_tile_set_tet_part(t, cells, 0, part, take) &&
@@ -431,7 +432,7 @@ SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visit
         if (met && !visitor->queue(t, (int)item->source, item->cell, met, item->box))
             kernel_tile_meet_item(t, cells, item, visitor->is_pencil, met, visitor->take);
     }
-    kernel_tile_take_pending(t, cells, visitor->take);
+    kernel_tile_process_pending(t, cells, visitor->take);
 }
 
 /* ---- windows of depth ---- */
