@@ -46,22 +46,22 @@ SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
         kernel_values_colours(t->surface, part, t->cell->index, t->cell->vertices, t->cell->count, t->cell->g);
 }
 
-static void kernel_tile_meet(kernel_tile_trace *t, const kernel_tile_candidate *candidate, int part, int value,
-                             unsigned blocks)
+static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_tile_candidate *candidate, int part,
+                                          int value, unsigned blocks)
 {
     const render_surface_layer *layer = t->surface->layer;
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell *c = t->cell;
     kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
     if (kernel_has_own_faces(c->type)) {
-        kernel_blocks_meet(t, blocks, part, candidate->cell, NULL, 0);
+        kernel_blocks_trace(t, blocks, part, candidate->cell, NULL, 0);
         return;
     }
     kernel_cell_move(c, t->frame, &t->tile, g);
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_ready(t, part);
     t->curved->bounds = NULL;
-    kernel_blocks_meet(t, blocks, part, c->index, c, value);
+    kernel_blocks_trace(t, blocks, part, c->index, c, value);
 }
 
 /* Makes the surface layer of a candidate's source current. Stores the source's mesh part, and returns the number of its
@@ -159,7 +159,7 @@ static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
         int part;
         const int value = kernel_tile_source(t, m->alone[n].source, &part);
         const unsigned blocks = kernel_candidate_blocks(t, &m->alone[n]);
-        if (blocks) kernel_tile_meet(t, &m->alone[n], part, value, blocks);
+        if (blocks) kernel_tile_process_candidate(t, &m->alone[n], part, value, blocks);
     }
     m->alone_count = 0;
 }
@@ -223,8 +223,8 @@ static void kernel_pending_sort(kernel_prefetch_queue *w)
 }
 
 /* Prefetches the vertices of all pending cells, then queues them for tracing. */
-static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_tile_queue *m,
-                                                               kernel_prefetch_queue *w)
+static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_queue *m,
+                                                                   kernel_prefetch_queue *w)
 {
     kernel_pending_sort(w);
     for (int n = 0; n < w->count; n++) {
@@ -261,9 +261,9 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
             kernel_candidate_prefetch(t->frame, candidate);
             pending.items[pending.count++] = candidate;
-            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, queue, &pending);
+            if (pending.count == SIMD_WIDTH) kernel_tile_queue_prefetched(t, queue, &pending);
         }
-    kernel_tile_meet_pending(t, queue, &pending);
+    kernel_tile_queue_prefetched(t, queue, &pending);
     kernel_tile_queue_end(t, queue);
 }
 

@@ -54,23 +54,23 @@ int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER
     return count;
 }
 
-static void prepare_isovalues(kernel_interest *interest, const render_surface_layer *layer)
+static void prepare_isovalues(kernel_visible_values *visible_values, const render_surface_layer *layer)
 {
-    interest->count = layer->value_count;
+    visible_values->count = layer->value_count;
     for (int i = 0; i < layer->value_count; i++) {
         const mmbvh_interval interval = render_isovalue_interval(layer->values[i]);
-        interest->low[i] = interval.low;
-        interest->high[i] = interval.high;
+        visible_values->low[i] = interval.low;
+        visible_values->high[i] = interval.high;
     }
 }
 
-static void prepare_visible(kernel_interest *interest, const render_transfer *t)
+static void prepare_visible(kernel_visible_values *visible_values, const render_transfer *t)
 {
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
-    interest->count = render_visible_intervals(t, intervals);
-    for (int i = 0; i < interest->count; i++) {
-        interest->low[i] = intervals[i].low;
-        interest->high[i] = intervals[i].high;
+    visible_values->count = render_visible_intervals(t, intervals);
+    for (int i = 0; i < visible_values->count; i++) {
+        visible_values->low[i] = intervals[i].low;
+        visible_values->high[i] = intervals[i].high;
     }
 }
 
@@ -119,7 +119,7 @@ static void prepare_transfer(kernel_transfer *out, const render_transfer *t, dou
         out->ramp_rise[i] = t->opacities[i + 1] - t->opacities[i];
     }
     out->exponent = (float)(step / t->unit_distance);
-    prepare_visible(&out->interest, t);
+    prepare_visible(&out->visible_values, t);
 }
 
 static void prepare_lines(kernel_lines *out, const render_lines *l)
@@ -215,7 +215,7 @@ static void prepare_surfaces(kernel_frame *f)
                 s->layer = layer;
                 s->first_kind = kind;
                 s->own_clips = job->clip_count ? layer->clips & ~f->common_clips : 0;
-                prepare_isovalues(&s->interest, layer);
+                prepare_isovalues(&s->visible_values, layer);
                 if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, i);
                 f->needs_packets = f->needs_packets || layer->normal == RENDER_DIFFERENCES;
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);

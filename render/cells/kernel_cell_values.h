@@ -7,7 +7,7 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_types.h"
 #include "simd.h"
 
@@ -83,7 +83,7 @@ SIMD_INLINE bool kernel_values_show(const double *values, int count, const kerne
         low = values[i] < low ? values[i] : low;
         high = values[i] > high ? values[i] : high;
     }
-    return kernel_interest_meets(&t->interest, kernel_hold(low, 3e38), kernel_hold(high, 3e38));
+    return kernel_visible_values_overlap(&t->visible_values, kernel_hold(low, 3e38), kernel_hold(high, 3e38));
 }
 
 SIMD_INLINE bool kernel_cell_shows(const kernel_cell *c, const kernel_transfer *t)

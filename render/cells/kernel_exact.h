@@ -72,7 +72,7 @@ SIMD_INLINE kernel_half kernel_affine_at(const kernel_affine *a, kernel_half u, 
     return (a->c[0] + a->c[1] * u) + a->c[2] * v;
 }
 
-SIMD_INLINE kernel_double_end kernel_double_meet(const kernel_double_face *face, kernel_half u, kernel_half v)
+SIMD_INLINE kernel_double_end kernel_double_intersect(const kernel_double_face *face, kernel_half u, kernel_half v)
 {
     const kernel_half weight = kernel_affine_at(&face->weight, u, v), inverse = 1.0 / weight;
     return (kernel_double_end){kernel_affine_at(&face->depth, u, v) * inverse,
@@ -109,7 +109,7 @@ SIMD_INLINE void kernel_double_half(const kernel_double_cell *cell, const kernel
     const int lane = half * KERNEL_HALF;
     for (int n = 0; n < 4; n++) {
         const kernel_half_mask m = kernel_half_of_mask(hit[n], half);
-        const kernel_double_end end = kernel_double_meet(&cell->faces[n], rays->u[half], rays->v[half]);
+        const kernel_double_end end = kernel_double_intersect(&cell->faces[n], rays->u[half], rays->v[half]);
         kernel_double_select(m & ~met, &end, &first);
         kernel_double_select(m & met, &end, &last);
         met |= m;

@@ -41,11 +41,11 @@
 /* Crossings of rays with a triangle, at depth t with value v and colour value w, both linear on the triangle. For a
  * surface triangle t_face, v_face and w_face are those of its face, which differ for quads, because these are bilinear.
  * For a sheet v_face and w_face are the field's values there. */
-typedef struct kernel_meeting {
+typedef struct kernel_triangle_crossings {
     vm mask;
     vf t, v, w;
     vf t_face, v_face, w_face;
-} kernel_meeting;
+} kernel_triangle_crossings;
 
 /* The intervals of rays in the tet of surface triangle number `facet`: the value at t is v0 + (t - t0) (v1 - v0) / (t1
  * - t0). sign is the tet's sign. */
@@ -60,17 +60,18 @@ typedef struct kernel_subtet_interval {
 typedef struct kernel_poly_crossings {
     const kernel_packet *packet;
     const polyhedron *cell;
-    vm rays;                /* the rays to intersect */
-    bool has_colour;        /* whether colour values w are computed too */
-    vf *x, *y;              /* vertices and centre, projected along the rays */
-    vf *edge;               /* edge functions of the edges, then of the lines from each vertex to the centre */
-    kernel_meeting *facets; /* crossings of surface triangles by number; only those listed in `met` are set */
-    vm *left;               /* by surface triangle, the rays whose crossing has not been assigned to an interval yet */
+    vm rays;         /* the rays to intersect */
+    bool has_colour; /* whether colour values w are computed too */
+    vf *x, *y;       /* vertices and centre, projected along the rays */
+    vf *edge;        /* edge functions of the edges, then of the lines from each vertex to the centre */
+    kernel_triangle_crossings
+        *facets; /* crossings of surface triangles by number; only those listed in `met` are set */
+    vm *left;    /* by surface triangle, the rays whose crossing has not been assigned to an interval yet */
     /* rays that cross both triangles of a quad but not its bilinear patch, or the patch twice but no triangle */
     vm uneven;
     int *met;
     int met_count;
-    kernel_meeting *sheets; /* crossings of sheets by edge number; only those listed in met_sheets are set */
+    kernel_triangle_crossings *sheets; /* crossings of sheets by edge number; only those listed in met_sheets are set */
     int *met_sheets;
     int sheet_count;
     kernel_subtet_interval *segments;
@@ -82,7 +83,7 @@ typedef struct kernel_poly_crossings {
  * just inside. */
 typedef struct kernel_polyhedron_interval {
     kernel_interval interval;
-    kernel_meeting in, out;
+    kernel_triangle_crossings in, out;
     vf u_in, u_out;
 } kernel_polyhedron_interval;
 
@@ -104,9 +105,10 @@ static bool kernel_poly_open(const kernel_packet *p, const polyhedron *c, kernel
 {
     const size_t points = (size_t)c->vertex_count + 1, edges = (size_t)c->edge_count, facets = (size_t)c->facet_count;
     const size_t pieces = 11, spare = 64 * pieces;
-    const size_t bytes = points * 2 * sizeof(vf) + (edges + points) * (sizeof(vf) + sizeof(int)) +
-                         facets * (sizeof(kernel_meeting) + sizeof(vm) + sizeof(int) + sizeof(kernel_subtet_interval)) +
-                         edges * sizeof(kernel_meeting) + spare;
+    const size_t bytes =
+        points * 2 * sizeof(vf) + (edges + points) * (sizeof(vf) + sizeof(int)) +
+        facets * (sizeof(kernel_triangle_crossings) + sizeof(vm) + sizeof(int) + sizeof(kernel_subtet_interval)) +
+        edges * sizeof(kernel_triangle_crossings) + spare;
     char *at = p->thread->polyhedron_scratch(p->thread->polyhedra, bytes);
     if (!at) {
         p->thread->out_of_memory = true;
@@ -117,10 +119,10 @@ static bool kernel_poly_open(const kernel_packet *p, const polyhedron *c, kernel
     out->x = kernel_carve(&at, points * sizeof(vf));
     out->y = kernel_carve(&at, points * sizeof(vf));
     out->edge = kernel_carve(&at, (edges + points) * sizeof(vf));
-    out->facets = kernel_carve(&at, facets * sizeof(kernel_meeting));
+    out->facets = kernel_carve(&at, facets * sizeof(kernel_triangle_crossings));
     out->left = kernel_carve(&at, facets * sizeof(vm));
     out->met = kernel_carve(&at, facets * sizeof(int));
-    out->sheets = kernel_carve(&at, edges * sizeof(kernel_meeting));
+    out->sheets = kernel_carve(&at, edges * sizeof(kernel_triangle_crossings));
     out->met_sheets = kernel_carve(&at, edges * sizeof(int));
     out->segments = kernel_carve(&at, facets * sizeof(kernel_subtet_interval));
     out->met_count = out->sheet_count = out->segment_count = 0;
@@ -157,7 +159,8 @@ SIMD_INLINE void kernel_polyhedron_transform(polyhedron *c, const kernel_packet 
 
 /* ---- crossings of the surface ---- */
 
-SIMD_INLINE void kernel_meet(const polyhedron *c, const kernel_weights *w, bool has_colour, kernel_meeting *out)
+SIMD_INLINE void kernel_triangle_values_at(const polyhedron *c, const kernel_weights *w, bool has_colour,
+                                           kernel_triangle_crossings *out)
 {
     out->t = kernel_weigh_depth(w, c->z);
     out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
@@ -185,7 +188,7 @@ SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, k
 /* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the unmended weights, which
  * serve as a guess for the quad's patch and are the same as in a hex that shares the face. */
 static vm kernel_poly_facet(const kernel_poly_crossings *r, const polyhedron_facet *t, kernel_weights *w,
-                            kernel_meeting *out)
+                            kernel_triangle_crossings *out)
 {
     const vf ij = r->edge[t->edge[0]], jk = r->edge[t->edge[1]], ik = r->edge[t->edge[2]];
     out->mask = kernel_inside(r->rays, ij, jk, ik);
@@ -193,7 +196,7 @@ static vm kernel_poly_facet(const kernel_poly_crossings *r, const polyhedron_fac
     *w = kernel_weights_of(t->vertex[0], t->vertex[1], t->vertex[2], ij, jk, ik);
     kernel_weights mended = *w;
     kernel_poly_recompute(r, out->mask, &mended);
-    kernel_meet(r->cell, &mended, r->has_colour, out);
+    kernel_triangle_values_at(r->cell, &mended, r->has_colour, out);
     return out->mask;
 }
 
@@ -227,7 +230,7 @@ SIMD_INLINE void kernel_quad_of_facets(const kernel_poly_crossings *r, const pol
 /* Stores a point of the quad's patch as the face's point of a surface triangle's crossing, for the rays in `mine`. Rays
  * that do not cross the triangle itself use the patch's point for both. */
 SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_point *at, vm mine,
-                                   bool has_colour, kernel_meeting *m)
+                                   bool has_colour, kernel_triangle_crossings *m)
 {
     vf f[4], g[4];
     for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(has_colour ? c->g[corner[i]] : 0);
@@ -242,7 +245,7 @@ SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], con
 
 /* For rays that cross the patch twice and both triangles, exchanges the two points if necessary, so that the nearer
  * point belongs to the nearer triangle. */
-static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_meeting *const m[2],
+static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_triangle_crossings *const m[2],
                                                                     kernel_quad_point places[2])
 {
     const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
@@ -274,7 +277,7 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
     const bool has_corner = kernel_facet_has(&c->facets[first], corner[1]);
     const int twin = c->facets[first].twin, half_of[2] = {has_corner ? first : twin, has_corner ? twin : first};
     const polyhedron_facet *t[2] = {&c->facets[half_of[0]], &c->facets[half_of[1]]};
-    kernel_meeting *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
+    kernel_triangle_crossings *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
     for (int half = 0; half < 2; half++) kernel_poly_facet(r, t[half], &w, m[half]);
     kernel_quad_of_facets(r, t, corner, &quad);
     const vm once = vm_xor(m[0]->mask, m[1]->mask);
@@ -319,13 +322,13 @@ static bool kernel_poly_cross(kernel_poly_crossings *r, vm rays, bool has_colour
 
 /* Removes each ray's nearest crossing, by the depth of its face, from the list and returns it in *out. Returns false if
  * no ray has one left. */
-SIMD_INLINE bool kernel_poly_take_nearest(kernel_poly_crossings *r, kernel_meeting *out)
+SIMD_INLINE bool kernel_poly_take_nearest(kernel_poly_crossings *r, kernel_triangle_crossings *out)
 {
     const vf zero = vf_set(0);
     vf taken = vf_set(-1);
-    *out = (kernel_meeting){vm_none(), zero, zero, zero, vf_set(INFINITY), zero, zero};
+    *out = (kernel_triangle_crossings){vm_none(), zero, zero, zero, vf_set(INFINITY), zero, zero};
     for (int n = 0; n < r->met_count; n++) {
-        const kernel_meeting *m = &r->facets[r->met[n]];
+        const kernel_triangle_crossings *m = &r->facets[r->met[n]];
         const vm nearer = vm_and(r->left[r->met[n]], vf_lt(m->t_face, out->t_face));
         out->mask = vm_or(out->mask, nearer);
         out->t = vf_select(nearer, m->t, out->t);
@@ -367,17 +370,17 @@ static void kernel_poly_sheets(kernel_poly_crossings *r)
     for (int i = 0; i < centre; i++) kernel_poly_edge(r, spokes + i, i, centre);
     for (int i = 0; i < c->edge_count; i++) {
         const int a = c->edges[i][0], b = c->edges[i][1];
-        kernel_meeting *m = &r->sheets[i];
+        kernel_triangle_crossings *m = &r->sheets[i];
         m->mask = kernel_inside(r->rays, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
         if (!vm_any(m->mask)) continue;
         kernel_weights w = kernel_weights_of(a, b, centre, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
         kernel_poly_recompute(r, m->mask, &w);
-        kernel_meet(c, &w, r->has_colour, m);
+        kernel_triangle_values_at(c, &w, r->has_colour, m);
         r->met_sheets[r->sheet_count++] = i;
     }
 }
 
-SIMD_INLINE void kernel_segment_add(kernel_subtet_interval *s, const kernel_meeting *m, vm hit)
+SIMD_INLINE void kernel_segment_add(kernel_subtet_interval *s, const kernel_triangle_crossings *m, vm hit)
 {
     const vm first = vm_and(hit, vf_lt(m->t, s->t0)), last = vm_andnot(hit, vf_lt(m->t, s->t1));
     s->t0 = vf_select(first, m->t, s->t0);
@@ -455,7 +458,8 @@ static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool 
 
 /* Returns the rays for which the sheet lies in the interval: between the crossings of triangles, and between those of
  * faces. Sheets beyond the triangles belong to tets that extend out of the cell, and are not part of its field. */
-SIMD_INLINE vm kernel_polyhedron_interval_contains(const kernel_polyhedron_interval *stay, const kernel_meeting *sheet)
+SIMD_INLINE vm kernel_polyhedron_interval_contains(const kernel_polyhedron_interval *stay,
+                                                   const kernel_triangle_crossings *sheet)
 {
     const vm inside = vm_and(vf_lt(stay->interval.t_in, sheet->t), vf_lt(sheet->t, stay->interval.t_out));
     const vm within = vm_and(vf_lt(stay->in.t, sheet->t), vf_lt(sheet->t, stay->out.t));
@@ -464,7 +468,7 @@ SIMD_INLINE vm kernel_polyhedron_interval_contains(const kernel_polyhedron_inter
 
 /* Computes the field just inside an end of the interval: the face's value, plus the fields of all tets other than the
  * one whose triangle is crossed. */
-SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays, const kernel_meeting *end,
+SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays, const kernel_triangle_crossings *end,
                                          bool before, vf *u, vf *w)
 {
     vf v_sum = end->v, w_sum = end->w;
@@ -484,7 +488,7 @@ static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_inte
     kernel_poly_inner_value(r, i->mask, &stay->in, false, &stay->u_in, &i->w_in);
     kernel_poly_inner_value(r, i->mask, &stay->out, true, &stay->u_out, &i->w_out);
     for (int n = 0; n < r->sheet_count; n++) {
-        kernel_meeting *sheet = &r->sheets[r->met_sheets[n]];
+        kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
         const vm held = kernel_polyhedron_interval_contains(stay, sheet);
         vf v = sheet->v, w = sheet->w;
         if (!vm_any(held)) continue;
@@ -509,7 +513,7 @@ SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r, const kerne
 {
     vf t = stay->interval.t_out, v = v_out, w = stay->interval.w_out;
     for (int n = 0; n < r->sheet_count; n++) {
-        const kernel_meeting *sheet = &r->sheets[r->met_sheets[n]];
+        const kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
         const vm nearer = vm_and(kernel_polyhedron_interval_contains(stay, sheet),
                                  vm_and(vf_lt(piece->t1, sheet->t), vf_lt(sheet->t, t)));
         t = vf_select(nearer, sheet->t, t);

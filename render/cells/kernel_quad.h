@@ -423,7 +423,7 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
     }
 }
 
-SIMD_INLINE void kernel_quads_meet(const kernel_quad *q, int count, vm once, kernel_quad_point *out)
+SIMD_INLINE void kernel_quads_intersect(const kernel_quad *q, int count, vm once, kernel_quad_point *out)
 {
     const vm all[2] = {once, once};
     kernel_quads_cross(q, count, all, false, out);
@@ -497,7 +497,7 @@ SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kern
     const vf zero = vf_set(0);
     int count = 0;
     if (vm_any(once)) {
-        kernel_quads_meet(q, 1, once, &out[0]);
+        kernel_quads_intersect(q, 1, once, &out[0]);
         count = 1;
     }
     if (!vm_any(twice)) return count;

@@ -10,7 +10,7 @@
 #include "grid.h"
 #include "kernel_arrays.h"
 #include "kernel_cell.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_lanes_cell.h"
 #include "kernel_local.h"
 #include "kernel_transformed_curved.h"
@@ -126,7 +126,7 @@ SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scal
         }
         finite = vm_and(finite, vf_eq(odd, odd));
     }
-    return vm_and(finite, kernel_interest_meets_values(&t->interest, plain, count));
+    return vm_and(finite, kernel_visible_values_overlap_cells(&t->visible_values, plain, count));
 }
 
 /* Computes the tile's first and last column and row of pixels in which each lane's cell may be visible. The margin of

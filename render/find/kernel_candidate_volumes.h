@@ -7,7 +7,7 @@
 #include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_finder.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_wide.h"
 #include "simd.h"
 
@@ -35,7 +35,7 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
         kernel_rotate_to_camera(s, place, at);
         kernel_ends_add(s, &e, at, vm_all_lanes());
     }
-    const vm shows = kernel_interest_meets_values(s->interest, v, c->vertices);
+    const vm shows = kernel_visible_values_overlap_cells(s->visible_values, v, c->vertices);
     const unsigned all = (1u << c->count) - 1;
     const unsigned good = kernel_arrays_drawn(&s->arrays, c->cell, all & vm_bits(vm_and(usual, shows)));
     if (good) kernel_add_lanes(s, &e, good, c->cell, s->source);

@@ -71,7 +71,7 @@ typedef struct kernel_finder {
     const kernel_surface *surface;   /* the surface layer that is searched; NULL if a volume is searched */
     const kernel_transfer *transfer; /* transfer function of the volume, used if surface is NULL */
     const render_field *field;
-    const kernel_interest *interest;
+    const kernel_visible_values *visible_values;
     kernel_candidate_list *list;
     bool (*grow)(kernel_candidate_list *list);
     int part;
@@ -108,7 +108,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
         while (f->isovalues[s->source % RENDER_MAX_ISOVALUES].surface != subtree->surface) s->source++;
     }
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
-    s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
+    s->visible_values = s->surface ? &s->surface->visible_values : &s->transfer->visible_values;
     s->queued_count = 0;
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
         const int type = kernel_lane_types[i];

@@ -280,8 +280,8 @@ static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int pa
         memcpy(&low, ranges->low + node * ranges->stride, sizeof low);
         memcpy(&high, ranges->high + node * ranges->stride, sizeof high);
         out->cells += count;
-        for (int i = 0; i < s->interest.count; i++)
-            if (low <= s->interest.high[i] && high >= s->interest.low[i]) out->crossed += count;
+        for (int i = 0; i < s->visible_values.count; i++)
+            if (low <= s->visible_values.high[i] && high >= s->visible_values.low[i]) out->crossed += count;
     }
 }
 

@@ -142,10 +142,10 @@ typedef struct kernel_tile {
 } kernel_tile;
 
 /* Intervals of visible values, rounded outward: a node whose range meets none of them is skipped. */
-typedef struct kernel_interest {
+typedef struct kernel_visible_values {
     int count;
     float low[KERNEL_MAX_INTERVALS], high[KERNEL_MAX_INTERVALS];
-} kernel_interest;
+} kernel_visible_values;
 
 /* Maps values to positions in a colour table with a logarithmic or symlog scale s: position = s(value) * slope +
  * shift. */
@@ -173,7 +173,7 @@ typedef struct kernel_transfer {
     float ramp_start[RENDER_MAX_OPACITY_POINTS], ramp_inverse[RENDER_MAX_OPACITY_POINTS];
     float ramp_rise[RENDER_MAX_OPACITY_POINTS];
     float exponent; /* step / unit_distance: the power of (1 - opacity) that gives the transmittance of a sample */
-    kernel_interest interest;
+    kernel_visible_values visible_values;
 } kernel_transfer;
 
 /* The levels of contour lines, in a domain in which the first level is 0 and the last, if there are several, is 1. gap:
@@ -186,12 +186,12 @@ typedef struct kernel_lines {
 
 typedef struct kernel_surface {
     const render_surface_layer *layer;
-    kernel_interest interest; /* the visible values: the layer's isovalues */
-    kernel_transfer colour;   /* transfer function of the colour field; set if layer->colour_map */
-    kernel_lines lines;       /* contour lines on the surface; set if layer->lines */
-    uint32_t own_clips;       /* one bit per clip of this layer that is not among the frame's common_clips */
-    uint32_t first_kind;      /* fragment kind of the layer's first isovalue */
-    double value_scale;       /* power of two that scales the field's range to near 1, for differences */
+    kernel_visible_values visible_values; /* the visible values: the layer's isovalues */
+    kernel_transfer colour;               /* transfer function of the colour field; set if layer->colour_map */
+    kernel_lines lines;                   /* contour lines on the surface; set if layer->lines */
+    uint32_t own_clips;  /* one bit per clip of this layer that is not among the frame's common_clips */
+    uint32_t first_kind; /* fragment kind of the layer's first isovalue */
+    double value_scale;  /* power of two that scales the field's range to near 1, for differences */
 } kernel_surface;
 
 /* A cell whose isosurface or volume may be visible: its range of depths, and the box of pixels that it may cover, from

@@ -174,7 +174,7 @@ static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, ker
         }
         if (!b->has_normals) kernel_batch_normals(b, t->frame);
         kernel_batch_cell(t, b, n, t->cell);
-        kernel_blocks_meet(t, blocks, own->part, t->cell->index, t->cell, own->value[n]);
+        kernel_blocks_trace(t, blocks, own->part, t->cell->index, t->cell, own->value[n]);
     }
     kernel_batch_trace(t, b);
     own->count = 0;

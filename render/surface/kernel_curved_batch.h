@@ -198,7 +198,7 @@ static __attribute__((noinline)) void kernel_curved_batch_contract(const kernel_
 
 /* Lists the rays that cross two faces of their cells in `met`, with the numbers of these faces. Traces rays of other
  * cases one by one. Returns the mask of blocks in which a ray has a nearer hit than before. */
-SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
+SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
     h->met.count = 0;
@@ -226,9 +226,9 @@ SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_cu
     return nearer;
 }
 
-static __attribute__((noinline)) unsigned kernel_curved_batch_meet(kernel_tile_trace *t, kernel_curved_batch *h)
+static __attribute__((noinline)) unsigned kernel_curved_batch_find_faces(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_meet_of, t, h);
+    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_find_faces_of_type, t, h);
 }
 
 /* Computes the points at which rays enter and leave their cells. Rays with exactly one root, by the values at the ends,
@@ -472,7 +472,7 @@ static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trac
     kernel_pixel_list_close(&h->rays);
     kernel_curved_batch_contract(t, h);
     unsigned nearer = kernel_curved_batch_known(t, h);
-    nearer |= kernel_curved_batch_meet(t, h);
+    nearer |= kernel_curved_batch_find_faces(t, h);
     kernel_curved_batch_cross(t, h);
     kernel_pixel_list_close(&h->found);
     kernel_pixel_list_close(&h->others);
@@ -518,7 +518,7 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
         }
         kernel_curved_ready(t, h, n);
         cells.lane = n;
-        kernel_blocks_meet(t, blocks, h->own->part, own->cell[n], &h->cells[n], own->value[n]);
+        kernel_blocks_trace(t, blocks, h->own->part, own->cell[n], &h->cells[n], own->value[n]);
     }
     t->curved = alone;
 }

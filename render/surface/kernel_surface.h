@@ -700,8 +700,8 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *s
 /* ---- the blocks of a tile that a cell may meet ---- */
 
 /* Traces the cell with the block's rays. cell is NULL for a polyhedron, for which all isovalues are traced. */
-SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, uint32_t index, const kernel_cell *cell,
-                                   int value)
+SIMD_INLINE void kernel_block_trace(kernel_tile_trace *t, int block, int part, uint32_t index, const kernel_cell *cell,
+                                    int value)
 {
     bool is_nearer = false;
     kernel_block_begin(t, block);
@@ -722,10 +722,10 @@ SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, ui
     if (is_nearer) kernel_block_learn(t, block);
 }
 
-SIMD_INLINE void kernel_blocks_meet(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,
-                                    const kernel_cell *cell, int value)
+SIMD_INLINE void kernel_blocks_trace(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,
+                                     const kernel_cell *cell, int value)
 {
-    for (; blocks; blocks &= blocks - 1) kernel_block_meet(t, __builtin_ctz(blocks), part, index, cell, value);
+    for (; blocks; blocks &= blocks - 1) kernel_block_trace(t, __builtin_ctz(blocks), part, index, cell, value);
 }
 
 #endif

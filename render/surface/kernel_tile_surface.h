@@ -162,7 +162,8 @@ SIMD_INLINE void kernel_tile_find_node_bounds(const kernel_tile_trace *t, const 
         shown = vm_and(
             shown, kernel_node_pixels(at[first] - reach[first], at[last] + reach[last], scale, s->pad[a], &box, 8 * a));
     }
-    shown = vm_and(shown, kernel_interest_meets_lanes(&t->surface->interest, nodes->range_low, nodes->range_high));
+    shown = vm_and(
+        shown, kernel_visible_values_overlap_lanes(&t->surface->visible_values, nodes->range_low, nodes->range_high));
     vf_store(out->near, vf_max(at[KERNEL_FIND_DEPTH] - reach[KERNEL_FIND_DEPTH], vf_set(-INFINITY)));
     memcpy(out->box, &box, sizeof box);
     out->along = at[KERNEL_FIND_ALONG];

@@ -12,7 +12,7 @@
 #include "kernel_double.h"
 #include "kernel_exact.h"
 #include "kernel_integral.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"

@@ -35,7 +35,7 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
     stages->finish(t, l, type);
     for (unsigned lanes = showing & ~transformed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        kernel_tile_meet_cell(t, l->volume, l->part, q->cell[n], stages->is_pencil, q->blocks[n], l->take);
+        kernel_tile_process_cell(t, l->volume, l->part, q->cell[n], stages->is_pencil, q->blocks[n], l->take);
     }
     kernel_local_pop(q);
 }

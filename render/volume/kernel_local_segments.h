@@ -310,7 +310,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
 }
 
 /* Lists those of the rays from index n on that may meet their cells within the window. */
-SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_local_segment_batch *b, int n)
+SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, kernel_local_segment_batch *b, int n)
 {
     const int left = b->lanes.rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
@@ -340,7 +340,7 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
     kernel_local_segment_batch *b = (kernel_local_segment_batch *)l;
     kernel_pixel_list_close(&l->rays);
     b->met.count = 0;
-    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_segments_meet(t, b, n);
+    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_segments_overlap(t, b, n);
     KERNEL_OF_TYPE(type, kernel_local_segments_met, t, b, &l->queues[kernel_shape_number(type)]);
     l->rays.count = 0;
 }

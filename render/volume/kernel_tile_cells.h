@@ -17,7 +17,7 @@
 #include "kernel_bins.h"
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_local_queue.h"
 #include "kernel_map.h"
 #include "kernel_outline.h"
@@ -92,8 +92,8 @@ static __attribute__((noinline, cold)) bool kernel_tile_ready_alone(kernel_tile_
     return true;
 }
 
-SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int part, uint32_t index, bool is_pencil,
-                                       unsigned blocks, kernel_tile_trace_cell *take)
+SIMD_INLINE void kernel_tile_process_cell(kernel_tile_trace *t, int volume, int part, uint32_t index, bool is_pencil,
+                                          unsigned blocks, kernel_tile_trace_cell *take)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_cell *c = &cells->cell;
@@ -142,7 +142,8 @@ SIMD_INLINE void kernel_transformed_domain(kernel_transformed_tets *transformed,
 /* Returns the lanes whose cells are visible and reach into the window; stores the least depth of each cell. */
 SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
                                                      const kernel_transformed_tets *transformed,
-                                                     const kernel_interest *interest, float near[SIMD_WIDTH])
+                                                     const kernel_visible_values *visible_values,
+                                                     float near[SIMD_WIDTH])
 {
     const vf *z = transformed->at[2];
     vf v[4], odd = vf_set(0);
@@ -155,7 +156,7 @@ SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
         }
         is_finite = vm_and(is_finite, vf_eq(odd, odd));
     }
-    const vm shows = kernel_interest_meets_values(interest, v, 4);
+    const vm shows = kernel_visible_values_overlap_cells(visible_values, v, 4);
     const vf front = vf_min(vf_min(z[0], z[1]), vf_min(z[2], z[3]));
     const vf back = vf_max(vf_max(z[0], z[1]), vf_max(z[2], z[3]));
     const vf pad = KERNEL_OUTLINE_PAD * vf_max(vf_abs(front), vf_abs(back));
@@ -177,7 +178,7 @@ SIMD_INLINE unsigned kernel_tile_transform_pending(kernel_tile_trace *t, kernel_
     kernel_transform_tets(&cells->transformed, &cells->arrays, t->frame, &t->tile, vertices, count);
     kernel_transformed_domain(&cells->transformed, transfer);
     unsigned candidates =
-        kernel_transformed_tets_visible(t, &cells->transformed, &transfer->interest, near) & ((1u << count) - 1);
+        kernel_transformed_tets_visible(t, &cells->transformed, &transfer->visible_values, near) & ((1u << count) - 1);
     candidates = kernel_arrays_drawn(&cells->arrays, cells->tets.cell, candidates);
     for (; candidates; candidates &= candidates - 1) {
         const int n = __builtin_ctz(candidates);
@@ -247,8 +248,8 @@ typedef struct kernel_cell_visitor {
     bool (*queue)(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box);
 } kernel_cell_visitor;
 
-SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume, int part,
-                                       const uint32_t *cells, int count, unsigned blocks)
+SIMD_INLINE void kernel_tile_process_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume,
+                                          int part, const uint32_t *cells, int count, unsigned blocks)
 {
     const grid *g = t->frame->job->parts[part].cells;
     kernel_tile_cells *pending = t->thread->tile_cells;
@@ -259,7 +260,7 @@ SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, const kernel_cell_v
         if (waits && kernel_is_linear(kernel_arrays_type(&pending->arrays, cells[n])))
             kernel_tile_enqueue_tet(t, pending, cells[n], blocks, box, visitor->take);
         else
-            kernel_tile_meet_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
+            kernel_tile_process_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
 }
 
 /* Traverses the trees of the given mesh parts, skipping nodes whose values are invisible in the volume. */
@@ -271,7 +272,7 @@ SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, cons
         const int part = (int)parts[n];
         if (field->ranges[part].low)
             kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part],
-                                 &t->frame->volumes[volume].interest, blocks, part, visit);
+                                 &t->frame->volumes[volume].visible_values, blocks, part, visit);
     }
 }
 
@@ -297,7 +298,7 @@ SIMD_INLINE void kernel_visit_leaf(kernel_tile_trace *t, const kernel_cell_visit
     for (int n = 0; n < count; n++) kernel_prefetch_indices(g, cells[n]);
     for (int n = 0; n < count; n++)
         if (!visitor->queue(t, part, cells[n], blocks, KERNEL_ALL_PIXELS)) others[left++] = cells[n];
-    if (left) kernel_tile_meet_leaf(t, visitor, volume, part, others, left, blocks);
+    if (left) kernel_tile_process_leaf(t, visitor, volume, part, others, left, blocks);
 }
 
 /* ---- cells found before, as candidates of the tile ---- */
@@ -390,16 +391,16 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
 }
 
 /* Processes one of the cells that overlap the window. */
-SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *cells,
-                                       const kernel_tile_candidate *item, bool is_pencil, unsigned blocks,
-                                       kernel_tile_trace_cell *take)
+SIMD_INLINE void kernel_tile_process_item(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                          const kernel_tile_candidate *item, bool is_pencil, unsigned blocks,
+                                          kernel_tile_trace_cell *take)
 {
     const int part = (int)item->source;
     if (kernel_tile_set_tet_part(t, cells, 0, part, take) &&
         kernel_is_linear(kernel_arrays_type(&cells->arrays, item->cell)))
         kernel_tile_enqueue_tet(t, cells, item->cell, blocks, item->box, take);
     else
-        kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);
+        kernel_tile_process_cell(t, 0, part, item->cell, is_pencil, blocks, take);
 }
 
 /* Prefetches the next cells of the window: the vertex indices of 2 * KERNEL_OPEN_PIECE cells, and the vertices of
@@ -430,7 +431,7 @@ SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visit
         if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
         const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
         if (met && !visitor->queue(t, (int)item->source, item->cell, met, item->box))
-            kernel_tile_meet_item(t, cells, item, visitor->is_pencil, met, visitor->take);
+            kernel_tile_process_item(t, cells, item, visitor->is_pencil, met, visitor->take);
     }
     kernel_tile_process_pending(t, cells, visitor->take);
 }
