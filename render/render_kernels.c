@@ -361,7 +361,7 @@ static int volume_intervals(const kernel_frame *f)
 }
 
 /* Returns whether one of the rectangle's pixels must be traced. */
-static bool is_wanted(const render_job *job, int x0, int y0, int columns, int rows)
+static bool has_active_pixel(const render_job *job, int x0, int y0, int columns, int rows)
 {
     const int x1 = x0 + columns, y1 = y0 + rows;
     if (!job->pixels) return x0 < job->camera.width && y0 < job->camera.height;
@@ -371,12 +371,12 @@ static bool is_wanted(const render_job *job, int x0, int y0, int columns, int ro
     return false;
 }
 
-static unsigned wanted_blocks(const render_job *job, int x0, int y0)
+static unsigned active_blocks(const render_job *job, int x0, int y0)
 {
     unsigned blocks = 0;
     for (int i = 0; i < KERNEL_BLOCKS; i++)
-        if (is_wanted(job, x0 + i % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK, y0 + i / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK,
-                      KERNEL_BLOCK, KERNEL_BLOCK))
+        if (has_active_pixel(job, x0 + i % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK,
+                             y0 + i / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK, KERNEL_BLOCK, KERNEL_BLOCK))
             blocks |= 1u << i;
     return blocks;
 }
@@ -440,11 +440,11 @@ static bool begins_run(const kernel_frame *f, int x0, int y0)
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
 {
     thread->serial++;
-    if (begins_run(f, x0, y0)) kernel_depth_forget(&thread->tile_volume->depth);
+    if (begins_run(f, x0, y0)) kernel_depth_reset(&thread->tile_volume->depth);
     kernel_tile_trace *t = thread->tile;
     const bool fogs = has_volume(f, thread, x0, y0);
     if (!fogs && !has_surface(f, thread, x0, y0)) return;
-    const unsigned wanted = wanted_blocks(f->job, x0, y0);
+    const unsigned wanted = active_blocks(f->job, x0, y0);
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
     if (f->surface_count) trace_tile_surfaces(t);

@@ -99,12 +99,12 @@ typedef struct tracer {
     ray_name names[CHUNK_RAYS];
 } tracer;
 
-static bool grow_doubts(kernel_straights *s)
+static bool grow_undecided(kernel_straights *s)
 {
     const int64_t capacity = s->capacity + s->capacity / 2 + 1024;
-    kernel_doubt *doubts = base_realloc(s->doubts, (size_t)capacity * sizeof *doubts);
-    if (!doubts) return false;
-    s->doubts = doubts;
+    kernel_undecided_pair *undecided = base_realloc(s->undecided, (size_t)capacity * sizeof *undecided);
+    if (!undecided) return false;
+    s->undecided = undecided;
     s->capacity = capacity;
     return true;
 }
@@ -215,76 +215,76 @@ static void set_light_ray(tracer *t, const render_hit *hit, int light)
 
 static int by_ray(const void *a, const void *b)
 {
-    const kernel_doubt *x = a, *y = b;
+    const kernel_undecided_pair *x = a, *y = b;
     if (x->ray != y->ray) return x->ray < y->ray ? -1 : 1;
     return (x->occluder > y->occluder) - (x->occluder < y->occluder);
 }
 
-static void ask_cell(tracer *t, int32_t occluder)
+static void test_cell(tracer *t, int32_t occluder)
 {
     t->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
 /* Marks a doubt (a ray that must be tested exactly in a cell) whose cell has already been tested with all its rays. */
-enum { ASKED = -1 };
+enum { TESTED = -1 };
 
 /* Tests a hit's rays into the hemisphere exactly in the cells of its `count` doubts, and closes the rays that are
  * blocked. */
-static void settle_hemisphere(tracer *t, const render_hit *hit, kernel_doubt *doubts, int64_t count)
+static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_pair *undecided, int64_t count)
 {
     uint64_t open = 0;
     int32_t ray_of[RENDER_MAX_SAMPLES];
     set_hemisphere_rays(t, hit);
     for (int64_t i = 0; i < count; i++) {
-        const int k = t->names[doubts[i].ray].number;
-        ray_of[k] = doubts[i].ray;
-        if (t->rays[doubts[i].ray].is_open) open |= (uint64_t)1 << k;
+        const int k = t->names[undecided[i].ray].number;
+        ray_of[k] = undecided[i].ray;
+        if (t->rays[undecided[i].ray].is_open) open |= (uint64_t)1 << k;
     }
-    const uint64_t asked = open;
+    const uint64_t prefetched = open;
     for (int64_t i = 0; i < count && open; i++) {
-        const int32_t occluder = doubts[i].occluder;
-        if (occluder == ASKED) continue;
+        const int32_t occluder = undecided[i].occluder;
+        if (occluder == TESTED) continue;
         t->bundle.open = 0;
         for (int64_t j = i; j < count; j++) {
-            if (doubts[j].occluder != occluder) continue;
-            t->bundle.open |= (uint64_t)1 << t->names[doubts[j].ray].number;
-            doubts[j].occluder = ASKED;
+            if (undecided[j].occluder != occluder) continue;
+            t->bundle.open |= (uint64_t)1 << t->names[undecided[j].ray].number;
+            undecided[j].occluder = TESTED;
         }
         t->bundle.open &= open;
         if (!t->bundle.open) continue;
         const uint64_t before = t->bundle.open;
-        ask_cell(t, occluder);
+        test_cell(t, occluder);
         open &= ~(before & ~t->bundle.open);
     }
-    for (uint64_t closed = asked & ~open; closed; closed &= closed - 1)
+    for (uint64_t closed = prefetched & ~open; closed; closed &= closed - 1)
         t->rays[ray_of[__builtin_ctzll(closed)]].is_open = false;
 }
 
-static void settle_light(tracer *t, const render_hit *hit, const kernel_doubt *doubt)
+static void trace_light(tracer *t, const render_hit *hit, const kernel_undecided_pair *doubt)
 {
     kernel_straight *ray = &t->rays[doubt->ray];
     if (!ray->is_open) return;
     set_light_ray(t, hit, t->names[doubt->ray].number - RENDER_MAX_SAMPLES);
     t->bundle.open = 1;
-    ask_cell(t, doubt->occluder);
+    test_cell(t, doubt->occluder);
     ray->is_open = t->bundle.open;
 }
 
-static void settle_doubts(tracer *t, const render_hit *hits)
+static void trace_undecided(tracer *t, const render_hit *hits)
 {
     kernel_straights *s = &t->straights;
-    qsort(s->doubts, (size_t)s->doubt_count, sizeof *s->doubts, by_ray);
-    for (int64_t first = 0, end; first < s->doubt_count; first = end) {
-        kernel_doubt *from = &s->doubts[first];
+    qsort(s->undecided, (size_t)s->undecided_count, sizeof *s->undecided, by_ray);
+    for (int64_t first = 0, end; first < s->undecided_count; first = end) {
+        kernel_undecided_pair *from = &s->undecided[first];
         const ray_name name = t->names[from->ray];
-        for (end = first + 1; end < s->doubt_count && name.number < RENDER_MAX_SAMPLES; end++) {
-            const ray_name next = t->names[s->doubts[end].ray];
+        for (end = first + 1; end < s->undecided_count && name.number < RENDER_MAX_SAMPLES; end++) {
+            const ray_name next = t->names[s->undecided[end].ray];
             if (next.hit != name.hit || next.number >= RENDER_MAX_SAMPLES) break;
         }
         if (name.number < RENDER_MAX_SAMPLES)
-            settle_hemisphere(t, &hits[name.hit], from, end - first);
+            trace_hemisphere(t, &hits[name.hit], from, end - first);
         else
-            settle_light(t, &hits[name.hit], from);
+            trace_light(t, &hits[name.hit], from);
     }
 }
 
@@ -294,10 +294,10 @@ static void trace_chunk(tracer *t, const render_hit *hits, render_hit_rays *rays
     t->thread.serial++;
     if (t->thread.polyhedra) polyhedra_reset(t->thread.polyhedra);
     s->count = 0;
-    s->doubt_count = 0;
+    s->undecided_count = 0;
     for (int i = 0; i < count; i++) add_hit(t, i, &hits[i], &rays[i]);
     t->kernels->occlude(&t->frame, &t->thread, &t->of->trees, s);
-    if (s->doubt_count) settle_doubts(t, hits);
+    if (s->undecided_count) trace_undecided(t, hits);
     for (int i = 0; i < s->count; i++) {
         const ray_name name = t->names[i];
         if (t->rays[i].is_open) continue;
@@ -324,7 +324,7 @@ static tracer *tracer_create(const render_occluders *of)
     t->frame = of->frame;
     t->frame.job = &t->moved;
     t->frame.depth_shift = t->moved.space.depth_origin = 0;
-    t->straights = (kernel_straights){.rays = t->rays, .grow = grow_doubts};
+    t->straights = (kernel_straights){.rays = t->rays, .grow = grow_undecided};
     t->thread = (kernel_thread){.memory = base_alloc(t->kernels->memory_bytes),
                                 .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
                                 .find_polyhedron = polyhedra_find,
@@ -344,7 +344,7 @@ static bool tracer_free(tracer *t)
     const bool is_well = !t->thread.out_of_memory;
     polyhedra_free(t->thread.polyhedra);
     base_free(t->thread.memory);
-    base_free(t->straights.doubts);
+    base_free(t->straights.undecided);
     base_free(t);
     return is_well;
 }

@@ -42,7 +42,7 @@ typedef struct kernel_arrays {
     struct { /* the arrays that are prefetched by vertex index: coordinates and values */
         const char *data;
         int64_t stride;
-    } asked[4];
+    } prefetched[4];
 } kernel_arrays;
 
 static inline kernel_numbers kernel_numbers_of(const grid_array *a, int64_t count)
@@ -80,12 +80,12 @@ static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const gr
         const grid_array *c = &g->coordinates[a];
         p->coordinates[a] = kernel_numbers_of(c, g->vertex_count);
         p->has_narrow_positions = p->has_narrow_positions && kernel_numbers_are_narrow(&p->coordinates[a]);
-        p->asked[a].data = c->data;
-        p->asked[a].stride = c->stride;
+        p->prefetched[a].data = c->data;
+        p->prefetched[a].stride = c->stride;
     }
     p->is_narrow = p->has_narrow_positions && kernel_numbers_are_narrow(&p->values);
-    p->asked[3].data = p->is_by_cell ? p->asked[0].data : values.data;
-    p->asked[3].stride = p->is_by_cell ? p->asked[0].stride : values.stride;
+    p->prefetched[3].data = p->is_by_cell ? p->prefetched[0].data : values.data;
+    p->prefetched[3].stride = p->is_by_cell ? p->prefetched[0].stride : values.stride;
 }
 
 /* ---- cells ---- */
@@ -138,7 +138,8 @@ SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int v
 {
     for (int n = lane; n < lane + count; n++)
         for (int i = 0; i < vertices; i++)
-            for (int k = 0; k < 4; k++) __builtin_prefetch(p->asked[k].data + vertex[i][n] * p->asked[k].stride);
+            for (int k = 0; k < 4; k++)
+                __builtin_prefetch(p->prefetched[k].data + vertex[i][n] * p->prefetched[k].stride);
 }
 
 /* Stores a cell's vertex indices, that of vertex i in out[i * room], and prefetches the coordinates and values of these
@@ -154,7 +155,7 @@ SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, i
     for (int i = 0; i < vertices; i++, at += c.stride) {
         const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
         const int32_t vertex = (int32_t)(index - c.base);
-        for (int k = 0; k < 4; k++) __builtin_prefetch(p->asked[k].data + vertex * p->asked[k].stride);
+        for (int k = 0; k < 4; k++) __builtin_prefetch(p->prefetched[k].data + vertex * p->prefetched[k].stride);
         out[i * room] = vertex;
     }
 }

@@ -71,8 +71,8 @@ SIMD_INLINE vf kernel_edge_projected(const kernel_packet *p, kernel_tile_positio
                                kernel_project_y(p, b));
 }
 
-static __attribute__((noinline, cold)) vf kernel_edge_doubted(const kernel_packet *p, kernel_tile_position a,
-                                                              kernel_tile_position b, vm doubt, vf e)
+static __attribute__((noinline, cold)) vf kernel_edge_recomputed(const kernel_packet *p, kernel_tile_position a,
+                                                                 kernel_tile_position b, vm doubt, vf e)
 {
     return vf_select(doubt, kernel_edge_projected(p, a, b), e);
 }
@@ -89,7 +89,7 @@ SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_
     if (!p->is_pencil) return kernel_edge_projected(p, a, b);
     const vf e = kernel_line_at(p, l);
     const vm doubt = vm_not(vf_lt(vf_set(l->bound), vf_abs(e)));
-    return __builtin_expect(vm_any(doubt), 0) ? kernel_edge_doubted(p, a, b, doubt, e) : e;
+    return __builtin_expect(vm_any(doubt), 0) ? kernel_edge_recomputed(p, a, b, doubt, e) : e;
 }
 
 /* Returns the rays that cross the triangle i, j, k, by its edge functions. i, j and k are in the order of

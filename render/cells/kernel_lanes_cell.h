@@ -61,7 +61,7 @@ SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile,
 }
 
 /* Returns the error bound of the edge function between two vertices whose sizes are given (kernel_lanes_size()). */
-SIMD_INLINE vf kernel_lanes_doubt(vf size_a, vf size_b)
+SIMD_INLINE vf kernel_lanes_edge_error(vf size_a, vf size_b)
 {
     return 6 * 6e-8f * (size_a * size_b);
 }

@@ -285,7 +285,7 @@ SIMD_INLINE void kernel_lanes_lines_of(const kernel_transformed_curved *transfor
         const int i = shape->edges[n][0], j = shape->edges[n][1];
         kernel_lanes_line(f, at[i], at[j], out->line[n]);
         kernel_lanes_line_error(out->line[n], tile->radius, at[i], at[j], &out->error[n], &out->extent[n]);
-        out->line[n][3] = kernel_lanes_doubt(size[i], size[j]);
+        out->line[n][3] = kernel_lanes_edge_error(size[i], size[j]);
     }
 }
 

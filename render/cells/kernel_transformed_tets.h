@@ -89,7 +89,7 @@ SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const ke
         out->c[n] = line[0];
         out->cu[n] = line[1];
         out->cv[n] = line[2];
-        out->bound[n] = kernel_lanes_doubt(size[i], size[j]);
+        out->bound[n] = kernel_lanes_edge_error(size[i], size[j]);
         out->doubt = vf_max(out->doubt, out->bound[n]);
     }
     for (int n = 0; n < 4; n++) {

@@ -199,7 +199,7 @@ SIMD_INLINE unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_l
 }
 
 /* Reads the vertex indices of all queued cells before index `end` that have not been read yet. */
-SIMD_INLINE void kernel_local_learn(const kernel_arrays *p, kernel_local_queue *q, int end, int type)
+SIMD_INLINE void kernel_local_read_indices(const kernel_arrays *p, kernel_local_queue *q, int end, int type)
 {
     for (; q->known < end; q->known++)
         kernel_arrays_vertices(p, q->cell[q->known], grid_type_vertices(type), q->vertex[0] + q->known,
@@ -211,7 +211,7 @@ SIMD_INLINE void kernel_local_learn(const kernel_arrays *p, kernel_local_queue *
 SIMD_INLINE unsigned kernel_local_fetch_all(kernel_local_lanes *l, kernel_local_queue *q, int type)
 {
     const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH, vertices = grid_type_vertices(type);
-    kernel_local_learn(&l->arrays, q, count, type);
+    kernel_local_read_indices(&l->arrays, q, count, type);
     for (int n = count; n < SIMD_WIDTH; n++) {
         q->cell[n] = q->cell[0];
         for (int i = 0; i < vertices; i++) q->vertex[i][n] = q->vertex[i][0];
@@ -242,7 +242,7 @@ SIMD_INLINE bool kernel_local_push(const kernel_arrays *p, kernel_local_queue *q
     q->cell[n] = cell;
     q->blocks[n] = (uint16_t)blocks;
     q->box[n] = (uint16_t)box;
-    kernel_local_learn(p, q, q->count - KERNEL_LOCAL_AHEAD, type);
+    kernel_local_read_indices(p, q, q->count - KERNEL_LOCAL_AHEAD, type);
     return q->count == KERNEL_LOCAL_ROOM;
 }
 

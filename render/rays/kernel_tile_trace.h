@@ -77,7 +77,7 @@ SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
 }
 
 /* Updates the farthest t_far of the block and of its pixels after new hits. */
-SIMD_INLINE void kernel_block_learn(kernel_tile_trace *t, int block)
+SIMD_INLINE void kernel_block_update_far(kernel_tile_trace *t, int block)
 {
     t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
     if (t->frame->candidates) return;

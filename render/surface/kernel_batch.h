@@ -144,7 +144,7 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
         const vm hit = kernel_batch_hit(b, t->t_near, &r, &depth);
         if (vm_any(hit)) nearer |= kernel_batch_accept(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
     }
-    for (; nearer; nearer &= nearer - 1) kernel_block_learn(t, __builtin_ctz(nearer));
+    for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
     b->rays.count = 0;
 }
 

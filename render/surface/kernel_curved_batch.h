@@ -417,7 +417,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_tr
     return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h, false);
 }
 
-static __attribute__((noinline)) unsigned kernel_curved_batch_known(kernel_tile_trace *t, kernel_curved_batch *h)
+static __attribute__((noinline)) unsigned kernel_curved_batch_hit_contracted(kernel_tile_trace *t,
+                                                                             kernel_curved_batch *h)
 {
     return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h, true);
 }
@@ -471,14 +472,14 @@ static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trac
 {
     kernel_pixel_list_close(&h->rays);
     kernel_curved_batch_contract(t, h);
-    unsigned nearer = kernel_curved_batch_known(t, h);
+    unsigned nearer = kernel_curved_batch_hit_contracted(t, h);
     nearer |= kernel_curved_batch_find_faces(t, h);
     kernel_curved_batch_cross(t, h);
     kernel_pixel_list_close(&h->found);
     kernel_pixel_list_close(&h->others);
     nearer |= kernel_curved_batch_hit(t, h);
     for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_curved_batch_search(t, h, n);
-    for (; nearer; nearer &= nearer - 1) kernel_block_learn(t, __builtin_ctz(nearer));
+    for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
     h->rays.count = 0;
 }
 

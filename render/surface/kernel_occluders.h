@@ -83,15 +83,15 @@ typedef struct kernel_straight {
 } kernel_straight;
 
 /* A ray that the trees cannot decide for a cell, so that it must be traced in that cell. */
-typedef struct kernel_doubt {
+typedef struct kernel_undecided_pair {
     int32_t ray, occluder;
-} kernel_doubt;
+} kernel_undecided_pair;
 
 typedef struct kernel_straights {
     int count;
     kernel_straight *rays;
-    int64_t doubt_count, capacity;
-    kernel_doubt *doubts; /* undecided ray-cell pairs, sorted by ray */
+    int64_t undecided_count, capacity;
+    kernel_undecided_pair *undecided; /* undecided ray-cell pairs, sorted by ray */
     bool (*grow)(struct kernel_straights *rays);
 } kernel_straights;
 

@@ -197,9 +197,9 @@ static void kernel_occlude_by_cell(const kernel_frame *f, kernel_thread *thread,
         kernel_occlusion o = {&f->surfaces[occluder->surface], occluder->surface, b, first, NULL, 0};
         if (!(b->open >> first & (((uint64_t)1 << SIMD_WIDTH) - 1))) continue;
         kernel_bundle_packet(&p, f, thread, b, first);
-        const unsigned asked = vm_bits(p.active);
+        const unsigned prefetched = vm_bits(p.active);
         kernel_occlusion_cell(&p, &o, occluder);
-        b->open &= ~((uint64_t)(asked & ~vm_bits(p.active)) << first);
+        b->open &= ~((uint64_t)(prefetched & ~vm_bits(p.active)) << first);
     }
 }
 

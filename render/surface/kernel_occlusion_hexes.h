@@ -23,10 +23,10 @@ typedef struct kernel_curved_pairs {
     kernel_transformed_curved transformed;
 } kernel_curved_pairs;
 
-SIMD_INLINE bool kernel_doubts_add(kernel_straights *s, int32_t ray, int32_t occluder)
+SIMD_INLINE bool kernel_undecided_add(kernel_straights *s, int32_t ray, int32_t occluder)
 {
-    if (s->doubt_count == s->capacity && !s->grow(s)) return false;
-    s->doubts[s->doubt_count++] = (kernel_doubt){ray, occluder};
+    if (s->undecided_count == s->capacity && !s->grow(s)) return false;
+    s->undecided[s->undecided_count++] = (kernel_undecided_pair){ray, occluder};
     return true;
 }
 
@@ -84,9 +84,9 @@ SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float 
 
 /* The result for each ray-hex pair: the hex blocks the ray, or it is in doubt; in all other pairs the hex does not
  * block the ray. */
-typedef struct kernel_pair_verdict {
+typedef struct kernel_pair_result {
     vm blocked, doubt;
-} kernel_pair_verdict;
+} kernel_pair_result;
 
 /* Returns the value, at the distance t along each ray, of the linear function L that defines the slab around the
  * surface. */
@@ -115,7 +115,7 @@ static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pa
     return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].value), vf_abs(ends[1].value))));
 }
 
-SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pairs, vm active, vf far)
+SIMD_INLINE kernel_pair_result kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active, vf far)
 {
     const vf zero = vf_set(0), reach = vf_load(pairs->reach);
     kernel_lane_rays p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
@@ -125,7 +125,7 @@ SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pa
     for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = i;
     p.lane = kernel_load_ints(lanes);
     kernel_curved_faces(&pairs->transformed, &p, GRID_HEX, &crossed);
-    kernel_pair_verdict out = {vm_none(), crossed.alone};
+    kernel_pair_result out = {vm_none(), crossed.alone};
     if (!vm_any(crossed.two)) return out;
     p.active = crossed.two;
     kernel_curved_cross(&pairs->transformed, &p, GRID_HEX, crossed.first | crossed.last << 3, ends);
@@ -157,13 +157,13 @@ static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o
     }
     kernel_pairs_transform(pairs, o->hexes, &rays);
     const vm active = vm_from_bits((1u << pairs->count) - 1);
-    const kernel_pair_verdict verdict = kernel_pairs_judge(pairs, active, vf_load(rays.far));
+    const kernel_pair_result verdict = kernel_pairs_classify(pairs, active, vf_load(rays.far));
     for (unsigned bits = vm_bits(verdict.blocked); bits; bits &= bits - 1)
         s->rays[pairs->ray[__builtin_ctz(bits)]].is_open = false;
     for (unsigned bits = vm_bits(vm_and(verdict.doubt, active)); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
         if (s->rays[pairs->ray[i]].is_open)
-            is_well = kernel_doubts_add(s, pairs->ray[i], pairs->occluder[i]) && is_well;
+            is_well = kernel_undecided_add(s, pairs->ray[i], pairs->occluder[i]) && is_well;
     }
     pairs->count = 0;
     return is_well;

@@ -88,7 +88,7 @@ typedef struct kernel_leaf_lanes {
 static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, kernel_curved_pairs *pairs,
                               const kernel_leaf_lanes *lanes, int i, int32_t occluder)
 {
-    if (o->cells[occluder].record < 0) return kernel_doubts_add(s, lanes->ray, occluder);
+    if (o->cells[occluder].record < 0) return kernel_undecided_add(s, lanes->ray, occluder);
     const int n = pairs->count++;
     pairs->ray[n] = lanes->ray;
     pairs->occluder[n] = occluder;

@@ -48,11 +48,11 @@
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
 
 /* What is known about a piece of the interval, per ray. */
-typedef struct kernel_verdict {
+typedef struct kernel_piece_class {
     vm clear;    /* the piece has no root: the field has the sign `side` everywhere */
     vm monotone; /* the field is monotone, so the piece has at most one root */
     vm tiny;     /* the field is so close to 0 everywhere that its sign is only rounding */
-} kernel_verdict;
+} kernel_piece_class;
 
 /* The bounds of kernel_bounds, gathered for each ray's own cell. */
 typedef struct kernel_limits {
@@ -110,8 +110,8 @@ SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, cons
 
 /* Judges the piece between two points. side: the sign of the field at `from`, 1 or -1. gap: upper bound of the distance
  * of Y(from) and Y(to) from the ray. */
-SIMD_INLINE kernel_verdict kernel_judge(const kernel_map *map, const kernel_limits *b, const kernel_point *from,
-                                        const kernel_point *to, vf gap, vf side)
+SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, const kernel_limits *b,
+                                                     const kernel_point *from, const kernel_point *to, vf gap, vf side)
 {
     const bool is_pyramid = map->is_pyramid;
     kernel_chord chord = {
@@ -140,7 +140,7 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map *map, const kernel_limi
     const vf off_slope = b->stretch * (b->twist * scale * off * length + 3.0f * bend_slope + 2.0f * gap);
     const vf tolerance = b->curve * scale * off * (length + off_slope) + b->slope * off_slope + KERNEL_ROOT_BAND;
     const vf low = vf_min(middle, vf_min(d0, d1)), high = vf_max(middle, vf_max(d0, d1));
-    kernel_verdict out;
+    kernel_piece_class out;
     out.clear = vf_lt(bound, least);
     out.monotone = vm_or(vf_lt(tolerance, low), vf_lt(tolerance, -high));
     out.tiny = vf_le(most + wrong, vf_set(KERNEL_ROOT_BAND));
@@ -246,7 +246,7 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     const kernel_interval *i = s->interval;
     const vm change = kernel_search_changes(s);
     const vf gap = vf_max(kernel_face_gap(s, &s->low), kernel_face_gap(s, &s->high));
-    const kernel_verdict v = kernel_judge(&s->map, &s->limits, &s->low, &s->high, gap, s->side);
+    const kernel_piece_class v = kernel_classify_piece(&s->map, &s->limits, &s->low, &s->high, gap, s->side);
     const vf jump = s->limits.slope * s->limits.stretch * gap + KERNEL_ROOT_BAND;
     const vm faced = vf_lt(jump, vf_min(i->v_in * s->side, i->v_out * s->side));
     const vm monotone = vm_or(s->limits.is_monotone, v.monotone), sure = vf_le(vf_set(1), s->limits.coarsest);
@@ -319,7 +319,7 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
     while (vm_any(going)) {
         kernel_point to;
         kernel_search_piece(s, going, &to);
-        const kernel_verdict v = kernel_judge(&s->map, &s->limits, &s->from, &to, vf_set(0), s->side);
+        const kernel_piece_class v = kernel_classify_piece(&s->map, &s->limits, &s->from, &to, vf_set(0), s->side);
         const vm small =
             vm_or(vf_le(s->size, vf_set(KERNEL_SMALLEST_PIECE)), vf_lt(vf_set(KERNEL_ROOT_PIECES), s->pieces));
         const vm certain = vm_and(vm_or(v.monotone, v.clear), vf_le(s->size, s->limits.coarsest));

@@ -247,9 +247,9 @@ static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved
 
 /* Accepts the crossings that are computed by contraction (kernel_contraction.h). Returns the rays that contraction has
  * decided. */
-static __attribute__((noinline)) vm kernel_curved_known(kernel_packet *p, kernel_surface_state *state,
-                                                        const kernel_cell *c, const kernel_curved *curved, int value,
-                                                        vm wanted)
+static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packet *p, kernel_surface_state *state,
+                                                                    const kernel_cell *c, const kernel_curved *curved,
+                                                                    int value, vm wanted)
 {
     const kernel_rays rays = kernel_packet_rays(p);
     const vi lane = vi_set(curved->lane);
@@ -273,25 +273,25 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
     const render_surface_layer *layer = state->surface->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int count = kernel_curved_intervals(p, c, rays, list);
-    vm asked[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
+    vm prefetched[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
         /* If a ray crosses both triangles of a quad but not its patch, both ends of the interval are the same point
          * outside the ray; such an interval is skipped. */
         const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        asked[n] = vm_and(kernel_is_near(p, i), room);
-        any = vm_or(any, asked[n]);
+        prefetched[n] = vm_and(kernel_is_near(p, i), room);
+        any = vm_or(any, prefetched[n]);
     }
     if (!vm_any(any)) return;
     if (!curved->bounds) {
         const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
         kernel_curved_alone(c, &beam, curved);
     }
-    if (!state->is_contracted) known = kernel_curved_known(p, state, c, curved, value, any);
+    if (!state->is_contracted) known = kernel_curved_accept_contracted(p, state, c, curved, value, any);
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
-        const vm wanted = vm_andnot(vm_and(asked[n], kernel_is_near(p, i)), known);
+        const vm wanted = vm_andnot(vm_and(prefetched[n], kernel_is_near(p, i)), known);
         if (vm_any(wanted)) kernel_curved_robust(p, state, c, curved, value, i, wanted);
     }
 }
@@ -719,7 +719,7 @@ SIMD_INLINE void kernel_block_trace(kernel_tile_trace *t, int block, int part, u
             kernel_polyhedron_surfaces(p, &state, part, index, p->active);
         is_nearer = is_nearer || p->is_nearer;
     }
-    if (is_nearer) kernel_block_learn(t, block);
+    if (is_nearer) kernel_block_update_far(t, block);
 }
 
 SIMD_INLINE void kernel_blocks_trace(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,

@@ -140,7 +140,7 @@ SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_lo
 }
 
 /* Error terms, per ray, if one segment replaces the ray's whole interval in its cell. */
-typedef struct kernel_local_wrong {
+typedef struct kernel_local_errors {
     vf mean;    /* mean of |v - f|; with n segments it is divided by n^2 */
     vf quartic; /* upper bound E of the quartic part of the field's deviation from its chord */
     vf unknown; /* error of the field due to the residual of Newton's method */
@@ -148,10 +148,10 @@ typedef struct kernel_local_wrong {
     /* variation of the error's weight g (see the top of this file) that is caused by the changes of T and b along the
      * segment */
     vf fade;
-} kernel_local_wrong;
+} kernel_local_errors;
 
-SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kernel_local_pairs *p,
-                                       kernel_local_wrong *out)
+SIMD_INLINE void kernel_local_errors_of(const kernel_local_budget *b, const kernel_local_pairs *p,
+                                        kernel_local_errors *out)
 {
     const vi lane = p->rays.lane;
     const vf *d = p->off_chord.field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
@@ -169,7 +169,7 @@ SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kerne
 
 /* Returns the error of light per unit distance if the interval becomes one segment: the part that varies along the
  * segment, plus the part of its mean. */
-SIMD_INLINE vf kernel_local_wrong_by_one(const kernel_local_wrong *w, vf sway, vf cost)
+SIMD_INLINE vf kernel_local_single_segment_error(const kernel_local_errors *w, vf sway, vf cost)
 {
     const vf half = vf_min(0.5f * (sway + w->fade), cost);
     return vf_muladd(half, w->mean, cost * (w->quartic + w->unknown));
@@ -191,7 +191,7 @@ SIMD_INLINE void kernel_local_own_bound(const kernel_pieces *t, const kernel_loc
  * which no number is enough. */
 static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_tile_trace *t,
                                                                 const kernel_local_budget *b,
-                                                                const kernel_local_wrong *wrong, vf least,
+                                                                const kernel_local_errors *wrong, vf least,
                                                                 kernel_local_pairs *p)
 {
     const kernel_transfer *transfer = &t->frame->volumes[0];
@@ -204,7 +204,7 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
     kernel_local_own_bound(b->pieces, p, wrong->quartic, &sway, &cost);
     /* The error allowed per unit distance. */
     const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(wrong->length, opacities, one));
-    const vm few = vf_le(kernel_local_wrong_by_one(wrong, sway, cost), allowed);
+    const vm few = vf_le(kernel_local_single_segment_error(wrong, sway, cost), allowed);
     const vf half = vf_min(0.5f * (sway + wrong->fade), cost), made = half * wrong->mean;
     const vf rest = cost * (wrong->quartic + wrong->unknown) + vf_min(3.1f * half, 2.1f * cost) * wrong->quartic;
     const vf wanted = -vf_floor(-vf_sqrt(made / vf_max(allowed - rest, vf_set(1e-30f))));
@@ -218,13 +218,13 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
  * kernel_local_count_by_depth(). */
 SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local_budget *b, kernel_local_pairs *p)
 {
-    kernel_local_wrong wrong;
-    kernel_local_wrong_of(b, p, &wrong);
+    kernel_local_errors wrong;
+    kernel_local_errors_of(b, p, &wrong);
     const vf one = vf_set(1), allowed = vf_set(b->allowance * (1 / b->reach));
     const vf sway = kernel_gather_lane(b->bounds.sway, p->rays.lane),
              cost = kernel_gather_lane(b->bounds.cost, p->rays.lane);
     const vm strays = kernel_local_strays(b, p);
-    const vm enough = vm_andnot(vf_le(kernel_local_wrong_by_one(&wrong, sway, cost), allowed), strays);
+    const vm enough = vm_andnot(vf_le(kernel_local_single_segment_error(&wrong, sway, cost), allowed), strays);
     p->count = one;
     if (!vm_any(vm_andnot(p->active, enough))) return vm_none();
     const vm none = kernel_local_count_by_depth(t, b, &wrong, vf_select(strays, 2.0f * one, one), p);

@@ -173,7 +173,7 @@ SIMD_INLINE unsigned kernel_tile_transform_pending(kernel_tile_trace *t, kernel_
     int32_t vertices[4][SIMD_WIDTH];
     float near[SIMD_WIDTH];
     unsigned lanes = 0;
-    kernel_local_learn(&cells->arrays, &cells->tets, count, GRID_TET);
+    kernel_local_read_indices(&cells->arrays, &cells->tets, count, GRID_TET);
     for (int i = 0; i < 4; i++) memcpy(vertices[i], cells->tets.vertex[i], sizeof vertices[i]);
     kernel_transform_tets(&cells->transformed, &cells->arrays, t->frame, &t->tile, vertices, count);
     kernel_transformed_domain(&cells->transformed, transfer);

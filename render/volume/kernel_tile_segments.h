@@ -225,8 +225,8 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
 
 /* Chooses the next window's depth from the lengths of this window's lists, so that the fullest list will be three
  * quarters full. */
-SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *packets, int count, float begin,
-                                            float end)
+SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, const int *packets, int count, float begin,
+                                                   float end)
 {
     const int room = s->packets[packets[0]].list.room;
     int most = room / 16;
@@ -271,7 +271,7 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
         if (!(t->t_near < INFINITY)) break;
         const float end = s->depth > 0 ? t->t_near + s->depth : reach->far;
         kernel_tile_segments_find(t, s, reach->blocks, end);
-        kernel_tile_segments_learn(s, packets, count, t->t_near, fminf(end, reach->far));
+        kernel_tile_segments_adapt_window(s, packets, count, t->t_near, fminf(end, reach->far));
         for (int n = 0; n < count; n++) {
             kernel_tile_ray_segments *r = &s->packets[packets[n]];
             if (vm_any(t->packets[packets[n]].active))

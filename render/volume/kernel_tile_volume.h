@@ -257,7 +257,7 @@ SIMD_INLINE int kernel_tile_window_samples(const kernel_tile_volume *v, const ke
 {
     enum { LEAST = 8 };
     const int most = p->frame->job->sample_group, least = most < LEAST ? most : LEAST;
-    const float wanted = kernel_depth_wanted(&v->depth, kernel_sample_t(p, first)[0]) * p->sample_inverse[0];
+    const float wanted = kernel_depth_next_window(&v->depth, kernel_sample_t(p, first)[0]) * p->sample_inverse[0];
     return wanted < (float)most ? wanted < (float)least ? least : (int)wanted + 1 : most;
 }
 
