@@ -189,7 +189,7 @@ SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t 
 
 /* Computes the vertices' coordinates along one axis of a rectilinear lattice from the position of each vertex on that
  * axis. It does for one vertex per lane what grid_index_along() does for one vertex. */
-static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_whole *out)
+static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_wide_doubles *out)
 {
     const grid_numbering *of = axis->vertices;
     const double outer = of->outer[axis->axis], inverse_outer = of->inverse_outer[axis->axis];
@@ -206,7 +206,7 @@ static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_who
     memcpy(out, places, sizeof places);
 }
 
-static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers *c, vi index, kernel_whole *out)
+static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers *c, vi index, kernel_wide_doubles *out)
 {
     double v[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
@@ -223,7 +223,7 @@ static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers
 /* Numbers as they were read: in `narrow` if the array is float32, which saves operations, else in `wide`. */
 typedef struct kernel_raw_numbers {
     vf narrow;
-    kernel_whole wide;
+    kernel_wide_doubles wide;
 } kernel_raw_numbers;
 
 SIMD_INLINE void kernel_numbers_gather_raw(const kernel_numbers *c, vi index, kernel_raw_numbers *out)
@@ -237,22 +237,22 @@ SIMD_INLINE void kernel_numbers_gather_raw(const kernel_numbers *c, vi index, ke
     }
 }
 
-SIMD_INLINE kernel_whole kernel_numbers_gather(const kernel_numbers *c, vi index)
+SIMD_INLINE kernel_wide_doubles kernel_numbers_gather(const kernel_numbers *c, vi index)
 {
     kernel_raw_numbers out;
     kernel_numbers_gather_raw(c, index, &out);
-    return kernel_numbers_are_narrow(c) ? kernel_whole_widen(out.narrow) : out.wide;
+    return kernel_numbers_are_narrow(c) ? kernel_wide_doubles_widen(out.narrow) : out.wide;
 }
 
 /* Returns a < b per lane. is_narrow: whether both are stored as float32. */
 SIMD_INLINE vm kernel_raw_lt(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
-    return is_narrow ? vf_lt(a->narrow, b->narrow) : kernel_whole_lt(&a->wide, &b->wide);
+    return is_narrow ? vf_lt(a->narrow, b->narrow) : kernel_wide_doubles_lt(&a->wide, &b->wide);
 }
 
 SIMD_INLINE vm kernel_raw_eq(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
-    return is_narrow ? vf_eq(a->narrow, b->narrow) : kernel_whole_eq(&a->wide, &b->wide);
+    return is_narrow ? vf_eq(a->narrow, b->narrow) : kernel_wide_doubles_eq(&a->wide, &b->wide);
 }
 
 SIMD_INLINE void kernel_raw_swap(bool is_narrow, vm lanes, kernel_raw_numbers *a, kernel_raw_numbers *b)
@@ -262,8 +262,8 @@ SIMD_INLINE void kernel_raw_swap(bool is_narrow, vm lanes, kernel_raw_numbers *a
         a->narrow = vf_select(lanes, b->narrow, was.narrow);
         b->narrow = vf_select(lanes, was.narrow, b->narrow);
     } else {
-        a->wide = kernel_whole_select(lanes, &b->wide, &was.wide);
-        b->wide = kernel_whole_select(lanes, &was.wide, &b->wide);
+        a->wide = kernel_wide_doubles_select(lanes, &b->wide, &was.wide);
+        b->wide = kernel_wide_doubles_select(lanes, &was.wide, &b->wide);
     }
 }
 
@@ -289,9 +289,9 @@ SIMD_INLINE void kernel_arrays_positions(const kernel_arrays *p, bool is_narrow,
     }
 }
 
-SIMD_INLINE kernel_whole kernel_raw_to_double(bool is_narrow, const kernel_raw_numbers *v)
+SIMD_INLINE kernel_wide_doubles kernel_raw_to_double(bool is_narrow, const kernel_raw_numbers *v)
 {
-    return is_narrow ? kernel_whole_widen(v->narrow) : v->wide;
+    return is_narrow ? kernel_wide_doubles_widen(v->narrow) : v->wide;
 }
 
 /* A value to compare with: in double, as a sum of two float32 (middle + rest), and the least float32 that is not below
@@ -323,8 +323,9 @@ SIMD_INLINE kernel_level kernel_level_of(double value)
 /* Returns the lanes in which the number v is below the level. The comparison is exact. */
 SIMD_INLINE vm kernel_raw_below(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
 {
-    const kernel_whole value = kernel_whole_set(level->value);
-    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : kernel_whole_lt(&v->wide, &value);
+    const kernel_wide_doubles value = kernel_wide_doubles_set(level->value);
+    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least))
+                                        : kernel_wide_doubles_lt(&v->wide, &value);
 }
 
 /* Returns the number v minus the level, rounded to float32. */
@@ -332,7 +333,7 @@ SIMD_INLINE vf kernel_raw_minus(const kernel_numbers *c, const kernel_raw_number
 {
     vf out;
     if (kernel_numbers_are_narrow(c)) return (v->narrow - level->middle) - level->rest;
-    for (int half = 0; half < 2; half++) kernel_half_put(&out, half, v->wide.half[half] - level->value);
+    for (int half = 0; half < 2; half++) kernel_doubles_store_lanes(&out, half, v->wide.half[half] - level->value);
     return out;
 }
 

@@ -70,7 +70,7 @@ SIMD_INLINE double kernel_values_colours(const kernel_surface *s, int part, uint
 }
 
 /* Returns v clamped to the interval [-limit, limit] and rounded to float32. */
-SIMD_INLINE float kernel_hold(double v, double limit)
+SIMD_INLINE float kernel_clamp(double v, double limit)
 {
     return (float)(v < -limit ? -limit : v > limit ? limit : v);
 }
@@ -83,7 +83,7 @@ SIMD_INLINE bool kernel_values_show(const double *values, int count, const kerne
         low = values[i] < low ? values[i] : low;
         high = values[i] > high ? values[i] : high;
     }
-    return kernel_visible_values_overlap(&t->visible_values, kernel_hold(low, 3e38), kernel_hold(high, 3e38));
+    return kernel_visible_values_overlap(&t->visible_values, kernel_clamp(low, 3e38), kernel_clamp(high, 3e38));
 }
 
 SIMD_INLINE bool kernel_cell_shows(const kernel_cell *c, const kernel_transfer *t)
@@ -96,7 +96,7 @@ SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
 {
     c->is_constant = true;
     for (int i = 0; i < c->count; i++) {
-        c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
+        c->f[i] = kernel_clamp((c->values[i] - t->low) * t->inverse_width, 1e18);
         c->is_constant = c->is_constant && c->values[i] == c->values[0];
     }
 }

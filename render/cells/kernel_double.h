@@ -31,9 +31,9 @@
 #define KERNEL_DOUBLE_EDGE 1e-3
 
 /* What float32 loses of an interval: its exact length in t, and the rounding errors of its two values. */
-typedef struct kernel_double {
+typedef struct kernel_precise_interval {
     vf length, rest_in, rest_out;
-} kernel_double;
+} kernel_precise_interval;
 
 /* An affine function of the ray: c[0] + c[1] u + c[2] v. */
 typedef struct kernel_affine {
@@ -52,12 +52,12 @@ typedef struct kernel_double_cell {
 
 /* The (u, v) of a packet's rays in double, relative to the tile's centre. */
 typedef struct kernel_double_rays {
-    kernel_half u[2], v[2];
+    kernel_doubles u[2], v[2];
 } kernel_double_rays;
 
-SIMD_INLINE kernel_double kernel_double_of(const kernel_interval *i)
+SIMD_INLINE kernel_precise_interval kernel_precise_interval_of(const kernel_interval *i)
 {
-    return (kernel_double){i->t_out - i->t_in, vf_set(0), vf_set(0)};
+    return (kernel_precise_interval){i->t_out - i->t_in, vf_set(0), vf_set(0)};
 }
 
 SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_double_rays *out)

@@ -60,48 +60,48 @@ SIMD_INLINE vf kernel_bilinear(const vf f[4], vf s, vf r)
 
 /* ---- one ray, in double ---- */
 
-typedef struct kernel_flat_quad {
+typedef struct kernel_scalar_quad {
     double x[4], y[4], z[4];
     bool e01, e32, e03, e12; /* sign bits of the edge functions: true if negative */
-} kernel_flat_quad;
+} kernel_scalar_quad;
 
 /* The quadratic (1-x)² c0 + 2 x (1-x) c1 + x² c2, and the exact sign bits of c0 and c2. */
-typedef struct kernel_flat_quadratic {
+typedef struct kernel_scalar_quadratic {
     double c0, c1, c2;
     bool is_negative0, is_negative2;
-} kernel_flat_quadratic;
+} kernel_scalar_quadratic;
 
 /* Returns the cross product of corners i and j in double, which has a single rounding for float32 corners. */
-static inline double kernel_flat_cross(const kernel_flat_quad *q, int i, int j)
+static inline double kernel_scalar_cross(const kernel_scalar_quad *q, int i, int j)
 {
     return q->x[i] * q->y[j] - q->x[j] * q->y[i];
 }
 
-static inline kernel_flat_quadratic kernel_flat_b(const kernel_flat_quad *q)
+static inline kernel_scalar_quadratic kernel_scalar_b(const kernel_scalar_quad *q)
 {
-    return (kernel_flat_quadratic){kernel_flat_cross(q, 0, 1),
-                                   0.5 * (kernel_flat_cross(q, 0, 2) + kernel_flat_cross(q, 3, 1)),
-                                   kernel_flat_cross(q, 3, 2), q->e01, q->e32};
+    return (kernel_scalar_quadratic){kernel_scalar_cross(q, 0, 1),
+                                     0.5 * (kernel_scalar_cross(q, 0, 2) + kernel_scalar_cross(q, 3, 1)),
+                                     kernel_scalar_cross(q, 3, 2), q->e01, q->e32};
 }
 
-static inline kernel_flat_quadratic kernel_flat_a(const kernel_flat_quad *q)
+static inline kernel_scalar_quadratic kernel_scalar_a(const kernel_scalar_quad *q)
 {
-    return (kernel_flat_quadratic){kernel_flat_cross(q, 0, 3),
-                                   0.5 * (kernel_flat_cross(q, 0, 2) + kernel_flat_cross(q, 1, 3)),
-                                   kernel_flat_cross(q, 1, 2), q->e03, q->e12};
+    return (kernel_scalar_quadratic){kernel_scalar_cross(q, 0, 3),
+                                     0.5 * (kernel_scalar_cross(q, 0, 2) + kernel_scalar_cross(q, 1, 3)),
+                                     kernel_scalar_cross(q, 1, 2), q->e03, q->e12};
 }
 
-static inline bool kernel_flat_turns(const kernel_flat_quadratic *c)
+static inline bool kernel_scalar_turns(const kernel_scalar_quadratic *c)
 {
     return c->is_negative0 != c->is_negative2;
 }
 
-static inline bool kernel_flat_vanishes(const kernel_flat_quadratic *c)
+static inline bool kernel_scalar_vanishes(const kernel_scalar_quadratic *c)
 {
     return c->c0 == 0 && c->c1 == 0 && c->c2 == 0;
 }
 
-static inline double kernel_flat_discriminant(const kernel_flat_quadratic *c)
+static inline double kernel_scalar_discriminant(const kernel_scalar_quadratic *c)
 {
     const double d = c->c1 * c->c1 - c->c0 * c->c2;
     return d > 0 ? d : 0;
@@ -109,7 +109,7 @@ static inline double kernel_flat_discriminant(const kernel_flat_quadratic *c)
 
 /* Returns the root x in [0, 1] of the quadratic at which half of its derivative equals `turn`. There are two formulas
  * for the root; the one in which digits do not cancel is used. */
-static inline double kernel_flat_root(const kernel_flat_quadratic *c, double turn)
+static inline double kernel_scalar_root(const kernel_scalar_quadratic *c, double turn)
 {
     const bool is_sum = c->c1 * turn <= 0;
     const double n = is_sum ? turn - c->c1 : c->c0, d = is_sum ? n + c->c2 : c->c0 - c->c1 - turn;
@@ -118,7 +118,7 @@ static inline double kernel_flat_root(const kernel_flat_quadratic *c, double tur
 }
 
 /* Solves v0 + x (v1 - v0) = 0 for x, clamped to [0, 1]. v0 and v1 must not both be 0. */
-static inline double kernel_flat_zero(double v0, double v1)
+static inline double kernel_scalar_zero(double v0, double v1)
 {
     const double x = v0 / (v0 - v1);
     return x >= 0 ? fmin(x, 1) : 0;
@@ -126,47 +126,47 @@ static inline double kernel_flat_zero(double v0, double v1)
 
 /* Returns the limit of the root of the quadratic A or B (see the top of this file) if it vanishes for all parameters.
  * The two lines are from corner i to i2 and from corner j to j2. */
-static inline double kernel_flat_limit(const kernel_flat_quad *q, int i, int i2, int j, int j2)
+static inline double kernel_scalar_limit(const kernel_scalar_quad *q, int i, int i2, int j, int j2)
 {
     const double y0 = q->y[i2] - q->y[i], y1 = q->y[j2] - q->y[j];
-    return y0 != y1 ? kernel_flat_zero(y0, y1) : kernel_flat_zero(q->x[i2] - q->x[i], q->x[j2] - q->x[j]);
+    return y0 != y1 ? kernel_scalar_zero(y0, y1) : kernel_scalar_zero(q->x[i2] - q->x[i], q->x[j2] - q->x[j]);
 }
 
 /* Computes the point of the patch (parameters s and r, and depth) at which the patch's Jacobian has the sign of `root`.
  * The magnitude of root is the square root of the discriminant D. */
-static inline void kernel_scalar_point(const kernel_flat_quad *q, const kernel_flat_quadratic *a,
-                                       const kernel_flat_quadratic *b, double root, double place[3])
+static inline void kernel_scalar_point(const kernel_scalar_quad *q, const kernel_scalar_quadratic *a,
+                                       const kernel_scalar_quadratic *b, double root, double place[3])
 {
-    const double s = kernel_flat_vanishes(a) ? kernel_flat_limit(q, 0, 3, 1, 2) : kernel_flat_root(a, root);
-    const double r = kernel_flat_vanishes(b) ? kernel_flat_limit(q, 0, 1, 3, 2) : kernel_flat_root(b, -root);
+    const double s = kernel_scalar_vanishes(a) ? kernel_scalar_limit(q, 0, 3, 1, 2) : kernel_scalar_root(a, root);
+    const double r = kernel_scalar_vanishes(b) ? kernel_scalar_limit(q, 0, 1, 3, 2) : kernel_scalar_root(b, -root);
     place[0] = s;
     place[1] = r;
     place[2] = (1 - r) * ((1 - s) * q->z[0] + s * q->z[1]) + r * ((1 - s) * q->z[3] + s * q->z[2]);
 }
 
 /* Computes the point of a ray that crosses exactly one of the two triangles. */
-static inline void kernel_flat_once(const kernel_flat_quad *q, double place[3])
+static inline void kernel_scalar_once(const kernel_scalar_quad *q, double place[3])
 {
-    const kernel_flat_quadratic a = kernel_flat_a(q), b = kernel_flat_b(q);
-    const bool by_b = kernel_flat_turns(&b);
-    const double root = __builtin_sqrt(kernel_flat_discriminant(by_b ? &b : &a));
+    const kernel_scalar_quadratic a = kernel_scalar_a(q), b = kernel_scalar_b(q);
+    const bool by_b = kernel_scalar_turns(&b);
+    const double root = __builtin_sqrt(kernel_scalar_discriminant(by_b ? &b : &a));
     const bool is_rising = by_b ? b.is_negative0 : a.is_negative0;
     kernel_scalar_point(q, &a, &b, by_b != is_rising ? root : -root, place);
 }
 
 /* Returns whether the quadratic may have two roots in (0, 1): its ends have one sign, and its middle coefficient has
  * the other. */
-static inline bool kernel_flat_bends(const kernel_flat_quadratic *c)
+static inline bool kernel_scalar_bends(const kernel_scalar_quadratic *c)
 {
-    return !kernel_flat_turns(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
+    return !kernel_scalar_turns(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
 }
 
 /* Computes the two points of a ray that crosses both triangles or none. Returns false if it does not meet the patch. */
-static inline bool kernel_flat_twice(const kernel_flat_quad *q, double places[2][3])
+static inline bool kernel_scalar_twice(const kernel_scalar_quad *q, double places[2][3])
 {
-    const kernel_flat_quadratic a = kernel_flat_a(q), b = kernel_flat_b(q);
-    if (!kernel_flat_bends(&a) || !kernel_flat_bends(&b)) return false;
-    const double root = __builtin_sqrt(kernel_flat_discriminant(&b));
+    const kernel_scalar_quadratic a = kernel_scalar_a(q), b = kernel_scalar_b(q);
+    if (!kernel_scalar_bends(&a) || !kernel_scalar_bends(&b)) return false;
+    const double root = __builtin_sqrt(kernel_scalar_discriminant(&b));
     if (!(root > 0)) return false;
     kernel_scalar_point(q, &a, &b, root, places[0]);
     kernel_scalar_point(q, &a, &b, -root, places[1]);
@@ -178,12 +178,12 @@ static inline bool kernel_is_negative(vf v, int lane)
     return __builtin_signbit(v[lane]) != 0;
 }
 
-static inline kernel_flat_quad kernel_flat_of(const kernel_quad *q, int lane)
+static inline kernel_scalar_quad kernel_scalar_of(const kernel_quad *q, int lane)
 {
-    kernel_flat_quad flat = {.e01 = kernel_is_negative(q->e01, lane),
-                             .e32 = kernel_is_negative(q->e32, lane),
-                             .e03 = kernel_is_negative(q->e03, lane),
-                             .e12 = kernel_is_negative(q->e12, lane)};
+    kernel_scalar_quad flat = {.e01 = kernel_is_negative(q->e01, lane),
+                               .e32 = kernel_is_negative(q->e32, lane),
+                               .e03 = kernel_is_negative(q->e03, lane),
+                               .e12 = kernel_is_negative(q->e12, lane)};
     for (int i = 0; i < 4; i++) {
         flat.x[i] = (double)q->x[i][lane];
         flat.y[i] = (double)q->y[i][lane];
@@ -201,82 +201,84 @@ static inline void kernel_quad_put(kernel_quad_point *out, int lane, const doubl
 
 /* ---- SIMD_WIDTH / 2 rays, in double ---- */
 
-typedef struct kernel_half_quad {
-    kernel_half x[4], y[4];
-} kernel_half_quad;
+typedef struct kernel_doubles_quad {
+    kernel_doubles x[4], y[4];
+} kernel_doubles_quad;
 
-typedef struct kernel_half_quadratic {
-    kernel_half c0, c1, c2;
-} kernel_half_quadratic;
+typedef struct kernel_doubles_quadratic {
+    kernel_doubles c0, c1, c2;
+} kernel_doubles_quadratic;
 
-SIMD_INLINE kernel_half kernel_half_cross(const kernel_half_quad *q, int i, int j)
+SIMD_INLINE kernel_doubles kernel_doubles_cross(const kernel_doubles_quad *q, int i, int j)
 {
     return q->x[i] * q->y[j] - q->x[j] * q->y[i];
 }
 
-SIMD_INLINE kernel_half_mask kernel_half_vanishes(const kernel_half_quadratic *c)
+SIMD_INLINE kernel_doubles_mask kernel_doubles_vanishes(const kernel_doubles_quadratic *c)
 {
-    return (kernel_half_mask)(c->c0 == 0) & (kernel_half_mask)(c->c1 == 0) & (kernel_half_mask)(c->c2 == 0);
+    return (kernel_doubles_mask)(c->c0 == 0) & (kernel_doubles_mask)(c->c1 == 0) & (kernel_doubles_mask)(c->c2 == 0);
 }
 
 /* Returns, per lane, the root in [0, 1] of the quadratic at which half of its derivative equals `turn`, by the same
- * formulas as kernel_flat_root(). */
-SIMD_INLINE kernel_half kernel_half_root(const kernel_half_quadratic *c, kernel_half turn)
+ * formulas as kernel_scalar_root(). */
+SIMD_INLINE kernel_doubles kernel_doubles_root(const kernel_doubles_quadratic *c, kernel_doubles turn)
 {
-    const kernel_half zero = {0}, one = zero + 1;
-    const kernel_half_mask is_sum = (kernel_half_mask)(c->c1 * turn <= 0);
-    const kernel_half n = kernel_half_select(is_sum, turn - c->c1, c->c0);
-    const kernel_half d = kernel_half_select(is_sum, n + c->c2, (c->c0 - c->c1) - turn);
-    const kernel_half whole = kernel_half_select(is_sum, one, zero);
-    const kernel_half x = kernel_half_select((kernel_half_mask)(d != 0), n / d, whole);
-    const kernel_half least = kernel_half_select((kernel_half_mask)(x < one), x, one);
-    return kernel_half_select((kernel_half_mask)(x >= 0), least, zero);
+    const kernel_doubles zero = {0}, one = zero + 1;
+    const kernel_doubles_mask is_sum = (kernel_doubles_mask)(c->c1 * turn <= 0);
+    const kernel_doubles n = kernel_doubles_select(is_sum, turn - c->c1, c->c0);
+    const kernel_doubles d = kernel_doubles_select(is_sum, n + c->c2, (c->c0 - c->c1) - turn);
+    const kernel_doubles whole = kernel_doubles_select(is_sum, one, zero);
+    const kernel_doubles x = kernel_doubles_select((kernel_doubles_mask)(d != 0), n / d, whole);
+    const kernel_doubles least = kernel_doubles_select((kernel_doubles_mask)(x < one), x, one);
+    return kernel_doubles_select((kernel_doubles_mask)(x >= 0), least, zero);
 }
 
 /* Computes the patch's point for the wanted rays in one half of the lanes. Each of these rays crosses one triangle.
  * Returns the rays for which one of the quadratics A and B vanishes, whose points must be computed one by one. */
-SIMD_INLINE kernel_half_mask kernel_half_once(const kernel_quad *quad, vm wanted, int half, kernel_quad_point *out)
+SIMD_INLINE kernel_doubles_mask kernel_doubles_once(const kernel_quad *quad, vm wanted, int half,
+                                                    kernel_quad_point *out)
 {
-    const kernel_half zero = {0}, one = zero + 1;
-    kernel_half_quad q;
-    kernel_half z[4], old[3];
+    const kernel_doubles zero = {0}, one = zero + 1;
+    kernel_doubles_quad q;
+    kernel_doubles z[4], old[3];
     const vi turns_b = vi_from_bits(quad->e01) ^ vi_from_bits(quad->e32);
-    const kernel_half_mask by_b = kernel_half_of_mask(vm_sign(turns_b), half);
-    const kernel_half_mask negative_a = kernel_half_of_mask(vm_sign(vi_from_bits(quad->e03)), half);
-    const kernel_half_mask negative_b = kernel_half_of_mask(vm_sign(vi_from_bits(quad->e01)), half);
+    const kernel_doubles_mask by_b = kernel_doubles_of_mask(vm_sign(turns_b), half);
+    const kernel_doubles_mask negative_a = kernel_doubles_of_mask(vm_sign(vi_from_bits(quad->e03)), half);
+    const kernel_doubles_mask negative_b = kernel_doubles_of_mask(vm_sign(vi_from_bits(quad->e01)), half);
     for (int i = 0; i < 4; i++) {
-        q.x[i] = kernel_half_of(&quad->x[i], half);
-        q.y[i] = kernel_half_of(&quad->y[i], half);
-        z[i] = kernel_half_of(&quad->z[i], half);
+        q.x[i] = kernel_doubles_of(&quad->x[i], half);
+        q.y[i] = kernel_doubles_of(&quad->y[i], half);
+        z[i] = kernel_doubles_of(&quad->z[i], half);
     }
-    const kernel_half across = kernel_half_cross(&q, 0, 2);
-    const kernel_half_quadratic a = {kernel_half_cross(&q, 0, 3), 0.5 * (across + kernel_half_cross(&q, 1, 3)),
-                                     kernel_half_cross(&q, 1, 2)};
-    const kernel_half_quadratic b = {kernel_half_cross(&q, 0, 1), 0.5 * (across + kernel_half_cross(&q, 3, 1)),
-                                     kernel_half_cross(&q, 3, 2)};
-    const kernel_half square = kernel_half_select(by_b, b.c1 * b.c1 - b.c0 * b.c2, a.c1 * a.c1 - a.c0 * a.c2);
-    const kernel_half root = kernel_half_sqrt(kernel_half_select((kernel_half_mask)(square > 0), square, zero));
-    const kernel_half_mask is_rising = (by_b & negative_b) | (~by_b & negative_a);
-    const kernel_half turn = kernel_half_select(by_b ^ is_rising, root, -root);
-    const kernel_half s = kernel_half_root(&a, turn), r = kernel_half_root(&b, -turn);
-    const kernel_half t = (one - r) * ((one - s) * z[0] + s * z[1]) + r * ((one - s) * z[3] + s * z[2]);
-    const kernel_half_mask rays = kernel_half_of_mask(wanted, half);
+    const kernel_doubles across = kernel_doubles_cross(&q, 0, 2);
+    const kernel_doubles_quadratic a = {kernel_doubles_cross(&q, 0, 3), 0.5 * (across + kernel_doubles_cross(&q, 1, 3)),
+                                        kernel_doubles_cross(&q, 1, 2)};
+    const kernel_doubles_quadratic b = {kernel_doubles_cross(&q, 0, 1), 0.5 * (across + kernel_doubles_cross(&q, 3, 1)),
+                                        kernel_doubles_cross(&q, 3, 2)};
+    const kernel_doubles square = kernel_doubles_select(by_b, b.c1 * b.c1 - b.c0 * b.c2, a.c1 * a.c1 - a.c0 * a.c2);
+    const kernel_doubles root =
+        kernel_doubles_sqrt(kernel_doubles_select((kernel_doubles_mask)(square > 0), square, zero));
+    const kernel_doubles_mask is_rising = (by_b & negative_b) | (~by_b & negative_a);
+    const kernel_doubles turn = kernel_doubles_select(by_b ^ is_rising, root, -root);
+    const kernel_doubles s = kernel_doubles_root(&a, turn), r = kernel_doubles_root(&b, -turn);
+    const kernel_doubles t = (one - r) * ((one - s) * z[0] + s * z[1]) + r * ((one - s) * z[3] + s * z[2]);
+    const kernel_doubles_mask rays = kernel_doubles_of_mask(wanted, half);
     vf *const lists[3] = {&out->s, &out->r, &out->t};
-    const kernel_half places[3] = {s, r, t};
+    const kernel_doubles places[3] = {s, r, t};
     for (int n = 0; n < 3; n++) {
-        old[n] = kernel_half_of(lists[n], half);
-        kernel_half_put(lists[n], half, kernel_half_select(rays, places[n], old[n]));
+        old[n] = kernel_doubles_of(lists[n], half);
+        kernel_doubles_store_lanes(lists[n], half, kernel_doubles_select(rays, places[n], old[n]));
     }
-    return rays & (kernel_half_vanishes(&a) | kernel_half_vanishes(&b));
+    return rays & (kernel_doubles_vanishes(&a) | kernel_doubles_vanishes(&b));
 }
 
 static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad *q, vm wanted, kernel_quad_point *out)
 {
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        const kernel_flat_quad flat = kernel_flat_of(q, lane);
+        const kernel_scalar_quad flat = kernel_scalar_of(q, lane);
         double place[3];
-        kernel_flat_once(&flat, place);
+        kernel_scalar_once(&flat, place);
         kernel_quad_put(out, lane, place);
     }
 }
@@ -288,7 +290,7 @@ static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm 
         const unsigned lanes = ((1u << KERNEL_HALF) - 1) << half * KERNEL_HALF;
         int64_t rays[KERNEL_HALF], any = 0;
         if (!(vm_bits(wanted) & lanes)) continue;
-        const kernel_half_mask vanish = kernel_half_once(q, wanted, half, out);
+        const kernel_doubles_mask vanish = kernel_doubles_once(q, wanted, half, out);
         memcpy(rays, &vanish, sizeof rays);
         for (int i = 0; i < KERNEL_HALF; i++) any |= rays[i];
         if (!any) continue;
@@ -304,9 +306,9 @@ static __attribute__((noinline, cold)) vm kernel_quad_twice(const kernel_quad *q
     unsigned found = 0;
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        const kernel_flat_quad flat = kernel_flat_of(q, lane);
+        const kernel_scalar_quad flat = kernel_scalar_of(q, lane);
         double places[2][3];
-        if (!kernel_flat_twice(&flat, places)) continue;
+        if (!kernel_scalar_twice(&flat, places)) continue;
         kernel_quad_put(&out[0], lane, places[0]);
         kernel_quad_put(&out[1], lane, places[1]);
         found |= 1u << lane;

@@ -41,7 +41,7 @@ typedef struct kernel_transformed_curved {
     /* least sum of weights of each triangle that is accurate enough (kernel_triangle_least()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
     /* The following members are used only by kernel_transformed_curved_cell(), which extracts one lane's cell. */
-    kernel_whole world[3][8];
+    kernel_wide_doubles world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_transformed_curved;
 
@@ -345,12 +345,12 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
                                                int type)
 {
     const int count = grid_type_vertices(type);
-    kernel_whole values[8];
+    kernel_wide_doubles values[8];
     vf relative[8], rank[8];
     const vm collapsed = p->has_narrow_positions ? kernel_sorted_curved_fetch(out, p, true, type, vertices, rank)
                                                  : kernel_sorted_curved_fetch(out, p, false, type, vertices, rank);
     for (int i = 0; i < count; i++) {
-        const kernel_whole *world[3];
+        const kernel_wide_doubles *world[3];
         vi vertex;
         vf at[3];
         memcpy(&vertex, out->vertex[i], sizeof vertex);
@@ -391,7 +391,7 @@ static __attribute__((noinline)) void kernel_transformed_curved_cell(const kerne
         c->z[i] = h->at[2][i][n];
         c->f[i] = h->at[3][i][n];
         c->rank[i] = h->rank[i][n];
-        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_whole_lane(&h->world[a][i], n);
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_wide_doubles_lane(&h->world[a][i], n);
     }
 }
 

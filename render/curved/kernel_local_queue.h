@@ -93,18 +93,18 @@ SIMD_INLINE int kernel_local_queue_of(int type)
 SIMD_INLINE void kernel_local_fetch(kernel_local_lanes *l, const kernel_local_queue *q, int vertices)
 {
     const kernel_arrays *p = &l->arrays;
-    const kernel_whole none = kernel_whole_set(NAN);
+    const kernel_wide_doubles none = kernel_wide_doubles_set(NAN);
     const vm drawn = vm_from_bits(kernel_arrays_drawn(p, q->cell, (1u << SIMD_WIDTH) - 1));
     for (int i = 0; i < vertices; i++) {
         vi vertex;
         memcpy(&vertex, q->vertex[i], sizeof vertex);
         for (int a = 0; a < 3; a++) {
-            const kernel_whole place = kernel_numbers_gather(&p->coordinates[a], vertex);
+            const kernel_wide_doubles place = kernel_numbers_gather(&p->coordinates[a], vertex);
             memcpy(l->world[a][i], &place, sizeof place);
         }
         if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, q->cell, sizeof vertex);
-        kernel_whole value = kernel_numbers_gather(&p->values, vertex);
-        if (__builtin_expect(p->own != NULL, 0)) value = kernel_whole_select(drawn, &value, &none);
+        kernel_wide_doubles value = kernel_numbers_gather(&p->values, vertex);
+        if (__builtin_expect(p->own != NULL, 0)) value = kernel_wide_doubles_select(drawn, &value, &none);
         memcpy(l->scalars[i], &value, sizeof value);
     }
 }
@@ -118,11 +118,11 @@ SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scal
     vm finite = vm_all_lanes();
     for (int i = 0; i < count; i++) {
         for (int half = 0; half < 2; half++) {
-            kernel_half v;
+            kernel_doubles v;
             memcpy(&v, scalars[i] + half * KERNEL_HALF, sizeof v);
-            kernel_half_put(&odd, half, v - v);
-            kernel_half_put(&plain[i], half, kernel_half_hold(v, 3e38));
-            kernel_half_put(&values[i], half, kernel_half_hold((v - t->low) * t->inverse_width, 1e18));
+            kernel_doubles_store_lanes(&odd, half, v - v);
+            kernel_doubles_store_lanes(&plain[i], half, kernel_doubles_clamp(v, 3e38));
+            kernel_doubles_store_lanes(&values[i], half, kernel_doubles_clamp((v - t->low) * t->inverse_width, 1e18));
         }
         finite = vm_and(finite, vf_eq(odd, odd));
     }
@@ -185,10 +185,10 @@ SIMD_INLINE unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_l
     const int count = grid_type_vertices(type);
     const vm shows = kernel_local_domain(&t->frame->volumes[l->volume], l->scalars, count, lists[3]);
     for (int i = 0; i < count; i++) {
-        kernel_whole places[3];
+        kernel_wide_doubles places[3];
         vf at[3];
         for (int a = 0; a < 3; a++) memcpy(&places[a], l->world[a][i], sizeof places[a]);
-        const kernel_whole *const world[3] = {&places[0], &places[1], &places[2]};
+        const kernel_wide_doubles *const world[3] = {&places[0], &places[1], &places[2]};
         kernel_lanes_transform(t->frame, &t->tile, world, at);
         for (int a = 0; a < 3; a++) lists[a][i] = at[a];
     }

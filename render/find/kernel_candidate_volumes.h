@@ -28,7 +28,7 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
         kernel_raw_numbers value;
         vf place[3], at[3];
         kernel_arrays_values(&s->arrays, vertex, c->cell, &value);
-        v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_whole_narrow(&value.wide);
+        v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_wide_doubles_narrow(&value.wide);
         usual = vm_and(usual, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
         kernel_found_positions(s, vertex, place);
         usual = kernel_usual_position(usual, place);

@@ -95,7 +95,7 @@ SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type
 
 /* Moves the reference coordinates r to the nearest point of the domain D, which for hexes and wedges is widened by
  * `rim`. For a pyramid the point is only close to the nearest one. */
-SIMD_INLINE void kernel_contraction_hold(int type, vf rim, vf r[3])
+SIMD_INLINE void kernel_contraction_clamp(int type, vf rim, vf r[3])
 {
     const vf half = 0.5f + rim;
     if (kernel_is_box(type)) {
@@ -178,7 +178,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight
     }
     const vm sure = vm_and(rays, vf_lt(c->grow, vf_set(INFINITY)));
     for (int n = 0; n < KERNEL_CONTRACTION_STEPS; n++) {
-        kernel_contraction_hold(type, c->rim, q);
+        kernel_contraction_clamp(type, c->rim, q);
         kernel_contraction_local(type, q, local);
         kernel_bend_at(type, local, &bend);
         /* kernel_bounds.h computes the Jacobian at the centre with a b / k² = 1/2 instead of 1/4, which leaves this

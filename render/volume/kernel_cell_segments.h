@@ -357,8 +357,8 @@ static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, 
                                .t_out = vf_set((float)sub->end.t),
                                .v_in = vf_set(v[0]),
                                .v_out = vf_set(v[1])};
-    const kernel_double precise = {vf_set((float)(sub->end.t - from->t)), vf_set((float)rest[0]),
-                                   vf_set((float)rest[1])};
+    const kernel_precise_interval precise = {vf_set((float)(sub->end.t - from->t)), vf_set((float)rest[0]),
+                                             vf_set((float)rest[1])};
     if (!list->is_double) lane = vm_and(lane, vf_lt(i.t_in, i.t_out));
     kernel_segments_add(h->state->pieces, list, lane, &i, list->is_double ? &precise : NULL);
 }
@@ -501,11 +501,11 @@ SIMD_INLINE void kernel_cell_interval_double(kernel_segment_state *state, const 
                                              vf t0, vf t1)
 {
     const kernel_interval *i = span->interval;
-    const kernel_double *precise = span->precise;
+    const kernel_precise_interval *precise = span->precise;
     const kernel_unit_segment whole = {precise->length, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
     const kernel_unit_segment run = kernel_unit_segment_part(&whole, kernel_share(i, t0), kernel_share(i, t1));
     const kernel_interval sub = {.t_in = t0, .t_out = t1, .v_in = run.v_in, .v_out = run.v_out};
-    const kernel_double own = {run.length, run.rest_in, run.rest_out};
+    const kernel_precise_interval own = {run.length, run.rest_in, run.rest_out};
     const vm mine = vm_and(vf_le(state->list->t_begin, t0), vf_lt(t0, state->list->t_end));
     kernel_segments_add(state->pieces, state->list, vm_and(rays, mine), &sub, &own);
 }
@@ -543,7 +543,7 @@ SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segment_
         if (!(state->mixing > 0)) {
             const kernel_interval sub = {
                 .t_in = s.from, .t_out = s.to, .v_in = s.before + lift, .v_out = s.after + lift};
-            const kernel_double precise = kernel_double_of(&sub);
+            const kernel_precise_interval precise = kernel_precise_interval_of(&sub);
             kernel_segments_add(state->pieces, list, vm_and(open, mine), &sub, list->is_double ? &precise : NULL);
         } else if (vm_any(vm_and(open, mine))) {
             const kernel_unit_segment run =
@@ -587,7 +587,7 @@ static __attribute__((noinline)) void kernel_tet_segments_general(kernel_packet 
                                                                   kernel_interval i)
 {
     kernel_cell_interval span = {.interval = &i};
-    kernel_double precise;
+    kernel_precise_interval precise;
     if (state->mixing > 0) {
         kernel_cell_interval_bound(state, c->f, c->count, &span);
     } else if (state->list->is_double) {
@@ -619,7 +619,7 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     vm mine = vm_and(i.mask, window);
     if (!list->is_double) mine = vm_and(mine, vf_lt(i.t_in, i.t_out));
     if (!vm_any(mine)) return;
-    kernel_double precise;
+    kernel_precise_interval precise;
     if (list->is_double) {
         /* A ray may have many segments whose ends are equal in float32, so lengths are compared in double. */
         precise = kernel_tet_double(p, c, double_cell, &list->rays, &i);
@@ -646,7 +646,7 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, k
 
 SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *t)
 {
-    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
+    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_clamp((c->values[i] - t->low) * t->inverse_width, 1e18);
 }
 
 /* Sets the window's samples begin .. end - 1 that lie in the piece of the profile and in the interval. A sample that

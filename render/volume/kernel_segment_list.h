@@ -23,8 +23,8 @@ typedef struct kernel_segment {
     float t_in, t_out, v_in, v_out;
 } kernel_segment;
 
-/* Exact length and rounding errors of a segment, used if no error is allowed (one lane of kernel_double). It is as
- * large as kernel_segment, so that one index serves both. */
+/* Exact length and rounding errors of a segment, used if no error is allowed (one lane of kernel_precise_interval). It
+ * is as large as kernel_segment, so that one index serves both. */
 typedef struct kernel_segment_double {
     float length, rest_in, rest_out, unused;
 } kernel_segment_double;
@@ -210,7 +210,7 @@ SIMD_INLINE bool kernel_segments_put(kernel_segments *list, int lane, const kern
 /* Adds the segment of each given ray to its list. The segments must begin in the rays' windows. precise: NULL unless
  * the list is in double. */
 SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays,
-                                     const kernel_interval *i, const kernel_double *precise)
+                                     const kernel_interval *i, const kernel_precise_interval *precise)
 {
     kernel_segment all[SIMD_WIDTH];
     kernel_segment_double doubles[SIMD_WIDTH];
@@ -328,7 +328,7 @@ typedef struct kernel_cell_interval {
     const kernel_map *map;   /* inverse map of the cell; NULL if the field is linear */
     const kernel_cell *cell; /* the cell; NULL for a tet or a polyhedron; without a map the cell is constant */
     const kernel_interval *interval;
-    const kernel_double *precise; /* exact length and values of a tet's interval, or NULL */
+    const kernel_precise_interval *precise; /* exact length and values of a tet's interval, or NULL */
     float cost; /* change of light per unit distance for a field error of 1; 0 if neither error nor mixing is limited */
     int first_step, step_count; /* the opacity's steps that lie within the range of the cell's values */
     /* whether a steep ramp, and a narrow ramp, lies within the range of the cell's values */
