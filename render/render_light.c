@@ -94,12 +94,12 @@ typedef struct tracer {
     kernel_frame frame;
     kernel_thread thread;
     kernel_bundle bundle;
-    kernel_straights straights;
-    kernel_straight rays[CHUNK_RAYS];
+    kernel_secondary_rays secondary_rays;
+    kernel_secondary_ray rays[CHUNK_RAYS];
     ray_name names[CHUNK_RAYS];
 } tracer;
 
-static bool grow_undecided(kernel_straights *s)
+static bool grow_undecided(kernel_secondary_rays *s)
 {
     const int64_t capacity = s->capacity + s->capacity / 2 + 1024;
     kernel_undecided_pair *undecided = base_realloc(s->undecided, (size_t)capacity * sizeof *undecided);
@@ -114,8 +114,8 @@ static bool grow_undecided(kernel_straights *s)
 static void add_ray(tracer *t, int hit, int number, const double start[3], const double direction[3], double far)
 {
     const render_space *space = &t->job->space;
-    const int i = t->straights.count++;
-    kernel_straight *ray = &t->rays[i];
+    const int i = t->secondary_rays.count++;
+    kernel_secondary_ray *ray = &t->rays[i];
     t->names[i] = (ray_name){(int16_t)hit, (int16_t)number};
     for (int a = 0; a < 3; a++) {
         ray->origin[a] = (float)((start[a] - space->origin[a]) * space->scale);
@@ -262,7 +262,7 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_
 
 static void trace_light(tracer *t, const render_hit *hit, const kernel_undecided_pair *doubt)
 {
-    kernel_straight *ray = &t->rays[doubt->ray];
+    kernel_secondary_ray *ray = &t->rays[doubt->ray];
     if (!ray->is_open) return;
     set_light_ray(t, hit, t->names[doubt->ray].number - RENDER_MAX_SAMPLES);
     t->bundle.open = 1;
@@ -272,7 +272,7 @@ static void trace_light(tracer *t, const render_hit *hit, const kernel_undecided
 
 static void trace_undecided(tracer *t, const render_hit *hits)
 {
-    kernel_straights *s = &t->straights;
+    kernel_secondary_rays *s = &t->secondary_rays;
     qsort(s->undecided, (size_t)s->undecided_count, sizeof *s->undecided, by_ray);
     for (int64_t first = 0, end; first < s->undecided_count; first = end) {
         kernel_undecided_pair *from = &s->undecided[first];
@@ -290,7 +290,7 @@ static void trace_undecided(tracer *t, const render_hit *hits)
 
 static void trace_chunk(tracer *t, const render_hit *hits, render_hit_rays *rays, int count)
 {
-    kernel_straights *s = &t->straights;
+    kernel_secondary_rays *s = &t->secondary_rays;
     t->thread.serial++;
     if (t->thread.polyhedra) polyhedra_reset(t->thread.polyhedra);
     s->count = 0;
@@ -324,7 +324,7 @@ static tracer *tracer_create(const render_occluders *of)
     t->frame = of->frame;
     t->frame.job = &t->moved;
     t->frame.depth_shift = t->moved.space.depth_origin = 0;
-    t->straights = (kernel_straights){.rays = t->rays, .grow = grow_undecided};
+    t->secondary_rays = (kernel_secondary_rays){.rays = t->rays, .grow = grow_undecided};
     t->thread = (kernel_thread){.memory = base_alloc(t->kernels->memory_bytes),
                                 .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
                                 .find_polyhedron = polyhedra_find,
@@ -344,7 +344,7 @@ static bool tracer_free(tracer *t)
     const bool is_well = !t->thread.out_of_memory;
     polyhedra_free(t->thread.polyhedra);
     base_free(t->thread.memory);
-    base_free(t->straights.undecided);
+    base_free(t->secondary_rays.undecided);
     base_free(t);
     return is_well;
 }

@@ -338,7 +338,7 @@ typedef struct kernel_thread {
 struct kernel_bundle;
 struct kernel_occluder;
 struct kernel_occluders;
-struct kernel_straights;
+struct kernel_secondary_rays;
 
 /* The functions that the object of one instruction set exports. */
 typedef struct kernel_table {
@@ -352,7 +352,7 @@ typedef struct kernel_table {
                             kernel_candidate_list *list, bool (*grow)(kernel_candidate_list *list));
     /* Removes the rays that an opaque surface certainly blocks, and records the cells that must be tested exactly. */
     void (*occlude)(const kernel_frame *frame, kernel_thread *thread, const struct kernel_occluders *occluders,
-                    struct kernel_straights *rays);
+                    struct kernel_secondary_rays *rays);
     /* Clears the open bits of the bundle's rays that this cell blocks. */
     void (*occlude_by_cell)(const kernel_frame *frame, kernel_thread *thread, struct kernel_bundle *bundle,
                             const struct kernel_occluder *occluder);

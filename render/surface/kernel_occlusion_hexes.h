@@ -23,7 +23,7 @@ typedef struct kernel_curved_pairs {
     kernel_transformed_curved transformed;
 } kernel_curved_pairs;
 
-SIMD_INLINE bool kernel_undecided_add(kernel_straights *s, int32_t ray, int32_t occluder)
+SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int32_t occluder)
 {
     if (s->undecided_count == s->capacity && !s->grow(s)) return false;
     s->undecided[s->undecided_count++] = (kernel_undecided_pair){ray, occluder};
@@ -31,16 +31,17 @@ SIMD_INLINE bool kernel_undecided_add(kernel_straights *s, int32_t ray, int32_t 
 }
 
 /* Rays in lanes: origin and shear along each ray's own axes. */
-typedef struct kernel_plumb_lanes {
+typedef struct kernel_prepared_ray_lanes {
     int32_t record[SIMD_WIDTH]; /* index of the first float of the hex's record */
     float axis[SIMD_WIDTH];     /* number of the axis kz, as a float; kx and ky follow it cyclically */
     float origin[3][SIMD_WIDTH], shear[2][SIMD_WIDTH], stretch[SIMD_WIDTH], far[SIMD_WIDTH];
-} kernel_plumb_lanes;
+} kernel_prepared_ray_lanes;
 
-SIMD_INLINE void kernel_pair_ray(const kernel_straight *ray, int32_t record, int lane, kernel_plumb_lanes *out)
+SIMD_INLINE void kernel_pair_ray(const kernel_secondary_ray *ray, int32_t record, int lane,
+                                 kernel_prepared_ray_lanes *out)
 {
-    kernel_plumb p;
-    kernel_plumb_axes(ray, &p);
+    kernel_prepared_ray p;
+    kernel_prepared_ray_axes(ray, &p);
     const int axes[3] = {p.kx, p.ky, p.kz};
     out->record[lane] = record * KERNEL_CURVED_RECORD_WORDS;
     out->axis[lane] = (float)p.kz;
@@ -60,7 +61,8 @@ SIMD_INLINE vi kernel_load_ints(const int32_t *from)
 
 /* Computes the vertices as seen by their rays: x and y across the ray, which is at the origin, and the distance along
  * it. */
-SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays)
+SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float *hexes,
+                                        const kernel_prepared_ray_lanes *rays)
 {
     kernel_transformed_curved *h = &pairs->transformed;
     const vm along_x = vf_eq(vf_load(rays->axis), vf_set(0)), along_y = vf_eq(vf_load(rays->axis), vf_set(1));
@@ -145,10 +147,10 @@ SIMD_INLINE kernel_pair_result kernel_pairs_classify(const kernel_curved_pairs *
     return out;
 }
 
-static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o, kernel_straights *s,
+static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o, kernel_secondary_rays *s,
                                                        kernel_curved_pairs *pairs)
 {
-    kernel_plumb_lanes rays;
+    kernel_prepared_ray_lanes rays;
     bool is_well = true;
     if (!pairs->count) return true;
     for (int i = 0; i < SIMD_WIDTH; i++) {
