@@ -358,7 +358,7 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
             status = render_preintegral_build(&f->pieces[i], t, error_of_each, (double)f->reach[i], error);
     }
     if (status == INSITU_OK && f->allowance > 0 && has_curved_cells(job))
-        status = render_swings_build(&f->pieces[0], job->volumes[0].transfer, error);
+        status = render_variations_build(&f->pieces[0], job->volumes[0].transfer, error);
     return status;
 }
 

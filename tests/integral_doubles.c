@@ -3,7 +3,7 @@
 #define KERNEL_REAL_IS_DOUBLE
 #define BASE_SIMD_H
 #define render_pieces_build pieces_build_of_doubles
-#define render_swings_build swings_build_of_doubles
+#define render_variations_build swings_build_of_doubles
 #define render_pieces_free pieces_free_of_doubles
 
 #include <math.h>

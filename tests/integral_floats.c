@@ -25,10 +25,10 @@ void integral_swings(const render_transfer *t, int count, const double (*ranges)
     kernel_pieces pieces;
     base_error error = {0};
     if (render_pieces_build(&pieces, t, 0, &error) != INSITU_OK) abort();
-    if (render_swings_build(&pieces, t, &error) != INSITU_OK) abort();
+    if (render_variations_build(&pieces, t, &error) != INSITU_OK) abort();
     for (int i = 0; i < count; i++) {
         const vf low = vf_set((float)ranges[i][0]), high = vf_set((float)ranges[i][1]);
-        const float *found = &pieces.swings->swing + kernel_swing_entry(&pieces, low, high)[0];
+        const float *found = &pieces.variations->variation + kernel_light_variation_entry(&pieces, low, high)[0];
         for (int n = 0; n < 4; n++) out[i][n] = (double)found[n];
     }
     render_pieces_free(&pieces);

@@ -11,9 +11,9 @@
  * middle), so with K < 0.9 the step leaves 2 K / (1 - K) (1e-4)^2 = 1.8e-7 of r, which is as much of the cell's extent
  * along the ray; t is rounded to half a unit, twice.
  *
- * And quads that are taken to look convex along all rays of a box (kernel_curved_dents()), of the same cells: as each
- * of many rays sees its vertices, in float32, all of its corners turn one way in double; and where the edges of the
- * quad have known signs, the quad's two triangles and its patch say of the ray what the edges alone do. */
+ * And quads that are taken to look convex along all rays of a box (kernel_curved_nonconvex_quads()), of the same cells:
+ * as each of many rays sees its vertices, in float32, all of its corners turn one way in double; and where the edges of
+ * the quad have known signs, the quad's two triangles and its patch say of the ray what the edges alone do. */
 #include "kernel_bounds.h"
 #include "kernel_contraction.h"
 #include "kernel_quad.h"
@@ -407,7 +407,7 @@ static vm edges_are_wrong(const vf x[8], const vf y[8], const signed char *loop)
     }
     const vm once = kernel_halves_once(side, vm_sign(edge_of(x, y, loop[0], loop[2], &least)));
     const vm known = vf_lt(vf_set(KERNEL_EDGE_LEAST), least);
-    const vm bends = kernel_curved_bends(x, y, loop, vm_all_lanes(), side);
+    const vm bends = kernel_curved_may_cross_twice(x, y, loop, vm_all_lanes(), side);
     return vm_and(known, vm_or(vm_xor(once, vm_sign(kernel_sides_agree(around, 4))), bends));
 }
 
@@ -450,7 +450,7 @@ static void quads_that_look_convex_are(void **state)
                 aim_box(&b, rays, &box);
                 for (int a = 0; a < 3; a++)
                     for (int i = 0; i < 8; i++) at[a][i] = vf_load(b.at[a][i]);
-                const vi dents = kernel_curved_dents(at, &box, types[k]);
+                const vi dents = kernel_curved_nonconvex_quads(at, &box, types[k]);
                 for (int i = 0; i < BOX_RAYS; i++) judge_quads(&b, &rays[i], dents, &n);
             }
             printf("%s: of %lld quads seen %lld look convex, %lld do not, %lld are wrong\n", shape_names[s],

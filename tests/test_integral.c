@@ -172,7 +172,7 @@ static void brute_slopes(const render_transfer *t, long double x, long double b,
     out[5] = fabsl(slope);
 }
 
-/* As kernel_swing, from many values of the range and several b. */
+/* As kernel_light_variation, from many values of the range and several b. */
 static void brute_swing(const render_transfer *t, double low, double high, double out[4])
 {
     enum { VALUES = 300, BEHIND = 4 };

@@ -82,14 +82,14 @@ SIMD_INLINE vm kernel_curved_once(const kernel_projected *s, const kernel_curved
 {
     vm side[4];
     kernel_quad_around(shape, face, sides, side);
-    *alone = vm_or(*alone, kernel_curved_bends(s->x, s->y, shape->faces[face].vertices, rays, side));
+    *alone = vm_or(*alone, kernel_curved_may_cross_twice(s->x, s->y, shape->faces[face].vertices, rays, side));
     return kernel_halves_once(side, vm_sign(sides->side[shape->edge_count + face]));
 }
 
 /* Finds the two faces that each ray crosses once. Any other ray is marked to be traced in its cell alone (out->alone).
  * at: the cells' vertices, per lane. dents: per ray, bits of the quads that may not look convex; NULL: there are none.
  */
-SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *dents,
+SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *nonconvex,
                                     vm rays, kernel_curved_crossed *out, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -99,8 +99,8 @@ SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kern
     kernel_curved_sides_of(&seen, type, &sides);
     vm alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides.least));
     vi faces = kernel_curved_around(&sides, type);
-    for (int face = 0; dents && face < shape->face_count; face++) {
-        if (shape->faces[face].count == 3 || !vm_any(vm_and(rays, vm_sign(*dents << (31 - face))))) continue;
+    for (int face = 0; nonconvex && face < shape->face_count; face++) {
+        if (shape->faces[face].count == 3 || !vm_any(vm_and(rays, vm_sign(*nonconvex << (31 - face))))) continue;
         const vm once = kernel_curved_once(&seen, &sides, shape, face, rays, &alone);
         faces = (faces & ~vi_set(1 << face)) | vi_select(once, vi_set(1 << face), vi_set(0));
     }

@@ -156,7 +156,7 @@ static inline void kernel_scalar_once(const kernel_scalar_quad *q, double place[
 
 /* Returns whether the quadratic may have two roots in (0, 1): its ends have one sign, and its middle coefficient has
  * the other. */
-static inline bool kernel_scalar_bends(const kernel_scalar_quadratic *c)
+static inline bool kernel_scalar_may_have_two_roots(const kernel_scalar_quadratic *c)
 {
     return !kernel_scalar_turns(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
 }
@@ -165,7 +165,7 @@ static inline bool kernel_scalar_bends(const kernel_scalar_quadratic *c)
 static inline bool kernel_scalar_twice(const kernel_scalar_quad *q, double places[2][3])
 {
     const kernel_scalar_quadratic a = kernel_scalar_a(q), b = kernel_scalar_b(q);
-    if (!kernel_scalar_bends(&a) || !kernel_scalar_bends(&b)) return false;
+    if (!kernel_scalar_may_have_two_roots(&a) || !kernel_scalar_may_have_two_roots(&b)) return false;
     const double root = __builtin_sqrt(kernel_scalar_discriminant(&b));
     if (!(root > 0)) return false;
     kernel_scalar_point(q, &a, &b, root, places[0]);
@@ -447,7 +447,7 @@ SIMD_INLINE vf kernel_flip_sign(vf v, vf other)
 
 /* Returns those of the rays given by kernel_quad_sides() that may still meet the patch twice when the middle
  * coefficients are tested, too. */
-SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
+SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
 {
     const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
     const vf other = vf_diff_of_products(q->x[3], q->y[1], q->x[1], q->y[3]);
@@ -469,8 +469,9 @@ SIMD_INLINE vm kernel_halves_once(const vm around[4], vm side)
 /* Returns the rays that may still meet a quad's patch twice when the discriminant is tested, too. A ray is excluded
  * only if the discriminant is negative by more than its rounding in float32, which is below a millionth of its
  * terms. */
-static __attribute__((noinline)) vm kernel_curved_bends_yet(const vf x[8], const vf y[8], const signed char *loop,
-                                                            vm rays, vf across, vf other)
+static __attribute__((noinline)) vm kernel_curved_may_cross_twice_by_discriminant(const vf x[8], const vf y[8],
+                                                                                  const signed char *loop, vm rays,
+                                                                                  vf across, vf other)
 {
     const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
     const vf b0 = vf_diff_of_products(x[a], y[b], x[b], y[a]), b2 = vf_diff_of_products(x[d], y[c], x[c], y[d]);
@@ -478,10 +479,11 @@ static __attribute__((noinline)) vm kernel_curved_bends_yet(const vf x[8], const
     return vm_andnot(rays, vf_lt(b1 * b1 - product, -1e-6f * (most * most + vf_abs(product))));
 }
 
-/* Returns the rays that may meet a quad's patch twice: those of kernel_quad_bends() and a few more. loop: corners 0 to
- * 3 in cyclic order; side[i]: side of the edge from corner i to the next. Only rays that are on different sides of
- * opposite edges are tested. */
-SIMD_INLINE vm kernel_curved_bends(const vf x[8], const vf y[8], const signed char *loop, vm rays, const vm side[4])
+/* Returns the rays that may meet a quad's patch twice: those of kernel_quad_may_cross_twice() and a few more. loop:
+ * corners 0 to 3 in cyclic order; side[i]: side of the edge from corner i to the next. Only rays that are on different
+ * sides of opposite edges are tested. */
+SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const signed char *loop, vm rays,
+                                             const vm side[4])
 {
     const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
     const vm outside = vm_and(rays, vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3])));
@@ -489,7 +491,9 @@ SIMD_INLINE vm kernel_curved_bends(const vf x[8], const vf y[8], const signed ch
     const vf slack = 2e-6f * (vf_abs(across) + vf_abs(other)), sum = across + other, difference = across - other;
     const vm bent = vf_le(vf_select(side[0], -sum, sum), slack);
     const vm bends = vm_and(outside, vm_and(bent, vf_le(vf_select(side[3], difference, -difference), slack)));
-    return __builtin_expect(vm_any(bends), 0) ? kernel_curved_bends_yet(x, y, loop, bends, across, other) : bends;
+    return __builtin_expect(vm_any(bends), 0)
+               ? kernel_curved_may_cross_twice_by_discriminant(x, y, loop, bends, across, other)
+               : bends;
 }
 
 /* Computes the points at which rays meet the patch. Rays in `once` meet it once; rays in `twice` meet it twice or
@@ -503,7 +507,7 @@ SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kern
         count = 1;
     }
     if (!vm_any(twice)) return count;
-    const vm bends = kernel_quad_bends(q, twice);
+    const vm bends = kernel_quad_may_cross_twice(q, twice);
     if (__builtin_expect(!vm_any(bends), 1)) return count;
     if (!count) out[0] = (kernel_quad_point){vm_none(), zero, zero, zero};
     out[1] = (kernel_quad_point){vm_none(), zero, zero, zero};
@@ -584,18 +588,18 @@ SIMD_INLINE vm kernel_quad_is_convex(const kernel_seen_edges *e, const signed ch
 }
 
 /* Returns a mask of the quads that may look other than convex along some ray of the box. */
-SIMD_INLINE vi kernel_curved_dents(vf (*const at)[8], const kernel_ray_box *box, int type)
+SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], const kernel_ray_box *box, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     kernel_seen_edges edges;
-    vi dents = vi_set(0);
+    vi nonconvex = vi_set(0);
     kernel_seen_edges_of(at, box, type, &edges);
     for (int face = 0; face < shape->face_count; face++) {
         if (shape->faces[face].count == 3) continue;
         const vm convex = kernel_quad_is_convex(&edges, shape->faces[face].sides);
-        dents |= vi_select(convex, vi_set(0), vi_set(1 << face));
+        nonconvex |= vi_select(convex, vi_set(0), vi_set(1 << face));
     }
-    return dents;
+    return nonconvex;
 }
 
 #endif

@@ -27,8 +27,9 @@ enum { KERNEL_LOCAL_ROW = 16, KERNEL_LOCAL_ROWS = 3 };
 typedef struct kernel_local_faces {
     float at[4][8][SIMD_WIDTH];
     float words[KERNEL_CURVED_FACES][SIMD_WIDTH];
-    /* per cell, a bit for each quad that may not look convex on some of the cell's pixels (kernel_curved_dents()) */
-    float dents[SIMD_WIDTH];
+    /* per cell, a bit for each quad that may not look convex on some of the cell's pixels
+     * (kernel_curved_nonconvex_quads()) */
+    float nonconvex[SIMD_WIDTH];
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
 } kernel_local_faces;
 
@@ -112,7 +113,7 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
     const kernel_shape *shape = kernel_cell_shape(type);
     kernel_ray_box box;
     kernel_local_ray_box(tile, ends, &box);
-    vf_store(out->dents, vf_from_bits(kernel_curved_dents(lists, &box, type)));
+    vf_store(out->nonconvex, vf_from_bits(kernel_curved_nonconvex_quads(lists, &box, type)));
     for (int n = 0; n < 4; n++)
         for (int i = 0; i < grid_type_vertices(type); i++) vf_store(out->at[n][i], lists[n][i]);
     for (int face = 0; face < shape->face_count; face++) {
@@ -132,19 +133,19 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
 /* ---- rays ---- */
 
 static __attribute__((noinline)) void kernel_local_find_dented(const kernel_local_faces *f, const kernel_lane_rays *own,
-                                                               const vi *dents, vm rays, int type,
+                                                               const vi *nonconvex, vm rays, int type,
                                                                kernel_curved_crossed *out)
 {
-    KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])f->at, own, dents, rays, out);
+    KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])f->at, own, nonconvex, rays, out);
 }
 
 /* Finds the two faces that each ray crosses once. All other rays are added to out->alone, to be traced one by one. */
 SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kernel_lane_rays *own, vm rays, int type,
                                          kernel_curved_crossed *out)
 {
-    const vi dents = vi_from_bits(kernel_gather_lane(f->dents, own->lane));
-    if (vm_any(vm_and(rays, vm_sign(-dents))))
-        kernel_local_find_dented(f, own, &dents, rays, type, out);
+    const vi nonconvex = vi_from_bits(kernel_gather_lane(f->nonconvex, own->lane));
+    if (vm_any(vm_and(rays, vm_sign(-nonconvex))))
+        kernel_local_find_dented(f, own, &nonconvex, rays, type, out);
     else
         kernel_curved_find((const float(*)[8][SIMD_WIDTH])f->at, own, NULL, rays, out, type);
 }

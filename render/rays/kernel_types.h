@@ -31,7 +31,7 @@ typedef float kernel_real;
 #define KERNEL_SHORT 2e-6f
 #endif
 
-enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64, KERNEL_SWING_BINS = 128, KERNEL_SWING_WIDTHS = 29 };
+enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WIDTHS = 29 };
 
 /* Entries of a piece: a part of a transfer function on which opacity and colour are linear. At a value x they are
  * entry[..] + (x - low) * slope. 1 - opacity has entries of its own, because near an opacity of 1 the difference would
@@ -66,10 +66,10 @@ typedef struct kernel_bound {
 /* Bounds of a transfer function over a range of values that contains no step of the opacity. A field error d changes
  * the light by at most cost * d per unit distance. For fixed light from the front and from behind, that change varies
  * by at most swing * d. */
-typedef struct kernel_swing {
-    float swing, cost;
+typedef struct kernel_light_variation {
+    float variation, cost;
     float extinction, steepness; /* maximum of the extinction, and of its slope times the contrast */
-} kernel_swing;
+} kernel_light_variation;
 
 /* A step of the opacity: its exact value, and that value rounded to float, at which pieces end. */
 typedef struct kernel_step {
@@ -115,11 +115,11 @@ typedef struct kernel_pieces {
      * constant. */
     float bound_inverse;
     kernel_bound bounds[KERNEL_BOUND_BINS];
-    /* Bounds over ranges of values, in a table of KERNEL_SWING_WIDTHS × KERNEL_SWING_BINS: its row is the range's class
-     * of width, its column the equal-width bin in which the range begins; bins begin at bin_low
-     * (kernel_swing_entry()). */
-    float swing_inverse;
-    kernel_swing *swings;
+    /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS: its row is the
+     * range's class of width, its column the equal-width bin in which the range begins; bins begin at bin_low
+     * (kernel_light_variation_entry()). */
+    float variation_inverse;
+    kernel_light_variation *variations;
     /* Set if a ramp of the opacity is so narrow that the rounding of its ends is visible: values near it then use the
      * ends' rounding errors (KERNEL_PIECE_LOW_REST). */
     bool has_rests;

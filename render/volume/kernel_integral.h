@@ -65,14 +65,14 @@ SIMD_INLINE vf kernel_exp(vf x)
 
 /* Returns the offset, in floats, into the table `swings` of the entry with the bounds for the values from low to
  * high. */
-SIMD_INLINE vi kernel_swing_entry(const kernel_pieces *t, vf low, vf high)
+SIMD_INLINE vi kernel_light_variation_entry(const kernel_pieces *t, vf low, vf high)
 {
-    const vf zero = vf_set(0), last = vf_set(KERNEL_SWING_BINS - 1);
-    const vf begin = vf_clamp((low - t->bin_low) * t->swing_inverse, zero, last);
-    const vf end = vf_clamp((high - t->bin_low) * t->swing_inverse, begin, last);
+    const vf zero = vf_set(0), last = vf_set(KERNEL_VARIATION_BINS - 1);
+    const vf begin = vf_clamp((low - t->bin_low) * t->variation_inverse, zero, last);
+    const vf end = vf_clamp((high - t->bin_low) * t->variation_inverse, begin, last);
     /* The number of bins that the values cover, plus 1, is classified by quarters of an octave. */
     const vi width = (vi_from_bits((end - begin) + 1.0f) >> 21) - (127 << 2);
-    return (width * KERNEL_SWING_BINS + vi_from_vf(begin)) * (int)(sizeof(kernel_swing) / sizeof(float));
+    return (width * KERNEL_VARIATION_BINS + vi_from_vf(begin)) * (int)(sizeof(kernel_light_variation) / sizeof(float));
 }
 #endif
 

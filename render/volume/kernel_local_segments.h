@@ -64,7 +64,7 @@ typedef struct kernel_local_segment_batch {
 /* Returns whether segments of cells of this type are computed in lanes in this frame. */
 SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
 {
-    return kernel_segments_fit(f) && f->pieces[0].swings && kernel_local_queue_of(type) >= 0;
+    return kernel_segments_fit(f) && f->pieces[0].variations && kernel_local_queue_of(type) >= 0;
 }
 
 /* Adds a segment to the list of the ray at `at`, if it begins before the window's end. It must not begin before the

@@ -75,7 +75,7 @@ SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_p
 
 /* Returns 1 - exp(-y). *share receives this number divided by y. For small y the series is used, whose first omitted
  * term is y^6 / 5040. */
-SIMD_INLINE vf kernel_gone(vf y, vf *share)
+SIMD_INLINE vf kernel_absorbed_share(vf y, vf *share)
 {
     vf p = y * (-1.0f / 720) + 1.0f / 120;
     p = p * y - 1.0f / 24;
@@ -120,7 +120,7 @@ SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pr
         sum[i] = ((all - own) + (of_a * a->own[i] + of_b * b->own[i])) * per_bin;
     }
     out->depth = sum[0] * t->depth_unit;
-    const vf gone = kernel_gone(0.5f * out->depth, &mean);
+    const vf gone = kernel_absorbed_share(0.5f * out->depth, &mean);
     /* mean transmittance along the segment, which is its absorption divided by its optical depth */
     mean *= 1.0f - 0.5f * gone;
     const vf lost = 1.0f - mean, square = lost * lost * (1.0f + lost);
