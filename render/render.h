@@ -161,10 +161,10 @@ typedef struct render_pending_list {
 
 /* The samples around a hit: before and behind it along the first axis, then along the second and the third. They take
  * 32 bytes. */
-typedef struct render_samples_about {
+typedef struct render_difference_samples {
     uint32_t found, unused; /* found: one bit per sample, set if some cell contains the sample's point */
     float values[RENDER_DIFFERENCE_SAMPLES];
-} render_samples_about;
+} render_difference_samples;
 
 /* Value of `transmittance` that marks the placeholder fragments of these hits while a frame is traced. */
 #define RENDER_WAITS 2.0f

@@ -129,9 +129,9 @@ typedef struct chunk_work {
     const kernel_table *kernels;
     int threads;
     const render_pending_hit *hits;
-    render_samples_about *samples;
+    render_difference_samples *samples;
     const render_pending_list *list; /* hits to be lit; NULL if samples are to be taken */
-    const render_samples_about *merged;
+    const render_difference_samples *merged;
     fragment *out;
 } chunk_work;
 
@@ -174,7 +174,7 @@ static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_
 }
 
 insitu_status render_differences_sample(const render_job *job, const render_pending_hit *hits,
-                                        render_samples_about *out, int64_t count, base_error *error)
+                                        render_difference_samples *out, int64_t count, base_error *error)
 {
     chunk_work work = {.hits = hits, .samples = out};
     if (count && !job->part_count) memset(out, 0, (size_t)count * sizeof *out);
@@ -182,7 +182,7 @@ insitu_status render_differences_sample(const render_job *job, const render_pend
     return work_on_all(job, &work, 0, count, error);
 }
 
-void render_differences_merge(render_samples_about *into, const render_samples_about *other)
+void render_differences_merge(render_difference_samples *into, const render_difference_samples *other)
 {
     for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
         const uint32_t bit = 1u << k;
@@ -193,8 +193,8 @@ void render_differences_merge(render_samples_about *into, const render_samples_a
 }
 
 insitu_status render_differences_light(const render_job *job, const render_pending_list *list,
-                                       const render_samples_about *samples, int64_t first, int64_t count, fragment *out,
-                                       base_error *error)
+                                       const render_difference_samples *samples, int64_t first, int64_t count,
+                                       fragment *out, base_error *error)
 {
     /* With a list that begins at hit `first`, hits, samples and fragments have the same indices, from 0 on. */
     const render_pending_list some = {list->items + first, list->shadings + first, count, count};

@@ -32,14 +32,14 @@ bool render_differences_meet(const render_job *job, const render_pending_hit *hi
 
 /* Samples this rank's cells around the hits, which may belong to any rank. Local. */
 insitu_status render_differences_sample(const render_job *job, const render_pending_hit *hits,
-                                        render_samples_about *out, int64_t count, base_error *error);
+                                        render_difference_samples *out, int64_t count, base_error *error);
 
-void render_differences_merge(render_samples_about *into, const render_samples_about *other);
+void render_differences_merge(render_difference_samples *into, const render_difference_samples *other);
 
 /* Lights `count` hits of the list from `first` on by their samples (samples[0] belongs to hit `first`), as the job
  * paints them: the fragments are those that render_frame() would have computed. Local. */
 insitu_status render_differences_light(const render_job *job, const render_pending_list *list,
-                                       const render_samples_about *samples, int64_t first, int64_t count, fragment *out,
-                                       base_error *error);
+                                       const render_difference_samples *samples, int64_t first, int64_t count,
+                                       fragment *out, base_error *error);
 
 #endif

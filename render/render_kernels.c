@@ -151,7 +151,7 @@ SIMD_INLINE void kernel_tile_queue_put(kernel_tile_trace *t, kernel_tile_queue *
 
 /* Traces the cells that are queued in no vector. Traces the vectors first, because their cells were found earlier and
  * may hide these. */
-static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
+static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     if (!m->alone_count) return;
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_run(t, m, &m->pending[i]);
@@ -175,14 +175,14 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *
         kernel_tile_queue_put(t, m, &m->pending[kernel_found_number(type)], candidate, value);
         return;
     }
-    if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_alone(t, m);
+    if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_trace_singly(t, m);
     m->alone[m->alone_count++] = *candidate;
 }
 
 /* Traces all cells that are still queued. */
 static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
 {
-    kernel_tile_queue_alone(t, m);
+    kernel_tile_queue_trace_singly(t, m);
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_run(t, m, &m->pending[i]);
 }
 

@@ -549,8 +549,8 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
 }
 
 /* Computes the bounds of one cell that is traced on its own, with its data in all lanes. */
-static __attribute__((noinline, unused)) void kernel_curved_alone(const kernel_cell *c, const kernel_beam *beam,
-                                                                  kernel_curved *out)
+static __attribute__((noinline, unused)) void kernel_curved_single_bounds(const kernel_cell *c, const kernel_beam *beam,
+                                                                          kernel_curved *out)
 {
     kernel_curved_room *room = out->room;
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};

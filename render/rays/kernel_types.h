@@ -359,10 +359,10 @@ typedef struct kernel_table {
     /* Samples this rank's cells around each of `count` hits, for normals by central differences; out[i] belongs to
      * hits[i]. */
     void (*sample_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
-                           render_samples_about *out, int64_t count);
+                           render_difference_samples *out, int64_t count);
     /* Computes the fragments out[i] of the list's hits i from samples[i], first <= i < first + count. */
     void (*light_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_list *list,
-                          const render_samples_about *samples, int64_t first, int64_t count, fragment *out);
+                          const render_difference_samples *samples, int64_t first, int64_t count, fragment *out);
 } kernel_table;
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;

@@ -305,7 +305,7 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
  * computes one; the value w of the colour field; and the field of contour lines (NULL if the surface has none). */
 typedef struct kernel_hit_points {
     vf t, normal[3], w;
-    const kernel_along *along;
+    const kernel_line_field *along;
 } kernel_hit_points;
 
 /* Returns the value that colours the surface, in the field's units, or the isovalue if there is no colour field. w: the

@@ -90,9 +90,9 @@ SIMD_INLINE void kernel_curved_ready(const kernel_tile_trace *t, kernel_curved_b
 
 /* Traces the rays in `wanted` one by one in their cells; rays of one cell and packet are traced together. Returns the
  * mask of blocks in which a ray has a nearer hit than before. */
-static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                                    const kernel_pixel_list *rays, int first,
-                                                                    vi at_lanes, unsigned wanted)
+static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                           const kernel_pixel_list *rays, int first,
+                                                                           vi at_lanes, unsigned wanted)
 {
     kernel_curved curved = kernel_curved_batch_cells(h);
     unsigned blocks = 0;
@@ -219,7 +219,7 @@ SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t
             kernel_curved_ray_add(&h->met, &h->rays, n + i);
         }
         if (__builtin_expect(vm_any(crossed.alone), 0))
-            nearer |= kernel_curved_batch_alone(t, h, &h->rays, n, p.at, vm_bits(crossed.alone));
+            nearer |= kernel_curved_batch_trace_singly(t, h, &h->rays, n, p.at, vm_bits(crossed.alone));
     }
     kernel_pixel_list_close(&h->met);
     memset(h->faces + h->met.count, 0, SIMD_WIDTH);
@@ -263,14 +263,14 @@ static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_til
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r in each ray's
  * own cell. */
-SIMD_INLINE void kernel_curved_batch_along(const kernel_tile_trace *t, const kernel_curved_batch *h, vi lane,
-                                           const vf r[3], kernel_along *out, int type)
+SIMD_INLINE void kernel_curved_batch_line_field(const kernel_tile_trace *t, const kernel_curved_batch *h, vi lane,
+                                                const vf r[3], kernel_line_field *out, int type)
 {
     kernel_map map;
     vf c[8];
     kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, lane, &map, type);
     kernel_maps_polynomial((const float(*)[SIMD_WIDTH])h->lines, lane, c, type);
-    kernel_map_along(&t->tile, &map, c, r, out);
+    kernel_map_line_field(&t->tile, &map, c, r, out);
 }
 
 /* Reads the colour field at the vertices of the lanes' cells, in the cells' order of vertices. */
@@ -319,8 +319,8 @@ kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batc
             for (int a = 0; a < 3; a++) colours[a][i] = layer->colours[3 * h->own->value[lanes[i]] + a];
     }
     if (!layer->lines) return;
-    kernel_along along;
-    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_along, t, h, p->lane, places->r, &along);
+    kernel_line_field along;
+    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_line_field, t, h, p->lane, places->r, &along);
     kernel_draw_lines(t->frame, &t->tile, t->surface, &p->rays, places->t, &along, colours);
 }
 
@@ -406,7 +406,7 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         }
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (__builtin_expect(vm_any(open), 0))
-            nearer |= kernel_curved_batch_alone(t, h, &h->found, n, p.at, vm_bits(open));
+            nearer |= kernel_curved_batch_trace_singly(t, h, &h->found, n, p.at, vm_bits(open));
         if (vm_any(hit)) nearer |= kernel_curved_batch_accept_hits(t, h, n, &p, &map, &at, hit);
     }
     return nearer;

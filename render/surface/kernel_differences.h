@@ -136,15 +136,16 @@ SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm r
 
 /* Samples around a packet's hits: before and behind each hit along the first axis, then along the second and the
  * third. */
-typedef struct kernel_samples_about {
+typedef struct kernel_difference_samples {
     vm found[RENDER_DIFFERENCE_SAMPLES];
     vf values[RENDER_DIFFERENCE_SAMPLES];
-} kernel_samples_about;
+} kernel_difference_samples;
 
 /* Takes six samples of the field around each hit at depth t, at the distance `reach` from it. s must be one of the
  * frame's surfaces. */
-static __attribute__((noinline)) void kernel_sample_about(const kernel_packet *p, const kernel_surface *s, int value,
-                                                          vm hit, vf t, vf reach, kernel_samples_about *out)
+static __attribute__((noinline)) void kernel_sample_differences(const kernel_packet *p, const kernel_surface *s,
+                                                                int value, vm hit, vf t, vf reach,
+                                                                kernel_difference_samples *out)
 {
     const kernel_frame *f = p->frame;
     kernel_probe probe = {.surface = s,
@@ -160,7 +161,8 @@ static __attribute__((noinline)) void kernel_sample_about(const kernel_packet *p
 /* Replaces the cells' gradients in `normal` (camera axes) by differences of the samples, for the rays in `hit`. The
  * difference is one-sided if one sample of an axis is in no cell. If both are in no cell, the ray keeps its cell's
  * gradient. */
-SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_samples_about *about, vm hit, vf normal[3])
+SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_difference_samples *about, vm hit,
+                                      vf normal[3])
 {
     const render_camera *c = &p->frame->job->camera;
     const double *axes[3] = {c->right, c->up, c->forward};
@@ -182,9 +184,9 @@ SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_sampl
 SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
                                     vf normal[3])
 {
-    kernel_samples_about about;
+    kernel_difference_samples about;
     hit = vm_and(hit, vf_lt(vf_set(0), reach));
-    kernel_sample_about(p, s, value, hit, t, reach, &about);
+    kernel_sample_differences(p, s, value, hit, t, reach, &about);
     kernel_differentiate(p, &about, hit, normal);
 }
 
@@ -264,17 +266,17 @@ static void kernel_pending_group_begin(kernel_pending_group *run, const kernel_f
 
 /* Samples this rank's cells around all hits of the list; out[i] gets the samples of hits[i]. */
 static void kernel_sample_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_hit *hits,
-                                  render_samples_about *out, int64_t count)
+                                  render_difference_samples *out, int64_t count)
 {
     kernel_pending_group run;
     kernel_pending_packet_begin(&run);
     for (int64_t i = 0; i < count; i += run.count) {
-        kernel_samples_about about;
+        kernel_difference_samples about;
         kernel_pending_group_begin(&run, f, thread, hits + i, count - i);
-        kernel_sample_about(&run.packet, run.surface, run.value, run.rays, run.t, run.reach, &about);
+        kernel_sample_differences(&run.packet, run.surface, run.value, run.rays, run.t, run.reach, &about);
         for (int n = 0; n < run.count; n++) {
-            render_samples_about *own = &out[i + n];
-            *own = (render_samples_about){0, 0, {0}};
+            render_difference_samples *own = &out[i + n];
+            *own = (render_difference_samples){0, 0, {0}};
             for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
                 const bool is_found = vm_bits(about.found[k]) >> run.lanes[n] & 1;
                 own->found |= (uint32_t)is_found << k;
@@ -284,8 +286,9 @@ static void kernel_sample_pending(const kernel_frame *f, kernel_thread *thread, 
     }
 }
 
-SIMD_INLINE void kernel_load_about(const kernel_pending_group *run, const render_samples_about *samples,
-                                   kernel_samples_about *out)
+SIMD_INLINE void kernel_load_difference_samples(const kernel_pending_group *run,
+                                                const render_difference_samples *samples,
+                                                kernel_difference_samples *out)
 {
     for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
         float values[SIMD_WIDTH] = {0};

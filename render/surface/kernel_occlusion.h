@@ -108,7 +108,7 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
         const vm room_left = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
         const vm wanted = vm_and(kernel_is_near(p, i), room_left);
         if (!vm_any(wanted)) continue;
-        if (!curved.bounds) kernel_curved_alone(c, &beam, &curved);
+        if (!curved.bounds) kernel_curved_single_bounds(c, &beam, &curved);
         kernel_occlusion_roots(p, o, &curved, i, wanted);
     }
 }

@@ -48,12 +48,12 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
 /* Lights `count` hits of the waiting list from index `first` on, by the merged samples of all ranks. out[i] becomes the
  * fragment of hit i. */
 static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_list *list,
-                                 const render_samples_about *samples, int64_t first, int64_t count, fragment *out)
+                                 const render_difference_samples *samples, int64_t first, int64_t count, fragment *out)
 {
     kernel_pending_group run;
     kernel_pending_packet_begin(&run);
     for (int64_t i = first; i < first + count; i += run.count) {
-        kernel_samples_about about;
+        kernel_difference_samples about;
         vf normal[3], colour[3];
         kernel_pending_group_begin(&run, f, thread, list->items + i, first + count - i);
         for (int a = 0; a < 3; a++) {
@@ -63,7 +63,7 @@ static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, c
                 colour[a][run.lanes[n]] = list->shadings[i + n].colour[a];
             }
         }
-        kernel_load_about(&run, samples + i, &about);
+        kernel_load_difference_samples(&run, samples + i, &about);
         kernel_differentiate(&run.packet, &about, run.rays, normal);
         const float opacity = run.surface->layer->opacity;
         const vf kind = vf_set((float)((int)run.surface->first_kind + run.value));

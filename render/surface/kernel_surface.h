@@ -169,9 +169,9 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
         const vf along = vf_select(vf_lt(vf_set(0), length), (t - i.t_in) / length, vf_set(0));
         at.w = i.w_in + along * (i.w_out - i.w_in);
     }
-    kernel_along along;
+    kernel_line_field along;
     if (state->surface->layer->lines) {
-        kernel_tet_along(p, state->surface, c, t, at.normal, &along);
+        kernel_tet_line_field(p, state->surface, c, t, at.normal, &along);
         at.along = &along;
     }
     kernel_accept(p, state, c, value, hit, &at);
@@ -201,9 +201,9 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *stat
     }
     if (state->surface->layer->colour_map)
         places.w = kernel_maps_value_of_type(curved->colours, vi_set(curved->lane), at->r, curved->type);
-    kernel_along along;
+    kernel_line_field along;
     if (state->surface->layer->lines) {
-        kernel_curved_along(p, state->surface, c, map, at->r, &along);
+        kernel_curved_line_field(p, state->surface, c, map, at->r, &along);
         places.along = &along;
     }
     kernel_accept(p, state, c, value, hit, &places);
@@ -286,7 +286,7 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
     if (!vm_any(any)) return;
     if (!curved->bounds) {
         const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
-        kernel_curved_alone(c, &beam, curved);
+        kernel_curved_single_bounds(c, &beam, curved);
     }
     if (!state->is_contracted) known = kernel_curved_accept_contracted(p, state, c, curved, value, any);
     for (int n = 0; n < count; n++) {
@@ -591,9 +591,9 @@ static vm kernel_profile_walk_next(const kernel_poly_crossings *r, const kernel_
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the hits, in the tet that contains the
  * hit or is nearest to it. */
-static __attribute__((noinline)) void kernel_polyhedron_along(const kernel_packet *p, const kernel_surface *s,
-                                                              const kernel_poly_crossings *r, vm hit, vf t,
-                                                              kernel_along *out)
+static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_packet *p, const kernel_surface *s,
+                                                                   const kernel_poly_crossings *r, vm hit, vf t,
+                                                                   kernel_line_field *out)
 {
     const polyhedron *c = r->cell;
     const grid_field *field = &s->layer->lines->field.fields[c->part];
@@ -601,7 +601,7 @@ static __attribute__((noinline)) void kernel_polyhedron_along(const kernel_packe
     double mean = 0;
     kernel_polyhedron_facets(r, hit, t, facets);
     for (int i = 0; i < c->vertex_count; i++) mean += kernel_lines_value(s, field, c->vertices[i]) / c->vertex_count;
-    *out = (kernel_along){.value = vf_set(NAN)};
+    *out = (kernel_line_field){.value = vf_set(NAN)};
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
         if (facets[ray] < 0) continue;
@@ -637,9 +637,9 @@ static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *sta
         kernel_polyhedron_smooth(p, r->cell, state->surface->layer, r, hit, walk->t, at.normal);
     else
         kernel_polyhedron_normal(p, r->cell, r, hit, walk->t, at.normal);
-    kernel_along along;
+    kernel_line_field along;
     if (state->surface->layer->lines) {
-        kernel_polyhedron_along(p, state->surface, r, hit, walk->t, &along);
+        kernel_polyhedron_line_field(p, state->surface, r, hit, walk->t, &along);
         at.along = &along;
     }
     kernel_accept(p, state, NULL, value, hit, &at);

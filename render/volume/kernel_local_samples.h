@@ -79,7 +79,7 @@ static __attribute__((noinline, cold)) void kernel_local_decide(kernel_tile_trac
     kernel_volume_state state = {b->lanes.volume, &b->packets[at / SIMD_WIDTH].samples};
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_local_lanes *l = &b->lanes;
-    if (!kernel_tile_ready_alone(t, l->volume, l->part, q->cell[lane], true, lane, &l->alone)) return;
+    if (!kernel_tile_ready_single(t, l->volume, l->part, q->cell[lane], true, lane, &l->alone)) return;
     const vm ray = vm_and(p->active, vm_from_bits(1u << at % SIMD_WIDTH));
     const int intervals = kernel_curved_intervals(p, &cells->cell, ray, list);
     for (int k = 0; k < intervals; k++)

@@ -220,9 +220,9 @@ static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_til
 /* ---- rays ---- */
 
 /* Processes the rays in `wanted` in single cells; rays of the same cell and packet are processed together. */
-static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_trace *t, kernel_local_segment_batch *b,
-                                                                  const kernel_local_queue *q,
-                                                                  const kernel_lane_rays *rays, unsigned wanted)
+static __attribute__((noinline)) void
+kernel_local_segments_process_singly(kernel_tile_trace *t, kernel_local_segment_batch *b, const kernel_local_queue *q,
+                                     const kernel_lane_rays *rays, unsigned wanted)
 {
     int32_t at[SIMD_WIDTH], lane[SIMD_WIDTH];
     memcpy(at, &rays->at, sizeof at);
@@ -239,7 +239,7 @@ static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_tr
         }
         kernel_local_lanes *l = &b->lanes;
         const uint32_t cell = q->cell[lane[first]];
-        if (!kernel_tile_ready_alone(t, l->volume, l->part, cell, false, lane[first], &l->alone)) continue;
+        if (!kernel_tile_ready_single(t, l->volume, l->part, cell, false, lane[first], &l->alone)) continue;
         const kernel_cell *c = &t->thread->tile_cells->cell;
         kernel_packet *p = &t->packets[packet];
         const vm active = p->active;
@@ -279,7 +279,8 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_
     words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
     if (kernel_has_triangles(type)) kernel_local_list_add(&b->crossed[1], vm_andnot(crossed.two, on_quad), words);
-    if (__builtin_expect(vm_any(crossed.alone), 0)) kernel_local_segments_alone(t, b, q, &rays, vm_bits(crossed.alone));
+    if (__builtin_expect(vm_any(crossed.alone), 0))
+        kernel_local_segments_process_singly(t, b, q, &rays, vm_bits(crossed.alone));
 }
 
 /* Adds the segments of a vector of rays, from index n on, each of which crosses two faces of its cell. */
@@ -306,7 +307,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     const vm coarse = vm_and(p.active, kernel_local_count(t, &b->budget, &p));
     kernel_local_emit(b, &p, vm_andnot(p.active, coarse));
     if (__builtin_expect(vm_any(coarse), 0)) alone = vm_or(alone, kernel_local_segments_parts(t, b, &p, coarse, type));
-    if (__builtin_expect(vm_any(alone), 0)) kernel_local_segments_alone(t, b, q, &p.rays, vm_bits(alone));
+    if (__builtin_expect(vm_any(alone), 0)) kernel_local_segments_process_singly(t, b, q, &p.rays, vm_bits(alone));
 }
 
 /* Lists those of the rays from index n on that may meet their cells within the window. */

@@ -177,8 +177,8 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
 
 /* Emits each sample or segment as a fragment for the fold, and marks those in front of which another rank may have
  * fragments. The current fragment then has no light of its own, so that nothing is emitted when it ends. */
-SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
-                                    vf clear)
+SIMD_INLINE void kernel_blend_separate(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
+                                       vf clear)
 {
     const vm fresh = vm_andnot(has, b->open);
     const kernel_fragments own = {
@@ -256,7 +256,7 @@ SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_blend *b, const ke
             b->contact_out = vf_select(has, s->t_out[n], b->contact_out);
         }
         if (is_folded) {
-            kernel_blend_apart(p, b, has, t, t, colour, clear);
+            kernel_blend_separate(p, b, has, t, t, colour, clear);
             continue;
         }
         b->t_first = vf_select(fresh, t, b->t_first);

@@ -116,14 +116,14 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
             kernel_integrate(pieces, has, &run, &light);
         kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in, t_out)));
         if (p->frame->job->reproducible)
-            kernel_blend_apart(p, b, has, t_in, t_out, light.colour, light.transmittance);
+            kernel_blend_separate(p, b, has, t_in, t_out, light.colour, light.transmittance);
         else
             kernel_blend_light(b, has, t_in, t_out, &light);
     }
     const vm heaped = kernel_shows(list->heap.colour, list->heap.transmittance);
     if (!vm_any(heaped)) return;
     if (p->frame->job->reproducible)
-        kernel_blend_apart(p, b, heaped, b->t_last, b->t_last, list->heap.colour, list->heap.transmittance);
+        kernel_blend_separate(p, b, heaped, b->t_last, b->t_last, list->heap.colour, list->heap.transmittance);
     else
         kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
 }

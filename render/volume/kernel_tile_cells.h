@@ -79,8 +79,9 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
 /* Makes a batch's cell the tile's current cell, ready for the rays of all blocks, unless it already is. cell: its
  * index; lane: its lane in the batch. Returns false if it is invisible. *alone: the lane whose cell is the current one,
  * or -1. */
-static __attribute__((noinline, cold)) bool kernel_tile_ready_alone(kernel_tile_trace *t, int volume, int part,
-                                                                    uint32_t cell, bool is_pencil, int lane, int *alone)
+static __attribute__((noinline, cold)) bool kernel_tile_ready_single(kernel_tile_trace *t, int volume, int part,
+                                                                     uint32_t cell, bool is_pencil, int lane,
+                                                                     int *alone)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     const grid *g = t->frame->job->parts[part].cells;

@@ -252,9 +252,9 @@ SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segme
 }
 
 /* Emits all segments of all volumes as fragments of their own, at once and without windows. */
-static __attribute__((noinline, cold)) void kernel_tile_segments_apart(kernel_tile_trace *t, kernel_tile_segments *s,
-                                                                       const int *packets, int count,
-                                                                       const kernel_placement *reach)
+static __attribute__((noinline, cold)) void kernel_tile_segments_separate(kernel_tile_trace *t, kernel_tile_segments *s,
+                                                                          const int *packets, int count,
+                                                                          const kernel_placement *reach)
 {
     for (int volume = 0; volume < t->frame->volume_count; volume++) {
         kernel_tile_segments_of(t, s, packets, count, volume, reach->near);
@@ -293,7 +293,7 @@ static void kernel_tile_segments_trace(kernel_tile_trace *t)
     for (int n = 0; n < count; n++)
         kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, t->first_fragment);
     if (t->frame->job->separate_samples)
-        kernel_tile_segments_apart(t, s, packets, count, &reach);
+        kernel_tile_segments_separate(t, s, packets, count, &reach);
     else
         kernel_tile_segments_windows(t, s, packets, count, &reach);
     for (int n = 0; n < count; n++) {

@@ -106,8 +106,8 @@ SIMD_INLINE bool kernel_tet_samples_fit(const kernel_frame *f)
 }
 
 /* Emits a sample that also lies in another cell as a fragment of its own. */
-static __attribute__((noinline, cold)) void kernel_tet_sample_apart(kernel_tile_trace *t, kernel_local_batch *b, int at,
-                                                                    float depth, float value)
+static __attribute__((noinline, cold)) void kernel_tet_sample_separate(kernel_tile_trace *t, kernel_local_batch *b,
+                                                                       int at, float depth, float value)
 {
     const int packet = at / SIMD_WIDTH;
     const kernel_interval cell = {0};
@@ -131,7 +131,7 @@ SIMD_INLINE void kernel_tet_samples_put(kernel_tile_trace *t, kernel_local_batch
         float *to = (float *)(void *)&b->packets[at[i] / SIMD_WIDTH].samples.value[b->lanes.volume][number[i]];
         to += at[i] % SIMD_WIDTH;
         if (__builtin_expect(*to == *to, 0))
-            kernel_tet_sample_apart(t, b, at[i], depth[i], values[i]);
+            kernel_tet_sample_separate(t, b, at[i], depth[i], values[i]);
         else
             *to = values[i];
     }

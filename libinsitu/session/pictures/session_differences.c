@@ -20,7 +20,7 @@
 enum {
     ROUND_HITS = 1 << 18,
     REQUEST_WORDS = sizeof(render_pending_hit) / 8,
-    ANSWER_WORDS = sizeof(render_samples_about) / 8
+    ANSWER_WORDS = sizeof(render_difference_samples) / 8
 };
 
 typedef struct differing {
@@ -35,7 +35,7 @@ typedef struct differing {
     render_box *boxes;
     /* The hits of the current round and their samples. */
     int64_t first, count;
-    render_samples_about *samples;
+    render_difference_samples *samples;
     int64_t *requested_hits; /* hits for which samples are requested, in the order of the message */
 } differing;
 
@@ -137,7 +137,7 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
     if (!out->counts || !out->words) return false;
     for (int r = 0; r < d->ranks; r++) out->counts[r] = in->counts[r] / REQUEST_WORDS * ANSWER_WORDS;
     render_differences_sample(d->job, (const render_pending_hit *)(const void *)in->words,
-                              (render_samples_about *)(void *)out->words, count, error);
+                              (render_difference_samples *)(void *)out->words, count, error);
     return true;
 }
 
@@ -155,7 +155,7 @@ static insitu_status exchange_round(differing *d, base_error *error)
         for (int64_t i = 0; i < sent_requests.total / REQUEST_WORDS; i++)
             render_differences_merge(
                 &d->samples[d->requested_hits[i]],
-                (const render_samples_about *)(const void *)(received_answers.words + i * ANSWER_WORDS));
+                (const render_difference_samples *)(const void *)(received_answers.words + i * ANSWER_WORDS));
     session_mail_free(&sent_requests);
     session_mail_free(&received_requests);
     session_mail_free(&sent_answers);
