@@ -102,7 +102,7 @@ SIMD_INLINE vm kernel_inside(vm rays, vf ij, vf jk, vf ik)
 
 /* Returns the sum of a value (depth or field) over a crossed triangle's vertices, weighted by the edge functions of the
  * opposite edges. It must still be divided by the sum of the weights. All terms of the sum have the same sign. */
-SIMD_INLINE vf kernel_weigh_value(vf ij, vf jk, vf ik, float i, float j, float k)
+SIMD_INLINE vf kernel_weighted_value(vf ij, vf jk, vf ik, float i, float j, float k)
 {
     return vf_muladd(ij, vf_set(k), vf_muladd(-ik, vf_set(j), jk * i));
 }
@@ -130,14 +130,14 @@ static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_
 }
 
 /* Returns the rays that cross a triangle but whose sum of weights is too small to be accurate. */
-SIMD_INLINE vm kernel_weak(vm hit, vf weight, float least)
+SIMD_INLINE vm kernel_is_inaccurate(vm hit, vf weight, float least)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), vf_set(least)));
 }
 
 /* Computes the triangle's edge functions again on the given rays, from its projected vertices. */
 static __attribute__((noinline, cold)) void
-kernel_triangle_mend(const kernel_packet *p, const kernel_tile_position ijk[3], vm weak, vf *ij, vf *jk, vf *ik)
+kernel_triangle_recompute(const kernel_packet *p, const kernel_tile_position ijk[3], vm weak, vf *ij, vf *jk, vf *ik)
 {
     const vf ax = kernel_project_x(p, ijk[0]), ay = kernel_project_y(p, ijk[0]);
     const vf bx = kernel_project_x(p, ijk[1]), by = kernel_project_y(p, ijk[1]);
@@ -189,27 +189,27 @@ SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, 
 
 /* Computes the weights of the triangle i, j, k again on rays for which they are not accurate enough. least: an upper
  * bound of kernel_triangle_least() for the triangle, tested first. */
-SIMD_INLINE void kernel_weights_mend(const kernel_packet *p, float least, vm hit, kernel_tile_position i,
+SIMD_INLINE void kernel_weights_recompute(const kernel_packet *p, float least, vm hit, kernel_tile_position i,
                                      kernel_tile_position j, kernel_tile_position k, kernel_weights *w)
 {
     if (!p->is_pencil) return;
     const vf weight = kernel_weight(w->ij, w->jk, w->ik);
-    if (__builtin_expect(!vm_any(kernel_weak(hit, weight, least)), 1)) return;
-    const vm weak = kernel_weak(hit, weight, kernel_triangle_least(p, i, j, k));
+    if (__builtin_expect(!vm_any(kernel_is_inaccurate(hit, weight, least)), 1)) return;
+    const vm weak = kernel_is_inaccurate(hit, weight, kernel_triangle_least(p, i, j, k));
     vf ij = w->ij, jk = w->jk, ik = w->ik;
     if (!vm_any(weak)) return;
-    kernel_triangle_mend(p, (const kernel_tile_position[3]){i, j, k}, weak, &ij, &jk, &ik);
+    kernel_triangle_recompute(p, (const kernel_tile_position[3]){i, j, k}, weak, &ij, &jk, &ik);
     *w = kernel_weights_of(w->i, w->j, w->k, ij, jk, ik);
 }
 
-SIMD_INLINE vf kernel_weigh(const kernel_weights *w, float fi, float fj, float fk)
+SIMD_INLINE vf kernel_weighted_sum(const kernel_weights *w, float fi, float fj, float fk)
 {
-    return kernel_weigh_value(w->ij, w->jk, w->ik, fi, fj, fk) * w->inverse;
+    return kernel_weighted_value(w->ij, w->jk, w->ik, fi, fj, fk) * w->inverse;
 }
 
-SIMD_INLINE vf kernel_weigh_depth(const kernel_weights *w, const float *z)
+SIMD_INLINE vf kernel_weighted_depth(const kernel_weights *w, const float *z)
 {
-    return kernel_weigh(w, z[w->i], z[w->j], z[w->k]);
+    return kernel_weighted_sum(w, z[w->i], z[w->j], z[w->k]);
 }
 
 /* Parameters of a search for crossings that are common to all faces of the cell: the packet and its rays, the cell, its
@@ -227,9 +227,9 @@ SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kerne
 {
     const kernel_cell *c = s->cell;
     const kernel_shape *shape = s->shape;
-    out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
+    out->v = kernel_weighted_sum(w, c->f[w->i], c->f[w->j], c->f[w->k]);
     for (int a = 0; a < 3; a++)
-        out->r[a] = kernel_weigh(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
+        out->r[a] = kernel_weighted_sum(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
 }
 
 /* Returns the edge function from one corner to another, negated if they are not in the order of coordinates. */
@@ -296,10 +296,10 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
     if (!vm_any(hit)) return false;
     kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]],
                                          edges->e[ijk[0]][ijk[2]]);
-    kernel_weights_mend(s->packet, c->least[0], hit, kernel_cell_position(c, w.i), kernel_cell_position(c, w.j),
+    kernel_weights_recompute(s->packet, c->least[0], hit, kernel_cell_position(c, w.i), kernel_cell_position(c, w.j),
                         kernel_cell_position(c, w.k), &w);
     out->mask = hit;
-    out->t = kernel_weigh_depth(&w, c->z);
+    out->t = kernel_weighted_depth(&w, c->z);
     kernel_triangle_values(s, &w, out);
     return true;
 }

@@ -162,7 +162,7 @@ typedef struct kernel_curved_triangle {
 } kernel_curved_triangle;
 
 /* Returns the rays on which the triangle's weights are not good enough. number: the triangle's, per ray. */
-SIMD_INLINE vm kernel_curved_triangle_weak(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
+SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
                                            const kernel_curved_triangle *own)
 {
     const vf weight = kernel_weight(own->e[0], own->e[1], own->e[2]);
@@ -170,7 +170,7 @@ SIMD_INLINE vm kernel_curved_triangle_weak(const kernel_transformed_curved *h, v
 }
 
 /* Computes edge functions in doubt, and those of weak weights, again from projected vertices. */
-static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const kernel_transformed_curved *h,
+static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(const kernel_transformed_curved *h,
                                                                         const kernel_lane_rays *p, vm rays, vi number,
                                                                         const vm doubt[3], kernel_curved_triangle *own)
 {
@@ -185,7 +185,7 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const ke
     e[1] = kernel_edge_between(x[1], y[1], x[2], y[2]);
     e[2] = kernel_edge_between(x[0], y[0], x[2], y[2]);
     for (int i = 0; i < 3; i++) own->e[i] = vf_select(doubt[i], e[i], own->e[i]);
-    const vm weak = kernel_curved_triangle_weak(h, p->lane, rays, number, own);
+    const vm weak = kernel_curved_triangle_inaccurate(h, p->lane, rays, number, own);
     for (int i = 0; i < 3; i++) own->e[i] = vf_select(weak, e[i], own->e[i]);
 }
 
@@ -206,12 +206,12 @@ SIMD_INLINE void kernel_curved_triangle_gather(const kernel_transformed_curved *
         doubt[i] = vm_andnot(rays, vf_lt(vf_gather(lines->bound[i], at), vf_abs(own->e[i])));
         any = vm_or(any, doubt[i]);
     }
-    any = vm_or(any, kernel_curved_triangle_weak(h, p->lane, rays, number, own));
-    if (__builtin_expect(vm_any(any), 0)) kernel_curved_triangle_mend(h, p, rays, number, doubt, own);
+    any = vm_or(any, kernel_curved_triangle_inaccurate(h, p->lane, rays, number, own));
+    if (__builtin_expect(vm_any(any), 0)) kernel_curved_triangle_recompute(h, p, rays, number, doubt, own);
 }
 
 /* Returns the mean of the corners' values v, weighted by the edge functions. */
-SIMD_INLINE vf kernel_curved_weigh(const kernel_curved_triangle *own, const vf v[3], vf inverse)
+SIMD_INLINE vf kernel_curved_weighted_mean(const kernel_curved_triangle *own, const vf v[3], vf inverse)
 {
     return vf_muladd(own->e[0], v[2], vf_muladd(-own->e[2], v[1], own->e[1] * v[0])) * inverse;
 }
@@ -223,12 +223,12 @@ SIMD_INLINE void kernel_curved_triangle_reference(const kernel_transformed_curve
     const vf inverse = 1.0f / kernel_weight(own->e[0], own->e[1], own->e[2]);
     vf v[3];
     for (int i = 0; i < 3; i++) v[i] = kernel_curved_pick(h->at[2], count, lane, own->corner[i]);
-    out->t = kernel_curved_weigh(own, v, inverse);
+    out->t = kernel_curved_weighted_mean(own, v, inverse);
     for (int i = 0; i < 3; i++) v[i] = kernel_curved_pick(h->at[3], count, lane, own->corner[i]);
-    out->value = kernel_curved_weigh(own, v, inverse);
+    out->value = kernel_curved_weighted_mean(own, v, inverse);
     for (int a = 0; a < 3; a++) {
         for (int i = 0; i < 3; i++) v[i] = kernel_curved_own(kernel_cell_shape(type), count, a, own->corner[i]);
-        out->r[a] = kernel_curved_weigh(own, v, inverse);
+        out->r[a] = kernel_curved_weighted_mean(own, v, inverse);
     }
 }
 

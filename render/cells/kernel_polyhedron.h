@@ -162,9 +162,9 @@ SIMD_INLINE void kernel_polyhedron_transform(polyhedron *c, const kernel_packet 
 SIMD_INLINE void kernel_triangle_values_at(const polyhedron *c, const kernel_weights *w, bool has_colour,
                                            kernel_triangle_crossings *out)
 {
-    out->t = kernel_weigh_depth(w, c->z);
-    out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
-    out->w = has_colour ? kernel_weigh(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
+    out->t = kernel_weighted_depth(w, c->z);
+    out->v = kernel_weighted_sum(w, c->f[w->i], c->f[w->j], c->f[w->k]);
+    out->w = has_colour ? kernel_weighted_sum(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
     out->t_face = out->t;
     out->v_face = out->v;
     out->w_face = out->w;
@@ -181,7 +181,7 @@ SIMD_INLINE void kernel_poly_edge(kernel_poly_crossings *r, int number, int a, i
 SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, kernel_weights *w)
 {
     const polyhedron *c = r->cell;
-    kernel_weights_mend(r->packet, c->least, hit, kernel_polyhedron_position(c, w->i),
+    kernel_weights_recompute(r->packet, c->least, hit, kernel_polyhedron_position(c, w->i),
                         kernel_polyhedron_position(c, w->j), kernel_polyhedron_position(c, w->k), w);
 }
 

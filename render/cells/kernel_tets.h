@@ -157,7 +157,7 @@ SIMD_INLINE void kernel_ends_order(const kernel_ends *ends, bool has_colour, ker
 }
 
 /* Returns the rays that cross face n and whose weights are not good enough. */
-SIMD_INLINE vm kernel_tets_weak(const kernel_tets *t, int n, vm hit, vf weight)
+SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf weight)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n], least[n])));
 }
@@ -175,7 +175,7 @@ SIMD_INLINE kernel_ends kernel_tets_choose_exactly(const kernel_tets *t, vm rays
         const signed char *face = kernel_tet_face[n];
         const int i = face[0], j = face[1], k = face[2];
         vf ij = e[(int)face[3]], jk = e[(int)face[4]], ik = e[(int)face[5]];
-        const vm weak = kernel_tets_weak(t, n, hit[n], kernel_weight(ij, jk, ik));
+        const vm weak = kernel_tets_inaccurate(t, n, hit[n], kernel_weight(ij, jk, ik));
         if (vm_any(weak)) {
             ij = vf_select(weak, kernel_edge_between(x[i], y[i], x[j], y[j]), ij);
             jk = vf_select(weak, kernel_edge_between(x[j], y[j], x[k], y[k]), jk);
@@ -187,7 +187,7 @@ SIMD_INLINE kernel_ends kernel_tets_choose_exactly(const kernel_tets *t, vm rays
 }
 
 /* As above. is_one is made a constant, because one packet in some has such weights. */
-static __attribute__((noinline, cold)) kernel_ends kernel_tets_mend(const kernel_tets *t, vm rays,
+static __attribute__((noinline, cold)) kernel_ends kernel_tets_recompute(const kernel_tets *t, vm rays,
                                                                     const vf e[KERNEL_TET_EDGES], bool has_colour)
 {
     const kernel_tets one = {.is_one = true, .packet = t->packet, .one = t->one};
@@ -215,11 +215,11 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
     }
     kernel_ends ends = kernel_tets_choose(hit, sums);
     if (is_pencil) {
-        for (int n = 0; n < 4; n++) weak[n] = kernel_tets_weak(t, n, hit[n], sums[n].weight);
+        for (int n = 0; n < 4; n++) weak[n] = kernel_tets_inaccurate(t, n, hit[n], sums[n].weight);
         if (__builtin_expect(vm_any(vm_or(vm_or(weak[0], weak[1]), vm_or(weak[2], weak[3]))), 0)) {
             kernel_lane_rays own;
             const kernel_tets copy = kernel_tets_copy(t, &own);
-            ends = kernel_tets_mend(&copy, rays, e, has_colour);
+            ends = kernel_tets_recompute(&copy, rays, e, has_colour);
         }
     }
     kernel_ends_order(&ends, has_colour, out);

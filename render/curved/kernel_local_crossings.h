@@ -259,7 +259,7 @@ SIMD_INLINE void kernel_local_quad_end(const kernel_local_corners *c, int type, 
     }
 }
 
-SIMD_INLINE vf kernel_local_weigh(const vf e[3], vf inverse, vf i, vf j, vf k)
+SIMD_INLINE vf kernel_local_weighted_mean(const vf e[3], vf inverse, vf i, vf j, vf k)
 {
     return vf_muladd(e[0], k, vf_muladd(-e[2], j, e[1] * i)) * inverse;
 }
@@ -272,11 +272,11 @@ SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int ty
     const vf e[3] = {vf_diff_of_products(i[0], j[1], j[0], i[1]), vf_diff_of_products(j[0], k[1], k[0], j[1]),
                      vf_diff_of_products(i[0], k[1], k[0], i[1])};
     const vf inverse = 1.0f / kernel_weight(e[0], e[1], e[2]);
-    out->t = kernel_local_weigh(e, inverse, i[2], j[2], k[2]);
-    out->value = kernel_local_weigh(e, inverse, i[3], j[3], k[3]);
+    out->t = kernel_local_weighted_mean(e, inverse, i[2], j[2], k[2]);
+    out->value = kernel_local_weighted_mean(e, inverse, i[3], j[3], k[3]);
     for (int a = 0; a < 3; a++)
         out->r[a] =
-            kernel_local_weigh(e, inverse, kernel_local_own(type, a, c->vertex[0]),
+            kernel_local_weighted_mean(e, inverse, kernel_local_own(type, a, c->vertex[0]),
                                kernel_local_own(type, a, c->vertex[1]), kernel_local_own(type, a, c->vertex[2]));
 }
 

@@ -489,7 +489,7 @@ SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_cell_interval *sp
 /* Returns by how much a subinterval's chord must be raised so that its mean equals the field's mean. For a parabola
  * that is a twelfth of the second difference, which is estimated from the adjacent subintervals. A single subinterval
  * is not raised. */
-SIMD_INLINE vf kernel_parts_lift(const kernel_parts *s, vm is_first, vm is_last)
+SIMD_INLINE vf kernel_parts_chord_offset(const kernel_parts *s, vm is_first, vm is_last)
 {
     const vf zero = vf_set(0), both = 0.5f * (s->bend + s->next_bend);
     const vf bend = vf_select(is_first, vf_select(is_last, zero, s->next_bend), vf_select(is_last, s->bend, both));
@@ -538,7 +538,7 @@ SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segment_
         const vm inner = vm_and(open, vf_lt(vf_set((float)n), s.count));
         const vf next = kernel_parts_end(p, span, &s, inner, n + 1, &s.ahead);
         s.next_bend = (s.before - s.after) + (s.ahead - s.after);
-        const vf lift = kernel_parts_lift(&s, n == 1 ? rays : vm_none(), vm_not(inner));
+        const vf lift = kernel_parts_chord_offset(&s, n == 1 ? rays : vm_none(), vm_not(inner));
         const vm mine = vm_and(vf_le(list->t_begin, s.from), vf_lt(s.from, list->t_end));
         if (!(state->mixing > 0)) {
             const kernel_interval sub = {

@@ -122,7 +122,7 @@ typedef struct kernel_local_pairs {
 } kernel_local_pairs;
 
 /* Returns by how much a single chord must be raised so that its mean equals the field's mean. */
-SIMD_INLINE vf kernel_local_lift(const kernel_local_pairs *p)
+SIMD_INLINE vf kernel_local_chord_offset(const kernel_local_pairs *p)
 {
     const vf *d = p->off_chord.field;
     return (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
@@ -132,7 +132,7 @@ SIMD_INLINE vf kernel_local_lift(const kernel_local_pairs *p)
  * the field's, are outside the range of values for which the error bounds hold. */
 SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_local_pairs *p)
 {
-    const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_lift(p);
+    const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_chord_offset(p);
     const vf low = vf_min(v0, v1) + lift, high = vf_max(v0, v1) + lift;
     return vm_or(vf_lt(low, kernel_gather_lane(b->bounds.low, p->rays.lane)),
                  vf_lt(kernel_gather_lane(b->bounds.high, p->rays.lane), high));

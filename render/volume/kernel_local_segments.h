@@ -117,7 +117,7 @@ SIMD_INLINE void kernel_local_put_all(const kernel_local_segment_batch *b, vi pl
 /* Adds the segments of rays for which one segment is enough. */
 SIMD_INLINE void kernel_local_emit_one(const kernel_local_segment_batch *b, const kernel_local_pairs *p, vm rays)
 {
-    const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_lift(p);
+    const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_chord_offset(p);
     const vf ends[4] = {t0, t1, p->ends[0].value + lift, p->ends[1].value + lift};
     kernel_local_put_all(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
 }
