@@ -346,7 +346,7 @@ typedef struct kernel_memory {
     kernel_cell_cache packet_cells;
     kernel_cell tile_cell;
     kernel_curved tile_curved;
-    kernel_curved_room tile_curved_room;
+    kernel_curved_storage tile_curved_room;
     kernel_tile_trace tile;
     kernel_tile_volume volume;
     kernel_tile_segments segments;

@@ -76,7 +76,7 @@ static void chord_leaf(kernel_packet *p, void *opaque_state, int part, const uin
 static void chord_tile_rays(kernel_packet *p, const kernel_lanes *l)
 {
     const bool flat = p->frame->job->camera.is_orthographic;
-    const double reach = kernel_reach(p->frame);
+    const double reach = kernel_slope_to_origin(p->frame);
     float lanes[4][SIMD_WIDTH];
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const double dx = l->px[i] - p->tile->centre_x, dy = l->py[i] - p->tile->centre_y;

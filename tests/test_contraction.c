@@ -162,13 +162,13 @@ static void contract(const batch *b, kernel_contracted *out, kernel_bounds *boun
     int32_t own[SIMD_WIDTH];
     vi lanes;
     kernel_contraction c;
-    kernel_sight ray;
+    kernel_cell_ray ray;
     kernel_map map;
     kernel_point at;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) own[lane] = lane;
     memcpy(&lanes, own, sizeof lanes);
     kernel_bounds_of(b->type, b->at, &b->beam, bounds);
-    kernel_sight_of(&cells, &b->rays, lanes, &ray);
+    kernel_cell_ray_of(&cells, &b->rays, lanes, &ray);
     kernel_contraction_of(bounds, lanes, b->type, &c);
     KERNEL_OF_TYPE(b->type, kernel_contract, &c, &ray, vm_all_lanes(), out);
     kernel_maps_of_type(b->at, lanes, b->type, &map);

@@ -243,7 +243,7 @@ typedef struct rates {
 static void judge_bundle(bundle *b, rates *r)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_curved_room room;
+    kernel_curved_storage room;
     kernel_curved curved = {.room = &room};
     const int intervals = bundle_intervals(b, list, &curved);
     r->monotone += room.bounds.jump[0] >= 0;

@@ -401,7 +401,7 @@ static void judge_bundle(bundle *b, const reference_cell *cell, course *c, count
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_map map;
-    kernel_curved_room room;
+    kernel_curved_storage room;
     kernel_curved curved = {.room = &room};
     const int intervals = bundle_intervals(b, list, &curved);
     kernel_map_setup(&map, &b->cell);

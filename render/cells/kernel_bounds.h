@@ -531,14 +531,14 @@ typedef struct kernel_curved {
     const float (*at)[8][SIMD_WIDTH];
     const float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
     const kernel_bounds *bounds;        /* NULL if the bounds of a single cell have not been computed yet */
-    struct kernel_curved_room *room;    /* memory for the data and bounds of a single cell */
+    struct kernel_curved_storage *room;    /* memory for the data and bounds of a single cell */
 } kernel_curved;
 
 /* Memory for a single cell, whose data are copied to all lanes. */
-typedef struct kernel_curved_room {
+typedef struct kernel_curved_storage {
     float at[4][8][SIMD_WIDTH], colours[8][SIMD_WIDTH];
     kernel_bounds bounds;
-} kernel_curved_room;
+} kernel_curved_storage;
 
 /* Returns the range of directions and origins of the tile's rays. */
 SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
@@ -552,7 +552,7 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
 static __attribute__((noinline, unused)) void kernel_curved_single_bounds(const kernel_cell *c, const kernel_beam *beam,
                                                                           kernel_curved *out)
 {
-    kernel_curved_room *room = out->room;
+    kernel_curved_storage *room = out->room;
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
     for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, room->at[n]);
     kernel_map_spread(c->g, c->count, room->colours);

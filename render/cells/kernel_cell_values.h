@@ -76,7 +76,7 @@ SIMD_INLINE float kernel_clamp(double v, double limit)
 }
 
 /* Returns whether some value between the smallest and the largest of these is visible with the transfer function. */
-SIMD_INLINE bool kernel_values_show(const double *values, int count, const kernel_transfer *t)
+SIMD_INLINE bool kernel_values_are_visible(const double *values, int count, const kernel_transfer *t)
 {
     double low = values[0], high = low;
     for (int i = 1; i < count; i++) {
@@ -86,9 +86,9 @@ SIMD_INLINE bool kernel_values_show(const double *values, int count, const kerne
     return kernel_visible_values_overlap(&t->visible_values, kernel_clamp(low, 3e38), kernel_clamp(high, 3e38));
 }
 
-SIMD_INLINE bool kernel_cell_shows(const kernel_cell *c, const kernel_transfer *t)
+SIMD_INLINE bool kernel_cell_is_visible(const kernel_cell *c, const kernel_transfer *t)
 {
-    return kernel_values_show(c->values, c->count, t);
+    return kernel_values_are_visible(c->values, c->count, t);
 }
 
 /* Sets f to the values in the transfer function's domain, clamped to +-1e18 so that interpolation cannot overflow. */

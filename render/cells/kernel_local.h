@@ -114,11 +114,11 @@ SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
 }
 
 /* The nonlinear terms of a cell's map at given reference coordinates, and their derivatives along each of these. */
-typedef struct kernel_bend {
+typedef struct kernel_nonlinear_terms {
     vf term[KERNEL_BENT_TERMS], along[KERNEL_BENT_TERMS][3];
-} kernel_bend;
+} kernel_nonlinear_terms;
 
-SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
+SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], kernel_nonlinear_terms *b)
 {
     const vf zero = vf_set(0);
     if (kernel_is_box(type)) {
@@ -291,9 +291,9 @@ SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
     for (int n = 0; n < (kernel_is_box(type) ? 8 : kernel_is_prism(type) ? 6 : 0); n++) {
         const float *corner = corners[kernel_is_box(type) ? 0 : 1][n];
         const vf r[3] = {vf_set(corner[0]), vf_set(corner[1]), vf_set(corner[2])};
-        kernel_bend b;
+        kernel_nonlinear_terms b;
         vf sum = vf_set(0);
-        kernel_bend_at(type, r, &b);
+        kernel_nonlinear_terms_at(type, r, &b);
         for (int i = 0; i < 3; i++)
             for (int a = 0; a < 3; a++) {
                 vf slope = vf_set(0);
@@ -398,7 +398,7 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
 /* Points, one per lane, each in the cell of its lane. */
 typedef struct kernel_local_points {
     vf y[3], r[3], bent[KERNEL_BENT_TERMS][3];
-    kernel_bend bend;     /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
+    kernel_nonlinear_terms bend;     /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
     vf column[3][3], det; /* columns of the adjugate of the derivatives' matrix, and 1 / its determinant in det */
 } kernel_local_points;
 
@@ -448,7 +448,7 @@ SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
         largest = vf_max(largest, vf_abs(move));
         p->r[i] = vf_select(lanes, vf_clamp(p->r[i] + move, -far, far), p->r[i]);
     }
-    kernel_bend_at(type, p->r, &p->bend);
+    kernel_nonlinear_terms_at(type, p->r, &p->bend);
     return largest;
 }
 
@@ -469,10 +469,10 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
     for (int k = 0; k < kernel_bent_terms(type); k++)
         for (int a = 0; a < 3; a++) p->bent[k][a] = kernel_gather_lane(cells->bent[k][a], lane);
     vf left[3];
-    kernel_bend_at(type, p->r, &p->bend);
+    kernel_nonlinear_terms_at(type, p->r, &p->bend);
     kernel_local_left(type, p, left);
     for (int i = 0; i < 3; i++) p->r[i] += left[i];
-    kernel_bend_at(type, p->r, &p->bend);
+    kernel_nonlinear_terms_at(type, p->r, &p->bend);
     kernel_local_derive(type, p);
     const vf first = kernel_local_step(type, p, vm_all_lanes()), second = kernel_local_step(type, p, vm_all_lanes());
     vm open = vm_not(vf_le(first * second, vf_set(5e-7f)));

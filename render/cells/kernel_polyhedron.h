@@ -92,7 +92,7 @@ typedef struct kernel_profile_piece {
     vf t0, t1, v0, v1, w0, w1;
 } kernel_profile_piece;
 
-SIMD_INLINE void *kernel_carve(char **at, size_t bytes)
+SIMD_INLINE void *kernel_scratch_alloc(char **at, size_t bytes)
 {
     void *p = *at;
     *at += (bytes + 63) & ~(size_t)63;
@@ -116,15 +116,15 @@ static bool kernel_poly_open(const kernel_packet *p, const polyhedron *c, kernel
     }
     out->packet = p;
     out->cell = c;
-    out->x = kernel_carve(&at, points * sizeof(vf));
-    out->y = kernel_carve(&at, points * sizeof(vf));
-    out->edge = kernel_carve(&at, (edges + points) * sizeof(vf));
-    out->facets = kernel_carve(&at, facets * sizeof(kernel_triangle_crossings));
-    out->left = kernel_carve(&at, facets * sizeof(vm));
-    out->met = kernel_carve(&at, facets * sizeof(int));
-    out->sheets = kernel_carve(&at, edges * sizeof(kernel_triangle_crossings));
-    out->met_sheets = kernel_carve(&at, edges * sizeof(int));
-    out->segments = kernel_carve(&at, facets * sizeof(kernel_subtet_interval));
+    out->x = kernel_scratch_alloc(&at, points * sizeof(vf));
+    out->y = kernel_scratch_alloc(&at, points * sizeof(vf));
+    out->edge = kernel_scratch_alloc(&at, (edges + points) * sizeof(vf));
+    out->facets = kernel_scratch_alloc(&at, facets * sizeof(kernel_triangle_crossings));
+    out->left = kernel_scratch_alloc(&at, facets * sizeof(vm));
+    out->met = kernel_scratch_alloc(&at, facets * sizeof(int));
+    out->sheets = kernel_scratch_alloc(&at, edges * sizeof(kernel_triangle_crossings));
+    out->met_sheets = kernel_scratch_alloc(&at, edges * sizeof(int));
+    out->segments = kernel_scratch_alloc(&at, facets * sizeof(kernel_subtet_interval));
     out->met_count = out->sheet_count = out->segment_count = 0;
     out->has_sheets = false;
     out->uneven = vm_none();
@@ -275,7 +275,7 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
     kernel_quad_corners(&ranks, loop, corner);
     for (int i = 0; i < 4; i++) corner[i] = around[corner[i]];
     const bool has_corner = kernel_facet_has(&c->facets[first], corner[1]);
-    const int twin = c->facets[first].twin, half_of[2] = {has_corner ? first : twin, has_corner ? twin : first};
+    const int other_half = c->facets[first].other_half, half_of[2] = {has_corner ? first : other_half, has_corner ? other_half : first};
     const polyhedron_facet *t[2] = {&c->facets[half_of[0]], &c->facets[half_of[1]]};
     kernel_triangle_crossings *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
     for (int half = 0; half < 2; half++) kernel_poly_facet(r, t[half], &w, m[half]);
@@ -311,7 +311,7 @@ static bool kernel_poly_cross(kernel_poly_crossings *r, vm rays, bool has_colour
     for (int i = 0; i < c->facet_count; i++) {
         kernel_weights w;
         if (c->facets[i].quad >= 0) {
-            if (i < c->facets[i].twin) kernel_poly_quad(r, i);
+            if (i < c->facets[i].other_half) kernel_poly_quad(r, i);
             continue;
         }
         r->left[i] = kernel_poly_facet(r, &c->facets[i], &w, &r->facets[i]);

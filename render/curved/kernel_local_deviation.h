@@ -109,8 +109,8 @@ typedef struct kernel_local_iterate {
 
 SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_BENT_TERMS])
 {
-    kernel_bend b;
-    kernel_bend_at(type, r, &b);
+    kernel_nonlinear_terms b;
+    kernel_nonlinear_terms_at(type, r, &b);
     memcpy(out, b.term, sizeof b.term);
 }
 

@@ -134,7 +134,7 @@ SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, 
     int left = 0;
     for (int n = 0; n < count; n++) {
         candidates[left] = entries[n];
-        left += kernel_node_shows(s->visible_values, ranges, entries[n] >> 1);
+        left += kernel_node_is_visible(s->visible_values, ranges, entries[n] >> 1);
     }
     front->count = 0;
     for (int n = 0; n < left; n++) {

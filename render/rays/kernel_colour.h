@@ -150,7 +150,7 @@ typedef struct kernel_fragments {
 } kernel_fragments;
 
 /* Returns which rays have a visible fragment: one that absorbs light or is not black (fragment_shows()). */
-SIMD_INLINE vm kernel_shows(const vf colour[3], vf transmittance)
+SIMD_INLINE vm kernel_fragment_is_visible(const vf colour[3], vf transmittance)
 {
     const vf zero = vf_set(0);
     const vm black = vm_and(vf_eq(colour[0], zero), vm_and(vf_eq(colour[1], zero), vf_eq(colour[2], zero)));

@@ -179,7 +179,7 @@ SIMD_INLINE kernel_placement kernel_tile_classify_node(const kernel_tile_trace *
                                                        unsigned blocks)
 {
     kernel_placement placement = {0};
-    if (visible_values && !kernel_node_shows(visible_values, ranges, node)) return placement;
+    if (visible_values && !kernel_node_is_visible(visible_values, ranges, node)) return placement;
     placement = kernel_box_placement(&t->tree_planes, tree, node);
     placement.blocks &= placement.far < t->t_near ? 0 : blocks;
     if (placement.blocks) {

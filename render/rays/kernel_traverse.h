@@ -40,7 +40,7 @@ SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbv
     const kernel_visible_values *visible_values = d->visible_values;
     int64_t stack[MMBVH_MAX_DEPTH];
     int top = 0;
-    if (tree->node_count && (!visible_values || kernel_node_shows(visible_values, ranges, 0))) stack[top++] = 0;
+    if (tree->node_count && (!visible_values || kernel_node_is_visible(visible_values, ranges, 0))) stack[top++] = 0;
     while (top) {
         const int64_t node = stack[--top];
         vf t_in = d->t_low, t_out = *d->t_high;
@@ -54,8 +54,8 @@ SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbv
         const int64_t left = mmbvh_node_ref(tree, node);
         const bool swap = kernel_right_first(p, tree, left);
         const int64_t near = left + swap, far = left + !swap;
-        if (!visible_values || kernel_node_shows(visible_values, ranges, far)) stack[top++] = far;
-        if (!visible_values || kernel_node_shows(visible_values, ranges, near)) stack[top++] = near;
+        if (!visible_values || kernel_node_is_visible(visible_values, ranges, far)) stack[top++] = far;
+        if (!visible_values || kernel_node_is_visible(visible_values, ranges, near)) stack[top++] = near;
     }
 }
 

@@ -37,7 +37,7 @@ SIMD_INLINE vm kernel_visible_values_overlap_cells(const kernel_visible_values *
     return kernel_visible_values_overlap_lanes(visible_values, low, high);
 }
 
-SIMD_INLINE bool kernel_node_shows(const kernel_visible_values *visible_values, const mmbvh_ranges *ranges,
+SIMD_INLINE bool kernel_node_is_visible(const kernel_visible_values *visible_values, const mmbvh_ranges *ranges,
                                    int64_t node)
 {
     float low, high;

@@ -345,7 +345,7 @@ static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *
 }
 
 /* Returns those of the hits at t that are in front of the eye and are kept by the surface's own clips. */
-SIMD_INLINE vm kernel_kept(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
+SIMD_INLINE vm kernel_unclipped_hits(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
     const vm in_front = vm_and(hit, vf_le(p->t_near, t));
     if (__builtin_expect(s->own_clips == 0, 1)) return in_front;
@@ -354,7 +354,7 @@ SIMD_INLINE vm kernel_kept(const kernel_packet *p, const kernel_surface *s, vm h
 
 SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
-    return kernel_kept(p, s, vm_and(hit, vf_le(t, p->t_far)), t);
+    return kernel_unclipped_hits(p, s, vm_and(hit, vf_le(t, p->t_far)), t);
 }
 
 /* ---- hits of rays in lanes, each with its own cell ---- */

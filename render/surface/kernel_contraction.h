@@ -44,9 +44,9 @@ enum { KERNEL_CONTRACTION_STEPS = 7 };
 
 /* A ray in the coordinates of its cell: y and w as above, from the ray's point at the depth of vertex 0 on; L at that
  * point (level) and its derivative along the ray (rise). */
-typedef struct kernel_sight {
+typedef struct kernel_cell_ray {
     vf y[3], w[3], level, rise;
-} kernel_sight;
+} kernel_cell_ray;
 
 /* The coefficients of kernel_contractions, gathered for each ray's own cell. */
 typedef struct kernel_contraction {
@@ -61,7 +61,7 @@ typedef struct kernel_contracted {
 } kernel_contracted;
 
 /* Converts the rays to the coordinates of their cells. */
-SIMD_INLINE void kernel_sight_of(const kernel_curved *c, const kernel_rays *rays, vi lane, kernel_sight *out)
+SIMD_INLINE void kernel_cell_ray_of(const kernel_curved *c, const kernel_rays *rays, vi lane, kernel_cell_ray *out)
 {
     vf origin[3], normal[3], g[3];
     for (int a = 0; a < 3; a++) {
@@ -162,13 +162,13 @@ SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, co
     return vf_lt(2.0f * most + error_bound, 0.999f * kernel_dot(s, s));
 }
 
-SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight *ray, vm rays, kernel_contracted *out,
+SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_ray *ray, vm rays, kernel_contracted *out,
                                  int type)
 {
     const int terms = kernel_bent_terms(type);
     const vf over = 1.0f / ray->rise, t = (ray->level + c->middle) * over;
     vf a[3], slope[4][3], q[3], s[3], local[3];
-    kernel_bend bend;
+    kernel_nonlinear_terms bend;
     out->one = out->none = vm_none();
     out->t = vf_set(0);
     for (int i = 0; i < 3; i++) q[i] = a[i] = (ray->y[i] + c->offset[i]) - ray->w[i] * t;
@@ -180,7 +180,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight
     for (int n = 0; n < KERNEL_CONTRACTION_STEPS; n++) {
         kernel_contraction_clamp(type, c->rim, q);
         kernel_contraction_local(type, q, local);
-        kernel_bend_at(type, local, &bend);
+        kernel_nonlinear_terms_at(type, local, &bend);
         /* kernel_bounds.h computes the Jacobian at the centre with a b / k² = 1/2 instead of 1/4, which leaves this
          * linear term */
         if (kernel_has_apex(type)) bend.term[0] += 0.25f * q[2];

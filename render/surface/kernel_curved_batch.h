@@ -128,7 +128,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
 /* Returns the rays that are outside the slab that contains the isosurface, throughout the part of the ray between the
  * cell's bounding planes. On these rays the faces' values have L's sign, so there is no root. Depths are relative to
  * vertex 0. */
-SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_sight *ray)
+SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_cell_ray *ray)
 {
     const vf thick = kernel_gather_lane(h->bounds.thickness, lane);
     vf from = vf_set(-INFINITY), to = vf_set(INFINITY);
@@ -172,13 +172,13 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
     h->found.count = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
-        kernel_sight ray;
+        kernel_cell_ray ray;
         kernel_contraction c;
         kernel_contracted at;
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_batch_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->own->near, p.lane), p.far));
-        kernel_sight_of(&cells, &p.rays, p.lane, &ray);
+        kernel_cell_ray_of(&cells, &p.rays, p.lane, &ray);
         p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &ray));
         if (!vm_any(p.active)) continue;
         kernel_contraction_of(&h->bounds, p.lane, type, &c);

@@ -231,8 +231,8 @@ SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays 
                                       kernel_contracted *out, int type)
 {
     kernel_contraction contraction;
-    kernel_sight ray;
-    kernel_sight_of(c, rays, lane, &ray);
+    kernel_cell_ray ray;
+    kernel_cell_ray_of(c, rays, lane, &ray);
     kernel_contraction_of(c->bounds, lane, type, &contraction);
     kernel_contract(&contraction, &ray, wanted, out, type);
     out->t += kernel_gather_lane(c->at[2][0], lane);
@@ -560,7 +560,7 @@ SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, const
 }
 
 /* Returns a number that is one or two roundings above t. */
-SIMD_INLINE vf kernel_just_behind(vf t)
+SIMD_INLINE vf kernel_next_float(vf t)
 {
     return t + (vf_abs(t) * 2.4e-7f + 1e-30f);
 }
@@ -584,7 +584,7 @@ static vm kernel_profile_walk_next(const kernel_poly_crossings *r, const kernel_
     const vf length = piece->t1 - piece->t0;
     const vf t = kernel_secant(piece->t0, piece->v0, piece->t1, piece->v1);
     const vf along = vf_select(vf_lt(vf_set(0), length), (t - piece->t0) / length, vf_set(0));
-    walk->t = vf_select(vf_lt(piece->t0, piece->t1), t, vf_select(jump, kernel_just_behind(piece->t0), piece->t0));
+    walk->t = vf_select(vf_lt(piece->t0, piece->t1), t, vf_select(jump, kernel_next_float(piece->t0), piece->t0));
     walk->w = piece->w0 + along * (piece->w1 - piece->w0);
     return found;
 }
@@ -654,7 +654,7 @@ static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *stat
     kernel_profile_walk_begin(stay, wanted, &walk);
     do {
         const vm found = kernel_profile_walk_next(r, stay, &walk);
-        const vm kept = kernel_kept(p, state->surface, found, walk.t);
+        const vm kept = kernel_unclipped_hits(p, state->surface, found, walk.t);
         kernel_polyhedron_accept(p, state, value, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
         if (state->is_opaque) walk.open = vm_andnot(walk.open, kept);
     } while (vm_any(walk.open));

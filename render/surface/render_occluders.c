@@ -358,7 +358,7 @@ static void find_in_subtree(subject *s, const kernel_subtree *subtree)
     while (top && !s->into->out_of_memory) {
         const int64_t node = stack[--top], ref = mmbvh_node_ref(tree, node);
         const int count = mmbvh_node_count(tree, node);
-        if (!kernel_node_shows(&surface->visible_values, ranges, node)) continue;
+        if (!kernel_node_is_visible(&surface->visible_values, ranges, node)) continue;
         for (int n = 0; n < count; n++) {
             s->index = tree->cells[ref + n];
             find_in_cell(s);

@@ -61,9 +61,9 @@ enum { KERNEL_BISECTION_DEPTH = 40, KERNEL_BISECTION_ROOM = 128, KERNEL_BISECTIO
 /* ---- the field on a ray ---- */
 
 /* A point of the ray: depth t, value v of the field, and reference coordinates r in the cell. */
-typedef struct kernel_knot {
+typedef struct kernel_exact_point {
     double t, v, r[3];
-} kernel_knot;
+} kernel_exact_point;
 
 /* State of the bisection of one ray's interval. */
 typedef struct kernel_bisection {
@@ -71,7 +71,7 @@ typedef struct kernel_bisection {
     const kernel_cell_interval *span;
     const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
     double u, v, slope, shift;   /* constants of the ray: at depth t it is at (u, v) * (slope * t + shift) */
-    kernel_knot in, out;         /* ends of the interval, at the crossings of the faces */
+    kernel_exact_point in, out;         /* ends of the interval, at the crossings of the faces */
     /* unit distances per t; length of the interval; share of the light that reaches the current subinterval */
     double per_t, length, light;
     int64_t *map_failures;
@@ -84,10 +84,10 @@ static inline double kernel_between(double from, double to, double share)
 }
 
 /* Returns the point at depth t by Newton's method from `guess`, as kernel_solve() does it. */
-static kernel_knot kernel_knot_at(const kernel_bisection *h, double t, const double guess[3])
+static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, double t, const double guess[3])
 {
     const double whole = h->out.t - h->in.t, share = whole > 0 ? (t - h->in.t) / whole : 0;
-    kernel_knot out = {.t = t, .v = kernel_between(h->in.v, h->out.v, share)};
+    kernel_exact_point out = {.t = t, .v = kernel_between(h->in.v, h->out.v, share)};
     if (!h->map) return out;
     const double reach = h->slope * t + h->shift, target[3] = {h->u * reach, h->v * reach, t};
     double slopes[3];
@@ -105,24 +105,24 @@ static kernel_knot kernel_knot_at(const kernel_bisection *h, double t, const dou
     return out;
 }
 
-static kernel_knot kernel_knot_between(const kernel_bisection *h, const kernel_knot *a, const kernel_knot *b,
+static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, const kernel_exact_point *a, const kernel_exact_point *b,
                                        double share)
 {
     double guess[3];
     for (int n = 0; n < 3; n++) guess[n] = kernel_between(a->r[n], b->r[n], share);
-    return kernel_knot_at(h, kernel_between(a->t, b->t, share), guess);
+    return kernel_exact_point_at(h, kernel_between(a->t, b->t, share), guess);
 }
 
 /* Returns the point between a and b, whose values lie on either side of x, at which the field is x. It uses regula
  * falsi that halves the value at an end that stays (the Illinois method). */
-static kernel_knot kernel_knot_where(const kernel_bisection *h, const kernel_knot *a, const kernel_knot *b, double x)
+static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, const kernel_exact_point *a, const kernel_exact_point *b, double x)
 {
-    kernel_knot low = *a, high = *b, at = *a;
+    kernel_exact_point low = *a, high = *b, at = *a;
     double low_v = low.v - x, high_v = high.v - x;
     const double enough = 1e-15 * fmax(1, fabs(x));
     for (int n = 0; n < 60; n++) {
         const double share = n % 3 == 2 ? 0.5 : low_v / (low_v - high_v);
-        at = kernel_knot_between(h, &low, &high, share);
+        at = kernel_exact_point_between(h, &low, &high, share);
         const double v = at.v - x;
         if (fabs(v) <= enough || high.t - low.t <= 1e-16 * fabs(at.t)) break;
         if ((v < 0) == (low_v < 0)) {
@@ -215,7 +215,7 @@ static kernel_medium_range kernel_medium_range_of(const kernel_pieces *t, double
 
 /* A subinterval: its end and middle, its bisection depth, and whether the field is known to be monotone on it. */
 typedef struct kernel_subinterval {
-    kernel_knot end, middle;
+    kernel_exact_point end, middle;
     int depth;
     bool is_monotone;
 } kernel_subinterval;
@@ -226,9 +226,9 @@ typedef struct kernel_subinterval_values {
 
 /* Computes the subinterval's largest sampled deviation from its chord, and the range of its values, from the field at
  * its middle and quarters. */
-static kernel_subinterval_values kernel_subinterval_sample(const kernel_bisection *h, const kernel_knot *from,
-                                                           kernel_subinterval *sub, const kernel_knot *first,
-                                                           const kernel_knot *third)
+static kernel_subinterval_values kernel_subinterval_sample(const kernel_bisection *h, const kernel_exact_point *from,
+                                                           kernel_subinterval *sub, const kernel_exact_point *first,
+                                                           const kernel_exact_point *third)
 {
     const double a = from->v, b = sub->end.v, rise = b - a;
     kernel_subinterval_values out = {0, fmin(a, b), fmax(a, b)};
@@ -308,8 +308,8 @@ static kernel_medium_range kernel_subinterval_range(const kernel_bisection *h, c
 /* ---- segments ---- */
 
 /* Emits the subinterval as `subdivisions` equal segments. */
-static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_knot *from,
-                                    const kernel_knot *to, const double values[2], double subdivisions)
+static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_exact_point *from,
+                                    const kernel_exact_point *to, const double values[2], double subdivisions)
 {
     float begin = (float)from->t;
     for (int n = 1; n <= (int)subdivisions; n++) {
@@ -329,7 +329,7 @@ static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h,
 
 /* Adds the subinterval's segments, on its chord. They are not raised to the field's mean, as equal subintervals are,
  * because they might then reach values that have not been checked. */
-static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_knot *from,
+static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_exact_point *from,
                                    const kernel_subinterval *sub, const kernel_subinterval_values *values,
                                    const kernel_medium_range *s)
 {
@@ -377,7 +377,7 @@ static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_s
 }
 
 /* Divides an interval, whose ends and middle are known, into subintervals by bisection, and adds their segments. */
-static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_knot from,
+static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_exact_point from,
                                      kernel_subinterval whole)
 {
     const kernel_segments *list = h->state->list;
@@ -387,8 +387,8 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
     stack[0] = whole;
     while (count > 0 && (float)from.t < list->t_end[lane]) {
         kernel_subinterval sub = stack[--count];
-        const kernel_knot first = kernel_knot_between(h, &from, &sub.middle, 0.5);
-        const kernel_knot third = kernel_knot_between(h, &sub.middle, &sub.end, 0.5);
+        const kernel_exact_point first = kernel_exact_point_between(h, &from, &sub.middle, 0.5);
+        const kernel_exact_point third = kernel_exact_point_between(h, &sub.middle, &sub.end, 0.5);
         const kernel_subinterval_values values = kernel_subinterval_sample(h, &from, &sub, &first, &third);
         const kernel_step *step = kernel_step_between(h, values.low, values.high);
         const kernel_medium_range s = kernel_subinterval_range(h, &values, sub.middle.v, step);
@@ -406,9 +406,9 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
         kernel_subinterval near = {sub.middle, first, sub.depth + 1, sub.is_monotone};
         kernel_subinterval far = {sub.end, third, sub.depth + 1, sub.is_monotone};
         if (step && sub.is_monotone) {
-            near.end = kernel_knot_where(h, &from, &sub.end, step->at);
-            near.middle = kernel_knot_between(h, &from, &near.end, 0.5);
-            far.middle = kernel_knot_between(h, &near.end, &far.end, 0.5);
+            near.end = kernel_exact_point_where(h, &from, &sub.end, step->at);
+            near.middle = kernel_exact_point_between(h, &from, &near.end, 0.5);
+            far.middle = kernel_exact_point_between(h, &near.end, &far.end, 0.5);
         }
         stack[count++] = far;
         stack[count++] = near;
@@ -452,12 +452,12 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
         const double whole = h.out.t - h.in.t;
         if (!(whole > 0)) continue;
         const double a = ((double)t0[n] - h.in.t) / whole, b = ((double)t1[n] - h.in.t) / whole;
-        const kernel_knot from = kernel_knot_between(&h, &h.in, &h.out, a);
-        kernel_subinterval sub = {.end = kernel_knot_between(&h, &h.in, &h.out, b)};
-        kernel_knot begin = from;
+        const kernel_exact_point from = kernel_exact_point_between(&h, &h.in, &h.out, a);
+        kernel_subinterval sub = {.end = kernel_exact_point_between(&h, &h.in, &h.out, b)};
+        kernel_exact_point begin = from;
         begin.t = (double)t0[n];
         sub.end.t = (double)t1[n];
-        sub.middle = kernel_knot_between(&h, &from, &sub.end, 0.5);
+        sub.middle = kernel_exact_point_between(&h, &from, &sub.end, 0.5);
         sub.is_monotone = !span->map;
         kernel_subinterval_halve(p, &h, n, begin, sub);
     }
@@ -699,7 +699,7 @@ static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int par
     polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part,
                                                p->frame->surface_count + volume, index);
     if (!c) p->thread->out_of_memory = true;
-    if (!c || !c->is_finite || !kernel_values_show(c->values, c->vertex_count, transfer)) return NULL;
+    if (!c || !c->is_finite || !kernel_values_are_visible(c->values, c->vertex_count, transfer)) return NULL;
     if (!c->is_transformed) {
         kernel_polyhedron_transform(c, p);
         kernel_polyhedron_domain(c, transfer);

@@ -171,7 +171,7 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
     if (!vm_any(closing)) return;
     const kernel_fragments ended = {
         b->t_first, b->t_last, {b->colour[0], b->colour[1], b->colour[2]}, b->transmittance, vf_set(0)};
-    kernel_emit(p, vm_and(closing, kernel_shows(b->colour, b->transmittance)), FRAGMENT_VOLUME, &ended);
+    kernel_emit(p, vm_and(closing, kernel_fragment_is_visible(b->colour, b->transmittance)), FRAGMENT_VOLUME, &ended);
     b->open = vm_andnot(b->open, closing);
 }
 
@@ -183,7 +183,7 @@ SIMD_INLINE void kernel_blend_separate(kernel_packet *p, kernel_blend *b, vm has
     const vm fresh = vm_andnot(has, b->open);
     const kernel_fragments own = {
         t_in, t_out, {colour[0], colour[1], colour[2]}, clear, vf_select(fresh, vf_set(FRAGMENT_EARLY), vf_set(0))};
-    kernel_emit(p, vm_and(has, vm_or(fresh, kernel_shows(colour, clear))), FRAGMENT_VOLUME, &own);
+    kernel_emit(p, vm_and(has, vm_or(fresh, kernel_fragment_is_visible(colour, clear))), FRAGMENT_VOLUME, &own);
     const vf stretch = vf_floor(t_in * (float)FRAGMENT_INTERVALS);
     const vm next = vm_andnot(has, vf_eq(stretch, b->stretch));
     b->light = vf_select(next, b->within, b->light);

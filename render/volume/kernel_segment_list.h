@@ -586,7 +586,7 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *st
         const vm put = vm_andnot(open, cut);
         const kernel_fragments segment = {
             begin, end, {light.colour[0], light.colour[1], light.colour[2]}, light.transmittance, vf_set(0)};
-        kernel_emit(p, vm_and(put, kernel_shows(light.colour, light.transmittance)), FRAGMENT_VOLUME, &segment);
+        kernel_emit(p, vm_and(put, kernel_fragment_is_visible(light.colour, light.transmittance)), FRAGMENT_VOLUME, &segment);
         depth += vf_select(put, light.depth, vf_set(0));
         open = vm_andnot(open, vm_and(put, vm_or(vf_eq(to, one), vf_lt(vf_set(KERNEL_DARK_DEPTH), depth))));
         from = vf_select(put, to, from);

@@ -120,7 +120,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         else
             kernel_blend_light(b, has, t_in, t_out, &light);
     }
-    const vm heaped = kernel_shows(list->heap.colour, list->heap.transmittance);
+    const vm heaped = kernel_fragment_is_visible(list->heap.colour, list->heap.transmittance);
     if (!vm_any(heaped)) return;
     if (p->frame->job->reproducible)
         kernel_blend_separate(p, b, heaped, b->t_last, b->t_last, list->heap.colour, list->heap.transmittance);

@@ -63,7 +63,7 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
 {
     kernel_cell *c = &cells->cell;
     kernel_outline outline;
-    if (!c->is_finite || !kernel_cell_shows(c, transfer)) return 0;
+    if (!c->is_finite || !kernel_cell_is_visible(c, transfer)) return 0;
     kernel_cell_move(c, t->frame, &t->tile, g);
     kernel_vertex_outline(c, &outline);
     const unsigned meets = kernel_tile_keep(t, &outline, blocks);
