@@ -75,7 +75,7 @@ static void add_triangles(reference_cell *cell)
         }
         p->is_patch[face] =
             p->face_size[face] == 4 && !(size == 4 && reference_is_concave_quad((const double(*)[3])corners));
-        const int count = size < 3 ? 0 : reference_polygon_cut((const double(*)[3])corners, size, cut);
+        const int count = size < 3 ? 0 : reference_polygon_triangulate((const double(*)[3])corners, size, cut);
         for (int i = 0; i < count; i++) {
             for (int k = 0; k < 3; k++) p->triangles[p->triangle_count][k] = loop[cut[i][k]];
             p->face_of[p->triangle_count++] = face;

@@ -181,10 +181,10 @@ DEFINE_SORT(sort_facets, closed_triangle, facet_compare)
 /* Lays out the temporary arrays in the buffer (NULL: only computes the size). Returns their size in bytes. */
 static size_t lay_out(work *w, char *buffer)
 {
-    base_carving at = {buffer, closed_faces_lay_out(&w->faces, buffer)};
-    w->rank = base_carve(&at, (size_t)w->faces.entry_count * sizeof(int));
-    w->positions = base_carve(&at, (size_t)w->faces.entry_count * sizeof *w->positions);
-    w->vertices = base_carve(&at, (size_t)w->faces.entry_count * sizeof *w->vertices);
+    base_arena at = {buffer, closed_faces_lay_out(&w->faces, buffer)};
+    w->rank = base_arena_alloc(&at, (size_t)w->faces.entry_count * sizeof(int));
+    w->positions = base_arena_alloc(&at, (size_t)w->faces.entry_count * sizeof *w->positions);
+    w->vertices = base_arena_alloc(&at, (size_t)w->faces.entry_count * sizeof *w->vertices);
     return at.used;
 }
 
@@ -212,17 +212,17 @@ static void read_faces(work *w, int64_t cell)
 
 static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
 {
-    base_carving at = {buffer, 0};
+    base_arena at = {buffer, 0};
     const size_t points = (size_t)c->vertex_count + 1;
-    c->world = base_carve(&at, points * sizeof *c->world);
-    c->values = base_carve(&at, points * sizeof *c->values);
-    c->vertices = base_carve(&at, points * sizeof *c->vertices);
+    c->world = base_arena_alloc(&at, points * sizeof *c->world);
+    c->values = base_arena_alloc(&at, points * sizeof *c->values);
+    c->vertices = base_arena_alloc(&at, points * sizeof *c->vertices);
     float **const floats[5] = {&c->x, &c->y, &c->z, &c->f, &c->g};
-    for (int i = 0; i < 5; i++) *floats[i] = base_carve(&at, points * sizeof(float));
-    c->facets = base_carve(&at, (size_t)c->facet_count * sizeof *c->facets);
-    c->edges = base_carve(&at, (size_t)c->facet_count * 3 * sizeof *c->edges);
-    c->lines = base_carve(&at, ((size_t)c->facet_count * 3 + points) * sizeof *c->lines);
-    c->quads = base_carve(&at, (size_t)quads * sizeof *c->quads);
+    for (int i = 0; i < 5; i++) *floats[i] = base_arena_alloc(&at, points * sizeof(float));
+    c->facets = base_arena_alloc(&at, (size_t)c->facet_count * sizeof *c->facets);
+    c->edges = base_arena_alloc(&at, (size_t)c->facet_count * 3 * sizeof *c->edges);
+    c->lines = base_arena_alloc(&at, ((size_t)c->facet_count * 3 + points) * sizeof *c->lines);
+    c->quads = base_arena_alloc(&at, (size_t)quads * sizeof *c->quads);
     return at.used;
 }
 
@@ -314,7 +314,7 @@ static polyhedron *store_polyhedron(polyhedron_store *store, work *w, int64_t ce
     *c = shape;
     lay_out_polyhedron(c, block + head, w->faces.face_count);
     store_vertices(w, cell, c);
-    closed_faces_turn_outward(&w->faces, (const double(*)[3])c->world, c->world[c->vertex_count]);
+    closed_faces_orient_outward(&w->faces, (const double(*)[3])c->world, c->world[c->vertex_count]);
     store_facets(w, c);
     link_quad_halves(c);
     return c;
@@ -328,8 +328,8 @@ static polyhedron *decompose_polyhedron(polyhedron_store *store, const grid *g, 
     if (!buffer) return NULL;
     lay_out(&w, buffer);
     read_faces(&w, index);
-    closed_faces_turn(&w.faces);
-    closed_faces_cut(&w.faces, (const double(*)[3])w.positions);
+    closed_faces_orient(&w.faces);
+    closed_faces_triangulate(&w.faces, (const double(*)[3])w.positions);
     sort_facets(w.faces.triangles, w.faces.triangle_count);
     return store_polyhedron(store, &w, index);
 }

@@ -181,10 +181,10 @@ static bool reserve(const widening *w, size_t nodes, size_t leaves)
 static void count_use(const widening *w)
 {
     const size_t width = (size_t)w->width, nodes = (size_t)w->out->node_count, leaves = (size_t)w->out->leaf_count;
-    base_use(w->out->boxes, nodes * 6 * width * sizeof(float));
-    base_use(w->out->children, nodes * width * sizeof(int32_t));
-    base_use(w->out->leaves, leaves * (size_t)w->of->rows * width * sizeof(float));
-    base_use(w->out->sources, leaves * width * sizeof(int32_t));
+    base_set_used_bytes(w->out->boxes, nodes * 6 * width * sizeof(float));
+    base_set_used_bytes(w->out->children, nodes * width * sizeof(int32_t));
+    base_set_used_bytes(w->out->leaves, leaves * (size_t)w->of->rows * width * sizeof(float));
+    base_set_used_bytes(w->out->sources, leaves * width * sizeof(int32_t));
 }
 
 static bool widen(widening *w)
