@@ -214,7 +214,7 @@ static sweep_sum run_box_ranges(const sweep *s, int64_t first, int64_t end)
 static bool is_plain(const grid *g, const grid_field *field)
 {
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
-    return is_float && !field->own && !grid_has_faces(g);
+    return is_float && !field->source_cells && !grid_has_faces(g);
 }
 
 bool sweep_reads_floats(const sweep *ranges)

@@ -294,7 +294,7 @@ static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *b
     const grid_field *field = wish->field;
     selector s = {.run = mark_any, .g = g, .wish = wish, .values = field->values, .bits = bits};
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
-    if (is_float && !field->own && !grid_has_faces(g))
+    if (is_float && !field->source_cells && !grid_has_faces(g))
         s.run = table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
     if (rows_can_read(g, field)) s.run = mark_rows;
     if (field->component > 0) s.values.data += field->component * field->component_stride;

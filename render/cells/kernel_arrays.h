@@ -36,7 +36,7 @@ typedef struct kernel_arrays {
     const grid *cells;         /* the mesh */
     int type;                  /* type of all cells, or GRID_NO_TYPE if the mesh has several types */
     /* field that is not finite for cells without a value of their own; NULL if all cells have one */
-    const grid_field *own;
+    const grid_field *source_cells;
     bool is_by_cell; /* set if values belong to cells, not to vertices */
     kernel_numbers coordinates[3], values;
     struct { /* the arrays that are prefetched by vertex index: coordinates and values */
@@ -69,7 +69,7 @@ static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const gr
     p->cells = g;
     p->type = g->cell_types ? GRID_NO_TYPE : g->cell_type;
     p->has_lanes = kernel_arrays_fit(g);
-    p->own = field->own;
+    p->source_cells = field->source_cells;
     p->is_by_cell = field->is_cell_centred;
     if (field->component >= 0) values.data += field->component * field->component_stride;
     p->values = kernel_numbers_of(&values, count);
@@ -107,7 +107,7 @@ SIMD_INLINE int64_t kernel_arrays_first(const grid *g, uint32_t cell, int vertic
 static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, int vertices, int32_t *out, int room)
 {
     const int64_t first = grid_lattice_first(l, cell);
-    for (int i = 0; i < vertices; i++) out[i * room] = (int32_t)(first + l->corner[i]);
+    for (int i = 0; i < vertices; i++) out[i * room] = (int32_t)(first + l->corner_offsets[i]);
 }
 
 /* Reads the vertex indices of `count` cells into lanes lane, lane + 1, ... of `out`. vertices: number of vertices of
@@ -180,8 +180,8 @@ SIMD_INLINE void kernel_arrays_cells(const kernel_arrays *p, const uint32_t *cel
 /* Returns those of the given lanes (a bit mask) whose cells have a finite value of their own. */
 SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t *cells, unsigned lanes)
 {
-    for (unsigned left = p->own ? lanes : 0; left; left &= left - 1)
-        if (!isfinite(grid_field_value(p->own, cells[__builtin_ctz(left)]))) lanes &= ~(left & -left);
+    for (unsigned left = p->source_cells ? lanes : 0; left; left &= left - 1)
+        if (!isfinite(grid_field_value(p->source_cells, cells[__builtin_ctz(left)]))) lanes &= ~(left & -left);
     return lanes;
 }
 
@@ -202,7 +202,7 @@ static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_wid
         const double above = (double)(int32_t)((number + 0.5) * inverse_outer);
         at[n] = (int32_t)((number - above * outer + 0.5) * inverse_stride);
     }
-    for (int n = 0; n < SIMD_WIDTH; n++) places[n] = axis->places[at[n]];
+    for (int n = 0; n < SIMD_WIDTH; n++) places[n] = axis->axis_coordinates[at[n]];
     memcpy(out, places, sizeof places);
 }
 

@@ -104,7 +104,7 @@ SIMD_INLINE void kernel_local_fetch(kernel_local_lanes *l, const kernel_local_qu
         }
         if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, q->cell, sizeof vertex);
         kernel_wide_doubles value = kernel_numbers_gather(&p->values, vertex);
-        if (__builtin_expect(p->own != NULL, 0)) value = kernel_wide_doubles_select(drawn, &value, &none);
+        if (__builtin_expect(p->source_cells != NULL, 0)) value = kernel_wide_doubles_select(drawn, &value, &none);
         memcpy(l->scalars[i], &value, sizeof value);
     }
 }
