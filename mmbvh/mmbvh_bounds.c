@@ -188,7 +188,7 @@ static void array_range(const grid_array *a, int64_t count, int threads, double 
     if (!(low > -INFINITY && high < INFINITY)) array_range_any(a, count, threads, least, most);
 }
 
-fetch_box bounds_guess(const bounds_source *source, int threads)
+fetch_box bounds_estimate(const bounds_source *source, int threads)
 {
     fetch_box box;
     const int64_t size = (int64_t)sizeof(float);

@@ -209,8 +209,8 @@ void fixture_use_set(int set)
 
 bool fixture_lacks_set(void)
 {
-    const char *wish = getenv("INSITU_ISA");
-    const bool is_lacking = wish && strcmp(wish, render_isa()) != 0;
+    const char *query = getenv("INSITU_ISA");
+    const bool is_lacking = query && strcmp(query, render_isa()) != 0;
     if (is_lacking) fprintf(stderr, "skipped: %s\n", render_isa_warning());
     return is_lacking;
 }
