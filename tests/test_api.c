@@ -122,7 +122,7 @@ static void folder_that_cannot_be_written_is_named(void **context)
 
 /* Written in the background: the steps go on, and one of them tells which cycle's pictures are not there. What none of
  * them has told is told at the end. */
-static void picture_that_is_not_written_is_told_later(void **context)
+static void picture_that_is_not_written_is_reported_later(void **context)
 {
     (void)context;
     char output[2048];
@@ -290,7 +290,7 @@ static void pictures_are_kept_in_memory_where_asked_for(void **context)
     insitu_destroy(&session);
 }
 
-static void wrong_scene_text_is_told_with_its_line(void **context)
+static void wrong_scene_text_is_reported_with_its_line(void **context)
 {
     (void)context;
     insitu_session *session = NULL;
@@ -337,12 +337,12 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(picture_is_written_where_the_scene_says),
         cmocka_unit_test(folder_that_cannot_be_written_is_named),
-        cmocka_unit_test(picture_that_is_not_written_is_told_later),
+        cmocka_unit_test(picture_that_is_not_written_is_reported_later),
         cmocka_unit_test(callers_error_handler_stays),
         cmocka_unit_test(sessions_of_split_ranks_live_side_by_side),
         cmocka_unit_test(scene_given_as_text_draws_what_its_file_draws),
         cmocka_unit_test(pictures_are_kept_in_memory_where_asked_for),
-        cmocka_unit_test(wrong_scene_text_is_told_with_its_line),
+        cmocka_unit_test(wrong_scene_text_is_reported_with_its_line),
         cmocka_unit_test(calls_on_no_session_are_errors),
     };
     insitu_session *early = NULL, *late = NULL;

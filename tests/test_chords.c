@@ -265,7 +265,7 @@ static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t co
     base_free(thread.cells);
 }
 
-static void tell(const char *what, const char *mesh, int by_tile, const tally *t)
+static void print_tally(const char *what, const char *mesh, int by_tile, const tally *t)
 {
     printf("%s%s%s, %s: %lld rays, %lld cells; off by %.2g of the side at most; %lld slanted, off by %.2g of the "
            "shift's share at most, %lld touching; %.2g beyond the shrunk and swollen hull's; overlaps by rounding on "
@@ -322,12 +322,12 @@ static void judge(chord_aim aim, const char *what)
             judge_mesh(mesh, jittered ? jitter_wanted : 0, aim, share, t);
             for (int by_tile = 0; by_tile < 2; by_tile++) {
                 if (t[by_tile].off || t[by_tile].unpaired || getenv("INSITU_TEST_VERBOSE"))
-                    tell(what, mesh_name(mesh), by_tile, &t[by_tile]);
+                    print_tally(what, mesh_name(mesh), by_tile, &t[by_tile]);
                 assert_true(3 * t[by_tile].met > t[by_tile].rays);
                 add_tally(&all[by_tile], &t[by_tile]);
             }
         }
-    for (int by_tile = 0; by_tile < 2; by_tile++) tell(what, "", by_tile, &all[by_tile]);
+    for (int by_tile = 0; by_tile < 2; by_tile++) print_tally(what, "", by_tile, &all[by_tile]);
     for (int by_tile = 0; by_tile < 2; by_tile++) {
         assert_int_equal(all[by_tile].off, 0);
         assert_int_equal(all[by_tile].unpaired, 0);

@@ -257,7 +257,7 @@ static void check_overlaps(int width, int height, uint32_t count, dealing how, u
     assert_everywhere(base_memory_held() == held, "nothing is left allocated");
 }
 
-static void overlaps_are_told_to_all(void **context)
+static void overlaps_are_reported_on_all_ranks(void **context)
 {
     (void)context;
     const int sizes[][2] = {{1, 1}, {1, 7}, {65, 3}, {101, 67}};
@@ -415,7 +415,7 @@ int main(int argc, char **argv)
     if (!group.claims) MPI_Abort(comm, 1);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(composite_equals_serial_merge),
-        cmocka_unit_test(overlaps_are_told_to_all),
+        cmocka_unit_test(overlaps_are_reported_on_all_ranks),
         cmocka_unit_test(large_image_equals_serial_merge),
         cmocka_unit_test(smooth_surfaces_travel_in_a_third),
         cmocka_unit_test(messages_are_as_counted),

@@ -164,7 +164,7 @@ static void edges_are_where_rays_see_them(void **state)
 
 /* A box seen over a corner has three edges behind it, over an edge five, and face on eight: the far face's four and
  * those that run away from the eye. From within, all twelve are behind. */
-static void edges_that_data_hides_are_told(void **state)
+static void edges_that_data_hides_are_reported(void **state)
 {
     (void)state;
     const double lower[3] = {0, 0, 0}, upper[3] = {1, 1, 1}, focal[3] = {0.5, 0.5, 0.5}, up[3] = {0, 1, 0.01};
@@ -276,7 +276,7 @@ int main(void)
                                        cmocka_unit_test(ticks_stand_where_their_numbers_are),
                                        cmocka_unit_test(bands_of_ids_have_them_in_their_middle),
                                        cmocka_unit_test(edges_are_where_rays_see_them),
-                                       cmocka_unit_test(edges_that_data_hides_are_told),
+                                       cmocka_unit_test(edges_that_data_hides_are_reported),
                                        cmocka_unit_test(rulers_stand_where_their_numbers_are),
                                        cmocka_unit_test(scale_bars_are_as_long_as_they_say)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -112,7 +112,7 @@ static void judge_frame(const render_fixture *f, double margin, tally *t)
     drawn_free(&drawn);
 }
 
-static void tell(const char *what, const tally *t)
+static void print_tally(const char *what, const tally *t)
 {
     printf("%s: %d rays, %d hits, %d excluded, %d folded, %d different; residual %.2g (%d beyond 1e-6), depth off by "
            "%.2g cells, %.2g of what rounding may, %d tangent\n",
@@ -164,7 +164,7 @@ static void robust_hits_are_on_the_surface(void **state)
             fixture_look(&f, camera, 53, 45);
             add_robust(&f, 0.4f); /* all crossings, not the first alone */
             judge_frame(&f, 1e-6, &t);
-            tell(test_mesh_kind_name(kinds[k]), &t);
+            print_tally(test_mesh_kind_name(kinds[k]), &t);
             assert_true(t.hits > 600);
             assert_int_equal(t.different, 0);
             assert_depths(&t, 250);
@@ -222,7 +222,7 @@ static void robust_hits_in_ugly_cells_are_the_reference(void **state)
             fixture_free(&f);
             test_mesh_free(&mesh);
         }
-        tell(names[kind], &t);
+        print_tally(names[kind], &t);
         assert_few_left_out(&t);
         assert_true(t.hits > 800);
         assert_int_equal(t.different, 0);

@@ -199,11 +199,11 @@ static bool try_in_child(const picture_case *c, const file_bytes *expected, cons
         _exit(write(pipe_ends[1], &mine, sizeof mine) == (ssize_t)sizeof mine ? 0 : 1);
     }
     close(pipe_ends[1]);
-    const bool is_told = read(pipe_ends[0], out, sizeof *out) == (ssize_t)sizeof *out;
+    const bool is_reported = read(pipe_ends[0], out, sizeof *out) == (ssize_t)sizeof *out;
     close(pipe_ends[0]);
     waitpid(child, &status, 0);
     remove_picture(c);
-    return is_told && WIFEXITED(status);
+    return is_reported && WIFEXITED(status);
 }
 
 static void expect(const picture_case *c, file_bytes *expected)

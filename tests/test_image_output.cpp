@@ -349,7 +349,7 @@ void writing_leaves_the_picture_alone(void **)
 }
 
 /* Root may write anywhere, so nothing here depends on permissions. */
-void unwritable_places_are_told(void **)
+void unwritable_places_are_reported(void **)
 {
     const fs::path in = folder / "unwritable";
     fs::create_directories(in / "taken.png" / "below");
@@ -379,7 +379,7 @@ void unwritable_places_are_told(void **)
 }
 
 /* A full disk, in small: no file of this process may grow beyond 4 KiB. */
-void full_disk_is_told_and_leaves_the_old_picture(void **)
+void full_disk_is_reported_and_leaves_the_old_picture(void **)
 {
     const fs::path in = folder / "full";
     const picture small = make_picture(2, 2, true), large = make_picture(200, 200, false);
@@ -460,7 +460,7 @@ void files_of_killed_runs_are_removed(void **)
     close(writer);
 }
 
-void pipe_in_the_picture_s_place_is_told(void **)
+void pipe_in_the_picture_s_place_is_reported(void **)
 {
     const fs::path in = folder / "pipe";
     fs::create_directories(in);
@@ -534,12 +534,12 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(deep_exr_is_bitwise),
         cmocka_unit_test(deep_exr_is_flattened_by_openimageio),
         cmocka_unit_test(writing_leaves_the_picture_alone),
-        cmocka_unit_test(unwritable_places_are_told),
-        cmocka_unit_test(full_disk_is_told_and_leaves_the_old_picture),
+        cmocka_unit_test(unwritable_places_are_reported),
+        cmocka_unit_test(full_disk_is_reported_and_leaves_the_old_picture),
         cmocka_unit_test(longest_legal_name_is_written),
         cmocka_unit_test(planted_links_keep_their_victims),
         cmocka_unit_test(files_of_killed_runs_are_removed),
-        cmocka_unit_test(pipe_in_the_picture_s_place_is_told),
+        cmocka_unit_test(pipe_in_the_picture_s_place_is_reported),
         cmocka_unit_test(pictures_are_put_into_places),
         cmocka_unit_test(nonsense_is_refused),
     };

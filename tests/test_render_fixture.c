@@ -249,7 +249,7 @@ void drawn_free(drawn_frame *drawn)
     memset(drawn, 0, sizeof *drawn);
 }
 
-static void tell_difference(const drawn_frame *a, const drawn_frame *b, int64_t p)
+static void print_difference(const drawn_frame *a, const drawn_frame *b, int64_t p)
 {
     const float *x = a->picture.rgba + 4 * p, *y = b->picture.rgba + 4 * p;
     fail_msg("pixel %d, %d: depth %.9g and %.9g, red %.9g and %.9g, green %.9g and %.9g, alpha %.9g and %.9g",
@@ -262,7 +262,7 @@ void drawn_assert_same_depth(const drawn_frame *a, const drawn_frame *b)
 {
     const int64_t pixels = (int64_t)a->picture.width * a->picture.height;
     for (int64_t p = 0; p < pixels; p++)
-        if (memcmp(a->picture.depth + p, b->picture.depth + p, sizeof(float))) tell_difference(a, b, p);
+        if (memcmp(a->picture.depth + p, b->picture.depth + p, sizeof(float))) print_difference(a, b, p);
 }
 
 void drawn_assert_same(const drawn_frame *a, const drawn_frame *b)
@@ -270,7 +270,7 @@ void drawn_assert_same(const drawn_frame *a, const drawn_frame *b)
     const int64_t pixels = (int64_t)a->picture.width * a->picture.height;
     drawn_assert_same_depth(a, b);
     for (int64_t p = 0; p < pixels; p++)
-        if (memcmp(a->picture.rgba + 4 * p, b->picture.rgba + 4 * p, 4 * sizeof(float))) tell_difference(a, b, p);
+        if (memcmp(a->picture.rgba + 4 * p, b->picture.rgba + 4 * p, 4 * sizeof(float))) print_difference(a, b, p);
 }
 
 double drawn_difference(const drawn_frame *a, const drawn_frame *b)
@@ -315,7 +315,7 @@ static int surface_fragments(const drawn_frame *drawn, int64_t pixel, const frag
     return count;
 }
 
-static void tell_hits(const comparison *c, int x, int y, const reference_ray *ray, int count,
+static void print_hits(const comparison *c, int x, int y, const reference_ray *ray, int count,
                       const fragment *const *hits)
 {
     fprintf(stderr, "%s, pixel %d, %d: edge margin %.3g, value margin %.3g%s%s\n", c->what, x, y, ray->edge_margin,
@@ -335,7 +335,7 @@ static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
     bool same = count == ray->hit_count;
     for (int i = 0; same && i < count; i++) same = hits[i]->kind - FRAGMENT_SURFACE == (uint32_t)ray->hits[i].surface;
     if (!same && !ray->ambiguous) {
-        tell_hits(c, x, y, ray, count, hits);
+        print_hits(c, x, y, ray, count, hits);
         fail_msg("%s: not the same hits", c->what);
     }
     c->outcome.hits += count > 0;
@@ -352,7 +352,7 @@ static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
         worst = test_worse(worst, off / c->f->cell_size - grazing);
     }
     double *kept = ray->ambiguous ? &c->outcome.worst_ambiguous : &c->outcome.worst_depth;
-    if (worst > *kept && !ray->ambiguous && worst > c->bounds->depth) tell_hits(c, x, y, ray, count, hits);
+    if (worst > *kept && !ray->ambiguous && worst > c->bounds->depth) print_hits(c, x, y, ray, count, hits);
     *kept = fmax(*kept, worst);
 }
 

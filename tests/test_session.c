@@ -25,7 +25,7 @@ static void step_draws(insitu_session *session, int64_t cycle, int images)
 {
     forget_pictures();
     const insitu_status status = insitu_step(session, cycle, 0.5 * (double)cycle);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == images);
     everywhere(caught_count == (own_rank == 0 ? images : 0));
 }
@@ -427,7 +427,7 @@ static void missing_field_leaves_the_other_picture(void **context)
     everywhere(hand_over(session, &input) == INSITU_OK);
     forget_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"; there are",
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"; there are",
                     "\"f\" (mesh \"m\")");
     everywhere(insitu_last_report(session)->images == 1);
     everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_0.exr")));
@@ -441,7 +441,7 @@ static void component_that_is_not_there_is_named(void **context)
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
     everywhere(hand_over(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"",
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"",
                     "it has components 0 to 0");
     insitu_destroy(&session);
 }
@@ -460,33 +460,33 @@ static void images_are_drawn_when_their_time_has_passed(void **context)
     double time = 0;
     for (int cycle = 0; cycle < 11; cycle++, time += 0.1) {
         forget_pictures();
-        told_everywhere(session, insitu_step(session, cycle, time), INSITU_OK, "");
+        reported_everywhere(session, insitu_step(session, cycle, time), INSITU_OK, "");
         everywhere(insitu_last_report(session)->images == expected[cycle]);
     }
     everywhere(own_rank != 0 || !strcmp(caught[0].path, "a_10_1.00.exr"));
     const double later[] = {7.1, 7.1, 7.2, 7.3};
     const int then[] = {1, 0, 0, 1};
     for (int i = 0; i < 4; i++) {
-        told_everywhere(session, insitu_step(session, 11 + i, later[i]), INSITU_OK, "");
+        reported_everywhere(session, insitu_step(session, 11 + i, later[i]), INSITU_OK, "");
         everywhere(insitu_last_report(session)->images == then[i]);
     }
     forget_pictures();
     insitu_destroy(&session);
 }
 
-static void ranks_at_different_cycles_are_told(void **context)
+static void ranks_at_different_cycles_are_reported(void **context)
 {
     (void)context;
     if (rank_count < 2) return;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     everywhere(hand_over(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, own_rank == 1 ? 5 : 4, 0);
-    told_everywhere(session, status, INSITU_ERROR_MPI, "ranks disagree on the cycle: 4 on one, 5 on another");
+    reported_everywhere(session, status, INSITU_ERROR_MPI, "ranks disagree on the cycle: 4 on one, 5 on another");
     step_draws(session, 6, 1);
     insitu_destroy(&session);
 }
 
-static void picture_that_cannot_be_written_is_told_to_all(void **context)
+static void picture_that_cannot_be_written_is_reported_on_all_ranks(void **context)
 {
     (void)context;
     insitu_session *session =
@@ -496,7 +496,7 @@ static void picture_that_cannot_be_written_is_told_to_all(void **context)
     unwritable = "a_";
     const insitu_status status = insitu_step(session, 3, 0);
     unwritable = NULL;
-    told_everywhere(session, status, INSITU_ERROR_IO, "rank 0: image \"a\": a_3.exr: cannot be written");
+    reported_everywhere(session, status, INSITU_ERROR_IO, "rank 0: image \"a\": a_3.exr: cannot be written");
     everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_3.exr")));
     step_draws(session, 4, 2);
     insitu_destroy(&session);
@@ -541,8 +541,8 @@ static void images_without_outputs_are_for_memory(void **context)
         everywhere(insitu_last_report(session)->images == (cycle > 1));
         const insitu_picture *kept = insitu_last_pictures(session, &count);
         everywhere(count == (cycle > 1 && own_rank == 0) && (!kept || kept->width == 24));
-        const bool is_told = strstr(insitu_last_report(session)->warnings, "\"a\": it has no outputs") != NULL;
-        everywhere(is_told == (cycle == 0));
+        const bool is_reported = strstr(insitu_last_report(session)->warnings, "\"a\": it has no outputs") != NULL;
+        everywhere(is_reported == (cycle == 0));
     }
     insitu_destroy(&session);
 }
@@ -553,14 +553,14 @@ static void bad_scene_opens_no_session(void **context)
     insitu_session *session = (insitu_session *)&input;
     insitu_status status = insitu_create(MPI_COMM_WORLD, write_scene("images:\n  - nmae: a\n"), &session);
     everywhere(session == NULL);
-    told_everywhere(NULL, status, INSITU_ERROR_SCENE, ".yaml:2: ", "nmae");
+    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, ".yaml:2: ", "nmae");
     status = insitu_create(MPI_COMM_WORLD, own_rank == 0 ? "/nowhere/at/all.yaml" : NULL, &session);
-    told_everywhere(NULL, status, INSITU_ERROR_SCENE, "/nowhere/at/all.yaml: cannot be read");
+    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, "/nowhere/at/all.yaml: cannot be read");
     status = insitu_create(MPI_COMM_WORLD, own_rank == 0 ? NULL : "x", &session);
-    told_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "insitu_create: no scene is given");
+    reported_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "insitu_create: no scene is given");
     write_scene(plain_scene);
     status = insitu_create(MPI_COMM_WORLD, write_scene(plain_scene), own_rank == rank_count - 1 ? NULL : &session);
-    told_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "no place for the session");
+    reported_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "no place for the session");
     everywhere(insitu_create(MPI_COMM_NULL, "x", &session) == INSITU_ERROR_ARGUMENT);
     everywhere(insitu_destroy(&session) == INSITU_OK && insitu_destroy(NULL) == INSITU_OK);
 }
@@ -579,7 +579,7 @@ static insitu_status hand_over_both(insitu_session *session, insitu_field *cells
 }
 
 /* Opening a pipe that nobody writes to would wait for ever. */
-static void scene_that_is_no_file_is_told(void **context)
+static void scene_that_is_no_file_is_reported(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
@@ -595,10 +595,10 @@ static void scene_that_is_no_file_is_told(void **context)
     }
     insitu_session *other = NULL;
     const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &other);
-    told_everywhere(NULL, status, INSITU_ERROR_SCENE, scene, "is a named pipe (FIFO), expected a regular file");
+    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, scene, "is a named pipe (FIFO), expected a regular file");
     everywhere(own_rank != 0 || (unlink(scene) == 0 && rename(kept, scene) == 0));
     const insitu_status of_folder = insitu_create(MPI_COMM_WORLD, "/", &other);
-    told_everywhere(NULL, of_folder, INSITU_ERROR_SCENE,
+    reported_everywhere(NULL, of_folder, INSITU_ERROR_SCENE,
                     "/: cannot be read: it is a directory, expected a regular file");
     insitu_destroy(&session);
 }
@@ -678,12 +678,12 @@ static void failing_allocation_is_an_error_and_no_more(void **context)
             int is_over = !is_armed || base_memory_allocations() - count_before < n;
             MPI_Allreduce(MPI_IN_PLACE, &is_over, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
             if (is_over) {
-                told_everywhere(session, status, INSITU_OK, "");
+                reported_everywhere(session, status, INSITU_OK, "");
                 break;
             }
             failures += status != INSITU_OK;
             if (status != INSITU_OK && status != INSITU_ERROR_FIELD) /* a field may follow on a refused mesh */
-                told_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
+                reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
             everywhere(hand_over_both(session, &cells) == INSITU_OK);
             step_draws(session, n, 1);
             everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
@@ -707,7 +707,7 @@ static void failing_allocation_opens_no_session(void **context)
         const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &session);
         base_memory_fail_nth(0);
         everywhere((status == INSITU_OK) == (session != NULL));
-        if (status != INSITU_OK) told_everywhere(NULL, status, INSITU_ERROR_MEMORY, "memory");
+        if (status != INSITU_OK) reported_everywhere(NULL, status, INSITU_ERROR_MEMORY, "memory");
         insitu_destroy(&session);
         everywhere(base_memory_held() == before);
         if (status == INSITU_OK) break;
@@ -746,13 +746,13 @@ int main(int argc, char **argv)
         cmocka_unit_test(constant_fields_are_drawn),
         cmocka_unit_test(missing_field_leaves_the_other_picture),
         cmocka_unit_test(component_that_is_not_there_is_named),
-        cmocka_unit_test(ranks_at_different_cycles_are_told),
+        cmocka_unit_test(ranks_at_different_cycles_are_reported),
         cmocka_unit_test(images_are_drawn_when_their_time_has_passed),
-        cmocka_unit_test(picture_that_cannot_be_written_is_told_to_all),
+        cmocka_unit_test(picture_that_cannot_be_written_is_reported_on_all_ranks),
         cmocka_unit_test(edited_scene_is_taken_and_a_broken_one_is_not),
         cmocka_unit_test(images_without_outputs_are_for_memory),
         cmocka_unit_test(bad_scene_opens_no_session),
-        cmocka_unit_test(scene_that_is_no_file_is_told),
+        cmocka_unit_test(scene_that_is_no_file_is_reported),
         cmocka_unit_test(memory_is_given_back),
         cmocka_unit_test(picture_memory_is_kept_to_a_limit),
         cmocka_unit_test(failing_allocation_is_an_error_and_no_more),

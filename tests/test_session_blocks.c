@@ -398,7 +398,7 @@ static void set_all(insitu_session *session)
         if (owner_of(number) == own_rank) hand_block(session, &blocks[number], INSITU_CHANGED_ALL);
 }
 
-static void wrong_calls_are_told_at_once(void **state)
+static void wrong_calls_are_reported_at_once(void **state)
 {
     insitu_field field;
     insitu_mesh mesh;
@@ -421,7 +421,7 @@ static void wrong_calls_are_told_at_once(void **state)
 }
 
 /* One block is spoilt; then it is mended, and the picture is the truth. */
-static void faults_of_one_block_are_told_to_all(void **state)
+static void faults_of_one_block_are_reported_on_all_ranks(void **state)
 {
     const int spoilt = 5;
     const bool is_mine = owner_of(spoilt) == own_rank;
@@ -432,17 +432,17 @@ static void faults_of_one_block_are_told_to_all(void **state)
     insitu_mesh_defaults(&mesh);
     mesh.vertex_count = -1;
     if (is_mine) insitu_set_block(session, "m", spoilt, &mesh);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT, "mesh \"m[5]\": vertex_count is -1");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT, "mesh \"m[5]\": vertex_count is -1");
     blocks[spoilt].a.hexes[77] = -4; /* by its number it is a list of cells */
     if (is_mine) hand_block(session, &blocks[spoilt], INSITU_CHANGED_ALL);
-    told_everywhere(session, insitu_step(session, 1, 1), INSITU_ERROR_MESH, "mesh \"m[5]\": cell 9 ");
+    reported_everywhere(session, insitu_step(session, 1, 1), INSITU_ERROR_MESH, "mesh \"m[5]\": cell 9 ");
     blocks[spoilt].a.hexes[77] = blocks[spoilt].a.hexes[69] + 1;
     if (is_mine) insitu_set_block(session, "m", spoilt, NULL);
     destroy_block(&blocks[spoilt]);
     make_block(spoilt, &blocks[spoilt]);
     if (is_mine) set_block(session, &blocks[spoilt], INSITU_CHANGED_ALL); /* without its fields */
     if (rank_count > 1 || is_mine)
-        told_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
+        reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
                         "mesh \"m[5]\": field \"c\" is not set, other blocks have it");
     forget_pictures();
     if (is_mine) hand_block(session, &blocks[spoilt], 0);
@@ -457,7 +457,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(ids_join_blocks),
                                        cmocka_unit_test(blocks_come_and_go),
                                        cmocka_unit_test(whole_and_blocks_replace_each_other),
-                                       cmocka_unit_test(wrong_calls_are_told_at_once),
-                                       cmocka_unit_test(faults_of_one_block_are_told_to_all)};
+                                       cmocka_unit_test(wrong_calls_are_reported_at_once),
+                                       cmocka_unit_test(faults_of_one_block_are_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -35,8 +35,8 @@ static insitu_session *open_tree(scene_tree tree, const char *scene)
 static void step_both(insitu_session *full, insitu_session *other, int64_t cycle)
 {
     forget_pictures();
-    told_everywhere(full, insitu_step(full, cycle, 0), INSITU_OK, "");
-    told_everywhere(other, insitu_step(other, cycle, 0), INSITU_OK, "");
+    reported_everywhere(full, insitu_step(full, cycle, 0), INSITU_OK, "");
+    reported_everywhere(other, insitu_step(other, cycle, 0), INSITU_OK, "");
     if (own_rank == 0) {
         const caught_picture *a = &caught[0], *b = &caught[1];
         const size_t pixels = (size_t)a->width * (size_t)a->height;
@@ -128,7 +128,7 @@ static void partial_trees_are_of_the_cells_that_show(void **context)
     MPI_Allreduce(&straddling, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
     insitu_session *session = open_tree(SCENE_TREE_PARTIAL, write_scene(IMAGE(SURFACE)));
     everywhere(hand_over(session, &in) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(tree_cells(session) == all);
     everywhere(in.part.cell_count == 0 || strstr(insitu_last_report(session)->left_out, "show nothing in this step"));
     forget_pictures();
@@ -149,20 +149,20 @@ static void standing_cells_get_a_full_tree(void **context)
     int64_t cycle = 0;
     for (; cycle < 3; cycle++) {
         everywhere(hand_over(session, &in) == INSITU_OK);
-        told_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+        reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
         everywhere(tree_cells(session) < all);
     }
     in.mesh.changed = INSITU_CHANGED_NOTHING;
     while (tree_cells(session) < all && cycle < 1000) {
         change_values(&in, 1e-6);
         everywhere(hand_over(session, &in) == INSITU_OK);
-        told_everywhere(session, insitu_step(session, cycle++, 0), INSITU_OK, "");
+        reported_everywhere(session, insitu_step(session, cycle++, 0), INSITU_OK, "");
         forget_pictures();
     }
     everywhere(tree_cells(session) == all);
     change_values(&in, 1e-6);
     everywhere(hand_over(session, &in) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+    reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
     everywhere(insitu_last_report(session)->build_ms == 0 &&
                (insitu_last_report(session)->refit_ms > 0 || in.part.cell_count == 0));
     forget_pictures();
@@ -182,7 +182,7 @@ static void full_trees_are_built_where_most_cells_show(void **context)
         open_tree(SCENE_TREE_AUTO,
                   write_scene(IMAGE("      - volume: {field: f, range: [-4, 4], opacity: [[0, 0.1], [1, 0.5]]}\n")));
     everywhere(hand_over(session, &in) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(tree_cells(session) == all && !session->meshes.items[0]->is_partial);
     forget_pictures();
     insitu_destroy(&session);

@@ -113,7 +113,7 @@ static moved move_arrays(session_input *in, layout how)
 typedef struct drawing {
     caught_picture pictures[PICTURES];
     int64_t copied;
-    bool is_warned, tells_why;
+    bool is_warned, gives_reason;
 } drawing;
 
 static drawing step_and_catch(insitu_session *session, int cycle)
@@ -125,7 +125,7 @@ static drawing step_and_catch(insitu_session *session, int cycle)
     const insitu_report *report = insitu_last_report(session);
     drawing out = {.copied = report->bytes_copied,
                    .is_warned = strstr(report->warnings, "INSITU_ORDER_") != NULL,
-                   .tells_why =
+                   .gives_reason =
                        strstr(report->copied_why, "cells' vertices, one after the other in VTK's order") != NULL};
     for (int i = 0; i < PICTURES && own_rank == 0; i++) out.pictures[i] = caught[i];
     caught_count = 0;
@@ -182,7 +182,7 @@ static void check(test_mesh_kind kind, insitu_vertex_order order, layout how, in
     const bool is_copied = in.part.cell_count && (in.mesh.connectivity_row || has_turned(&in.part, order));
     everywhere(are_same(&expected, &drawn));
     everywhere(drawn.copied == expected.copied + is_copied * 4 * (in.part.connectivity_count + 1));
-    everywhere(drawn.tells_why == is_copied && !drawn.is_warned);
+    everywhere(drawn.gives_reason == is_copied && !drawn.is_warned);
     free_drawing(&expected);
     free_drawing(&drawn);
     free_moved(&plain_arrays);
@@ -218,7 +218,7 @@ static void recognised_cells_go_with_any_order(void **state)
     everywhere(are_same(&expected, &drawn) && expected.copied == drawn.copied);
     in.mesh.keep_polyhedra = 1;
     drawing kept = draw(&in);
-    everywhere(kept.copied < drawn.copied && kept.tells_why);
+    everywhere(kept.copied < drawn.copied && kept.gives_reason);
     free_drawing(&kept);
     free_drawing(&expected);
     free_drawing(&drawn);
@@ -380,12 +380,12 @@ static const spoilt_case cases[] = {
     {"bad type", type_in_order, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 99"}},
 };
 
-static void what_is_wrong_is_told_to_all(void **state)
+static void what_is_wrong_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_told(&in, cases, sizeof cases / sizeof cases[0]);
+    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
     free_moved(&spoilt);
 }
@@ -395,6 +395,6 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_order_and_layout_draws_the_same), cmocka_unit_test(recognised_cells_go_with_any_order),
         cmocka_unit_test(quads_are_shells_in_any_order), cmocka_unit_test(the_order_may_be_set_right),
-        cmocka_unit_test(what_is_wrong_is_told_to_all)};
+        cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -84,7 +84,7 @@ static char *copy_elsewhere(insitu_mesh *mesh, const moved_array *moved)
     return copy;
 }
 
-static void spoilt_arrays_elsewhere_are_told(void **context)
+static void spoilt_arrays_elsewhere_are_reported(void **context)
 {
     (void)context;
     for (size_t i = 0; i < sizeof moved_arrays / sizeof moved_arrays[0]; i++) {
@@ -96,7 +96,7 @@ static void spoilt_arrays_elsewhere_are_told(void **context)
         memcpy(copy + (size_t)moved->at * moved->bytes, &moved->value, moved->bytes == 1 ? 1 : 8);
         everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
         const insitu_status status = insitu_step(session, 1, 0);
-        told_everywhere(session, status, INSITU_ERROR_MESH, "rank 0: mesh \"m\": cell", moved->words);
+        reported_everywhere(session, status, INSITU_ERROR_MESH, "rank 0: mesh \"m\": cell", moved->words);
         insitu_destroy(&session);
         free(copy);
     }
@@ -180,7 +180,7 @@ static void turn_values(void)
 }
 
 /* Values that change in place, and are said not to have or are not set again, are drawn as they are, with a warning. */
-static void values_that_change_without_a_word_are_told(void **context)
+static void values_that_change_without_a_word_are_reported(void **context)
 {
     (void)context;
     static const char words[] = "mesh \"m\": field \"f\" has other values than in the last picture";
@@ -221,11 +221,11 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spoilt_arrays_elsewhere_are_told),
+        cmocka_unit_test(spoilt_arrays_elsewhere_are_reported),
         cmocka_unit_test(vertices_elsewhere_are_drawn_there),
         cmocka_unit_test(cells_elsewhere_are_drawn_with_their_fields),
         cmocka_unit_test(values_elsewhere_are_drawn),
-        cmocka_unit_test(values_that_change_without_a_word_are_told),
+        cmocka_unit_test(values_that_change_without_a_word_are_reported),
     };
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -221,7 +221,7 @@ static void steps_that_go_back_drop_what_was_after(void **state)
 
 /* ---- what fails ------------------------------------------------------------------------------------------------ */
 
-static void tables_that_cannot_be_written_are_told_and_written_later(void **state)
+static void tables_that_cannot_be_written_are_reported_and_written_later(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -231,16 +231,16 @@ static void tables_that_cannot_be_written_are_told_and_written_later(void **stat
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
     assert_int_equal(hand_over(session, &in), INSITU_OK);
     forget_pictures();
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv", "cannot be");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv", "cannot be");
     everywhere(caught_count == (own_rank == 0 ? 8 : 0));
     if (own_rank == 0) rmdir("out/a.cdb/data.csv");
     put_file("out/a.cdb/data.csv", "a,b\n1,2\n");
-    told_everywhere(session, insitu_step(session, 2, 1), INSITU_ERROR_IO, "out/a.cdb/data.csv", "other columns",
+    reported_everywhere(session, insitu_step(session, 2, 1), INSITU_ERROR_IO, "out/a.cdb/data.csv", "other columns",
                     "\"cycle,time,phi,theta,isovalue,FILE\"");
     forget_files();
     if (own_rank == 0) mkdir("out/a.cdb/data.js", 0777);
     forget_pictures();
-    told_everywhere(session, insitu_step(session, 4, 2), INSITU_ERROR_IO, "cinema: out/a.cdb/data.js", "written");
+    reported_everywhere(session, insitu_step(session, 4, 2), INSITU_ERROR_IO, "cinema: out/a.cdb/data.js", "written");
     if (own_rank == 0) rmdir("out/a.cdb/data.js");
     everywhere(insitu_step(session, 6, 3) == INSITU_OK);
     everywhere(is_table(4, 7)); /* what could not be written at cycle 4 is there */
@@ -259,7 +259,7 @@ static void pictures_that_cannot_be_written_have_no_line(void **state)
     assert_int_equal(hand_over(session, &in), INSITU_OK);
     forget_pictures();
     unwritable = "_002_";
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "image \"a\"", "a_000000_002_0.25.png");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "image \"a\"", "a_000000_002_0.25.png");
     unwritable = NULL;
     read_file("out/a.cdb/data.csv", MOST, text);
     everywhere(own_rank != 0 || (!strstr(text, "_002_") && strstr(text, "_003_-0.5.png\n")));
@@ -309,7 +309,7 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
 /* ---- news ------------------------------------------------------------------------------------------------------ */
 
 /* Compares a database's news with a pattern, in which # stands for a stamp of the scene's file. */
-static bool is_news(const char *path, const char *pattern)
+static bool report_matches(const char *path, const char *pattern)
 {
     static char text[MOST];
     read_file(path, MOST, text);
@@ -325,7 +325,7 @@ static bool is_news(const char *path, const char *pattern)
 
 /* report.json tells what a program that watches the run cannot know otherwise: warnings, errors of steps and of edits.
  */
-static void news_tell_of_warnings_and_edits(void **state)
+static void reports_have_warnings_and_edits(void **state)
 {
     (void)state;
     static const char news[] = "out/n.cdb/report.json";
@@ -355,7 +355,7 @@ static void news_tell_of_warnings_and_edits(void **state)
              " \"parameters\": {\"a\": 0.5, \"b\": -2.0000000000000001e+300},\n"
              " \"warnings\": [\n  {\"cycle\": 0, \"text\": \"%s\"}]}\n",
              scene, escaped);
-    everywhere(is_news(news, expected));
+    everywhere(report_matches(news, expected));
     if (own_rank == 0) unlink(news);
     everywhere(insitu_step(session, 1, 0) ==
                INSITU_OK); /* nothing is due, nothing is new, but what was never asked for */
@@ -374,7 +374,7 @@ static void news_tell_of_warnings_and_edits(void **state)
                 strstr(text, "\"a\": 0.5") && !strstr(text, "last edit was not taken")));
     write_scene(SCENE("", "g"));
     assert_int_equal(hand_over(session, &in), INSITU_OK);
-    told_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_FIELD, "\"g\"");
+    reported_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_FIELD, "\"g\"");
     read_file(news, MOST, text);
     everywhere(own_rank != 0 || (strstr(text, "\"error\": null}") && strstr(text, "\"g\\\"") &&
                                  strstr(text, "\"parameters\": {}") && strstr(text, "the scene file was edited")));
@@ -492,7 +492,7 @@ static void conditions_hold_for_all_pictures_of_an_image(void **state)
 
 /* An isovalue that the field does not reach is told once, though each picture has one value and is drawn at each step.
  */
-static void warnings_of_swept_isovalues_are_told_once(void **state)
+static void warnings_of_swept_isovalues_are_reported_once(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -527,14 +527,14 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(runs_that_begin_again_go_on_with_the_table),
                                        cmocka_unit_test(lines_go_from_the_first_step_on),
                                        cmocka_unit_test(steps_that_go_back_drop_what_was_after),
-                                       cmocka_unit_test(tables_that_cannot_be_written_are_told_and_written_later),
+                                       cmocka_unit_test(tables_that_cannot_be_written_are_reported_and_written_later),
                                        cmocka_unit_test(pictures_that_cannot_be_written_have_no_line),
                                        cmocka_unit_test(tables_stay_whole_where_memory_runs_out),
-                                       cmocka_unit_test(news_tell_of_warnings_and_edits),
+                                       cmocka_unit_test(reports_have_warnings_and_edits),
                                        cmocka_unit_test(sweeps_draw_what_each_image_alone_would),
                                        cmocka_unit_test(orbits_draw_what_each_camera_alone_would),
                                        cmocka_unit_test(paths_draw_what_a_camera_there_would),
                                        cmocka_unit_test(conditions_hold_for_all_pictures_of_an_image),
-                                       cmocka_unit_test(warnings_of_swept_isovalues_are_told_once)};
+                                       cmocka_unit_test(warnings_of_swept_isovalues_are_reported_once)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -147,7 +147,7 @@ static void a_step_waits_few_times(void **state)
 }
 
 /* Whichever way fragments go, the picture is the same, and the report has the way and its bytes. */
-static void schedules_change_no_bit_and_are_told(void **context)
+static void schedules_change_no_bit_and_are_reported(void **context)
 {
     static const char *const names[] = {"auto", "direct", "nodes", "radix", "binary"};
     enum { BYTES = 64 * 48 * 4 * sizeof(float) };
@@ -163,7 +163,7 @@ static void schedules_change_no_bit_and_are_told(void **context)
                  "    outputs: [{path: a.exr}]\n");
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
         everywhere(hand_over(session, &in) == INSITU_OK);
-        told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+        reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
         const insitu_report *report = insitu_last_report(session);
         int64_t sent = 0;
         MPI_Allreduce(&report->bytes_sent, &sent, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
@@ -182,6 +182,6 @@ static void schedules_change_no_bit_and_are_told(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_waits_few_times),
-                                       cmocka_unit_test(schedules_change_no_bit_and_are_told)};
+                                       cmocka_unit_test(schedules_change_no_bit_and_are_reported)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -220,7 +220,7 @@ static void every_kind_of_layer_has_a_range_over_a_run(void **state)
     remove_ranges();
 }
 
-static void broken_file_of_ranges_is_told_to_all(void **state)
+static void broken_file_of_ranges_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     static const char *const lines[] = {"volume 0 -2 3 1 f", "volume 0 -2 nan 1 f", "volume 0 -2 1 f", "whatever"};
@@ -231,7 +231,7 @@ static void broken_file_of_ranges_is_told_to_all(void **state)
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with("", ", range: run")));
         everywhere(hand_over(session, &block) == INSITU_OK);
         const insitu_status status = insitu_step(session, 0, 0);
-        told_everywhere(session, status, INSITU_ERROR_SCENE, image_name, ".ranges:3: is no range",
+        reported_everywhere(session, status, INSITU_ERROR_SCENE, image_name, ".ranges:3: is no range",
                         "delete the file to begin anew");
         remove_ranges();
         step_is_good(session, 1);
@@ -345,7 +345,7 @@ static void maps_from_files_are_every_ranks(void **state)
     assert_alike(&by_file, &by_list, 0);
 }
 
-static void missing_and_broken_maps_are_told_to_all(void **state)
+static void missing_and_broken_maps_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     char keys[128];
@@ -388,9 +388,9 @@ int main(int argc, char **argv)
         cmocka_unit_test(every_kind_of_layer_has_a_range_over_a_run),
         cmocka_unit_test(volumes_have_bands_and_colours_outside),
         cmocka_unit_test(points_of_the_opacity_are_where_the_scale_has_them),
-        cmocka_unit_test(broken_file_of_ranges_is_told_to_all),
+        cmocka_unit_test(broken_file_of_ranges_is_reported_on_all_ranks),
         cmocka_unit_test(maps_from_files_are_every_ranks),
-        cmocka_unit_test(missing_and_broken_maps_are_told_to_all),
+        cmocka_unit_test(missing_and_broken_maps_are_reported_on_all_ranks),
     };
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

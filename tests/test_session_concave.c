@@ -240,13 +240,13 @@ static bool is_well(const tile tiles[TILES], const caught_picture *picture, judg
 static bool are_one(const caught_picture *a, const caught_picture *b, const char *what)
 {
     if (same_pictures(a, b)) return true;
-    for (int pixel = 0, told = 0; pixel < PIXELS && told < 5; pixel++) {
+    for (int pixel = 0, reported = 0; pixel < PIXELS && reported < 5; pixel++) {
         double at[2];
         place_of(pixel, at);
         if (memcmp(a->rgba + 4 * (ptrdiff_t)pixel, b->rgba + 4 * (ptrdiff_t)pixel, 4 * sizeof(float)) == 0 &&
             a->depth[pixel] == b->depth[pixel])
             continue;
-        told++;
+        reported++;
         fprintf(stderr, "%s: (%g, %g): %.9g, %.9g on ranks, %.9g, %.9g on one\n", what, at[0], at[1],
                 (double)a->rgba[4 * pixel], (double)a->depth[pixel], (double)b->rgba[4 * pixel],
                 (double)b->depth[pixel]);

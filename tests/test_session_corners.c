@@ -386,17 +386,17 @@ static const spoilt_case cases[] = {
     {"centring", unknown_centring, INSITU_ERROR_ARGUMENT, true, {"unknown centring 3"}},
 };
 
-static void what_is_wrong_is_told_to_all(void **state)
+static void what_is_wrong_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_told(&in, cases, sizeof cases / sizeof cases[0]);
+    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
 }
 
 /* These are seen by a step; the centring is one on all ranks. */
-static void what_arrays_hold_is_told_to_all(void **state)
+static void what_arrays_hold_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -409,7 +409,7 @@ static void what_arrays_hold_is_told_to_all(void **state)
     const int64_t good = v.index[9];
     if (own_rank == rank_count - 1) v.index[9] = v.dealt_count;
     for (int step = 0; step < 2; step++)
-        told_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD, "the index of corner 9 is ",
+        reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD, "the index of corner 9 is ",
                         "outside 0..");
     v.index[9] = good;
     step_is_good(session, 2);
@@ -423,7 +423,7 @@ static void what_arrays_hold_is_told_to_all(void **state)
     assert_non_null(zeros);
     everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
     set_field(session, "f", INSITU_CORNER, in.part.connectivity_count, zeros, NULL, NULL);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "is a polyhedron, whose corners", "cell ");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "is a polyhedron, whose corners", "cell ");
     insitu_destroy(&session);
     free(zeros);
     input_free(&in);
@@ -434,7 +434,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {cmocka_unit_test(torn_cells_are_those_of_doubled_vertices),
                                        cmocka_unit_test(corners_in_rows_and_other_orders_are_plain_ones),
                                        cmocka_unit_test(joined_corners_have_their_means),
-                                       cmocka_unit_test(what_is_wrong_is_told_to_all),
-                                       cmocka_unit_test(what_arrays_hold_is_told_to_all)};
+                                       cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks),
+                                       cmocka_unit_test(what_arrays_hold_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

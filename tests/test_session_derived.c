@@ -597,7 +597,7 @@ static const wrong_case wrong[] = {
 };
 
 /* Each is told in the step, to all ranks alike, with the line; an image of other fields is drawn all the same. */
-static void what_is_wrong_is_told_to_all(void **state)
+static void what_is_wrong_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -620,7 +620,7 @@ static void what_is_wrong_is_told_to_all(void **state)
             if (is_right)
                 everywhere(status == INSITU_OK);
             else
-                told_everywhere(session, status, INSITU_ERROR_FIELD, ":1: ", wrong[i].words[0], wrong[i].words[1],
+                reported_everywhere(session, status, INSITU_ERROR_FIELD, ":1: ", wrong[i].words[0], wrong[i].words[1],
                                 wrong[i].words[2]);
             everywhere(own_rank != 0 || caught_count == (is_right ? 2 : 1));
         }
@@ -633,7 +633,7 @@ static void what_is_wrong_is_told_to_all(void **state)
 
 /* A name that the simulation has, too; one that is nearly a derived field's; and a field whose components differ on one
  * rank. */
-static void clashes_are_told_to_all(void **state)
+static void clashes_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -642,12 +642,12 @@ static void clashes_are_told_to_all(void **state)
     make_vector(&in.part, swirl, INSITU_VERTEX, true, "u", &u);
     insitu_session *session = begin(MPI_COMM_WORLD, SCENE("f: u.x + 1", "f"), &in, &u);
     insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, ":1: fields.f: mesh \"m\" has a field of this name already",
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, ":1: fields.f: mesh \"m\" has a field of this name already",
                     "expected another name");
     insitu_destroy(&session);
     session = begin(MPI_COMM_WORLD, SCENE("speed: mag(u)", "sped"), &in, &u);
     status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, "no mesh has the field \"sped\" (did you mean speed?)",
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, "no mesh has the field \"sped\" (did you mean speed?)",
                     "there are: ");
     insitu_destroy(&session);
     /* It may come later. */
@@ -656,14 +656,14 @@ static void clashes_are_told_to_all(void **state)
     late.name = "late";
     assert_int_equal(insitu_set_field(session, "m", &late), INSITU_OK);
     status = insitu_step(session, 1, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, "fields.late: mesh \"m\" has a field of this name already");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, "fields.late: mesh \"m\" has a field of this name already");
     insitu_destroy(&session);
     if (rank_count > 1) {
         session = begin(MPI_COMM_WORLD, SCENE("q: {q_criterion: u}", "q"), &in, NULL);
         if (own_rank == rank_count - 1) u.field.component_count = 2;
         assert_int_equal(insitu_set_field(session, "m", &u.field), INSITU_OK);
         status = insitu_step(session, 0, 0);
-        told_everywhere(session, status, INSITU_ERROR_FIELD, "fields.q.q_criterion: rank ", "field \"u\"",
+        reported_everywhere(session, status, INSITU_ERROR_FIELD, "fields.q.q_criterion: rank ", "field \"u\"",
                         "another centring or number of components");
         insitu_destroy(&session);
     }
@@ -678,7 +678,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(partitions_do_not_show),          cmocka_unit_test(blocks_show_no_seam),
         cmocka_unit_test(gradients_of_shells_lie_in_them), cmocka_unit_test(velocities_of_cells_and_corners_are_taken),
         cmocka_unit_test(what_stays_is_not_made_again),    cmocka_unit_test(an_edited_scene_has_its_own),
-        cmocka_unit_test(what_is_wrong_is_told_to_all),    cmocka_unit_test(clashes_are_told_to_all),
+        cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks),    cmocka_unit_test(clashes_are_reported_on_all_ranks),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -250,17 +250,17 @@ static const spoilt_case at_the_step[] = {
     {"NaN", coordinate_nan, INSITU_ERROR_MESH, false, {CELL_0, "vertex 0 has a coordinate that is not finite"}},
 };
 
-static void spoilt_arrays_are_told_at_once(void **context)
+static void spoilt_arrays_are_reported_at_once(void **context)
 {
     (void)context;
-    for (size_t i = 0; i < sizeof at_once / sizeof at_once[0]; i++) spoilt_is_told_to_all(session, &input, &at_once[i]);
+    for (size_t i = 0; i < sizeof at_once / sizeof at_once[0]; i++) spoilt_is_reported_on_all_ranks(session, &input, &at_once[i]);
 }
 
-static void spoilt_faces_are_told_at_the_step(void **context)
+static void spoilt_faces_are_reported_at_the_step(void **context)
 {
     (void)context;
     for (size_t i = 0; i < sizeof at_the_step / sizeof at_the_step[0]; i++)
-        spoilt_is_told_to_all(session, &input, &at_the_step[i]);
+        spoilt_is_reported_on_all_ranks(session, &input, &at_the_step[i]);
 }
 
 /* A ghost is not drawn: its vertices may be anywhere, its faces must be faces all the same. */
@@ -273,7 +273,7 @@ static void ghosts_are_proved_but_for_coordinates(void **context)
     coordinate_nan(&input);
     everywhere(hand_over(session, &input) == INSITU_OK);
     everywhere(insitu_step(session, 3, 0) == INSITU_OK);
-    spoilt_is_told_to_all(session, &input, &ghost);
+    spoilt_is_reported_on_all_ranks(session, &input, &ghost);
 }
 
 /* ---- cells of no volume -------------------------------------------------------------------------------------- */
@@ -336,7 +336,7 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
 
 /* The first allocation of a step that checks polyhedra, and need not recognise any, is for their edges. If it fails,
  * the cells are unchecked, and the next step must check them again. */
-static void check_without_memory_is_told_and_repeated(void **context)
+static void check_without_memory_is_reported_and_repeated(void **context)
 {
     (void)context;
     char rank_words[32];
@@ -346,7 +346,7 @@ static void check_without_memory_is_told_and_repeated(void **context)
     base_memory_fail_nth(own_rank == rank_count - 1);
     const insitu_status status = insitu_step(session, 8, 0);
     base_memory_fail_nth(0);
-    told_everywhere(session, status, INSITU_ERROR_MEMORY, rank_words, "mesh \"m\": no memory to check cell 0");
+    reported_everywhere(session, status, INSITU_ERROR_MEMORY, rank_words, "mesh \"m\": no memory to check cell 0");
     const int64_t cells = input.part.cell_count;
     step_is_good(session, 9);
     everywhere(insitu_last_report(session)->cells == cells && insitu_last_report(session)->bytes_trees > 0);
@@ -371,11 +371,11 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spoilt_arrays_are_told_at_once),
-        cmocka_unit_test(spoilt_faces_are_told_at_the_step),
+        cmocka_unit_test(spoilt_arrays_are_reported_at_once),
+        cmocka_unit_test(spoilt_faces_are_reported_at_the_step),
         cmocka_unit_test(ghosts_are_proved_but_for_coordinates),
         cmocka_unit_test(flat_polyhedra_are_counted_and_change_no_picture),
-        cmocka_unit_test(check_without_memory_is_told_and_repeated),
+        cmocka_unit_test(check_without_memory_is_reported_and_repeated),
     };
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -152,7 +152,7 @@ static void other_centring(insitu_field *field)
     field->centring = INSITU_CELL;
 }
 
-static void what_goes_wrong_is_told_to_all(void **state)
+static void what_goes_wrong_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     static const struct {
@@ -177,7 +177,7 @@ static void what_goes_wrong_is_told_to_all(void **state)
         f.calls = g.calls = 0;
         if (own_rank == rank_count - 1) f.status = cases[i].status, f.spoil = cases[i].spoil;
         forget_pictures();
-        told_everywhere(session, insitu_step(session, 2 * i, 0), INSITU_ERROR_FIELD, cases[i].words, "rank ");
+        reported_everywhere(session, insitu_step(session, 2 * i, 0), INSITU_ERROR_FIELD, cases[i].words, "rank ");
         everywhere(caught_count == 0 && f.calls == 1 && g.calls == 1);
         f.status = INSITU_OK;
         f.spoil = NULL;
@@ -186,7 +186,7 @@ static void what_goes_wrong_is_told_to_all(void **state)
     insitu_field both = fields[0];
     both.values = (insitu_array){f.values, INSITU_FLOAT64, 0};
     everywhere(insitu_set_field(session, "m", &both) == INSITU_ERROR_FIELD);
-    told_everywhere(session, insitu_step(session, 20, 0), INSITU_ERROR_FIELD, "values and fill are given");
+    reported_everywhere(session, insitu_step(session, 20, 0), INSITU_ERROR_FIELD, "values and fill are given");
     insitu_destroy(&session);
     free(f.values);
     free(g.values);
@@ -255,7 +255,7 @@ static void calls_of_a_fill_are_refused(void **state)
         f.call = calls_now ? i % CALLS : -1;
         f.is_refused = false;
         forget_pictures();
-        told_everywhere(f.session, insitu_step(f.session, 2 * i, 0), INSITU_ERROR_ARGUMENT, words, "rank ");
+        reported_everywhere(f.session, insitu_step(f.session, 2 * i, 0), INSITU_ERROR_ARGUMENT, words, "rank ");
         everywhere(f.is_refused == calls_now && caught_count == 0 && insitu_last_report(f.session)->cycle == 2 * i);
         f.call = -1;
         step_is_good(f.session, 2 * i + 1);
@@ -269,7 +269,7 @@ static void calls_of_a_fill_are_refused(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_a_function_makes_is_drawn_and_nothing_else_made),
-                                       cmocka_unit_test(what_goes_wrong_is_told_to_all),
+                                       cmocka_unit_test(what_goes_wrong_is_reported_on_all_ranks),
                                        cmocka_unit_test(calls_of_a_fill_are_refused)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

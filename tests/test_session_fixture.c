@@ -27,7 +27,7 @@ void assert_everywhere(bool is_well, const char *what, const char *file, int lin
     assert_true(all);
 }
 
-void assert_told(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
+void assert_reported(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
                  const char *file, int line)
 {
     char first[1024] = "";
@@ -166,12 +166,12 @@ void step_is_good(insitu_session *session, int cycle)
 {
     forget_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == 1);
     everywhere(caught_count == (own_rank == 0));
 }
 
-void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spoilt_case *c)
+void spoilt_is_reported_on_all_ranks(insitu_session *session, session_input *in, const spoilt_case *c)
 {
     const int bad_rank = rank_count - 1;
     const bool is_bad = own_rank == bad_rank;
@@ -184,7 +184,7 @@ void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spo
     for (int again = 0; again < 2; again++) { /* it stays wrong until it is mended */
         forget_pictures();
         const insitu_status status = insitu_step(session, 1, 0);
-        told_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
+        reported_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
                         c->words[1] ? c->words[1] : "");
         everywhere(insitu_last_report(session)->images == 0 && caught_count == 0);
     }
@@ -207,10 +207,10 @@ void take_own_cells(const test_mesh *whole, test_partition_kind dealt, int side,
 const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
                            "    outputs: [{path: a.exr}]\n";
 
-void all_are_told(session_input *in, const spoilt_case *cases, size_t count)
+void all_are_reported(session_input *in, const spoilt_case *cases, size_t count)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
-    for (size_t i = 0; i < count; i++) spoilt_is_told_to_all(session, in, &cases[i]);
+    for (size_t i = 0; i < count; i++) spoilt_is_reported_on_all_ranks(session, in, &cases[i]);
     insitu_destroy(&session);
 }
 

@@ -23,9 +23,9 @@ extern int own_rank, rank_count;
 void assert_everywhere(bool is_well, const char *what, const char *file, int line);
 
 /* Every rank was told the same, and it holds all of the count words (NULL ones are passed over). */
-#define told_everywhere(session, status, expected, ...)                                                                \
-    assert_told((session), (status), (expected), (const char *const[]){__VA_ARGS__, NULL}, __FILE__, __LINE__)
-void assert_told(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
+#define reported_everywhere(session, status, expected, ...)                                                                \
+    assert_reported((session), (status), (expected), (const char *const[]){__VA_ARGS__, NULL}, __FILE__, __LINE__)
+void assert_reported(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
                  const char *file, int line);
 
 /* Returns the values' sum, rounded once, divided by their number; NAN if there are none. Recentring leaves out less
@@ -97,11 +97,11 @@ typedef struct spoilt_case {
 
 /* Spoilt on the last rank alone, at every step all ranks are told the same, with the rank and the words in it, and no
  * picture is drawn; once the input is renewed the next step draws. */
-void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spoilt_case *c);
+void spoilt_is_reported_on_all_ranks(insitu_session *session, session_input *in, const spoilt_case *c);
 
 /* A scene of one small picture of "f", to which that is told; and each of the cases in a session of it. */
 extern const char error_scene[];
-void all_are_told(session_input *in, const spoilt_case *cases, size_t count);
+void all_are_reported(session_input *in, const spoilt_case *cases, size_t count);
 
 /* Pictures caught on rank 0 since the last forget_pictures(). */
 typedef struct caught_picture {

@@ -113,7 +113,7 @@ static insitu_field describe(const twice *t, bool is_by_index)
 typedef struct drawing {
     caught_picture pictures[STEPS][PICTURES];
     int64_t copied, borrowed;
-    bool tells_why;
+    bool gives_reason;
 } drawing;
 
 static void count_from_one(session_input *in)
@@ -155,7 +155,7 @@ static drawing draw(const session_input *in, twice *t, bool is_by_index)
     const insitu_report *report = insitu_last_report(session);
     out.copied = report->bytes_copied;
     out.borrowed = report->bytes_borrowed;
-    out.tells_why = strstr(report->copied_why, "field \"f\" by its index: ") != NULL;
+    out.gives_reason = strstr(report->copied_why, "field \"f\" by its index: ") != NULL;
     insitu_destroy(&session);
     return out;
 }
@@ -187,7 +187,7 @@ static void check(test_mesh_kind kind, const form *of)
     const int64_t size = of->is_narrow ? 4 : 8, tuples = size * of->components;
     everywhere(indexed.copied == plain.copied + t.places * tuples);
     everywhere(indexed.borrowed == plain.borrowed + (t.count - t.places) * tuples + t.places * size);
-    everywhere(indexed.tells_why && !plain.tells_why);
+    everywhere(indexed.gives_reason && !plain.gives_reason);
     compare(&plain, &indexed);
     free_twice(&t);
     input_free(&in);
@@ -309,18 +309,18 @@ static const spoilt_case cases[] = {
     {"type alone", type_alone, INSITU_ERROR_FIELD, true, {"values, the mesh has "}},
 };
 
-static void what_is_wrong_is_told_to_all(void **state)
+static void what_is_wrong_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_told(&in, cases, sizeof cases / sizeof cases[0]);
+    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
     free(spoilt);
 }
 
 /* The centring is one on all ranks, so this cannot be the last one's alone. */
-static void cells_are_told_too(void **state)
+static void cells_are_reported_too(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -331,7 +331,7 @@ static void cells_are_told_too(void **state)
     if (own_rank == rank_count - 1) spoilt[in.part.cell_count - 1] = 1000000;
     everywhere(hand_over(session, &in) == INSITU_OK);
     for (int step = 0; step < 2; step++)
-        told_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
+        reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
                         "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
     spoilt[in.part.cell_count - 1] = 0;
     step_is_good(session, 2); /* mended in place, for nothing was taken of it */
@@ -371,7 +371,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {cmocka_unit_test(an_index_draws_what_values_in_order_draw),
                                        cmocka_unit_test(an_index_that_nobody_needs_is_left_alone),
                                        cmocka_unit_test(ranks_without_vertices_have_values),
-                                       cmocka_unit_test(cells_are_told_too),
-                                       cmocka_unit_test(what_is_wrong_is_told_to_all)};
+                                       cmocka_unit_test(cells_are_reported_too),
+                                       cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -216,28 +216,28 @@ static const spoilt_case cases[] = {
     {"no components", no_components, INSITU_ERROR_ARGUMENT, true, {"field \"f\": component_count is 0"}},
 };
 
-static void spoilt_input_is_told_to_all(void **context)
+static void spoilt_input_is_reported_on_all_ranks(void **context)
 {
     (void)context;
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_told_to_all(session, &input, &cases[i]);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_reported_on_all_ranks(session, &input, &cases[i]);
 }
 
-static void call_without_a_mesh_is_told_once(void **context)
+static void call_without_a_mesh_is_reported_once(void **context)
 {
     (void)context;
     const bool is_bad = own_rank == 0;
     everywhere(!is_bad || insitu_set_field(session, "nowhere", &input.field) == INSITU_ERROR_FIELD);
     insitu_status status = insitu_step(session, 3, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, "rank 0: ", "\"nowhere\" is not set");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 0: ", "\"nowhere\" is not set");
     step_is_good(session, 4);
     everywhere(!is_bad || insitu_set_mesh(session, NULL, &input.mesh) == INSITU_ERROR_ARGUMENT);
     status = insitu_step(session, 5, 0);
-    told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "no name");
+    reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "no name");
     step_is_good(session, 6);
     if (is_bad) field_without_name(&input);
     everywhere(!is_bad || insitu_set_field(session, "m", &input.field) == INSITU_ERROR_ARGUMENT);
     status = insitu_step(session, 7, 0);
-    told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "without a name");
+    reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "without a name");
     input_renew(&input);
     everywhere(hand_over(session, &input) == INSITU_OK);
     step_is_good(session, 8);
@@ -252,7 +252,7 @@ static void field_missing_on_one_rank_names_it(void **context)
     everywhere(insitu_set_mesh(session, "m", &input.mesh) == INSITU_OK);
     everywhere(own_rank == rank_count - 1 || insitu_set_field(session, "m", &input.field) == INSITU_OK);
     insitu_status status = insitu_step(session, 9, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, words);
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, words);
     everywhere(hand_over(session, &input) == INSITU_OK);
     step_is_good(session, 10);
 }
@@ -267,7 +267,7 @@ static void field_of_two_centrings_is_refused(void **context)
     other.count = input.part.cell_count; /* fewer than vertices: the array is long enough */
     everywhere(own_rank != 1 || insitu_set_field(session, "m", &other) == INSITU_OK);
     const insitu_status status = insitu_step(session, 11, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"", "another centring");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"", "another centring");
     everywhere(hand_over(session, &input) == INSITU_OK);
     step_is_good(session, 12);
 }
@@ -354,7 +354,7 @@ static void bad_cell_of_a_mesh_of_one_type_is_named(void **context)
         if (own_rank == 0) input.part.connectivity[8 * cell + cell % 8] = cell % 2 ? -1 : input.part.vertex_count;
         make_plain(&input);
         everywhere(hand_over(session, &input) == INSITU_OK);
-        told_everywhere(session, insitu_step(session, 17 + cell, 0), INSITU_ERROR_MESH, words);
+        reported_everywhere(session, insitu_step(session, 17 + cell, 0), INSITU_ERROR_MESH, words);
         input_renew(&input);
         make_plain(&input);
         everywhere(hand_over(session, &input) == INSITU_OK);
@@ -457,14 +457,14 @@ static void message_stays_until_the_next_step(void **context)
     const int64_t right = input.part.connectivity[0];
     input.part.connectivity[0] = -1;
     everywhere(hand_over(session, &input) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, 70, 0), INSITU_ERROR_MESH, "vertex index -1");
+    reported_everywhere(session, insitu_step(session, 70, 0), INSITU_ERROR_MESH, "vertex index -1");
     input.part.connectivity[0] = right;
     everywhere(hand_over(session, &input) == INSITU_OK);
     everywhere(insitu_keep_pictures(session, 0) == INSITU_OK);
     everywhere(insitu_last_report(session)->cycle == 70 && strstr(insitu_error(session), "vertex index -1"));
     everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
     everywhere(strstr(insitu_error(session), "its mesh \"none\" is not set") != NULL);
-    told_everywhere(session, insitu_step(session, 71, 0), INSITU_ERROR_FIELD,
+    reported_everywhere(session, insitu_step(session, 71, 0), INSITU_ERROR_FIELD,
                     "rank 0: ", "its mesh \"none\" is not set");
     step_is_good(session, 72);
     everywhere(*insitu_error(session) == '\0');
@@ -515,7 +515,7 @@ static void step_draws(const char *names, insitu_status expected, const char *wo
     char drawn[8] = "";
     forget_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
-    told_everywhere(session, status, expected, words);
+    reported_everywhere(session, status, expected, words);
     for (int i = 0; i < caught_count && i < 7; i++) drawn[i] = caught[i].path[0];
     if (own_rank == 0 && strcmp(drawn, names) != 0) fprintf(stderr, "drawn: %s, expected: %s\n", drawn, names);
     everywhere(own_rank != 0 || strcmp(drawn, names) == 0);
@@ -578,8 +578,8 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spoilt_input_is_told_to_all),
-        cmocka_unit_test(call_without_a_mesh_is_told_once),
+        cmocka_unit_test(spoilt_input_is_reported_on_all_ranks),
+        cmocka_unit_test(call_without_a_mesh_is_reported_once),
         cmocka_unit_test(field_missing_on_one_rank_names_it),
         cmocka_unit_test(field_of_two_centrings_is_refused),
         cmocka_unit_test(nan_where_no_drawn_cell_is_is_fine),

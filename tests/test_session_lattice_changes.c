@@ -263,7 +263,7 @@ static const wrong_block wrong_blocks[] = {
     {"cell_field_short", cell_field_short, true, "119", INSITU_ERROR_FIELD},
 };
 
-static void tell(insitu_session *session, const wrong_block *wrong, int cycle)
+static void expect_report(insitu_session *session, const wrong_block *wrong, int cycle)
 {
     const bool is_last = own_rank == rank_count - 1;
     block *b = make_block();
@@ -276,12 +276,12 @@ static void tell(insitu_session *session, const wrong_block *wrong, int cycle)
     for (int i = 0; i < 2; i++) {
         const insitu_status status = insitu_step(session, cycle + i, 0);
         if (status != wrong->status) fprintf(stderr, "%s: %s\n", wrong->name, insitu_error(session));
-        told_everywhere(session, status, wrong->status, rank, wrong->words);
+        reported_everywhere(session, status, wrong->status, rank, wrong->words);
     }
     free(b);
 }
 
-static void wrong_blocks_are_told_to_all_ranks(void **state)
+static void wrong_blocks_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     block *right = make_block();
@@ -291,7 +291,7 @@ static void wrong_blocks_are_told_to_all_ranks(void **state)
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     caught_picture truth = take_caught();
     for (size_t i = 0; i < sizeof wrong_blocks / sizeof wrong_blocks[0]; i++) {
-        tell(session, &wrong_blocks[i], (int)(3 * i + 1));
+        expect_report(session, &wrong_blocks[i], (int)(3 * i + 1));
         forget_pictures();
         everywhere(set_block(session, right) == INSITU_OK);
         everywhere(insitu_step(session, (int64_t)(3 * i + 3), 0) == INSITU_OK);
@@ -443,7 +443,7 @@ static void changed_blocks_are_drawn_as_new_ones(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_blocks_are_told_to_all_ranks),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_blocks_are_reported_on_all_ranks),
                                        cmocka_unit_test(changed_blocks_are_drawn_as_new_ones)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

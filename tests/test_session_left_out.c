@@ -43,7 +43,7 @@ static void draw(insitu_session *session, const session_input *in, int cycle, ca
 {
     forget_pictures();
     everywhere(hand_over(session, in) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+    reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
     if (own_rank != 0) return;
     *out = caught[0];
     caught_count = 0;

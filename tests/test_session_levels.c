@@ -590,7 +590,7 @@ static void blocks_beside_a_change_stay(void **state)
 }
 
 /* Level 1 ends within a cell of level 0. */
-static void blocks_that_do_not_fit_are_told(void **state)
+static void blocks_that_do_not_fit_are_reported(void **state)
 {
     levels l = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count};
     block blocks[MOST_BLOCKS];
@@ -601,7 +601,7 @@ static void blocks_that_do_not_fit_are_told(void **state)
     for (int i = 0; i < l.count; i++)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]++;
     everywhere(hand_levels(session, &l, blocks));
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[", "refinement along j is 4",
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[", "refinement along j is 4",
                     "begin and end at borders of coarser cells");
     for (int i = 0; i < l.count; i++)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]--;
@@ -615,7 +615,7 @@ static void blocks_that_do_not_fit_are_told(void **state)
     } else {
         everywhere(true);
     }
-    told_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_MESH,
+    reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_MESH,
                     "mesh \"m[0]\": lattice: refinement along k is 0, expected 1..1048576");
     insitu_destroy(&session);
     free_blocks(&l, blocks);
@@ -632,6 +632,6 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sphere_goes_on_over_levels), cmocka_unit_test(outer_surfaces_have_no_wall_between_levels),
         cmocka_unit_test(levels_come_and_go), cmocka_unit_test(blocks_beside_a_change_stay),
-        cmocka_unit_test(blocks_that_do_not_fit_are_told)};
+        cmocka_unit_test(blocks_that_do_not_fit_are_reported)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -108,7 +108,7 @@ static void lines_are_the_same_on_all_ranks(void **state)
         }
 }
 
-static void meshes_without_the_field_are_told(void **state)
+static void meshes_without_the_field_are_reported(void **state)
 {
     (void)state;
     session_input in;
@@ -144,6 +144,6 @@ static void meshes_without_the_field_are_told(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(lines_are_the_same_on_all_ranks),
-                                       cmocka_unit_test(meshes_without_the_field_are_told)};
+                                       cmocka_unit_test(meshes_without_the_field_are_reported)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -71,7 +71,7 @@ static void cells_have_the_pictures_of_a_step(void **state)
     forget_pictures();
 }
 
-static void files_that_cannot_be_written_are_told(void **state)
+static void files_that_cannot_be_written_are_reported(void **state)
 {
     (void)state;
     session_input in;
@@ -82,7 +82,7 @@ static void files_that_cannot_be_written_are_told(void **state)
     unwritable = "all_0";
     const insitu_status status = insitu_step(session, 0, 0);
     unwritable = NULL;
-    told_everywhere(session, status, INSITU_ERROR_IO, "all_0.png: cannot be written");
+    reported_everywhere(session, status, INSITU_ERROR_IO, "all_0.png: cannot be written");
     everywhere(own_rank != 0 || (caught_count == 4 && find("a.png") && find("c.png")));
     insitu_destroy(&session);
     input_free(&in);
@@ -92,6 +92,6 @@ static void files_that_cannot_be_written_are_told(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(cells_have_the_pictures_of_a_step),
-                                       cmocka_unit_test(files_that_cannot_be_written_are_told)};
+                                       cmocka_unit_test(files_that_cannot_be_written_are_reported)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

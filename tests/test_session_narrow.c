@@ -313,13 +313,13 @@ static void constant_fields_have_one_tick(void **state)
 
 /* Values that rounding alone tells apart are told of, once; a constant field is not. The steps are good all the same.
  */
-static void values_too_near_are_told(void **state)
+static void values_too_near_are_reported(void **state)
 {
     (void)state;
     static const struct {
         double low, high;
         const char *range;
-        bool is_told;
+        bool is_reported;
     } near[] = {{1, 1 + 1e-15, "data", true},    {1, 1 + 1e-15, "[1, 1.000000000000001]", true},
                 {0, 1e-300, "data", true},       {0, 1e-300, "[0, 1e-300]", true},
                 {1e8, 1e8 + 1e-7, "data", true}, {1, 1, "data", false},
@@ -334,9 +334,9 @@ static void values_too_near_are_told(void **state)
             for (int cycle = 0; cycle < 2; cycle++) {
                 ramp_hand_over(&r, session);
                 everywhere(insitu_step(session, cycle, 0) == INSITU_OK);
-                const bool is_told = strstr(insitu_last_report(session)->warnings, "too near") != NULL;
-                if (is_told != (near[i].is_told && cycle == 0)) fprintf(stderr, "layer %d, %s\n", layer, keys);
-                everywhere(is_told == (near[i].is_told && cycle == 0));
+                const bool is_reported = strstr(insitu_last_report(session)->warnings, "too near") != NULL;
+                if (is_reported != (near[i].is_reported && cycle == 0)) fprintf(stderr, "layer %d, %s\n", layer, keys);
+                everywhere(is_reported == (near[i].is_reported && cycle == 0));
             }
             insitu_destroy(&session);
             ramp_free(&r);
@@ -348,7 +348,7 @@ static void values_too_near_are_told(void **state)
 
 /* A linear field over a cube: its ends are at corners, its mean in the middle. The histogram's shares add up to 1, and
  * are alike on both sides of the middle as far as cells are. */
-static void statistics_tell_narrow_fields_apart(void **state)
+static void statistics_distinguish_narrow_fields(void **state)
 {
     (void)state;
     for (int is_given = 0; is_given < 2; is_given++) {
@@ -390,6 +390,6 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(narrow_ranges_are_closed_forms), cmocka_unit_test(percentiles_are_those_of_doubles),
         cmocka_unit_test(percentiles_are_right_among_many_equal_values), cmocka_unit_test(constant_fields_have_one_tick),
-        cmocka_unit_test(values_too_near_are_told), cmocka_unit_test(statistics_tell_narrow_fields_apart)};
+        cmocka_unit_test(values_too_near_are_reported), cmocka_unit_test(statistics_distinguish_narrow_fields)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -276,7 +276,7 @@ static void cells_that_cannot_be_shown_count_once(void **state)
 static void cells_that_show_nothing_count_once(void **state)
 {
     (void)state;
-    int told = 0;
+    int reported = 0;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         order_mesh_create(&order_kinds[k], 2, 0, plane, own_rank, rank_count, &mesh);
@@ -291,14 +291,14 @@ static void cells_that_show_nothing_count_once(void **state)
         }
         insitu_session *session = draw(IMAGE("isosurface: {field: f, values: [1.4]}"), &mesh, NULL);
         const char *text = strstr(insitu_last_report(session)->left_out, "mesh \"m\": ");
-        const bool is_told = text && sscanf(text, "mesh \"m\": %lld of %lld cells show nothing", &left, &of) == 2;
-        everywhere(!is_told || (left == expected && of == mesh.cell_count));
-        told += is_told;
+        const bool is_reported = text && sscanf(text, "mesh \"m\": %lld of %lld cells show nothing", &left, &of) == 2;
+        everywhere(!is_reported || (left == expected && of == mesh.cell_count));
+        reported += is_reported;
         insitu_destroy(&session);
         forget_pictures();
         order_mesh_free(&mesh);
     }
-    everywhere(told >= order_kind_count / 2);
+    everywhere(reported >= order_kind_count / 2);
 }
 
 static void statistics_count_cells_once(void **state)

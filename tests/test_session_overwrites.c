@@ -49,7 +49,7 @@ static void check_step(insitu_session *session, int cycle, const char *const *wo
     everywhere(is_well);
 }
 
-static void overwritten_pictures_are_told(void **state)
+static void overwritten_pictures_are_reported(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -60,7 +60,7 @@ static void overwritten_pictures_are_told(void **state)
 }
 
 /* A step that a simulation repeats under its cycle is to replace the pictures. */
-static void repeated_steps_are_not_told(void **state)
+static void repeated_steps_are_not_reported(void **state)
 {
     (void)state;
     static const char *const none[4] = {NULL};
@@ -86,7 +86,7 @@ static int end_tests(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(overwritten_pictures_are_told),
-                                       cmocka_unit_test(repeated_steps_are_not_told)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(overwritten_pictures_are_reported),
+                                       cmocka_unit_test(repeated_steps_are_not_reported)};
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -297,7 +297,7 @@ static void six_quads_that_are_no_hex_stay(void **state)
 }
 
 /* Whichever face of a hex crosses itself, it is no hex, and not closed. The last rank has it. */
-static void hexes_with_a_crossed_face_are_told(void **state)
+static void hexes_with_a_crossed_face_are_reported(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -311,7 +311,7 @@ static void hexes_with_a_crossed_face_are_told(void **state)
         const int64_t first = v[1], second = v[2];
         v[1] = second, v[2] = first;
         hand_over(session, &in);
-        told_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH,
+        reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH,
                         "mesh \"m\": cell 0 (polyhedron): ", "the surface is not closed");
         v[1] = first, v[2] = second;
     }
@@ -357,7 +357,7 @@ static void moved_cells_are_the_same_cells(void **state)
 }
 
 /* One allocation fails on the last rank, the next, the next: an error to all or the picture, and then the picture. */
-static void memory_that_runs_out_is_told(void **state)
+static void memory_that_runs_out_is_reported(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -367,22 +367,22 @@ static void memory_that_runs_out_is_told(void **state)
     describe_owned(&faces, FORM_LISTS, 1, &in.mesh);
     drawing expected = draw(scene, &in), drawn;
     const int64_t held = base_memory_held();
-    int told = 0;
+    int reported = 0;
     for (int n = 1; n <= 12; n++) {
         insitu_session *s = open_session(MPI_COMM_WORLD, scene);
         everywhere(hand_over(s, &in) == INSITU_OK);
         base_memory_fail_nth(own_rank == rank_count - 1 ? n : 0);
         const insitu_status status = insitu_step(s, 0, 0);
         base_memory_fail_nth(0);
-        if (status) told_everywhere(s, status, INSITU_ERROR_MEMORY, "no memory");
-        told += status != INSITU_OK && strstr(insitu_error(s), "mesh \"m\"") != NULL;
+        if (status) reported_everywhere(s, status, INSITU_ERROR_MEMORY, "no memory");
+        reported += status != INSITU_OK && strstr(insitu_error(s), "mesh \"m\"") != NULL;
         step_and_catch(s, 1, &drawn);
         everywhere(are_same(&expected, &drawn) && drawn.recognised == expected.recognised);
         free_drawing(&drawn);
         insitu_destroy(&s);
         everywhere(base_memory_held() == held);
     }
-    everywhere(told >= 6); /* two arrays of the lists, two of owner and neighbour, types, two of the cells */
+    everywhere(reported >= 6); /* two arrays of the lists, two of owner and neighbour, types, two of the cells */
     free_drawing(&expected);
     free_owned(&faces);
     input_free(&in);
@@ -395,9 +395,9 @@ int main(int argc, char **argv)
         cmocka_unit_test(polyhedra_are_the_cells_that_they_are),
         cmocka_unit_test(hexes_among_polyhedra_are_hexes),
         cmocka_unit_test(six_quads_that_are_no_hex_stay),
-        cmocka_unit_test(hexes_with_a_crossed_face_are_told),
+        cmocka_unit_test(hexes_with_a_crossed_face_are_reported),
         cmocka_unit_test(moved_cells_are_the_same_cells),
-        cmocka_unit_test(memory_that_runs_out_is_told),
+        cmocka_unit_test(memory_that_runs_out_is_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -164,7 +164,7 @@ static void neighbour_beyond_the_halo(session_input *in)
     apart(in);
     spoilt.halo_pairs[1] = (int32_t)in->part.cell_count + OWNED_HALO;
 }
-static void halo_not_told(session_input *in)
+static void halo_not_reported(session_input *in)
 {
     apart(in);
     for (int64_t i = 0; i < spoilt.middle; i++) spoilt.halo_pairs[2 * i] = (int32_t)in->part.cell_count;
@@ -260,7 +260,7 @@ static void boundary_beside_lists(session_input *in)
 
 static const spoilt_case cases[] = {
     {"beyond the halo", neighbour_beyond_the_halo, INSITU_ERROR_MESH, false, {"face 0: its neighbour ", "outside 0.."}},
-    {"no halo", halo_not_told, INSITU_ERROR_MESH, false, {"face 0: its owner ", "is outside 0.."}},
+    {"no halo", halo_not_reported, INSITU_ERROR_MESH, false, {"face 0: its owner ", "is outside 0.."}},
     {"its owner", boundary_owner_large, INSITU_ERROR_MESH, false, {"its owner 1000000 is outside 0.."}},
     {"its owner -2", boundary_owner_negative, INSITU_ERROR_MESH, false, {"its owner -2 is outside 0.."}},
     {"offset",
@@ -331,18 +331,18 @@ static const spoilt_case cases[] = {
     {"floats", float_lists, INSITU_ERROR_ARGUMENT, true, {"face lists are of element type 1, not int32 or int64"}},
 };
 
-static void what_is_wrong_is_told_to_all(void **state)
+static void what_is_wrong_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_told(&in, cases, sizeof cases / sizeof cases[0]);
+    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
     free_owned(&spoilt);
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_told_to_all)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -159,7 +159,7 @@ static void offsets_alone(void)
 {
     patches[0].offsets = (insitu_array){numbers, INSITU_INT64, 0};
 }
-static void told_twice(void)
+static void patch_given_twice(void)
 {
     by_vertices(outer_quad, 1);
     patches[1].faces = (insitu_array){numbers, INSITU_INT64, 0};
@@ -239,7 +239,7 @@ static const fault faults[] = {
     {vertices_beyond, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 has vertices beyond the connectivity"}},
     {vertices_uneven, INSITU_ERROR_FIELD, true, {"patch 1: has 7 connectivity indices, no multiple of its 2 faces"}},
     {offsets_alone, INSITU_ERROR_FIELD, true, {"patch 0: offsets are given without connectivity"}},
-    {told_twice, INSITU_ERROR_FIELD, true, {"patch 1: faces and connectivity are given"}},
+    {patch_given_twice, INSITU_ERROR_FIELD, true, {"patch 1: faces and connectivity are given"}},
     {numbers_of_floats, INSITU_ERROR_ARGUMENT, true, {"patch 0: faces are of element type 1, not int32 or int64"}},
     {no_values, INSITU_ERROR_FIELD, true, {"patch 0: values are not given"}},
     {bytes_for_values, INSITU_ERROR_ARGUMENT, true, {"patch 0: values are of element type 5, not float32, float64"}},
@@ -264,7 +264,7 @@ static void check_fault(insitu_session *session, const fault *c, int cycle)
     const insitu_status at_once = hand_over(session, &input);
     everywhere(at_once == (is_last && c->at_once ? c->status : INSITU_OK));
     const insitu_status status = insitu_step(session, cycle, 0);
-    told_everywhere(session, status, c->status, rank, c->words[0], c->words[1]);
+    reported_everywhere(session, status, c->status, rank, c->words[0], c->words[1]);
     everywhere(caught_count == 0);
     input_free(&input);
     create();
@@ -274,7 +274,7 @@ static void check_fault(insitu_session *session, const fault *c, int cycle)
     input_free(&input);
 }
 
-static void what_is_wrong_is_told_to_all(void **state)
+static void what_is_wrong_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -296,7 +296,7 @@ static void hexes_want_vertices(void **state)
     input.field.patches = patches;
     input.field.patch_count = 1;
     everywhere(hand_over(session, &input) == INSITU_ERROR_FIELD);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "patch 0: names faces by their numbers",
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "patch 0: names faces by their numbers",
                     "the mesh has none");
     insitu_destroy(&session);
     input_free(&input);
@@ -304,7 +304,7 @@ static void hexes_want_vertices(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_told_to_all),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks),
                                        cmocka_unit_test(hexes_want_vertices)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -230,7 +230,7 @@ static void what_the_scene_says_comes_first(void **state)
     free_caught(&plain);
 }
 
-static void layers_that_show_nothing_are_told(void **state)
+static void layers_that_show_nothing_are_reported(void **state)
 {
     (void)state;
     static const struct {
@@ -310,7 +310,7 @@ static void isosurfaces_are_contour_lines(void **state)
         }
 }
 
-static void lines_beyond_the_field_are_told(void **state)
+static void lines_beyond_the_field_are_reported(void **state)
 {
     (void)state;
     plate part;
@@ -491,9 +491,9 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_the_colour_map_of_the_field),
                                        cmocka_unit_test(what_the_scene_says_comes_first),
-                                       cmocka_unit_test(layers_that_show_nothing_are_told),
+                                       cmocka_unit_test(layers_that_show_nothing_are_reported),
                                        cmocka_unit_test(isosurfaces_are_contour_lines),
-                                       cmocka_unit_test(lines_beyond_the_field_are_told),
+                                       cmocka_unit_test(lines_beyond_the_field_are_reported),
                                        cmocka_unit_test(bars_say_what_they_show),
                                        cmocka_unit_test(solids_need_z),
                                        cmocka_unit_test(statistics_weigh_shells_by_area),

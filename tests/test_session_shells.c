@@ -290,37 +290,37 @@ static void other_layers_pass_shells_over(void **state)
 
 /* ---- what is wrong ------------------------------------------------------------------------------------------- */
 
-static void is_told(const shell_mesh *m, const char *const words[2])
+static void is_reported(const shell_mesh *m, const char *const words[2])
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(IMAGE(SURFACE)));
     const insitu_mesh mesh = describe(m);
     insitu_set_mesh(session, "m", &mesh);
     set_field(session, "f", INSITU_VERTEX, m->vertex_count, m->values);
     const insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_MESH, words[0], words[1]);
+    reported_everywhere(session, status, INSITU_ERROR_MESH, words[0], words[1]);
     insitu_destroy(&session);
 }
 
-static void bad_shells_are_told(void **state)
+static void bad_shells_are_reported(void **state)
 {
     (void)state;
     shell_mesh m;
     const bool is_last = own_rank == rank_count - 1; /* it alone gets things wrong */
     make_sheet(MIXED, &m);
     if (is_last) m.connectivity[1] = 999;
-    is_told(&m, (const char *const[]){"cell 0 (quad)", "vertex index 999 is outside 0..48"});
+    is_reported(&m, (const char *const[]){"cell 0 (quad)", "vertex index 999 is outside 0..48"});
     make_sheet(POLYGONS, &m);
     if (is_last) m.connectivity[7] = -1;
-    is_told(&m, (const char *const[]){"cell 1 (polygon)", "vertex index -1 is outside 0..48"});
+    is_reported(&m, (const char *const[]){"cell 1 (polygon)", "vertex index -1 is outside 0..48"});
     make_sheet(POLYGONS, &m);
     if (is_last) m.offsets[1] = 2;
-    is_told(&m, (const char *const[]){"cell 0 (polygon)", "at least 3 vertices"});
+    is_reported(&m, (const char *const[]){"cell 0 (polygon)", "at least 3 vertices"});
     make_sheet(TRIANGLES, &m);
     if (is_last) m.coordinates[4] = NAN;
-    is_told(&m, (const char *const[]){"(triangle)", "not finite"});
+    is_reported(&m, (const char *const[]){"(triangle)", "not finite"});
     make_sheet(MIXED, &m);
     if (is_last) m.types[0] = 6;
-    is_told(&m, (const char *const[]){"cell 0", "unknown cell type 6"});
+    is_reported(&m, (const char *const[]){"cell 0", "unknown cell type 6"});
 }
 
 int main(int argc, char **argv)
@@ -329,7 +329,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(sheets_are_planes_on_any_ranks),
         cmocka_unit_test(shells_take_the_place_of_faces),
         cmocka_unit_test(other_layers_pass_shells_over),
-        cmocka_unit_test(bad_shells_are_told),
+        cmocka_unit_test(bad_shells_are_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

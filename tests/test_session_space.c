@@ -81,7 +81,7 @@ static void draw(const space_case *c, double scale, const double offset[3], caug
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
     create_input(c, scale, offset, &in);
     everywhere(hand_over(session, &in) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(caught_count == (own_rank == 0));
     if (own_rank == 0) *out = caught[0];
     caught_count = 0;

@@ -207,7 +207,7 @@ static void runs_that_begin_again_go_on_with_the_file(void **state)
 }
 
 /* The error is told on all ranks, and the picture is drawn. */
-static void files_that_cannot_be_written_are_told(void **state)
+static void files_that_cannot_be_written_are_reported(void **state)
 {
     (void)state;
     static char text[MOST];
@@ -218,14 +218,14 @@ static void files_that_cannot_be_written_are_told(void **state)
         open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: f, path: other.csv}]\n"));
     forget_pictures();
     assert_int_equal(hand_over(session, &in), INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns", "cycle,time");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns", "cycle,time");
     everywhere(caught_count == (own_rank == 0));
     read_file("other.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(text, "a,b\n1,2\n") == 0);
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: g, path: g.csv}]\n"));
     assert_int_equal(hand_over(session, &in), INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
     everywhere(caught_count == 2 * (own_rank == 0));
     insitu_destroy(&session);
     input_free(&in);
@@ -249,7 +249,7 @@ static void others_of_a_missing_field_are_found(void **state)
                                                                    "path: there.csv}]\n"));
     forget_pictures();
     assert_int_equal(hand_over(session, &in), INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
     everywhere(caught_count == (own_rank == 0) && insitu_last_report(session)->images == 1);
     insitu_destroy(&session);
     read_file("there.csv", MOST, text);
@@ -308,7 +308,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(numbers_of_cells_are_sums),
                                        cmocka_unit_test(files_do_not_depend_on_the_partition),
                                        cmocka_unit_test(runs_that_begin_again_go_on_with_the_file),
-                                       cmocka_unit_test(files_that_cannot_be_written_are_told),
+                                       cmocka_unit_test(files_that_cannot_be_written_are_reported),
                                        cmocka_unit_test(others_of_a_missing_field_are_found),
                                        cmocka_unit_test(conditions_hold_images_back)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);

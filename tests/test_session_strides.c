@@ -97,16 +97,16 @@ static void refuse(insitu_session *session, formed_mesh *m, const strided *s, bo
         if (is_last) *s->stride = wild[i];
         const insitu_status at_once = formed_hand_over(session, m, formed_has_corners(m->form));
         *s->stride = right;
-        char told[1024];
+        char reported[1024];
         const insitu_status status = insitu_step(session, 1, 0);
         const bool is_well = is_last == (at_once != INSITU_OK) && status;
         if (!is_well) fprintf(stderr, "%s: %s: %lld\n", mesh_form_name(m->form), s->name, (long long)wild[i]);
         assert_true(is_well);
-        snprintf(told, sizeof told, "%s", insitu_error(session));
-        const bool has_words = strstr(told, words[0]) && strstr(told, words[1]);
-        if (is_last && !has_words) fprintf(stderr, "%s; %s%s\n", told, words[0], words[1]);
+        snprintf(reported, sizeof reported, "%s", insitu_error(session));
+        const bool has_words = strstr(reported, words[0]) && strstr(reported, words[1]);
+        if (is_last && !has_words) fprintf(stderr, "%s; %s%s\n", reported, words[0], words[1]);
         assert_true(!is_last || has_words);
-        assert_true(strstr(told, "have a stride of "));
+        assert_true(strstr(reported, "have a stride of "));
     }
 }
 
@@ -133,7 +133,7 @@ static void strides_beyond_memory_are_refused(void **state)
         refuse_all(session, &m, list, list_of_patch(&m, list));
         everywhere(formed_hand_over(session, &m, is_torn) == INSITU_OK);
         const insitu_status status = insitu_step(session, 2, 0);
-        told_everywhere(session, status, INSITU_OK, "");
+        reported_everywhere(session, status, INSITU_OK, "");
         insitu_destroy(&session);
         formed_free(&m);
     }
@@ -165,7 +165,7 @@ static void rows_beyond_memory_are_refused(void **state)
     }
     everywhere(formed_hand_over(session, &m, true) == INSITU_OK);
     const insitu_status status = insitu_step(session, 2, 0);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     insitu_destroy(&session);
     formed_free(&m);
 }
@@ -199,7 +199,7 @@ static int draw(const char *scene, const formed_mesh *m, caught_picture *out)
     forget_pictures();
     everywhere(formed_hand_over(session, m, formed_has_corners(m->form)) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     const int count = caught_count;
     for (int i = 0; i < count; i++) out[i] = caught[i];
     caught_count = 0;

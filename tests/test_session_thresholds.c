@@ -213,7 +213,7 @@ static void bounds_may_show_all_or_nothing(void **state)
     }
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scenes[2]));
     assert_int_equal(hand_over(session, &part), INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"");
     insitu_destroy(&session);
     input_free(&part);
 }

@@ -481,12 +481,12 @@ static const spoilt_case faults[] = {
     {"no type", component_of_no_type, INSITU_ERROR_ARGUMENT, true, {"component 1: values are of element type 77"}},
 };
 
-static void faults_are_told_to_all(void **state)
+static void faults_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in;
     input_create(&in, TEST_HEXES, 4, TEST_BLOCK, own_rank, rank_count);
-    all_are_told(&in, faults, sizeof faults / sizeof faults[0]);
+    all_are_reported(&in, faults, sizeof faults / sizeof faults[0]);
     input_free(&in);
 }
 
@@ -500,7 +500,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(components_apart_are_the_same),
         cmocka_unit_test(components_may_be_set_again),
         cmocka_unit_test(forms_may_change_from_step_to_step),
-        cmocka_unit_test(faults_are_told_to_all),
+        cmocka_unit_test(faults_are_reported_on_all_ranks),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -92,7 +92,7 @@ static void order_that_fits_is_named(void **state)
 }
 
 /* Two opposite vertices of each hex change places: cells that no order mends. */
-static void twisted_cells_are_told(void **state)
+static void twisted_cells_are_reported(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -110,7 +110,7 @@ static void twisted_cells_are_told(void **state)
 }
 
 /* A few cells in another order are no majority. */
-static void few_cells_are_not_told(void **state)
+static void few_cells_are_not_reported(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -130,8 +130,8 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(order_that_fits_is_named),
-        cmocka_unit_test(twisted_cells_are_told),
-        cmocka_unit_test(few_cells_are_not_told),
+        cmocka_unit_test(twisted_cells_are_reported),
+        cmocka_unit_test(few_cells_are_not_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -292,7 +292,7 @@ static bool draw_wrong(bench *b, int number)
         fprintf(stderr, "case %d: set %d, step %d, %d images: %s\n", number, (int)set, (int)status, images,
                 insitu_error(b->session));
     everywhere(is_well);
-    told_everywhere(b->session, status, status, "");
+    reported_everywhere(b->session, status, status, "");
     return status != INSITU_OK;
 }
 

@@ -65,7 +65,7 @@ static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_tor
     MPI_Allreduce(MPI_IN_PLACE, &all_right, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     everywhere(!all_right || status == INSITU_OK);
     everywhere(!set || status);
-    told_everywhere(session, status, status, status ? "mesh \"m\"" : "");
+    reported_everywhere(session, status, status, status ? "mesh \"m\"" : "");
     m->mesh = right;
     memcpy(m->fields, right_fields, sizeof right_fields);
 }
@@ -88,7 +88,7 @@ static void check_form(mesh_form form, bool is_torn)
     forget_pictures();
     everywhere(formed_hand_over(session, &m, is_torn) == INSITU_OK);
     const insitu_status status = insitu_step(session, 2, 0);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == (is_torn ? FORMED_TORN_PICTURES : FORMED_PICTURES));
     insitu_destroy(&session);
     formed_free(&m);

@@ -166,7 +166,7 @@ static void step_draws(insitu_session *session, const picture_set *expected)
 {
     forget_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     at_allocation(own_rank != 0 || (are_of(expected) && caught_count == expected->count));
 }
 
@@ -176,7 +176,7 @@ static insitu_session *open_and_draw(const char *scene, const scenery *s, pictur
     everywhere(hand_over_scenery(session, s) == INSITU_OK);
     forget_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     *out = take_pictures();
     return session;
 }
@@ -202,14 +202,14 @@ static bool disarm(const failure *f)
 }
 
 /* An error is one of memory, or of the field that a refused mesh could not be given, and the same for all. */
-static void check_told(const insitu_session *session, insitu_status status)
+static void check_reported(const insitu_session *session, insitu_status status)
 {
     if (status == INSITU_OK || status == INSITU_ERROR_FIELD) {
-        told_everywhere(session, status, status, "");
+        reported_everywhere(session, status, status, "");
         return;
     }
     if (status != INSITU_ERROR_MEMORY) fprintf(stderr, "allocation %lld: ", (long long)allocation);
-    told_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
+    reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
 }
 
 static void run_failures(bool (*fails_well)(const scenery *s, const failure *f, void *state), const scenery *s,
@@ -238,7 +238,7 @@ static bool set_and_step_fail_well(const scenery *s, const failure *f, void *sta
     const insitu_status set = hand_over_scenery(t->session, s);
     const insitu_status status = insitu_step(t->session, 1, 0);
     const bool is_over = disarm(f);
-    check_told(t->session, status);
+    check_reported(t->session, status);
     at_allocation(own_rank != 0 || are_of(&t->expected));
     at_allocation(own_rank != 0 || status != INSITU_OK || caught_count == t->expected.count);
     int is_set = set == INSITU_OK;
@@ -304,7 +304,7 @@ static bool creation_fails_well(const scenery *s, const failure *f, void *state)
     const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &session);
     const bool is_over = disarm(f);
     everywhere((status == INSITU_OK) == (session != NULL));
-    check_told(NULL, status);
+    check_reported(NULL, status);
     if (session) {
         everywhere(hand_over_scenery(session, s) == INSITU_OK);
         step_draws(session, &t->expected);
@@ -345,7 +345,7 @@ static bool edit_fails_well(const scenery *s, const failure *f, void *state)
     arm(f);
     const insitu_status status = insitu_step(session, 1, 0);
     const bool is_over = disarm(f);
-    check_told(session, status);
+    check_reported(session, status);
     const bool is_taken = are_of(&t->after);
     at_allocation(own_rank != 0 || is_taken || are_of(&t->before));
     at_allocation(own_rank != 0 || is_taken || status != INSITU_OK || *insitu_last_report(session)->warnings);
@@ -354,7 +354,7 @@ static bool edit_fails_well(const scenery *s, const failure *f, void *state)
     return is_over;
 }
 
-static void failing_edit_is_told_and_taken_later(void **context)
+static void failing_edit_is_reported_and_taken_later(void **context)
 {
     (void)context;
     if (!heap_can_fail()) skip();
@@ -378,7 +378,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(failing_step_is_the_same_picture_or_an_error),
         cmocka_unit_test(failing_first_step_is_the_same_picture_or_an_error),
         cmocka_unit_test(failing_creation_opens_the_session_or_none),
-        cmocka_unit_test(failing_edit_is_told_and_taken_later),
+        cmocka_unit_test(failing_edit_is_reported_and_taken_later),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }
