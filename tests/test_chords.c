@@ -159,7 +159,7 @@ static bool is_paired(const render_job *job, const chord_ray *r, const chord_spa
 
 /* The longest overlap of intervals, which are sorted, and the longest gap; of rays that run within the hull's surface
  * only gaps in the shrunk hull count. */
-static void judge_neighbours(const render_job *job, const chord_ray *r, const chord_span *spans, int count, tally *t)
+static void verify_neighbours(const render_job *job, const chord_ray *r, const chord_span *spans, int count, tally *t)
 {
     double doubled = 0, gap = 0;
     for (int i = 1, last = 0; i < count; i++) {
@@ -175,7 +175,7 @@ static void judge_neighbours(const render_job *job, const chord_ray *r, const ch
     t->worst_gap = fmax(t->worst_gap, gap * r->line.length);
 }
 
-static void judge_length(const chord_ray *r, double sum, tally *t)
+static void verify_length(const chord_ray *r, double sum, tally *t)
 {
     const double spread = r->most - r->least, off = fabs(sum - r->length);
     const double bracketed = fmax(r->least - sum, sum - r->most);
@@ -191,7 +191,7 @@ static void judge_length(const chord_ray *r, double sum, tally *t)
                 r->length, r->least, r->most);
 }
 
-static void judge_ray(const render_job *job, const chord_rays *rays, int ray, chord_span *spans, int count, tally *t)
+static void verify_ray(const render_job *job, const chord_rays *rays, int ray, chord_span *spans, int count, tally *t)
 {
     const chord_ray r = chord_hull_ray(job, rays, ray);
     double sum = 0;
@@ -202,8 +202,8 @@ static void judge_ray(const render_job *job, const chord_rays *rays, int ray, ch
     t->met += count > 0;
     t->spans += count;
     for (int i = 0; i < count; i++) sum += ((double)spans[i].t_out - (double)spans[i].t_in) * r.line.length;
-    judge_neighbours(job, &r, spans, count, t);
-    judge_length(&r, sum, t);
+    verify_neighbours(job, &r, spans, count, t);
+    verify_length(&r, sum, t);
     if (is_paired(job, &r, spans, count)) return;
     if (t->unpaired++ < 3)
         fprintf(stderr, "ray %.17g %.17g: ends of one interval alone; chord %.9g, %.9g to %.9g\n", rays->x[ray],
@@ -235,7 +235,7 @@ static void trace(const render_job *job, kernel_thread *thread, chord_rays *rays
 }
 
 /* The first tally is of rays that are set up alone, the second of the same rays as those of one tile. */
-static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t count, tally tallies[2])
+static void verify_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t count, tally tallies[2])
 {
     static const double value[1] = {0};
     static chord_rays rays;
@@ -256,7 +256,7 @@ static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t co
             rays.is_pencil = by_tile;
             trace(&f.job, &thread, &rays);
             for (int i = 0; i < rays.count; i++)
-                judge_ray(&f.job, &rays, i, rays.spans[i], rays.span_count[i], &tallies[by_tile]);
+                verify_ray(&f.job, &rays, i, rays.spans[i], rays.span_count[i], &tallies[by_tile]);
         }
     }
     fixture_free(&f);
@@ -312,14 +312,14 @@ static void assert_few_at_the_surface(chord_aim aim, const tally *t)
         fail_msg("%d slanted and %d touching of %d rays", (int)t->slanted, (int)t->touching, (int)t->rays);
 }
 
-static void judge(chord_aim aim, const char *what)
+static void verify(chord_aim aim, const char *what)
 {
     const int64_t share = rays_wanted / (CHORD_AIM_COUNT * MESH_COUNT * 2) + 1;
     tally all[2] = {{.rays = 0}};
     for (chord_mesh mesh = 0; mesh < MESH_COUNT; mesh++)
         for (int jittered = 0; jittered < 2; jittered++) {
             tally t[2] = {{.rays = 0}};
-            judge_mesh(mesh, jittered ? jitter_wanted : 0, aim, share, t);
+            verify_mesh(mesh, jittered ? jitter_wanted : 0, aim, share, t);
             for (int by_tile = 0; by_tile < 2; by_tile++) {
                 if (t[by_tile].off || t[by_tile].unpaired || getenv("INSITU_TEST_VERBOSE"))
                     print_tally(what, mesh_name(mesh), by_tile, &t[by_tile]);
@@ -340,49 +340,49 @@ static void judge(chord_aim aim, const char *what)
 static void random_rays_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_RANDOM, "random");
+    verify(CHORD_RANDOM, "random");
 }
 
 static void rays_through_vertices_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_TO_VERTICES, "through vertices");
+    verify(CHORD_TO_VERTICES, "through vertices");
 }
 
 static void rays_through_edges_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_TO_EDGES, "through edges");
+    verify(CHORD_TO_EDGES, "through edges");
 }
 
 static void rays_through_faces_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_TO_FACES, "through faces");
+    verify(CHORD_TO_FACES, "through faces");
 }
 
 static void rays_along_edges_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_ALONG_EDGES, "along edges");
+    verify(CHORD_ALONG_EDGES, "along edges");
 }
 
 static void rays_along_faces_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_ALONG_FACES, "along faces");
+    verify(CHORD_ALONG_FACES, "along faces");
 }
 
 static void axis_aligned_rays_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_AXIS_ALIGNED, "axis-aligned");
+    verify(CHORD_AXIS_ALIGNED, "axis-aligned");
 }
 
 static void rays_from_inside_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_FROM_INSIDE, "from inside");
+    verify(CHORD_FROM_INSIDE, "from inside");
 }
 
 /* The argument is the number of rays. */

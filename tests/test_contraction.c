@@ -257,7 +257,7 @@ static double depth_bound(const batch *b, int lane, double t)
     return 6e-8 * fabs(t) + 1.8e-7 * (high - low);
 }
 
-static void judge(const batch *b, int lane, const kernel_contracted *at, count *n)
+static void verify(const batch *b, int lane, const kernel_contracted *at, count *n)
 {
     reference_cell cell;
     reference_line line;
@@ -298,7 +298,7 @@ static void decided_crossings_are_right(void **state)
                 contract(&b, &at, &bounds);
                 for (int lane = 0; lane < SIMD_WIDTH; lane++) {
                     n.contracting += bounds.contractions.grow[lane] < INFINITY;
-                    judge(&b, lane, &at, &n);
+                    verify(&b, lane, &at, &n);
                 }
             }
             printf("%s %s: %lld rays, %lld in cells that contract, %lld with one crossing, %lld with none, %lld wrong, "
@@ -411,7 +411,7 @@ static vm edges_are_wrong(const vf x[8], const vf y[8], const signed char *loop)
     return vm_and(known, vm_or(vm_xor(once, vm_sign(kernel_sides_agree(around, 4))), bends));
 }
 
-static void judge_quads(const batch *b, const kernel_rays *rays, vi dents, looks *n)
+static void verify_quads(const batch *b, const kernel_rays *rays, vi dents, looks *n)
 {
     const kernel_shape *shape = kernel_cell_shape(b->type);
     vf x[8], y[8];
@@ -451,7 +451,7 @@ static void quads_that_look_convex_are(void **state)
                 for (int a = 0; a < 3; a++)
                     for (int i = 0; i < 8; i++) at[a][i] = vf_load(b.at[a][i]);
                 const vi dents = kernel_curved_nonconvex_quads(at, &box, types[k]);
-                for (int i = 0; i < BOX_RAYS; i++) judge_quads(&b, &rays[i], dents, &n);
+                for (int i = 0; i < BOX_RAYS; i++) verify_quads(&b, &rays[i], dents, &n);
             }
             printf("%s: of %lld quads seen %lld look convex, %lld do not, %lld are wrong\n", shape_names[s],
                    (long long)n.quads, (long long)n.convex, (long long)n.turned, (long long)n.wrong);

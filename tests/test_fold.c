@@ -105,7 +105,7 @@ static void blend_in_double(const ray *r, double rgba[4])
 
 /* A fragment adds a product and a sum of colours and a product of transmittances, which affects all behind it: three
  * roundings of 2^-24 of at most 1. Dark stretches may be left out. */
-static void judge(const ray *r, const float rgba[4])
+static void verify(const ray *r, const float rgba[4])
 {
     double expected[4];
     blend_in_double(r, expected);
@@ -128,7 +128,7 @@ static void fold_is_the_same_on_any_ranks(void **state)
         memset(r.owners, 0, sizeof r.owners);
         merge(&r, alone, &sent);
         whole += sent;
-        judge(&r, alone);
+        verify(&r, alone);
         for (int dealt = 0; dealt < 4; dealt++) {
             deal(&r, dealt == 0 ? 1 : 0.3 / (1 + 3 * dealt));
             merge(&r, shared, &sent);

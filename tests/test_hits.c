@@ -50,7 +50,7 @@ static double depth_moved(const render_fixture *f, const reference_hit *truth, d
 
 /* A hit must be within 1e-5 cells of the reference, unless the ray is so nearly tangent to the surface that rounding
  * alone may move the hit farther. That is at slopes of the field below some 0.03 ranges a cell. */
-static void judge_depth(const render_fixture *f, const reference_hit *truth, double depth, double slope, tally *t)
+static void verify_depth(const render_fixture *f, const reference_hit *truth, double depth, double slope, tally *t)
 {
     const double off = fabs(depth - truth->depth) / f->cell_size, moved = depth_moved(f, truth, slope);
     t->moved = fmax(t->moved, off / moved);
@@ -60,7 +60,7 @@ static void judge_depth(const render_fixture *f, const reference_hit *truth, dou
         t->raw = fmax(t->raw, off);
 }
 
-static void judge_hit(const render_fixture *f, const reference_scene *scene, int x, int y, const reference_hit *truth,
+static void verify_hit(const render_fixture *f, const reference_scene *scene, int x, int y, const reference_hit *truth,
                       const fragment *hit, tally *t)
 {
     double slope;
@@ -72,10 +72,10 @@ static void judge_hit(const render_fixture *f, const reference_scene *scene, int
     /* An error of the field of 1e-6 ranges is one of depth by the slope. */
     const double grazing = 1e-6 / fabs(slope) / f->cell_size;
     t->depth = fmax(t->depth, fabs(depth - truth->depth) / f->cell_size - grazing);
-    judge_depth(f, truth, depth, slope, t);
+    verify_depth(f, truth, depth, slope, t);
 }
 
-static void judge_ray(const render_fixture *f, const drawn_frame *drawn, const reference_scene *scene, int x, int y,
+static void verify_ray(const render_fixture *f, const drawn_frame *drawn, const reference_scene *scene, int x, int y,
                       double margin, tally *t)
 {
     const fragment *hits[REFERENCE_MAX_HITS];
@@ -98,16 +98,16 @@ static void judge_ray(const render_fixture *f, const drawn_frame *drawn, const r
         fprintf(stderr, "pixel %d, %d: %d hits, reference %d\n", x, y, count, ray.hit_count);
         return;
     }
-    for (int i = 0; i < count; i++) judge_hit(f, scene, x, y, &ray.hits[i], hits[i], t);
+    for (int i = 0; i < count; i++) verify_hit(f, scene, x, y, &ray.hits[i], hits[i], t);
 }
 
-static void judge_frame(const render_fixture *f, double margin, tally *t)
+static void verify_frame(const render_fixture *f, double margin, tally *t)
 {
     drawn_frame drawn;
     reference_scene *scene = reference_create(&f->job);
     fixture_draw(f, &drawn);
     for (int y = 0; y < f->job.camera.height; y++)
-        for (int x = 0; x < f->job.camera.width; x++) judge_ray(f, &drawn, scene, x, y, margin, t);
+        for (int x = 0; x < f->job.camera.width; x++) verify_ray(f, &drawn, scene, x, y, margin, t);
     reference_free(scene);
     drawn_free(&drawn);
 }
@@ -163,7 +163,7 @@ static void robust_hits_are_on_the_surface(void **state)
             fixture_create_lattice(&f, kinds[k], kinds[k] == TEST_PYRAMIDS ? 3 : 4, 0.2, test_wave);
             fixture_look(&f, camera, 53, 45);
             add_robust(&f, 0.4f); /* all crossings, not the first alone */
-            judge_frame(&f, 1e-6, &t);
+            verify_frame(&f, 1e-6, &t);
             print_tally(test_mesh_kind_name(kinds[k]), &t);
             assert_true(t.hits > 600);
             assert_int_equal(t.different, 0);
@@ -218,7 +218,7 @@ static void robust_hits_in_ugly_cells_are_the_reference(void **state)
                 assert_true(render_camera_look_at(&f.job.camera, (const double[]){2.4, 1.6, 3.0},
                                                   mesh.coordinates + 3 * 4, (const double[]){0, 1, 0}, 2, 31, 29));
             add_many_robust(&f);
-            judge_frame(&f, 1e-6, &t);
+            verify_frame(&f, 1e-6, &t);
             fixture_free(&f);
             test_mesh_free(&mesh);
         }
@@ -276,7 +276,7 @@ static double normal_error(const render_fixture *f, const fragment *hit, const d
  * range and size; eight of them and the cell's distortion make 2e-6 of range / size, relative to the gradient's length.
  * The place is off by 1e-6 cells, which second derivatives of a range or two turn into as much again. Seen edge-on,
  * either side may face the eye. */
-static void judge_normal(const render_fixture *f, const reference_scene *scene, const reference_hit *truth,
+static void verify_normal(const render_fixture *f, const reference_scene *scene, const reference_hit *truth,
                          const fragment *hit, int64_t *checked)
 {
     const int x = (int)hit->pixel % f->job.camera.width, y = (int)hit->pixel / f->job.camera.width;
@@ -314,7 +314,7 @@ static void cell_gradients_are_the_reference(void **state)
                 continue;
             }
             assert_int_equal(count, ray.hit_count);
-            for (int i = 0; i < count; i++) judge_normal(&f, scene, &ray.hits[i], hits[i], &checked);
+            for (int i = 0; i < count; i++) verify_normal(&f, scene, &ray.hits[i], hits[i], &checked);
         }
         printf("%s: %d normals, %d of %d rays left out\n", test_mesh_kind_name(kinds[k]), (int)checked, (int)left_out,
                (int)rays);

@@ -166,7 +166,7 @@ static insitu_status write_in_shortage(const picture_case *c, const shortage *s,
     return status;
 }
 
-static verdict judge(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
+static verdict verify(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
 {
     static file_bytes found;
     const insitu_status status = write_in_shortage(c, s, out);
@@ -195,7 +195,7 @@ static bool try_in_child(const picture_case *c, const file_bytes *expected, cons
         setrlimit(RLIMIT_CORE, &no_core);
         alarm(SECONDS);
         outcome mine = {0};
-        mine.verdict = judge(c, expected, s, &mine);
+        mine.verdict = verify(c, expected, s, &mine);
         _exit(write(pipe_ends[1], &mine, sizeof mine) == (ssize_t)sizeof mine ? 0 : 1);
     }
     close(pipe_ends[1]);

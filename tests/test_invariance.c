@@ -362,7 +362,7 @@ static bool is_due(int kind, int how, int layers)
     return test_is_whole() || (kind + how + layers) % 6 == 0;
 }
 
-static bool judge_mesh(insitu_session *session, int kind, int side, const test_mesh *mesh, const caught_picture *whole)
+static bool verify_mesh(insitu_session *session, int kind, int side, const test_mesh *mesh, const caught_picture *whole)
 {
     static int cycle;
     bool are_well = true;
@@ -415,7 +415,7 @@ static void pictures_do_not_depend_on_the_partition(void **state)
         caught_picture whole[MOST_CASES] = {{0}};
         test_mesh_lattice(kinds[kind], side, 0.2, test_wave, &mesh);
         if (own_rank == 0) draw_whole(scene, &mesh, whole);
-        are_well = judge_mesh(session, kind, side, &mesh, whole) && are_well;
+        are_well = verify_mesh(session, kind, side, &mesh, whole) && are_well;
         for (int i = 0; i < case_count && own_rank == 0; i++) free_caught(&whole[i]);
         test_mesh_free(&mesh);
     }

@@ -138,7 +138,7 @@ static int look(const render_fixture *f, const test_mesh *mesh, const double sta
     return is_met;
 }
 
-static void judge(int said, bool is_open, const char *what, tally *t)
+static void verify(int said, bool is_open, const char *what, tally *t)
 {
     t->rays++;
     t->blocked += said == 1;
@@ -147,7 +147,7 @@ static void judge(int said, bool is_open, const char *what, tally *t)
     if (!t->wrong++) fprintf(stderr, "%s: %s\n", what, said ? "a blocked ray is open" : "an open ray is blocked");
 }
 
-static void judge_hit(const render_fixture *f, const test_mesh *mesh, const hits *h, int64_t i, const char *what,
+static void verify_hit(const render_fixture *f, const test_mesh *mesh, const hits *h, int64_t i, const char *what,
                       tally *t)
 {
     const render_hit *hit = &h->hits[i];
@@ -156,14 +156,14 @@ static void judge_hit(const render_fixture *f, const test_mesh *mesh, const hits
     start_of(f, hit, n, start);
     for (int k = 0; k < SAMPLES; k += 3) {
         test_hemisphere(hit->pixel, WIDTH, SAMPLES, k, n, d);
-        judge(look(f, mesh, start, d, radius), h->open[i].samples >> k & 1, what, t);
+        verify(look(f, mesh, start, d, radius), h->open[i].samples >> k & 1, what, t);
     }
     for (int k = 0; k < LIGHTS; k++)
         if (h->rays[i].lights >> k & 1)
-            judge(look(f, mesh, start, f->lights[k].direction, INFINITY), h->open[i].lights >> k & 1, what, t);
+            verify(look(f, mesh, start, f->lights[k].direction, INFINITY), h->open[i].lights >> k & 1, what, t);
 }
 
-static void judge_mesh(const test_mesh *mesh, fixture_camera camera, float contact, const char *what)
+static void verify_mesh(const test_mesh *mesh, fixture_camera camera, float contact, const char *what)
 {
     static const render_occlusion occlusion = {3, SAMPLES, 0.6};
     render_fixture f;
@@ -187,7 +187,7 @@ static void judge_mesh(const test_mesh *mesh, fixture_camera camera, float conta
         render_occluders_free(occluders);
         for (int64_t i = 0; i < h.count; i++)
             if (test_is_whole() || i % (set + 1 == fixture_set_count() ? 2 : 7) == 0)
-                judge_hit(&f, mesh, &h, i, what, &t);
+                verify_hit(&f, mesh, &h, i, what, &t);
         free_hits(&h);
         if (t.wrong || t.unsure * 4 > t.rays || t.blocked < t.rays / 20 || t.rays < 50)
             fail_msg("%s, %s: of %lld rays %lld blocked, %lld unsure, %lld wrong", what, fixture_set_name(set),
@@ -202,8 +202,8 @@ static void rays_meet_what_all_cells_say(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
         test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
-        judge_mesh(&mesh, kind % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, test_mesh_kind_name(kind));
-        judge_mesh(&mesh, kind % 2 ? CAMERA_INSIDE : CAMERA_ORTHOGRAPHIC, 0.5F, test_mesh_kind_name(kind));
+        verify_mesh(&mesh, kind % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, test_mesh_kind_name(kind));
+        verify_mesh(&mesh, kind % 2 ? CAMERA_INSIDE : CAMERA_ORTHOGRAPHIC, 0.5F, test_mesh_kind_name(kind));
         test_mesh_free(&mesh);
     }
 }
@@ -213,8 +213,8 @@ static void rays_meet_what_honeycombs_say(void **state)
     test_mesh mesh;
     (void)state;
     test_mesh_honeycomb(SIDE, 0.2, test_wave, &mesh);
-    judge_mesh(&mesh, CAMERA_OUTSIDE, 0, "honeycomb");
-    judge_mesh(&mesh, CAMERA_ORTHOGRAPHIC, 0.5F, "honeycomb");
+    verify_mesh(&mesh, CAMERA_OUTSIDE, 0, "honeycomb");
+    verify_mesh(&mesh, CAMERA_ORTHOGRAPHIC, 0.5F, "honeycomb");
     test_mesh_free(&mesh);
 }
 

@@ -129,7 +129,7 @@ static void volumes_add_up(const grid *g, bool is_mirrored)
     assert_true(fabs(sum - 8) < 1e-9);
 }
 
-static void cut_and_judge(const order_kind *kind, int way, double bend)
+static void cut_and_verify(const order_kind *kind, int way, double bend)
 {
     order_mesh mesh;
     base_error error = {.status = INSITU_OK};
@@ -153,8 +153,8 @@ static void pieces_fill_their_cells(void **state)
     for (int k = 0; k < order_kind_count; k++)
         for (int way = 0; way < WAYS; way++) {
             if (order_kinds[k].order > 2 && way) continue; /* cut by nothing that turns */
-            cut_and_judge(&order_kinds[k], way, 0);
-            cut_and_judge(&order_kinds[k], way, 0.08);
+            cut_and_verify(&order_kinds[k], way, 0);
+            cut_and_verify(&order_kinds[k], way, 0.08);
         }
 }
 

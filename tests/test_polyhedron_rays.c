@@ -296,16 +296,16 @@ typedef struct ray_hits {
     bool is_good[REFERENCE_MAX_HITS];
 } ray_hits;
 
-typedef struct judge {
+typedef struct verify {
     const render_fixture *f;
     const subject *s;
     double iso, place;
     bool is_opaque;
     tally *t;
-} judge;
+} verify;
 
 /* Hits in [from, to], a little more on both sides. */
-static bool has_hit(const judge *j, const ray_hits *hits, double from, double to)
+static bool has_hit(const verify *j, const ray_hits *hits, double from, double to)
 {
     for (int i = 0; i < hits->count; i++)
         if (from - j->place <= hits->z[i] && hits->z[i] <= to + j->place) return true;
@@ -313,7 +313,7 @@ static bool has_hit(const judge *j, const ray_hits *hits, double from, double to
 }
 
 /* Mark the hits that are beside a place where the path comes within the band. */
-static void mark_hits(const judge *j, const path *p, double band, ray_hits *hits)
+static void mark_hits(const verify *j, const path *p, double band, ray_hits *hits)
 {
     for (int i = 0; i < hits->count; i++)
         for (int k = 0; k + 1 < p->count; k++) {
@@ -327,7 +327,7 @@ static void mark_hits(const judge *j, const path *p, double band, ray_hits *hits
 }
 
 /* Each certain crossing of the path; of an opaque surface, where a hit hides the rest, the first. */
-static bool judge_path(const judge *j, const path *p, double band, const ray_hits *hits)
+static bool verify_path(const verify *j, const path *p, double band, const ray_hits *hits)
 {
     const bool is_inner = (p->v[0] >= j->iso) == (p->v[p->count - 1] >= j->iso);
     int side = 0;
@@ -352,14 +352,14 @@ static bool judge_path(const judge *j, const path *p, double band, const ray_hit
 }
 
 /* Where tets overlap, the slopes of a sum's terms add up, mostly three of them. */
-static double band_of(const judge *j, const span *spans, int count)
+static double band_of(const verify *j, const span *spans, int count)
 {
     double steepest = 0;
     for (int i = 0; i < count; i++) steepest = fmax(steepest, spans[i].slope);
     return 2e-6 * (j->s->high - j->s->low) + j->place * steepest * (j->s->is_star ? 1 : 3);
 }
 
-static void judge_ray(const judge *j, const reference_line *line, ray_hits *hits)
+static void verify_ray(const verify *j, const reference_line *line, ray_hits *hits)
 {
     static span spans[REFERENCE_MAX_TRIANGLES];
     static double ends[2 * REFERENCE_MAX_TRIANGLES];
@@ -378,7 +378,7 @@ static void judge_ray(const judge *j, const reference_line *line, ray_hits *hits
         cut_at_eye(&p);
         if (!p.count) continue;
         mark_hits(j, &p, band, hits);
-        goes_on = goes_on && judge_path(j, &p, band, hits);
+        goes_on = goes_on && verify_path(j, &p, band, hits);
     }
     for (int i = 0; i < hits->count; i++) j->t->wrong += !hits->is_good[i];
 }
@@ -406,12 +406,12 @@ static void look_at_random(render_fixture *f, uint64_t seed)
     f->job.space.depth_origin = seed % 8 == 7 ? 0 : distance;
 }
 
-static void judge_frame(const render_fixture *f, const double iso, tally *t)
+static void verify_frame(const render_fixture *f, const double iso, tally *t)
 {
     static subject s;
     drawn_frame drawn;
     make_subject(f, &s);
-    const judge j = {.f = f,
+    const verify j = {.f = f,
                      .s = &s,
                      .iso = iso,
                      .place = 3e-6 / f->job.space.scale,
@@ -425,12 +425,12 @@ static void judge_frame(const render_fixture *f, const double iso, tally *t)
             ray_hits hits;
             hits_of(f, &drawn, (int64_t)y * WIDTH + x, &hits);
             const reference_line line = line_of(&f->job.camera, x, y);
-            judge_ray(&j, &line, &hits);
+            verify_ray(&j, &line, &hits);
         }
     drawn_free(&drawn);
 }
 
-static void judge_cell(const test_mesh *mesh, uint64_t seed, tally *t)
+static void verify_cell(const test_mesh *mesh, uint64_t seed, tally *t)
 {
     render_fixture f;
     const double values[1] = {test_uniform_in(4, seed, -0.6, 0.6)};
@@ -438,7 +438,7 @@ static void judge_cell(const test_mesh *mesh, uint64_t seed, tally *t)
                    (const double[]){0, 0, 0});
     look_at_random(&f, seed);
     fixture_add_surface(&f, values, 1, seed % 2 ? 1 : 0.4f);
-    judge_frame(&f, values[0], t);
+    verify_frame(&f, values[0], t);
     fixture_free(&f);
 }
 
@@ -464,7 +464,7 @@ static void random_polyhedra_miss_no_crossing(void **state)
             test_mesh mesh;
             test_mesh_random(kind, 1000 * kind + seed, &mesh);
             test_mesh_split_quads(&mesh);
-            judge_cell(&mesh, seed, &t);
+            verify_cell(&mesh, seed, &t);
             test_mesh_free(&mesh);
         }
         assert_none_missed(test_random_name(kind), &t);
@@ -485,7 +485,7 @@ static void concave_polyhedra_miss_no_crossing(void **state)
             mesh.values[i] = test_uniform_in(i, seed + 1000, -1, 1);
         }
         test_mesh_split_quads(&mesh);
-        judge_cell(&mesh, seed, &t);
+        verify_cell(&mesh, seed, &t);
         test_mesh_free(&mesh);
     }
     assert_none_missed("concave cells", &t);

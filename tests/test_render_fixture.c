@@ -396,7 +396,7 @@ static void compare_rays(const render_job *job, comparison *sets, int count)
     reference_free(scene);
 }
 
-static void judge(const comparison *c, const char *set)
+static void verify(const comparison *c, const char *set)
 {
     const fixture_outcome *o = &c->outcome;
     if (getenv("INSITU_TEST_VERBOSE"))
@@ -423,7 +423,7 @@ fixture_outcome fixture_compare(const render_fixture *f, const fixture_bounds *b
     fixture_use_set(used_before);
     compare_rays(&f->job, sets, count);
     for (int i = 0; i < count; i++) {
-        judge(&sets[i], fixture_set_name(i));
+        verify(&sets[i], fixture_set_name(i));
         drawn_free(&drawn[i]);
     }
     return sets[count - 1].outcome;

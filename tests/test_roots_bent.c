@@ -363,7 +363,7 @@ static double band_of(const kernel_map *map, const course *c)
     return band;
 }
 
-static void judge_ray(count *n, const kernel_map *map, course *c, double low, double high, bool hit, double hit_t)
+static void verify_ray(count *n, const kernel_map *map, course *c, double low, double high, bool hit, double hit_t)
 {
     double certain_t = 0;
     course_trace(c, low, high);
@@ -397,7 +397,7 @@ static int64_t differ_alone(bundle *b, const kernel_curved *curved, const kernel
     return differing;
 }
 
-static void judge_bundle(bundle *b, const reference_cell *cell, course *c, count *n)
+static void verify_bundle(bundle *b, const reference_cell *cell, course *c, count *n)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_map map;
@@ -412,7 +412,7 @@ static void judge_bundle(bundle *b, const reference_cell *cell, course *c, count
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
             if (!(vm_bits(list[i].mask) >> lane & 1)) continue;
             *c = (course){.cell = cell, .values = b->values, .line = line_of(b, lane)};
-            judge_ray(n, &map, c, (double)list[i].t_in[lane], (double)list[i].t_out[lane], hit >> lane & 1,
+            verify_ray(n, &map, c, (double)list[i].t_in[lane], (double)list[i].t_out[lane], hit >> lane & 1,
                       (double)t[lane]);
         }
     }
@@ -431,7 +431,7 @@ static void curved_rays_miss_no_first_root(void **state)
         int64_t map_failures = 0;
         for (int roots = 0; n.rays < rays_wanted / BENT_COUNT; roots = (roots + 1) % 5) {
             make_bundle(&b, &cell, &c, kind, roots);
-            judge_bundle(&b, &cell, &c, &n);
+            verify_bundle(&b, &cell, &c, &n);
             map_failures += b.thread.map_failures;
         }
         printf("%s: %lld rays, %lld with a certain crossing, %lld missed, %lld off; worst residual %.2g bands, of at "

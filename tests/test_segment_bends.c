@@ -134,7 +134,7 @@ static void aim_values(const bend_looks *looks, bend_aim aim, double *values)
 /* ---- pictures ---- */
 
 /* Draws one cell; false where the middle ray is not for the aim. */
-static bool judge_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, double worst[3])
+static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, double worst[3])
 {
     test_mesh mesh;
     render_fixture f;
@@ -157,7 +157,7 @@ static bool judge_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doubl
         f.job.camera.half_height = 0.03;
         const double unit = pow(10, test_uniform_in(0, 100 * seed, -2, 1));
         fixture_set_function(&f, &function, 100 * seed + 9, false, 0.95, unit);
-        step_judge(&f, test_effort(2, 1), 1e-7, worst);
+        step_verify(&f, test_effort(2, 1), 1e-7, worst);
         fixture_free(&f);
     }
     test_mesh_free(&mesh);
@@ -173,7 +173,7 @@ static void max_error_is_kept_where_looks_say_little(void **state)
     (void)state;
     double worst_of_hard[3] = {0};
     for (size_t i = 0; i < sizeof hard_seeds / sizeof hard_seeds[0]; i++)
-        assert_true(judge_cell(TEST_UNIT_HEX, BLIND, hard_seeds[i], worst_of_hard));
+        assert_true(verify_cell(TEST_UNIT_HEX, BLIND, hard_seeds[i], worst_of_hard));
     step_assert_kept(worst_of_hard, "hard cells");
     for (int s = 0; s < SHAPES; s++)
         for (bend_aim aim = 0; aim < AIMS; aim++) {
@@ -183,7 +183,7 @@ static void max_error_is_kept_where_looks_say_little(void **state)
             if (aim == BLIND && shapes[s] != TEST_UNIT_HEX) continue;
             const int wanted = test_effort(20, 1500);
             for (uint64_t seed = 0; seen < wanted && seed < 8 * (uint64_t)wanted; seed++)
-                seen += judge_cell(shapes[s], aim, seed, worst);
+                seen += verify_cell(shapes[s], aim, seed, worst);
             snprintf(what, sizeof what, "%s, %s, %d cells", test_cell_shape_name(shapes[s]), aim_names[aim], seen);
             step_assert_kept(worst, what);
             assert_true(2 * seen > wanted);

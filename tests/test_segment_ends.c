@@ -98,7 +98,7 @@ static double bent_field(const double p[3])
 }
 
 /* The worst of each error asked for, 1e-2 to 1e-4, of one mesh and function. Returns whether there is a step. */
-static bool judge(const test_mesh *mesh, uint64_t seed, bool step, float opacity, double worst[3])
+static bool verify(const test_mesh *mesh, uint64_t seed, bool step, float opacity, double worst[3])
 {
     static const double values[2] = {0.35, 0.6};
     render_fixture f;
@@ -135,7 +135,7 @@ static void max_error_is_kept_in_dense_media(void **state)
                 test_mesh mesh;
                 test_mesh_lattice(kind, 2, 0.2, bent_field, &mesh);
                 /* The two densest media step, one for each camera. */
-                steps += judge(&mesh, seed, seed % 5 == 0, opacities[surface], worst);
+                steps += verify(&mesh, seed, seed % 5 == 0, opacities[surface], worst);
                 test_mesh_free(&mesh);
             }
             fprintf(stderr, "%s, surfaces of opacity %g: %.2g, %.2g, %.2g\n", test_mesh_kind_name(kind),

@@ -252,7 +252,7 @@ static void random_tets_keep_max_error(void **state)
 }
 
 /* Rays and cells are the same, and segments as well: only the order of those that begin at one place may differ. */
-static void judge_tiles(test_mesh_kind kind, int side, bool with_surface, double max_error)
+static void verify_tiles(test_mesh_kind kind, int side, bool with_surface, double max_error)
 {
     static const double value = 0.5, nowhere = 1e6;
     render_fixture f;
@@ -290,7 +290,7 @@ static void lanes_have_what_cells_alone_have(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (int with_surface = 0; with_surface < 2; with_surface++) judge_tiles(kind, 9, with_surface, 0);
+        for (int with_surface = 0; with_surface < 2; with_surface++) verify_tiles(kind, 9, with_surface, 0);
 }
 
 /* By float32 ends: tiles take tets of few pixels a ray and its tet a lane (kernel_small_tets.h). A ray meets more tets
@@ -298,7 +298,7 @@ static void lanes_have_what_cells_alone_have(void **state)
 static void small_tets_are_the_same_in_lanes(void **state)
 {
     (void)state;
-    for (int with_surface = 0; with_surface < 2; with_surface++) judge_tiles(TEST_TETS, 20, with_surface, 1e-2);
+    for (int with_surface = 0; with_surface < 2; with_surface++) verify_tiles(TEST_TETS, 20, with_surface, 1e-2);
 }
 
 /* Usually each kind from one of the cameras. */

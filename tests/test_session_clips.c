@@ -292,7 +292,7 @@ static double difference(const caught_picture *a, const caught_picture *b)
     return memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0 ? worst : (double)INFINITY;
 }
 
-static void judge(test_mesh_kind kind, const clip_case *c, const region *g, clip_place place,
+static void verify(test_mesh_kind kind, const clip_case *c, const region *g, clip_place place,
                   const session_input inputs[2])
 {
     const char *scene = scene_of(c, g, place);
@@ -313,12 +313,12 @@ static void judge(test_mesh_kind kind, const clip_case *c, const region *g, clip
 
 /* Two of the region and place pairs a case, others for each kind of mesh: over all kinds, every case has all of them.
  */
-static void judge_all(test_mesh_kind kind, const session_input inputs[2])
+static void verify_all(test_mesh_kind kind, const session_input inputs[2])
 {
     for (int i = 0; i < CASES; i++)
         for (int turn = 0; turn < 2; turn++) {
             const int pair = (2 * (int)kind + turn + i) % (REGIONS * PLACES);
-            judge(kind, &cases[i], &regions[pair / PLACES], (clip_place)(pair % PLACES), inputs);
+            verify(kind, &cases[i], &regions[pair / PLACES], (clip_place)(pair % PLACES), inputs);
         }
 }
 
@@ -332,7 +332,7 @@ static void layers_are_clipped(void **state)
         input_describe(&inputs[0]);
         take_own_cells(&inputs[0].part, TEST_RANDOM, SIDE, kind % 2, &inputs[1].part);
         input_describe(&inputs[1]);
-        judge_all(kind, inputs);
+        verify_all(kind, inputs);
         input_free(&inputs[0]);
         input_free(&inputs[1]);
     }

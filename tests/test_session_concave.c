@@ -179,7 +179,7 @@ static truth truth_at(const tile tiles[TILES], int pixel)
     return out;
 }
 
-typedef bool judge_function(const truth *t, const double at[2], const float *rgba, float depth);
+typedef bool verify_function(const truth *t, const double at[2], const float *rgba, float depth);
 
 /* Depths and colours to what test_session_surfaces.c derives. */
 static bool is_value(const truth *t, const double at[2], const float *rgba, float depth)
@@ -220,7 +220,7 @@ static bool is_clipped(const truth *t, const double at[2], const float *rgba, fl
     return is_value(&cut, at, rgba, depth);
 }
 
-static bool is_well(const tile tiles[TILES], const caught_picture *picture, judge_function *judge, const char *what)
+static bool is_well(const tile tiles[TILES], const caught_picture *picture, verify_function *verify, const char *what)
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
@@ -229,7 +229,7 @@ static bool is_well(const tile tiles[TILES], const caught_picture *picture, judg
         double at[2];
         place_of(pixel, at);
         hits += rgba[3] > 0;
-        if (judge(&t, at, rgba, picture->depth[pixel])) continue;
+        if (verify(&t, at, rgba, picture->depth[pixel])) continue;
         fprintf(stderr, "%s: (%g, %g): opacity %g, grey %g, depth %g; hit %d, %g from an edge, depth %g\n", what, at[0],
                 at[1], (double)rgba[3], (double)rgba[0], (double)picture->depth[pixel], t.is_hit, t.margin, t.depth);
         return false;
@@ -259,7 +259,7 @@ static void concave_shells_are_what_they_are(void **state)
     (void)state;
     static const struct {
         const char *what, *scene;
-        judge_function *judge;
+        verify_function *verify;
     } cases[] = {
         {"values", IMAGE("", BY_FIELD), is_value},
         {"light", IMAGE("", "colour: [1, 1, 1]"), is_lit},
@@ -277,7 +277,7 @@ static void concave_shells_are_what_they_are(void **state)
         bool is_good = true;
         if (own_rank == 0) {
             alone = draw(MPI_COMM_SELF, scene, &whole);
-            is_good = is_well(tiles, &alone, cases[i].judge, cases[i].what) && are_one(&ours, &alone, cases[i].what);
+            is_good = is_well(tiles, &alone, cases[i].verify, cases[i].what) && are_one(&ours, &alone, cases[i].what);
         }
         everywhere(is_good);
         free_caught(&ours);

@@ -89,7 +89,7 @@ static bool lacks_value(int64_t cell)
     return test_uniform((uint64_t)(cell + 100 * own_rank), 8) < 0.3;
 }
 
-static void judge_lacking(int kind, const char *scene)
+static void verify_lacking(int kind, const char *scene)
 {
     session_input in = {0};
     test_mesh whole;
@@ -126,7 +126,7 @@ static void cells_without_a_value_of_their_own_are_not_there(void **context)
 {
     (void)context;
     for (int kind = 0; kind < MESHES; kind++)
-        for (int i = 0; i < SCENES; i++) judge_lacking(kind, scenes[i]);
+        for (int i = 0; i < SCENES; i++) verify_lacking(kind, scenes[i]);
 }
 
 /* The means at vertices stay as they are: of cells of one value some lose theirs, others get it back. */
@@ -213,7 +213,7 @@ static void add_flat_cells(test_mesh *mesh, bool as_polyhedra)
     if (as_polyhedra) test_mesh_to_polyhedra(mesh, 1);
 }
 
-static void judge_flat(bool as_polyhedra, const char *scene)
+static void verify_flat(bool as_polyhedra, const char *scene)
 {
     session_input bare = {0}, more = {0};
     test_mesh whole;
@@ -244,7 +244,7 @@ static void flat_cells_between_differing_fields_change_no_pixel(void **context)
 {
     (void)context;
     for (int as_polyhedra = 0; as_polyhedra < 2; as_polyhedra++)
-        for (int i = 0; i < SCENES; i++) judge_flat(as_polyhedra, scenes[i]);
+        for (int i = 0; i < SCENES; i++) verify_flat(as_polyhedra, scenes[i]);
 }
 
 /* Vertices move, and the arrays are the same: hexes lie flat at one step and stand at the next. */

@@ -103,7 +103,7 @@ typedef struct tally {
 } tally;
 
 /* lit: by the shadowless picture's own light, beside which nothing is measured. */
-static tally judge_floor(const caught_picture *shadowed, const caught_picture *lit)
+static tally verify_floor(const caught_picture *shadowed, const caught_picture *lit)
 {
     tally out = {0};
     const double full = 0.2 + 0.8 * to_light[1];
@@ -128,7 +128,7 @@ static tally draw_floor(test_mesh_kind kind, const char *scene, const char *lit_
     tally out = {0};
     make_part(&in, kind, test_linear, TEST_RANDOM, own_rank, rank_count);
     caught_picture shadowed = draw(MPI_COMM_WORLD, scene, &in), lit = draw(MPI_COMM_WORLD, lit_scene, &in);
-    if (own_rank == 0) out = judge_floor(&shadowed, &lit);
+    if (own_rank == 0) out = verify_floor(&shadowed, &lit);
     free_caught(&shadowed);
     free_caught(&lit);
     input_free(&in);
@@ -232,7 +232,7 @@ typedef struct sky {
 } sky;
 
 /* Everything by AO alone: the picture is the unoccluded one times the share. */
-static sky judge_sky(const corner *c, const caught_picture *drawn, const caught_picture *plain)
+static sky verify_sky(const corner *c, const caught_picture *drawn, const caught_picture *plain)
 {
     sky out = {0};
     for (int p = 0; p < PIXELS; p++) {
@@ -273,7 +273,7 @@ static void corners_are_as_dark_as_disk_segments(void **context)
         caught_picture plain = draw(MPI_COMM_WORLD, IMAGE(DARK, CORNER), &in);
         bool is_right = true;
         if (own_rank == 0) {
-            const sky s = judge_sky(&slices, &drawn, &plain);
+            const sky s = verify_sky(&slices, &drawn, &plain);
             double expected = 0;
             int count = 0;
             for (int p = 0; p < PIXELS; p++) {
@@ -328,7 +328,7 @@ static void valleys_are_dark_to_the_ground(void **context)
         caught_picture plain = draw(MPI_COMM_WORLD, IMAGE(DARK, VALLEY), &in);
         bool is_right = true;
         if (own_rank == 0) {
-            const sky s = judge_sky(&valley, &drawn, &plain);
+            const sky s = verify_sky(&valley, &drawn, &plain);
             int near = 0;
             for (int p = 0; p < PIXELS; p++) {
                 double at[3];
@@ -373,7 +373,7 @@ static double difference(const caught_picture *a, const caught_picture *b)
 }
 
 /* most: 0 where there are surfaces alone, which are one picture to the bit. */
-static void judge_partition(const char *scene, const session_input *whole, const session_input *part, double most,
+static void verify_partition(const char *scene, const session_input *whole, const session_input *part, double most,
                             const char *what)
 {
     double off = 0;
@@ -398,9 +398,9 @@ static void lit_pictures_are_the_same_on_any_partition(void **context)
             const int count = dealt == TEST_RANDOM && rank_count > 1 ? rank_count - 1 : rank_count;
             make_part(&whole, kind, test_wave, TEST_BLOCK, 0, 1);
             make_part(&part, kind, test_wave, dealt, own_rank, count);
-            judge_partition(EVERYTHING, &whole, &part, 0, test_mesh_kind_name(kind));
+            verify_partition(EVERYTHING, &whole, &part, 0, test_mesh_kind_name(kind));
             if (dealt == TEST_CHECKERBOARD)
-                judge_partition(WITH_VOLUME, &whole, &part, 1e-6, test_mesh_kind_name(kind));
+                verify_partition(WITH_VOLUME, &whole, &part, 1e-6, test_mesh_kind_name(kind));
             input_free(&whole);
             input_free(&part);
         }
@@ -419,7 +419,7 @@ static void ghost_cells_cast_nothing(void **context)
     for (int64_t cell = 0; cell < part.part.cell_count; cell++) part.part.ghosts[cell] = owners[cell] != own_rank;
     free(owners);
     input_describe(&part);
-    judge_partition(EVERYTHING, &whole, &part, 0, "ghost cells");
+    verify_partition(EVERYTHING, &whole, &part, 0, "ghost cells");
     input_free(&whole);
     input_free(&part);
 }

@@ -128,7 +128,7 @@ static bool is_one_picture(const scene_case *scene, const char *file, mesh_kind 
     return is_one;
 }
 
-static void judge(mesh_kind kind)
+static void verify(mesh_kind kind)
 {
     session_input whole = {0}, part = {0};
     bool is_one = true;
@@ -181,32 +181,32 @@ static void default_volumes_are_off_by_a_hundredth_at_most(void **context)
 static void default_volumes_of_honeycombs_are_one_picture(void **context)
 {
     (void)context;
-    judge(HONEYCOMB);
+    verify(HONEYCOMB);
 }
 
 static void default_volumes_of_warped_polyhedra_are_one_picture(void **context)
 {
     (void)context;
-    judge(WARPED_POLYHEDRA);
+    verify(WARPED_POLYHEDRA);
 }
 
 static void default_volumes_of_polyhedra_among_others_are_one_picture(void **context)
 {
     (void)context;
-    judge(WARPED_MIXED);
+    verify(WARPED_MIXED);
 }
 
 static void default_volumes_of_hexes_are_one_picture(void **context)
 {
     (void)context;
-    judge(HEXES);
+    verify(HEXES);
 }
 
 /* When drawn to an error, flat cells overlap others, and such pixels agree to max_error. */
 static void flat_cells_do_not_change_the_default_step(void **context)
 {
     (void)context;
-    judge(FLAT_AMONG_HEXES);
+    verify(FLAT_AMONG_HEXES);
 }
 
 int main(int argc, char **argv)

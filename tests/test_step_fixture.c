@@ -71,7 +71,7 @@ double step_worst_of_sets(const render_fixture *f, const double *truth, int ever
     return worst;
 }
 
-void step_judge(render_fixture *f, int every, double tolerance, double worst[3])
+void step_verify(render_fixture *f, int every, double tolerance, double worst[3])
 {
     double *truth = step_truth(f, every, tolerance);
     for (int i = 0; i < 3; i++) {
