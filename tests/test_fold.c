@@ -48,7 +48,7 @@ static void make_ray(ray *r, double density, double gap, double surface)
 }
 
 /* Runs of some pieces a rank. */
-static void deal(ray *r, double change)
+static void distribute(ray *r, double change)
 {
     int owner = 0;
     for (int64_t i = 0; i < r->count; i++) {
@@ -129,8 +129,8 @@ static void fold_is_the_same_on_any_ranks(void **state)
         merge(&r, alone, &sent);
         whole += sent;
         verify(&r, alone);
-        for (int dealt = 0; dealt < 4; dealt++) {
-            deal(&r, dealt == 0 ? 1 : 0.3 / (1 + 3 * dealt));
+        for (int distributed = 0; distributed < 4; distributed++) {
+            distribute(&r, distributed == 0 ? 1 : 0.3 / (1 + 3 * distributed));
             merge(&r, shared, &sent);
             parts += sent;
             assert_memory_equal(alone, shared, sizeof alone);

@@ -88,7 +88,7 @@ static void folded_cells_make_numbers(void **state)
 
 /* Draws on seven ranks, each with its own numbering of cells and vertices and order within cells: surfaces agree to the
  * bit, separate samples to the rounding of "over". */
-static void draw_dealt(const test_mesh *mesh, scene_kind scene, drawn_frame *out)
+static void draw_distributed(const test_mesh *mesh, scene_kind scene, drawn_frame *out)
 {
     render_fixture parts[RANKS];
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
@@ -116,16 +116,16 @@ static void numbers_of_cells_and_ranks_do_not_show(void **state)
         for (int s = 0; s < 2; s++) {
             test_mesh mesh;
             render_fixture f;
-            drawn_frame whole, dealt;
+            drawn_frame whole, distributed;
             tangle(kinds[k], &mesh);
             stage(&f, &mesh, CAMERA_OUTSIDE, scenes[s]);
             f.job.separate_samples = scenes[s] == SAMPLES;
             fixture_draw(&f, &whole);
-            draw_dealt(&mesh, scenes[s], &dealt);
-            if (scenes[s] != SAMPLES) drawn_assert_same(&whole, &dealt);
-            if (!(drawn_difference(&whole, &dealt) <= 1e-6)) fail_msg("off by %g", drawn_difference(&whole, &dealt));
+            draw_distributed(&mesh, scenes[s], &distributed);
+            if (scenes[s] != SAMPLES) drawn_assert_same(&whole, &distributed);
+            if (!(drawn_difference(&whole, &distributed) <= 1e-6)) fail_msg("off by %g", drawn_difference(&whole, &distributed));
             drawn_free(&whole);
-            drawn_free(&dealt);
+            drawn_free(&distributed);
             fixture_free(&f);
             test_mesh_free(&mesh);
         }

@@ -125,9 +125,9 @@ static const char *scene_of_all(void)
 
 /* ---- meshes and partitions ------------------------------------------------------------------------------------ */
 
-typedef enum dealing { BLOCK, MORTON, RANDOM, CHECKERBOARD, RANK_EMPTY, DEALINGS } dealing;
+typedef enum distribution { BLOCK, MORTON, RANDOM, CHECKERBOARD, RANK_EMPTY, DEALINGS } distribution;
 
-static const char *const dealing_names[DEALINGS] = {"block", "Morton", "random", "checkerboard", "a rank empty"};
+static const char *const distribution_names[DEALINGS] = {"block", "Morton", "random", "checkerboard", "a rank empty"};
 
 static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_TETS, TEST_POLYHEDRA, TEST_MIXED};
 enum { KINDS = sizeof kinds / sizeof *kinds };
@@ -178,7 +178,7 @@ static int compare_codes(const void *a, const void *b)
     return (first > second) - (first < second);
 }
 
-static void deal_morton(const test_mesh *mesh, int *owners)
+static void distribute_morton(const test_mesh *mesh, int *owners)
 {
     const size_t cells = (size_t)mesh->cell_count;
     uint64_t *codes = calloc(cells, sizeof *codes);
@@ -190,13 +190,13 @@ static void deal_morton(const test_mesh *mesh, int *owners)
     free(codes);
 }
 
-static void deal(const test_mesh *mesh, dealing how, int side, int *owners)
+static void distribute(const test_mesh *mesh, distribution how, int side, int *owners)
 {
     static const test_partition_kind known[] = {TEST_BLOCK, TEST_BLOCK, TEST_RANDOM, TEST_CHECKERBOARD, TEST_RANDOM};
     const int empty = rank_count / 2;
     const bool has_empty = how == RANK_EMPTY && rank_count > 1;
     test_partition(mesh, known[how], side, has_empty ? rank_count - 1 : rank_count, owners);
-    if (how == MORTON) deal_morton(mesh, owners);
+    if (how == MORTON) distribute_morton(mesh, owners);
     for (int64_t i = 0; has_empty && i < mesh->cell_count; i++) owners[i] += owners[i] >= empty;
 }
 
@@ -373,9 +373,9 @@ static bool verify_mesh(insitu_session *session, int kind, int side, const test_
             char what[96];
             input part;
             if (!is_due(kind, how, layers)) continue;
-            snprintf(what, sizeof what, "%s, %s, %d ghost layers", test_mesh_kind_name(kinds[kind]), dealing_names[how],
+            snprintf(what, sizeof what, "%s, %s, %d ghost layers", test_mesh_kind_name(kinds[kind]), distribution_names[how],
                      layers);
-            deal(mesh, (dealing)how, side, owners);
+            distribute(mesh, (distribution)how, side, owners);
             take_part(mesh, owners, layers, &part);
             draw(session, &part, cycle++);
             if (own_rank == 0) are_well = are_the_same(whole, what) && are_well;

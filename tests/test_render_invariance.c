@@ -314,7 +314,7 @@ static void layouts_do_not_change_a_bit(void **state)
 /* ---- parts and ranks ---- */
 
 /* Deals the mesh's cells out. With ghosts, every part holds all cells, with those of others as ghosts. */
-static void deal(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts, test_mesh *out)
+static void distribute(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts, test_mesh *out)
 {
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
     test_partition(mesh, partition, n, parts, owners);
@@ -340,25 +340,25 @@ static void assert_same_to_rounding(const drawn_frame *whole, const drawn_frame 
     if (scene == OPAQUE || scene == TRANSPARENT) drawn_assert_same(whole, parts);
 }
 
-static void compare_dealt(test_mesh_kind kind, scene_kind scene, test_partition_kind partition, int parts, bool ghosts)
+static void compare_distributed(test_mesh_kind kind, scene_kind scene, test_partition_kind partition, int parts, bool ghosts)
 {
     const fixture_camera camera = (int)scene % 2 ? CAMERA_INSIDE : CAMERA_OUTSIDE;
-    test_mesh mesh, dealt[5];
+    test_mesh mesh, distributed[5];
     render_fixture f, apart[5];
     drawn_frame whole, other;
     test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
     mesh_fixture(&f, &mesh, 1, 4, scene, camera);
     fixture_draw(&f, &whole);
     fixture_free(&f);
-    deal(&mesh, partition, 4, parts, ghosts, dealt);
+    distribute(&mesh, partition, 4, parts, ghosts, distributed);
     for (int i = 0; i < parts; i++) {
-        mesh_fixture(&apart[i], &dealt[i], 1, 4, scene, camera);
+        mesh_fixture(&apart[i], &distributed[i], 1, 4, scene, camera);
         apart[i].job.is_alone = false;
     }
     fixture_draw_apart(apart, parts, &other);
     assert_same_to_rounding(&whole, &other, scene);
     drawn_free(&other);
-    mesh_fixture(&f, dealt, parts, 4, scene, camera);
+    mesh_fixture(&f, distributed, parts, 4, scene, camera);
     fixture_draw(&f, &other);
     assert_same_to_rounding(&whole, &other, scene);
     drawn_free(&other);
@@ -366,7 +366,7 @@ static void compare_dealt(test_mesh_kind kind, scene_kind scene, test_partition_
     fixture_free(&f);
     for (int i = 0; i < parts; i++) {
         fixture_free(&apart[i]);
-        test_mesh_free(&dealt[i]);
+        test_mesh_free(&distributed[i]);
     }
     test_mesh_free(&mesh);
 }
@@ -378,7 +378,7 @@ static void compare_volume_traversals(test_mesh_kind kind, scene_kind scene, fix
     render_fixture f;
     test_mesh mesh, parts[2];
     test_mesh_lattice(kind, 5, 0.2, test_wave, &mesh);
-    deal(&mesh, TEST_CHECKERBOARD, 5, 2, false, parts);
+    distribute(&mesh, TEST_CHECKERBOARD, 5, 2, false, parts);
     fixture_create(&f, parts, 2, layout, 0.4, 1, origin);
     fixture_look(&f, camera, 61, 47);
     add_layers(&f, scene);
@@ -404,7 +404,7 @@ static void parts_and_ranks_draw_the_whole(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
             for (test_partition_kind partition = 0; partition < TEST_PARTITION_COUNT; partition++)
-                compare_dealt(kind, scene, partition, 2 + ((int)kind + (int)partition) % 4, false);
+                compare_distributed(kind, scene, partition, 2 + ((int)kind + (int)partition) % 4, false);
 }
 
 /* Samples exactly on the faces between ranks: the eye 3.125 from the middle of a lattice of half units, samples at (k +
@@ -416,13 +416,13 @@ static void samples_on_faces_have_one_owner(void **state)
     static const float constant[1] = {0.2f};
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (test_partition_kind partition = 0; partition < TEST_PARTITION_COUNT; partition++) {
-            test_mesh mesh, dealt[3];
+            test_mesh mesh, distributed[3];
             render_fixture apart[3];
             drawn_frame drawn;
             test_mesh_lattice(kind, 4, 0, test_wave, &mesh);
-            deal(&mesh, partition, 4, 3, false, dealt);
+            distribute(&mesh, partition, 4, 3, false, distributed);
             for (int i = 0; i < 3; i++) {
-                mesh_fixture(&apart[i], &dealt[i], 1, 4, VOLUME, CAMERA_ALONG_X);
+                mesh_fixture(&apart[i], &distributed[i], 1, 4, VOLUME, CAMERA_ALONG_X);
                 apart[i].job.camera.eye[0] = 3.125;
                 apart[i].job.space.depth_origin = 3;
                 apart[i].job.is_alone = apart[i].job.jitter = false;
@@ -442,7 +442,7 @@ static void samples_on_faces_have_one_owner(void **state)
             drawn_free(&drawn);
             for (int i = 0; i < 3; i++) {
                 fixture_free(&apart[i]);
-                test_mesh_free(&dealt[i]);
+                test_mesh_free(&distributed[i]);
             }
             test_mesh_free(&mesh);
         }
@@ -452,22 +452,22 @@ static void ghosts_change_nothing(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) compare_dealt(kind, scene, TEST_RANDOM, 3, true);
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) compare_distributed(kind, scene, TEST_RANDOM, 3, true);
 }
 
 static void parent_tree_changes_nothing(void **state)
 {
     (void)state;
     for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
-        test_mesh mesh, dealt[5];
+        test_mesh mesh, distributed[5];
         render_fixture f;
         drawn_frame without, with;
         float lower[5][3], upper[5][3], ranges[5][2];
         mmbvh parent;
         base_error error = {0};
         test_mesh_lattice(TEST_MIXED, 4, 0.2, test_wave, &mesh);
-        deal(&mesh, TEST_BLOCK, 4, 5, false, dealt);
-        mesh_fixture(&f, dealt, 5, 4, scene, CAMERA_OUTSIDE);
+        distribute(&mesh, TEST_BLOCK, 4, 5, false, distributed);
+        mesh_fixture(&f, distributed, 5, 4, scene, CAMERA_OUTSIDE);
         fixture_draw(&f, &without);
         for (int i = 0; i < 5; i++) {
             float low[4], high[4];
@@ -488,7 +488,7 @@ static void parent_tree_changes_nothing(void **state)
         drawn_free(&without);
         drawn_free(&with);
         fixture_free(&f);
-        for (int i = 0; i < 5; i++) test_mesh_free(&dealt[i]);
+        for (int i = 0; i < 5; i++) test_mesh_free(&distributed[i]);
         test_mesh_free(&mesh);
     }
 }

@@ -238,7 +238,7 @@ static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
 enum { RANKS = 7 };
 
 /* is_turned: the cells' own orders change as well, which polyhedra do not see (a hex's inverse map does). */
-static void draw_dealt(const test_mesh *mesh, bool is_turned, scene_set *set, drawn_frame *out)
+static void draw_distributed(const test_mesh *mesh, bool is_turned, scene_set *set, drawn_frame *out)
 {
     render_fixture parts[RANKS];
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
@@ -265,18 +265,18 @@ static void random_ownership_changes_nothing(void **state)
     (void)state;
     for (int pass = 0; pass < 6; pass++) {
         test_mesh mesh;
-        drawn_frame alone, dealt;
+        drawn_frame alone, distributed;
         test_mesh_lattice(pass % 3 == 0   ? TEST_POLYHEDRA
                           : pass % 3 == 1 ? TEST_HEXES
                                           : TEST_MIXED,
                           4, 0.2, test_wave, &mesh);
         if (pass % 3) test_mesh_to_polyhedra(&mesh, pass % 3 == 1 ? 1 : 0.6);
         draw_mesh(&mesh, CAMERA_OUTSIDE, pass < 3 ? set_surfaces : set_volume, &alone);
-        draw_dealt(&mesh, pass % 3 < 2, pass < 3 ? set_surfaces : set_volume, &dealt);
-        if (pass < 3) drawn_assert_same(&alone, &dealt);
-        if (!(drawn_difference(&alone, &dealt) <= 1e-6)) fail_msg("off by %g", drawn_difference(&alone, &dealt));
+        draw_distributed(&mesh, pass % 3 < 2, pass < 3 ? set_surfaces : set_volume, &distributed);
+        if (pass < 3) drawn_assert_same(&alone, &distributed);
+        if (!(drawn_difference(&alone, &distributed) <= 1e-6)) fail_msg("off by %g", drawn_difference(&alone, &distributed));
         drawn_free(&alone);
-        drawn_free(&dealt);
+        drawn_free(&distributed);
         test_mesh_free(&mesh);
     }
 }

@@ -331,7 +331,7 @@ static void parts_make_the_whole(void **state)
     static const double values[2] = {-0.2, 0.3};
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (test_partition_kind deal = 0; deal < TEST_PARTITION_COUNT; deal++)
+        for (test_partition_kind distribute = 0; distribute < TEST_PARTITION_COUNT; distribute++)
             for (int surfaces = 0; surfaces < 2; surfaces++) {
                 enum { N = 4, RANKS = 3 };
                 test_mesh mesh;
@@ -339,7 +339,7 @@ static void parts_make_the_whole(void **state)
                 drawn_frame at_once, apart;
                 test_mesh_lattice(kind, N, 0.2, test_wave, &mesh);
                 int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
-                test_partition(&mesh, deal, N, RANKS, owners);
+                test_partition(&mesh, distribute, N, RANKS, owners);
                 for (int i = 0; i <= RANKS; i++) {
                     render_fixture *f = i ? &parts[i - 1] : &whole;
                     test_mesh part = mesh;
@@ -348,7 +348,7 @@ static void parts_make_the_whole(void **state)
                                    1, (const double[]){0, 0, 0});
                     if (i) test_mesh_free(&part);
                     fixture_look(f, CAMERA_OUTSIDE, 37, 31);
-                    set_segments(f, 0.3, deal == TEST_RANDOM ? 1e-3 : 0);
+                    set_segments(f, 0.3, distribute == TEST_RANDOM ? 1e-3 : 0);
                     f->job.extent = 3.5;
                     if (surfaces) fixture_add_surface(f, values, 2, 0.4f);
                     f->job.is_alone = i == 0;
@@ -360,7 +360,7 @@ static void parts_make_the_whole(void **state)
                     assert_true(
                         !comp_pixel_overlaps(apart.list.items + apart.first[p], apart.first[p + 1] - apart.first[p]));
                 if (!(off <= 1e-6))
-                    fail_msg("%s, %s: %g", test_mesh_kind_name(kind), test_partition_kind_name(deal), off);
+                    fail_msg("%s, %s: %g", test_mesh_kind_name(kind), test_partition_kind_name(distribute), off);
                 drawn_free(&at_once);
                 drawn_free(&apart);
                 for (int i = 0; i < RANKS; i++) fixture_free(&parts[i]);

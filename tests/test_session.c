@@ -355,15 +355,15 @@ static void overlapping_meshes_make_one_picture(void **context)
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", VOLUME, "    sampling: {frames: 2}\n")));
-    session_input whole[2], dealt[2];
+    session_input whole[2], distributed[2];
     caught_picture first = {0};
     for (int i = 0; i < 2; i++) {
         const test_mesh_kind kind = i ? TEST_TETS : TEST_HEXES;
         input_create(&whole[i], kind, 3 + i, TEST_BLOCK, 0, 1);
-        input_create(&dealt[i], kind, 3 + i, TEST_RANDOM, own_rank, rank_count);
+        input_create(&distributed[i], kind, 3 + i, TEST_RANDOM, own_rank, rank_count);
     }
     for (int turn = 0; turn < 2; turn++) {
-        const session_input *in = turn ? dealt : whole;
+        const session_input *in = turn ? distributed : whole;
         for (int i = 0; i < 2; i++) {
             const bool has_part = turn || own_rank == rank_count - 1;
             const char *const name = i ? "tets" : "hexes";
@@ -383,8 +383,8 @@ static void overlapping_meshes_make_one_picture(void **context)
     everywhere(insitu_set_mesh(session, "tets", NULL) == INSITU_OK);
     step_draws(session, 2, 1);
     everywhere(!warns_of_overlaps(session));
-    everywhere(insitu_set_mesh(session, "tets", &dealt[1].mesh) == INSITU_OK);
-    everywhere(insitu_set_field(session, "tets", &dealt[1].field) == INSITU_OK);
+    everywhere(insitu_set_mesh(session, "tets", &distributed[1].mesh) == INSITU_OK);
+    everywhere(insitu_set_field(session, "tets", &distributed[1].field) == INSITU_OK);
     step_draws(session, 3, 1);
     everywhere(warns_of_overlaps(session)); /* and again when it has ceased to be true */
     free(first.rgba);
@@ -392,7 +392,7 @@ static void overlapping_meshes_make_one_picture(void **context)
     insitu_destroy(&session);
     for (int i = 0; i < 2; i++) {
         input_free(&whole[i]);
-        input_free(&dealt[i]);
+        input_free(&distributed[i]);
     }
 }
 

@@ -17,7 +17,7 @@ enum {
     MOST = (WIDE + 1) * (WIDE + 1) * (WIDE + 1)
 };
 
-static const int deal[3] = {3, 2, 2}; /* blocks along each axis */
+static const int distribute[3] = {3, 2, 2}; /* blocks along each axis */
 
 static const char *const images[] = {
     "[{isosurface: {field: c, values: [0.55], normals: vertex}}]",
@@ -198,10 +198,10 @@ static void fill_block(block *b)
 
 static void make_block(int number, block *b)
 {
-    const int place[3] = {number % deal[0], number / deal[0] % deal[1], number / deal[0] / deal[1]};
+    const int place[3] = {number % distribute[0], number / distribute[0] % distribute[1], number / distribute[0] / distribute[1]};
     *b = (block){.number = number};
     for (int axis = 0; axis < 3; axis++) {
-        const int width = CELLS / deal[axis], first = place[axis] * width, end = first + width;
+        const int width = CELLS / distribute[axis], first = place[axis] * width, end = first + width;
         const int low = first > 0, high = end < CELLS;
         b->first[axis] = first - low;
         b->cells[axis] = width + low + high;
@@ -256,7 +256,7 @@ static bool hand_block(insitu_session *session, const block *b, unsigned changed
  * only where slabs meet. */
 static int owner_of(int number)
 {
-    if (are_in_slabs) return number % deal[0] % rank_count;
+    if (are_in_slabs) return number % distribute[0] % rank_count;
     return rank_count < 3 ? number % rank_count : (7 * number + 3) % 11 % (rank_count - 1);
 }
 

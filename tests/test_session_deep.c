@@ -152,11 +152,11 @@ static bool verify_case(const deep_case *c, const session_input *whole, const se
     return is_well;
 }
 
-static void verify(test_mesh_kind kind, test_partition_kind dealt)
+static void verify(test_mesh_kind kind, test_partition_kind distributed)
 {
     session_input whole = {0}, part = {0};
-    input_create(&whole, kind, SIDE, dealt, 0, 1);
-    input_create(&part, kind, SIDE, dealt, own_rank, rank_count);
+    input_create(&whole, kind, SIDE, distributed, 0, 1);
+    input_create(&part, kind, SIDE, distributed, own_rank, rank_count);
     for (int i = 0; i < CASES; i++) {
         const bool is_well = verify_case(&cases[i], &whole, &part);
         if (!is_well) fprintf(stderr, "%s: %s\n", test_mesh_kind_name(kind), cases[i].name);

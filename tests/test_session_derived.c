@@ -330,12 +330,12 @@ static void partitions_do_not_show(void **state)
     static const char *const names[] = {"q", "w", "l", "mixed"};
     static const char scene[] = "threads: 1\n" PARTITION_SCENE, two_threads[] = "threads: 2\n" PARTITION_SCENE;
     for (int kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (test_partition_kind dealt = TEST_BLOCK; dealt <= TEST_RANDOM; dealt++) {
+        for (test_partition_kind distributed = TEST_BLOCK; distributed <= TEST_RANDOM; distributed++) {
             session_input whole = {0}, in = {0};
             vector_field u, c, whole_u, whole_c;
             test_mesh_lattice((test_mesh_kind)kind, SIDE, 0.2, test_wave, &whole.part);
             input_describe(&whole);
-            take_own_cells(&whole.part, dealt, SIDE, kind == TEST_HEXES, &in.part);
+            take_own_cells(&whole.part, distributed, SIDE, kind == TEST_HEXES, &in.part);
             if (kind != TEST_POLYHEDRA) test_mesh_turn(&in.part, (uint64_t)own_rank + 3);
             input_describe(&in);
             make_vector(&in.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &u);
@@ -369,7 +369,7 @@ static void blocks_show_no_seam(void **state)
     (void)state;
     static const char *const meshes[] = {"m", "n"};
     const char *const scene = SCENE("q: {q_criterion: u}", "q");
-    for (test_partition_kind dealt = TEST_BLOCK; dealt <= TEST_RANDOM; dealt++) {
+    for (test_partition_kind distributed = TEST_BLOCK; distributed <= TEST_RANDOM; distributed++) {
         session_input whole = {0}, parts[2] = {0};
         vector_field whole_u, u[2];
         test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &whole.part);
@@ -378,7 +378,7 @@ static void blocks_show_no_seam(void **state)
         insitu_session *alone = open_stepped(MPI_COMM_SELF, scene, &whole, &whole_u), *session = NULL;
         int *owners = calloc((size_t)whole.part.cell_count, sizeof *owners);
         assert_non_null(owners);
-        test_partition(&whole.part, dealt, SIDE, 2 * rank_count, owners);
+        test_partition(&whole.part, distributed, SIDE, 2 * rank_count, owners);
         assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, scene, &session), INSITU_OK);
         for (int i = 0; i < 2; i++) {
             test_mesh_part(&whole.part, owners, 2 * own_rank + i, &parts[i].part);

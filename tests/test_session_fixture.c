@@ -127,18 +127,18 @@ void input_describe(session_input *in)
     in->field.values = (insitu_array){in->part.values, INSITU_FLOAT64, 0};
 }
 
-void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count)
+void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind distributed, int rank, int count)
 {
     test_mesh whole;
     in->kind = kind;
     in->side = side;
-    in->dealt = dealt;
+    in->distributed = distributed;
     in->rank = rank;
     in->count = count;
     test_mesh_lattice(kind, side, 0.2, test_wave, &whole);
     int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
     assert_non_null(owners);
-    test_partition(&whole, dealt, side, count, owners);
+    test_partition(&whole, distributed, side, count, owners);
     test_mesh_part(&whole, owners, rank, &in->part);
     free(owners);
     test_mesh_free(&whole);
@@ -148,7 +148,7 @@ void input_create(session_input *in, test_mesh_kind kind, int side, test_partiti
 void input_renew(session_input *in)
 {
     input_free(in);
-    input_create(in, in->kind, in->side, in->dealt, in->rank, in->count);
+    input_create(in, in->kind, in->side, in->distributed, in->rank, in->count);
 }
 
 void input_free(session_input *in)
@@ -193,11 +193,11 @@ void spoilt_is_reported_on_all_ranks(insitu_session *session, session_input *in,
     step_is_good(session, 2);
 }
 
-void take_own_cells(const test_mesh *whole, test_partition_kind dealt, int side, bool with_ghosts, test_mesh *out)
+void take_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts, test_mesh *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
     int *all = test_calloc((size_t)whole->cell_count, sizeof *all);
-    test_partition(whole, dealt, side, rank_count, owners);
+    test_partition(whole, distributed, side, rank_count, owners);
     test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, out);
     for (int64_t cell = 0; cell < out->cell_count && with_ghosts; cell++) out->ghosts[cell] = owners[cell] != own_rank;
     test_free(owners);

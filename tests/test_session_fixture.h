@@ -61,14 +61,14 @@ typedef struct session_input {
     insitu_field field; /* "f", at vertices */
     test_mesh_kind kind;
     int side, rank, count;
-    test_partition_kind dealt;
+    test_partition_kind distributed;
 } session_input;
 
 /* Describes a part as it is: with types, offsets, ghosts and faces. */
 void describe_part(const test_mesh *part, insitu_mesh *mesh);
 
 /* Hexes or any kind, side^3 cubes, dealt to count ranks; the part of rank. */
-void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count);
+void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind distributed, int rank, int count);
 /* Describe the part again, after it was spoilt. */
 void input_describe(session_input *in);
 /* Restores the input as it was created. */
@@ -76,7 +76,7 @@ void input_renew(session_input *in);
 void input_free(session_input *in);
 
 /* This rank's cells of the whole; with ghosts: all cells, of which the others' are ghosts. */
-void take_own_cells(const test_mesh *whole, test_partition_kind dealt, int side, bool with_ghosts, test_mesh *out);
+void take_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts, test_mesh *out);
 
 /* Set the mesh "m" and its field; the first status that is not OK. */
 insitu_status hand_over(insitu_session *session, const session_input *in);

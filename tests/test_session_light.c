@@ -53,23 +53,23 @@ static void normal_at(const caught_picture *picture, int pixel, double out[3])
 
 /* A mesh of its own on every rank's session: the whole of it on one rank, or dealt. */
 static void make_jittered(session_input *in, test_mesh_kind kind, double jitter, test_function *f,
-                          test_partition_kind dealt, int rank, int count)
+                          test_partition_kind distributed, int rank, int count)
 {
     test_mesh whole;
     test_mesh_lattice(kind, SIDE, jitter, f, &whole);
     int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
     assert_non_null(owners);
-    test_partition(&whole, dealt, SIDE, count, owners);
+    test_partition(&whole, distributed, SIDE, count, owners);
     test_mesh_part(&whole, owners, rank, &in->part);
     free(owners);
     test_mesh_free(&whole);
     input_describe(in);
 }
 
-static void make_part(session_input *in, test_mesh_kind kind, test_function *f, test_partition_kind dealt, int rank,
+static void make_part(session_input *in, test_mesh_kind kind, test_function *f, test_partition_kind distributed, int rank,
                       int count)
 {
-    make_jittered(in, kind, 0.2, f, dealt, rank, count);
+    make_jittered(in, kind, 0.2, f, distributed, rank, count);
 }
 
 /* ---- shadows in closed form ---------------------------------------------------------------------------------- */
@@ -377,13 +377,13 @@ static void verify_partition(const char *scene, const session_input *whole, cons
                             const char *what)
 {
     double off = 0;
-    caught_picture dealt = draw(MPI_COMM_WORLD, scene, part);
+    caught_picture distributed = draw(MPI_COMM_WORLD, scene, part);
     if (own_rank == 0) {
         caught_picture alone = draw(MPI_COMM_SELF, scene, whole);
-        off = difference(&dealt, &alone);
+        off = difference(&distributed, &alone);
         free_caught(&alone);
     }
-    free_caught(&dealt);
+    free_caught(&distributed);
     if (!(off <= most)) fprintf(stderr, "%s, %d ranks: off by %g\n", what, rank_count, off);
     everywhere(off <= most);
 }
@@ -392,14 +392,14 @@ static void lit_pictures_are_the_same_on_any_partition(void **context)
 {
     (void)context;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (test_partition_kind dealt = 0; dealt < TEST_PARTITION_COUNT; dealt++) {
+        for (test_partition_kind distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
             session_input whole = {0}, part = {0};
             /* At random the last rank is left without cells. */
-            const int count = dealt == TEST_RANDOM && rank_count > 1 ? rank_count - 1 : rank_count;
+            const int count = distributed == TEST_RANDOM && rank_count > 1 ? rank_count - 1 : rank_count;
             make_part(&whole, kind, test_wave, TEST_BLOCK, 0, 1);
-            make_part(&part, kind, test_wave, dealt, own_rank, count);
+            make_part(&part, kind, test_wave, distributed, own_rank, count);
             verify_partition(EVERYTHING, &whole, &part, 0, test_mesh_kind_name(kind));
-            if (dealt == TEST_CHECKERBOARD)
+            if (distributed == TEST_CHECKERBOARD)
                 verify_partition(WITH_VOLUME, &whole, &part, 1e-6, test_mesh_kind_name(kind));
             input_free(&whole);
             input_free(&part);

@@ -112,9 +112,9 @@ static void make_whole(test_mesh_kind kind, double jitter, session_input *out)
 }
 
 /* The rank's cells; with ghosts: all cells, of which the others' are ghosts. */
-static void take_part(const session_input *whole, test_partition_kind dealt, bool with_ghosts, session_input *out)
+static void take_part(const session_input *whole, test_partition_kind distributed, bool with_ghosts, session_input *out)
 {
-    take_own_cells(&whole->part, dealt, SIDE, with_ghosts, &out->part);
+    take_own_cells(&whole->part, distributed, SIDE, with_ghosts, &out->part);
     test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);
     input_describe(out);
 }
