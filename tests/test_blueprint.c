@@ -74,7 +74,7 @@ static void set_well(doorway *d, const char *name, const conduit_node *node)
 static caught_picture draw_plain(const char *path, const layout_case *layout, int64_t *copied)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, path);
-    everywhere(layout_hand_over(session, "mesh", layout) == INSITU_OK);
+    everywhere(layout_submit(session, "mesh", layout) == INSITU_OK);
     step_is_good(session, 100);
     *copied = insitu_last_report(session)->bytes_copied;
     insitu_destroy(&session);
@@ -169,8 +169,8 @@ static void domains_are_meshes_of_their_own(void **state)
     layout_make(&layout_kinds[16], &b);
     const char *path = write_scene(scene);
     insitu_session *session = open_session(MPI_COMM_WORLD, path);
-    everywhere(layout_hand_over(session, "grid/mesh/0", &a) == INSITU_OK);
-    everywhere(layout_hand_over(session, "grid/mesh/1", &b) == INSITU_OK);
+    everywhere(layout_submit(session, "grid/mesh/0", &a) == INSITU_OK);
+    everywhere(layout_submit(session, "grid/mesh/1", &b) == INSITU_OK);
     step_is_good(session, 100);
     caught_picture truth = take_caught();
     insitu_destroy(&session);
@@ -208,10 +208,10 @@ static void meshes_come_and_go(void **state)
         const bool has_a = step % 3 != 2, has_b = step % 3 != 1, is_here = step < 3 || own_rank == 0;
         insitu_session *session = open_session(MPI_COMM_WORLD, path);
         if (has_a && is_here)
-            everywhere(layout_hand_over(session, "a/mesh", &a) == INSITU_OK || true);
+            everywhere(layout_submit(session, "a/mesh", &a) == INSITU_OK || true);
         else
             everywhere(true);
-        if (has_b) layout_hand_over(session, "b/mesh", &b);
+        if (has_b) layout_submit(session, "b/mesh", &b);
         step_is_good(session, 100);
         caught_picture truth = take_caught();
         insitu_destroy(&session);

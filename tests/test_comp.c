@@ -584,15 +584,15 @@ static void claims_add_up(void **context)
 /* ---- strips -------------------------------------------------------------------------------------------------- */
 
 /* The fragments that sheets have handed over. */
-typedef struct handed {
+typedef struct received_sheets {
     const comp_grid *grid;
     fragment *items;
     int64_t count, sheets;
-} handed;
+} received_sheets;
 
 static bool take_sheet(void *state_of, const comp_sheet *sheet, int count)
 {
-    handed *h = state_of;
+    received_sheets *h = state_of;
     assert_int_equal(comp_sheet_count(sheet), count);
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
         if (comp_sheet_has(sheet, k))
@@ -608,7 +608,7 @@ static int by_all_bits(const void *a, const void *b)
 
 /* All fragments of a list come in sheets of their strips, for any number of threads: those of most are as many as the
  * fullest pixel has. */
-static void strips_hand_over_all(void **context)
+static void strips_send_all(void **context)
 {
     (void)context;
     enum { COUNT = 40000 };
@@ -620,7 +620,7 @@ static void strips_hand_over_all(void **context)
         for (int spread = 1; spread <= 1000; spread *= 10) {
             comp_grid grid = comp_grid_of(101, 67, threads); /* for four in shorter strips */
             comp_strips strips;
-            handed h = {&grid, back, 0, 0};
+            received_sheets h = {&grid, back, 0, 0};
             grid.threads = threads;
             for (int i = 0; i < COUNT; i++) {
                 items[i] = random_fragment();
@@ -1031,7 +1031,7 @@ int main(void)
         cmocka_unit_test(owners_share_what_they_have),
         cmocka_unit_test(fewer_owners_than_ranks_share_all),
         cmocka_unit_test(unfair_lots_are_levelled),
-        cmocka_unit_test(strips_hand_over_all),
+        cmocka_unit_test(strips_send_all),
         cmocka_unit_test(pixels_beyond_the_image_are_seen),
         cmocka_unit_test(tiles_are_merged_to_the_bit),
         cmocka_unit_test(tiles_without_memory_are_refused),

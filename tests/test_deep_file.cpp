@@ -55,7 +55,7 @@ slab make_slab()
     return s;
 }
 
-void hand_over(insitu_session *session, const slab &s)
+void submit(insitu_session *session, const slab &s)
 {
     insitu_mesh mesh;
     insitu_field field;
@@ -85,7 +85,7 @@ void draw(const std::string &name, const std::string &layers)
     const slab s = make_slab();
     insitu_session *session = nullptr;
     assert_int_equal(insitu_create(MPI_COMM_WORLD, scene.c_str(), &session), INSITU_OK);
-    hand_over(session, s);
+    submit(session, s);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     assert_int_equal(insitu_destroy(&session), INSITU_OK);
 }

@@ -298,7 +298,7 @@ static void take_whole(const test_mesh *mesh, input *out)
 static void draw(insitu_session *session, const input *in, int cycle)
 {
     forget_pictures();
-    insitu_status status = hand_over(session, &in->vertices);
+    insitu_status status = submit(session, &in->vertices);
     if (!status) status = insitu_set_field(session, "m", &in->cells);
     if (!status) status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "rank %d: %s\n", own_rank, insitu_error(session));
@@ -393,7 +393,7 @@ static void draw_whole(const char *scene, const test_mesh *mesh, caught_picture 
     take_whole(mesh, &whole);
     insitu_session *session = open_session(MPI_COMM_SELF, scene);
     forget_pictures();
-    assert_int_equal(hand_over(session, &whole.vertices), INSITU_OK);
+    assert_int_equal(submit(session, &whole.vertices), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &whole.cells), INSITU_OK);
     assert_int_equal(insitu_step(session, cycle++, 0), INSITU_OK);
     assert_int_equal(caught_count, case_count);

@@ -231,7 +231,7 @@ void formed_renew(formed_mesh *m)
     formed_create(last.form, last.side, last.rank, last.count, m);
 }
 
-insitu_status formed_hand_over(insitu_session *session, const formed_mesh *m, bool with_corners)
+insitu_status formed_submit(insitu_session *session, const formed_mesh *m, bool with_corners)
 {
     insitu_status status = insitu_set_mesh(session, "m", &m->mesh);
     for (int i = 0; i < FORMED_FIELDS; i++) {

@@ -45,7 +45,7 @@ static void images_are_drawn_when_due(void **context)
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "2", SURFACE, "") IMAGE("b", "3", VOLUME, "")));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     const int expected[] = {2, 0, 1, 1, 1, 0, 2};
     for (int cycle = 0; cycle < 7; cycle++) step_draws(session, cycle, expected[cycle]);
     everywhere(own_rank != 0 || (!strcmp(caught[0].path, "a_6.exr") && !strcmp(caught[1].path, "b_6.exr")));
@@ -58,27 +58,27 @@ static void unchanged_input_rebuilds_nothing(void **context)
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", SURFACE, "      - " VOLUME "\n")));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     everywhere(insitu_last_report(session)->build_ms > 0 || input.part.cell_count == 0);
     session_input same = input;
     same.mesh.changed = same.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(hand_over(session, &same) == INSITU_OK);
+    everywhere(submit(session, &same) == INSITU_OK);
     step_draws(session, 1, 1);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
     everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
     same.field.changed = INSITU_CHANGED_VALUES; /* as the caller says; the values say otherwise */
-    everywhere(hand_over(session, &same) == INSITU_OK);
+    everywhere(submit(session, &same) == INSITU_OK);
     step_draws(session, 2, 1);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
     everywhere(strstr(report->left_out, "\"f\" has the values of the last picture"));
     everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
     same.field.changed = INSITU_CHANGED_NOTHING;
     same.mesh.changed = INSITU_CHANGED_GEOMETRY;
-    everywhere(hand_over(session, &same) == INSITU_OK);
+    everywhere(submit(session, &same) == INSITU_OK);
     step_draws(session, 3, 1);
     everywhere(report->build_ms == 0 && (report->refit_ms > 0 || input.part.cell_count == 0));
     everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
@@ -93,14 +93,14 @@ static void changed_values_are_noticed(void **context)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", VOLUME, "")));
     session_input in;
     input_create(&in, TEST_TETS, 4, TEST_BLOCK, own_rank, rank_count);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_draws(session, 0, 1);
     in.mesh.changed = INSITU_CHANGED_NOTHING;
     for (int64_t cycle = 1; cycle < 20; cycle++) {
         const int64_t spots[] = {0, in.part.vertex_count / 3 + cycle, in.part.vertex_count - cycle};
         if (in.part.vertex_count > 60)
             in.part.values[spots[cycle % 3]] = nextafter(in.part.values[spots[cycle % 3]], 9);
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_draws(session, cycle, 1);
         everywhere(insitu_last_report(session)->refit_ms > 0 || in.part.vertex_count <= 60);
     }
@@ -113,7 +113,7 @@ static void moved_mesh_gives_the_moved_picture(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
@@ -123,7 +123,7 @@ static void moved_mesh_gives_the_moved_picture(void **context)
     insitu_mesh_interleaved(&moved.mesh, coordinates, INSITU_FLOAT64);
     moved.mesh.changed = INSITU_CHANGED_GEOMETRY;
     moved.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(hand_over(session, &moved) == INSITU_OK);
+    everywhere(submit(session, &moved) == INSITU_OK);
     step_draws(session, 1, 1);
     for (int i = 0; own_rank == 0 && i < 24 * 16; i++) caught[0].depth[i] /= 64;
     everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
@@ -206,7 +206,7 @@ static void what_no_picture_shows_is_left_out(void **context)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     insitu_field other = input.field;
     other.name = "g";
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const int64_t trees = insitu_last_report(session)->bytes_trees;
     everywhere(insitu_set_field(session, "m", &other) == INSITU_OK);
@@ -236,7 +236,7 @@ static void mirrored_cells_are_counted(void **context)
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
         session_input in;
         input_create(&in, (test_mesh_kind)kind, 3, TEST_BLOCK, own_rank, rank_count);
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_draws(session, 0, 1);
         const int64_t before = insitu_last_report(session)->cells_inverted, cells = in.part.cell_count;
         if (kind == TEST_PYRAMIDS)
@@ -244,7 +244,7 @@ static void mirrored_cells_are_counted(void **context)
         else
             everywhere(kind == TEST_MIXED || before == 0);
         test_mesh_mirror(&in.part, false);
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_draws(session, 1, 1);
         everywhere(insitu_last_report(session)->cells_inverted == cells - before);
         insitu_destroy(&session);
@@ -260,13 +260,13 @@ static void ghosts_are_counted_and_not_drawn(void **context)
     input_create(&in, TEST_HEXES, 4, TEST_BLOCK, own_rank, rank_count);
     for (int64_t cell = 0; cell < in.part.cell_count; cell += 3) in.part.ghosts[cell] = 1;
     test_mesh_mirror(&in.part, false);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_draws(session, 0, 1);
     const int64_t ghosts = (in.part.cell_count + 2) / 3;
     everywhere(insitu_last_report(session)->cells_ghost == ghosts);
     everywhere(insitu_last_report(session)->cells_inverted == in.part.cell_count - ghosts);
     memset(in.part.ghosts, 1, (size_t)in.part.cell_count);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_draws(session, 1, 1);
     everywhere(own_rank != 0 || covered_pixels(&caught[0]) == 0);
     insitu_destroy(&session);
@@ -300,7 +300,7 @@ static void cells_of_one_rank_are_seen(void **context)
         insitu_mesh none;
         insitu_mesh_defaults(&none);
         if (own_rank == holder)
-            everywhere(hand_over(session, &all) == INSITU_OK);
+            everywhere(submit(session, &all) == INSITU_OK);
         else /* an empty mesh on odd ranks, none on even ones */
             everywhere(insitu_set_mesh(session, "m", own_rank % 2 ? &none : NULL) == INSITU_OK);
         step_draws(session, holder, 1);
@@ -322,7 +322,7 @@ static void meshes_of_many_names_make_one_picture(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
@@ -405,7 +405,7 @@ static void constant_fields_are_drawn(void **context)
     const double constants[] = {0, 7, -1e30, 1e-300};
     for (int i = 0; i < 4; i++) {
         for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] = constants[i];
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_draws(session, i, 1);
         bool is_finite = true;
         for (int p = 0; own_rank == 0 && p < 24 * 16 * 4; p++) is_finite = is_finite && isfinite(caught[0].rgba[p]);
@@ -424,7 +424,7 @@ static void missing_field_leaves_the_other_picture(void **context)
     insitu_session *session = open_session(
         MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", "isosurface: {field: presure, values: [1]}", "") IMAGE(
                             "b", "1", SURFACE, "") IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     forget_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
     reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"; there are",
@@ -439,7 +439,7 @@ static void component_that_is_not_there_is_named(void **context)
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"",
                     "it has components 0 to 0");
@@ -456,7 +456,7 @@ static void images_are_drawn_when_their_time_has_passed(void **context)
         open_session(MPI_COMM_WORLD, write_scene("images:\n  - name: a\n    size: [24, 16]\n    every_time: 0.25\n"
                                                  "    layers:\n      - " SURFACE "\n"
                                                  "    outputs:\n      - path: a_{cycle}_{time:.2f}.exr\n"));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     double time = 0;
     for (int cycle = 0; cycle < 11; cycle++, time += 0.1) {
         forget_pictures();
@@ -479,7 +479,7 @@ static void ranks_at_different_cycles_are_reported(void **context)
     (void)context;
     if (rank_count < 2) return;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, own_rank == 1 ? 5 : 4, 0);
     reported_everywhere(session, status, INSITU_ERROR_MPI, "ranks disagree on the cycle: 4 on one, 5 on another");
     step_draws(session, 6, 1);
@@ -491,7 +491,7 @@ static void picture_that_cannot_be_written_is_reported_on_all_ranks(void **conte
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", SURFACE, "") IMAGE("b", "1", VOLUME, "")));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     forget_pictures();
     unwritable = "a_";
     const insitu_status status = insitu_step(session, 3, 0);
@@ -507,7 +507,7 @@ static void edited_scene_is_taken_and_a_broken_one_is_not(void **context)
     (void)context;
     static const char edited[] = "the scene file was edited: its images are drawn from this step on";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     write_scene("images:\n" IMAGE("first", "1", SURFACE, "") IMAGE("second", "1", VOLUME, ""));
     for (int again = 0; again < 2; again++) {
@@ -533,7 +533,7 @@ static void images_without_outputs_are_for_memory(void **context)
     static const char scene[] = "images:\n  - {name: a, size: [24, 16], layers: [" SURFACE "]}\n";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     int count = 0;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     for (int cycle = 0; cycle < 4; cycle++) {
         if (cycle == 2) everywhere(insitu_keep_pictures(session, 1) == INSITU_OK);
         forget_pictures();
@@ -572,9 +572,9 @@ static const char full_scene[] =
                       "      - isosurface: {field: c, values: [0], colour_by: {field: f}, opacity: 0.5}\n"
                       "      - " VOLUME "\n    sampling: {frames: 2}\n");
 
-static insitu_status hand_over_both(insitu_session *session, insitu_field *cells)
+static insitu_status submit_both(insitu_session *session, insitu_field *cells)
 {
-    const insitu_status status = hand_over(session, &input);
+    const insitu_status status = submit(session, &input);
     return status ? status : insitu_set_field(session, "m", cells);
 }
 
@@ -586,7 +586,7 @@ static void scene_that_is_no_file_is_reported(void **context)
     const char *scene = write_scene(plain_scene);
     char kept[1100];
     snprintf(kept, sizeof kept, "%s.kept", scene);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     everywhere(own_rank != 0 || (rename(scene, kept) == 0 && mkfifo(scene, 0600) == 0));
     for (int cycle = 1; cycle < 3; cycle++) {
@@ -612,7 +612,7 @@ static void memory_is_given_back(void **context)
     cells.name = "c", cells.centring = INSITU_CELL, cells.count = input.part.cell_count;
     int64_t held = 0;
     for (int cycle = 0; cycle < 4; cycle++) {
-        everywhere(hand_over_both(session, &cells) == INSITU_OK);
+        everywhere(submit_both(session, &cells) == INSITU_OK);
         step_draws(session, cycle, 1);
         everywhere(cycle < 2 || base_memory_held() == held);
         held = base_memory_held();
@@ -631,14 +631,14 @@ static void picture_memory_is_kept_to_a_limit(void **context)
     static const char huge[] = "images:\n  - name: h\n    size: [2049, 2048]\n    layers:\n      - " SURFACE
                                "\n    outputs: [{path: h.png}]\n";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 24 * 16 * 20 : 0));
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(large));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) {
         step_draws(session, cycle, 2);
         everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 100 * 70 * 16 : 0));
@@ -646,7 +646,7 @@ static void picture_memory_is_kept_to_a_limit(void **context)
     }
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(huge));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     everywhere(insitu_last_report(session)->bytes_pictures == 0);
     everywhere(own_rank != 0 || insitu_last_report(session)->bytes_peak >= 2049 * 2048 * 16);
@@ -661,7 +661,7 @@ static void failing_allocation_is_an_error_and_no_more(void **context)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
     insitu_field cells = input.field;
     cells.name = "c", cells.centring = INSITU_CELL, cells.count = input.part.cell_count;
-    everywhere(hand_over_both(session, &cells) == INSITU_OK);
+    everywhere(submit_both(session, &cells) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
@@ -672,7 +672,7 @@ static void failing_allocation_is_an_error_and_no_more(void **context)
             const int64_t count_before = base_memory_allocations();
             const bool is_armed = with_all || own_rank == rank_count - 1;
             base_memory_fail_nth(is_armed ? n : 0);
-            hand_over_both(session, &cells);
+            submit_both(session, &cells);
             const insitu_status status = insitu_step(session, n, 0);
             base_memory_fail_nth(0);
             int is_over = !is_armed || base_memory_allocations() - count_before < n;
@@ -684,7 +684,7 @@ static void failing_allocation_is_an_error_and_no_more(void **context)
             failures += status != INSITU_OK;
             if (status != INSITU_OK && status != INSITU_ERROR_FIELD) /* a field may follow on a refused mesh */
                 reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
-            everywhere(hand_over_both(session, &cells) == INSITU_OK);
+            everywhere(submit_both(session, &cells) == INSITU_OK);
             step_draws(session, n, 1);
             everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
         }

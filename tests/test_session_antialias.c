@@ -95,7 +95,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
 {
     insitu_session *session = open_session(comm, scene);
     forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
+    assert_int_equal(submit(session, in), INSITU_OK);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     *rays = insitu_last_report(session)->rays;
     const caught_picture picture = take_caught();

@@ -247,7 +247,7 @@ static void destroy_block(block *b)
     free(b->ids);
 }
 
-static bool hand_block(insitu_session *session, const block *b, unsigned changed)
+static bool submit_block(insitu_session *session, const block *b, unsigned changed)
 {
     return set_block(session, b, changed) == INSITU_OK && set_fields(session, b->number, &b->a, set_one_block_field);
 }
@@ -326,7 +326,7 @@ static void blocks_are_the_list_of_their_cells(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, scene());
     bool is_set = true;
     for (int number = 0; number < BLOCKS; number++)
-        if (owner_of(number) == own_rank) is_set = is_set && hand_block(session, &blocks[number], INSITU_CHANGED_ALL);
+        if (owner_of(number) == own_rank) is_set = is_set && submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
     everywhere(is_set);
     if (!own_rank) remove("numbers.csv");
     step_well(session, 0);
@@ -359,7 +359,7 @@ static void blocks_come_and_go(void **state)
             const bool was_here = cycle && (number + (number % 2 ? cycle - 1 : 0)) % rank_count == own_rank;
             if (was_here && !is_here) is_set = is_set && !insitu_set_block(session, "m", number, NULL);
             if (is_here && !(was_here && number % 4 == 0))
-                is_set = is_set && hand_block(session, &blocks[number], was_here ? 0 : INSITU_CHANGED_ALL);
+                is_set = is_set && submit_block(session, &blocks[number], was_here ? 0 : INSITU_CHANGED_ALL);
         }
         everywhere(is_set);
         step_well(session, cycle);
@@ -379,7 +379,7 @@ static void whole_and_blocks_replace_each_other(void **state)
         bool is_set = true;
         for (int number = 0; number < BLOCKS && cycle % 2; number++)
             if (number % rank_count == own_rank)
-                is_set = is_set && hand_block(session, &blocks[number], INSITU_CHANGED_ALL);
+                is_set = is_set && submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
         if (cycle % 2 && BLOCKS <= own_rank) is_set = is_set && !insitu_set_mesh(session, "m", NULL);
         if (cycle % 2 == 0) is_set = set_list(session, &list);
         everywhere(is_set);
@@ -395,7 +395,7 @@ static void whole_and_blocks_replace_each_other(void **state)
 static void set_all(insitu_session *session)
 {
     for (int number = 0; number < BLOCKS; number++)
-        if (owner_of(number) == own_rank) hand_block(session, &blocks[number], INSITU_CHANGED_ALL);
+        if (owner_of(number) == own_rank) submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
 }
 
 static void wrong_calls_are_reported_at_once(void **state)
@@ -434,7 +434,7 @@ static void faults_of_one_block_are_reported_on_all_ranks(void **state)
     if (is_mine) insitu_set_block(session, "m", spoilt, &mesh);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT, "mesh \"m[5]\": vertex_count is -1");
     blocks[spoilt].a.hexes[77] = -4; /* by its number it is a list of cells */
-    if (is_mine) hand_block(session, &blocks[spoilt], INSITU_CHANGED_ALL);
+    if (is_mine) submit_block(session, &blocks[spoilt], INSITU_CHANGED_ALL);
     reported_everywhere(session, insitu_step(session, 1, 1), INSITU_ERROR_MESH, "mesh \"m[5]\": cell 9 ");
     blocks[spoilt].a.hexes[77] = blocks[spoilt].a.hexes[69] + 1;
     if (is_mine) insitu_set_block(session, "m", spoilt, NULL);
@@ -445,7 +445,7 @@ static void faults_of_one_block_are_reported_on_all_ranks(void **state)
         reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
                         "mesh \"m[5]\": field \"c\" is not set, other blocks have it");
     forget_pictures();
-    if (is_mine) hand_block(session, &blocks[spoilt], 0);
+    if (is_mine) submit_block(session, &blocks[spoilt], 0);
     step_well(session, 3);
     pictures_are_the_truth();
     insitu_destroy(&session);

@@ -135,7 +135,7 @@ static drawing step_and_catch(insitu_session *session, int cycle)
 static drawing draw(const session_input *in)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
-    const insitu_status status = hand_over(session, in);
+    const insitu_status status = submit(session, in);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
     drawing out = step_and_catch(session, 0);
@@ -265,7 +265,7 @@ static void the_order_may_be_set_right(void **state)
     for (int step = 0; step < 3; step++) {
         in.mesh.changed = step == 2 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
         in.mesh.vertex_order = step ? INSITU_ORDER_LEXICOGRAPHIC : INSITU_ORDER_VTK;
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         drawing drawn = step_and_catch(session, step);
         everywhere(drawn.is_warned == (step == 0));
         everywhere(own_rank != 0 || are_same(&expected, &drawn) == (step > 0));

@@ -28,7 +28,7 @@ static void create_input(void)
 static insitu_session *open_and_draw(void)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 0);
     return session;
 }
@@ -111,7 +111,7 @@ static void next_picture_is(insitu_session *session, const session_input *now, i
     caught_picture first = {0};
     step_is_good(session, 1);
     if (own_rank == 0) first = caught[0], caught_count = 0;
-    everywhere(hand_over(fresh, now) == INSITU_OK);
+    everywhere(submit(fresh, now) == INSITU_OK);
     step_is_good(fresh, 0);
     everywhere(own_rank != 0 || !memcmp(first.rgba, caught[0].rgba, 4 * pixels * sizeof(float)));
     free(first.rgba);

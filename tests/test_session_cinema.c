@@ -54,7 +54,7 @@ static void run_steps(const char *scene, const session_input *in, int first, int
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     forget_pictures();
     for (int cycle = first; cycle < end; cycle++) {
-        assert_int_equal(hand_over(session, in), INSITU_OK);
+        assert_int_equal(submit(session, in), INSITU_OK);
         set_second_field(session, in, values);
         const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -211,7 +211,7 @@ static void steps_that_go_back_drop_what_was_after(void **state)
     static const int cycles[] = {0, 2, 4, 6, 2, 2};
     for (int i = 0; i < 6; i++) {
         forget_pictures();
-        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        assert_int_equal(submit(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycles[i], 0.5 * cycles[i]) == INSITU_OK);
         everywhere(is_table(0, cycles[i] + 1));
     }
@@ -229,7 +229,7 @@ static void tables_that_cannot_be_written_are_reported_and_written_later(void **
     forget_files();
     if (own_rank == 0) mkdir("out/a.cdb/data.csv", 0777);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     forget_pictures();
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv", "cannot be");
     everywhere(caught_count == (own_rank == 0 ? 8 : 0));
@@ -256,7 +256,7 @@ static void pictures_that_cannot_be_written_have_no_line(void **state)
     make_input(&in);
     forget_files();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     forget_pictures();
     unwritable = "_002_";
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "image \"a\"", "a_000000_002_0.25.png");
@@ -277,7 +277,7 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
     make_input(&in);
     forget_files();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     int cycle = 0, failures = 0;
     for (int n = 1; n < 1500; n += 7, cycle += 2) {
         forget_pictures();
@@ -338,7 +338,7 @@ static void reports_have_warnings_and_edits(void **state)
     const char *scene = write_scene(SCENE("parameters: {a: 0.5, b: -2e+300}\n", "f"));
     char expected[4096];
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     everywhere(insitu_step(session, 0, -0.25) == INSITU_OK);
     const char *warning = insitu_last_report(session)->warnings;
     everywhere(strncmp(warning, "image \"a\": the isosurface", 24) == 0 && !strpbrk(warning, "\n\\"));
@@ -373,7 +373,7 @@ static void reports_have_warnings_and_edits(void **state)
                (strstr(text, "\"error\": \"") && strstr(text, ".yaml:2: images[0]: the key \\\"nmae\\\" is unknown") &&
                 strstr(text, "\"a\": 0.5") && !strstr(text, "last edit was not taken")));
     write_scene(SCENE("", "g"));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     reported_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_FIELD, "\"g\"");
     read_file(news, MOST, text);
     everywhere(own_rank != 0 || (strstr(text, "\"error\": null}") && strstr(text, "\"g\\\"") &&
@@ -481,7 +481,7 @@ static void conditions_hold_for_all_pictures_of_an_image(void **state)
         forget_pictures();
         for (int64_t v = 0; v < in.part.vertex_count; v++)
             in.part.values[v] = (cycle == 1 || cycle == 2 ? 100 : 1) * test_linear(in.part.coordinates + 3 * v);
-        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        assert_int_equal(submit(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
         everywhere(insitu_last_report(session)->images == drawn[cycle]);
         everywhere(own_rank != 0 || caught_count == drawn[cycle]);
@@ -504,7 +504,7 @@ static void warnings_of_swept_isovalues_are_reported_once(void **state)
                          "{isosurface: {field: f, values: [0.25, 1e6, 2e6]}}", "{path: \"a{view}{isovalue}.png\"}")));
     for (int cycle = 0; cycle < 3; cycle++) {
         forget_pictures();
-        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        assert_int_equal(submit(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
         const char *warnings = insitu_last_report(session)->warnings;
         everywhere((strstr(warnings, "at 1e+06 is empty") != NULL) == (cycle == 0));

@@ -116,7 +116,7 @@ static void count_steps(const counted_scene *s)
     assert_non_null(values);
     for (int64_t i = 0; i < in.part.cell_count; i++) values[i] = test_uniform_in((uint64_t)i, 4, -1, 1);
     cells.name = "c", cells.centring = INSITU_CELL, cells.count = in.part.cell_count, cells.values.data = values;
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &cells) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
@@ -162,7 +162,7 @@ static void schedules_change_no_bit_and_are_reported(void **context)
                  "      - isosurface: {field: f, values: [-0.2, 0.1], opacity: 0.5}\n"
                  "    outputs: [{path: a.exr}]\n");
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
         const insitu_report *report = insitu_last_report(session);
         int64_t sent = 0;

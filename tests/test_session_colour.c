@@ -40,7 +40,7 @@ static caught_picture draw_step(insitu_session *session, int cycle)
 static caught_picture draw(const session_input *in, const char *surface_keys, const char *volume_keys)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with(surface_keys, volume_keys)));
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     const caught_picture picture = draw_step(session, 0);
     insitu_destroy(&session);
     return picture;
@@ -163,7 +163,7 @@ static void ranges_over_a_run_widen_and_outlive_it(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with(run, run)));
     for (int cycle = 0; cycle < 3; cycle++) {
         if (cycle) scale_values(&distributed, cycle == 1 ? 2 : 0.5);
-        everywhere(hand_over(session, &distributed) == INSITU_OK);
+        everywhere(submit(session, &distributed) == INSITU_OK);
         caught_picture picture = draw_step(session, cycle);
         if (cycle == 0)
             assert_alike(&picture, &by_data, 0);
@@ -206,7 +206,7 @@ static void every_kind_of_layer_has_a_range_over_a_run(void **state)
                      "    outputs: [{path: \"%s/a.exr\"}]\n",
                      image_name, layer, folder);
             insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
-            everywhere(hand_over(session, &block) == INSITU_OK);
+            everywhere(submit(session, &block) == INSITU_OK);
             pictures[is_run] = draw_step(session, 0);
             insitu_destroy(&session);
             FILE *file = own_rank == 0 ? fopen(ranges_file(), "r") : NULL;
@@ -229,7 +229,7 @@ static void broken_file_of_ranges_is_reported_on_all_ranks(void **state)
         if (file) fprintf(file, "# kept\nvolume 7 -2 0 1 f\n%s\n", lines[i]);
         if (file) fclose(file);
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with("", ", range: run")));
-        everywhere(hand_over(session, &block) == INSITU_OK);
+        everywhere(submit(session, &block) == INSITU_OK);
         const insitu_status status = insitu_step(session, 0, 0);
         reported_everywhere(session, status, INSITU_ERROR_SCENE, image_name, ".ranges:3: is no range",
                         "delete the file to begin anew");

@@ -73,7 +73,7 @@ static insitu_session *begin(MPI_Comm comm, const char *scene, const session_inp
     insitu_status status = insitu_create_from_text(comm, scene, &session);
     if (status) fprintf(stderr, "%s\n", insitu_error(NULL));
     assert_int_equal(status, INSITU_OK);
-    assert_int_equal(hand_over(session, in), INSITU_OK);
+    assert_int_equal(submit(session, in), INSITU_OK);
     if (u) assert_int_equal(insitu_set_field(session, "m", &u->field), INSITU_OK);
     return session;
 }
@@ -562,7 +562,7 @@ static void an_edited_scene_has_its_own(void **state)
     make_vector(&in.part, linear, INSITU_VERTEX, true, "u", &u);
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene(SCENE("a: u.x + 0, b: {gradient: a}, c: b.y + f", "c")));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     step_again(session, &u, INSITU_CHANGED_ALL, 0);
     everywhere(in.part.cell_count == 0 || fabs(value_of(session, "b", 1, 0) - slopes[0][1]) < 1e-9);
     write_scene(SCENE("longer: u.z + 0, a: {gradient: longer, component: y}, c: a - longer", "c"));

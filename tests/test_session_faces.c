@@ -271,7 +271,7 @@ static void ghosts_are_proved_but_for_coordinates(void **context)
         "ghost", face_vertex_large, INSITU_ERROR_MESH, false, {CELL_0 "face 0: vertex index 1000000 is outside 0.."}};
     for (int64_t cell = 0; cell < input.part.cell_count; cell++) input.part.ghosts[cell] = 1;
     coordinate_nan(&input);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     everywhere(insitu_step(session, 3, 0) == INSITU_OK);
     spoilt_is_reported_on_all_ranks(session, &input, &ghost);
 }
@@ -315,7 +315,7 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
 {
     (void)context;
     session_input more = input;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 5);
     everywhere(insitu_last_report(session)->cells_flat == 0);
     const size_t numbers = own_rank == 0 ? (size_t)4 * 24 * 16 : 0;
@@ -323,12 +323,12 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
     if (own_rank == 0) memcpy(before, caught[0].rgba, numbers * sizeof *before);
     const int64_t flat = add_flat_cells(&input.part, &more.part);
     input_describe(&more);
-    everywhere(hand_over(session, &more) == INSITU_OK);
+    everywhere(submit(session, &more) == INSITU_OK);
     step_is_good(session, 6);
     everywhere(insitu_last_report(session)->cells_flat == flat);
     everywhere(insitu_last_report(session)->cells_inverted == 0);
     everywhere(own_rank != 0 || memcmp(before, caught[0].rgba, numbers * sizeof *before) == 0);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 7);
     test_mesh_free(&more.part);
     test_free(before);
@@ -342,7 +342,7 @@ static void check_without_memory_is_reported_and_repeated(void **context)
     char rank_words[32];
     snprintf(rank_words, sizeof rank_words, "rank %d: ", rank_count - 1);
     input.mesh.keep_polyhedra = 1;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     base_memory_fail_nth(own_rank == rank_count - 1);
     const insitu_status status = insitu_step(session, 8, 0);
     base_memory_fail_nth(0);

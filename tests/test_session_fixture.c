@@ -156,7 +156,7 @@ void input_free(session_input *in)
     test_mesh_free(&in->part);
 }
 
-insitu_status hand_over(insitu_session *session, const session_input *in)
+insitu_status submit(insitu_session *session, const session_input *in)
 {
     const insitu_status status = insitu_set_mesh(session, "m", &in->mesh);
     return status ? status : insitu_set_field(session, "m", &in->field);
@@ -178,7 +178,7 @@ void spoilt_is_reported_on_all_ranks(insitu_session *session, session_input *in,
     char rank_words[32];
     snprintf(rank_words, sizeof rank_words, "rank %d: ", bad_rank);
     if (is_bad) c->spoil(in);
-    const insitu_status at_once = hand_over(session, in);
+    const insitu_status at_once = submit(session, in);
     everywhere(at_once == (is_bad && c->at_once ? c->status : INSITU_OK));
     everywhere(!is_bad || !c->at_once || strstr(insitu_error(session), c->words[0]) != NULL);
     for (int again = 0; again < 2; again++) { /* it stays wrong until it is mended */
@@ -189,7 +189,7 @@ void spoilt_is_reported_on_all_ranks(insitu_session *session, session_input *in,
         everywhere(insitu_last_report(session)->images == 0 && caught_count == 0);
     }
     input_renew(in);
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     step_is_good(session, 2);
 }
 
@@ -260,7 +260,7 @@ caught_picture take_caught(void)
 static void draw_well(insitu_session *session, const session_input *in)
 {
     forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
+    assert_int_equal(submit(session, in), INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);

@@ -79,7 +79,7 @@ void input_free(session_input *in);
 void take_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts, test_mesh *out);
 
 /* Set the mesh "m" and its field; the first status that is not OK. */
-insitu_status hand_over(insitu_session *session, const session_input *in);
+insitu_status submit(insitu_session *session, const session_input *in);
 
 /* The step is well on every rank, and its one picture is drawn. */
 void step_is_good(insitu_session *session, int cycle);

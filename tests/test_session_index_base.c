@@ -69,7 +69,7 @@ static void draw(const char *scene, const session_input *in, caught_picture out[
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
     forget_pictures();
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -123,15 +123,15 @@ static void errors_count_from_one_too(void **state)
     count_from_one(&in);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     if (is_last) in.part.connectivity[3] = 0;
-    hand_over(session, &in);
+    submit(session, &in);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "vertex index 0 is outside 1..",
                     "index_base is 1");
     if (is_last) in.part.connectivity[3] = in.part.vertex_count + 1;
-    hand_over(session, &in);
+    submit(session, &in);
     reported_everywhere(session, insitu_step(session, 1, 0), INSITU_ERROR_MESH, "is outside 1..");
     if (is_last) in.part.connectivity[3] = in.part.vertex_count;
     if (is_last) in.part.offsets[in.part.cell_count]--;
-    hand_over(session, &in);
+    submit(session, &in);
     reported_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_MESH, "offsets");
     if (is_last) in.part.offsets[in.part.cell_count]++;
     in.mesh.index_base = is_last ? 2 : 1;
@@ -150,12 +150,12 @@ static void wrong_indices_are_reported(insitu_session *session, const session_in
     MPI_Bcast(word, sizeof word, MPI_CHAR, rank_count - 1, MPI_COMM_WORLD);
     for (int i = 0; i < (int)(sizeof wrong / sizeof *wrong); i++) {
         if (own_rank == rank_count - 1) *place = wrong[i];
-        hand_over(session, in);
+        submit(session, in);
         reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH, word, "vertex index ",
                         " is outside 1..");
     }
     *place = good;
-    hand_over(session, in);
+    submit(session, in);
     everywhere(insitu_step(session, 9, 0) == INSITU_OK);
 }
 

@@ -213,7 +213,7 @@ static void an_index_that_nobody_needs_is_left_alone(void **state)
     insitu_field other = describe(&t, true);
     other.name = "other";
     ((int64_t *)(void *)t.index)[0] = -9;
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     const int64_t copied = insitu_last_report(session)->bytes_copied;
     everywhere(insitu_set_field(session, "m", &other) == INSITU_OK);
@@ -329,7 +329,7 @@ static void cells_are_reported_too(void **state)
     by_index(&in);
     in.field.centring = INSITU_CELL;
     if (own_rank == rank_count - 1) spoilt[in.part.cell_count - 1] = 1000000;
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     for (int step = 0; step < 2; step++)
         reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
                         "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
@@ -358,7 +358,7 @@ static void ranks_without_vertices_have_values(void **state)
         in.field.index.data = NULL;
     }
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_is_good(session, 0);
     insitu_destroy(&session);
     input_free(&in);

@@ -239,7 +239,7 @@ static void call_without_a_mesh_is_reported_once(void **context)
     status = insitu_step(session, 7, 0);
     reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "without a name");
     input_renew(&input);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 8);
 }
 
@@ -253,7 +253,7 @@ static void field_missing_on_one_rank_names_it(void **context)
     everywhere(own_rank == rank_count - 1 || insitu_set_field(session, "m", &input.field) == INSITU_OK);
     insitu_status status = insitu_step(session, 9, 0);
     reported_everywhere(session, status, INSITU_ERROR_FIELD, words);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 10);
 }
 
@@ -261,14 +261,14 @@ static void field_of_two_centrings_is_refused(void **context)
 {
     (void)context;
     if (rank_count < 2) return;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     insitu_field other = input.field;
     other.centring = INSITU_CELL;
     other.count = input.part.cell_count; /* fewer than vertices: the array is long enough */
     everywhere(own_rank != 1 || insitu_set_field(session, "m", &other) == INSITU_OK);
     const insitu_status status = insitu_step(session, 11, 0);
     reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"", "another centring");
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 12);
 }
 
@@ -286,10 +286,10 @@ static void nan_where_no_drawn_cell_is_is_fine(void **context)
     more.field.count++;
     insitu_mesh_interleaved(&more.mesh, coordinates, INSITU_FLOAT64);
     more.field.values.data = values;
-    everywhere(hand_over(session, &more) == INSITU_OK);
+    everywhere(submit(session, &more) == INSITU_OK);
     step_is_good(session, 13);
     everywhere(insitu_last_report(session)->cells_unusable == 0);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     test_free(coordinates);
     test_free(values);
 }
@@ -305,13 +305,13 @@ static void value_that_is_not_finite_is_counted(void **context)
         for (int v = 0; v < 8; v++) is_hit = is_hit || isnan(input.part.values[input.part.connectivity[8 * cell + v]]);
         expected += is_hit;
     }
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 14);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->cells_unusable == expected);
     everywhere(!is_bad || strstr(report->warnings, "values of field \"f\" are not finite"));
     input_renew(&input);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
 }
 
 /* Every vertex somewhere else: folded cells, some points of which have no coordinates in them. */
@@ -322,11 +322,11 @@ static void inverse_maps_that_fail_are_counted(void **context)
     everywhere(insitu_last_report(session)->map_failures == 0);
     for (int64_t i = 0; i < 3 * input.part.vertex_count; i++)
         input.part.coordinates[i] = 2 * test_uniform((uint64_t)i, 21 + (uint64_t)own_rank) - 1;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 16);
     everywhere(insitu_last_report(session)->map_failures > 0);
     input_renew(&input);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
 }
 
 /* Makes cells of one type, with indices of 4 bytes instead of 8. */
@@ -353,15 +353,15 @@ static void bad_cell_of_a_mesh_of_one_type_is_named(void **context)
         snprintf(words, sizeof words, "rank 0: mesh \"m\": cell %d (hex): vertex index ", cell);
         if (own_rank == 0) input.part.connectivity[8 * cell + cell % 8] = cell % 2 ? -1 : input.part.vertex_count;
         make_plain(&input);
-        everywhere(hand_over(session, &input) == INSITU_OK);
+        everywhere(submit(session, &input) == INSITU_OK);
         reported_everywhere(session, insitu_step(session, 17 + cell, 0), INSITU_ERROR_MESH, words);
         input_renew(&input);
         make_plain(&input);
-        everywhere(hand_over(session, &input) == INSITU_OK);
+        everywhere(submit(session, &input) == INSITU_OK);
         step_is_good(session, 18 + cell);
         input_renew(&input);
     }
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
 }
 
 /* ---- cells of no volume -------------------------------------------------------------------------------------- */
@@ -440,12 +440,12 @@ static void flat_cells_are_counted(void **context)
             if (layout == 1) flat.mesh.offsets = (insitu_array){offsets, INSITU_INT32, 0};
             if (layout == 2) flat.mesh.coordinates[2] = (insitu_array){narrow_z, INSITU_FLOAT32, 0};
             flat.field.values = (insitu_array){values, INSITU_FLOAT64, 0};
-            everywhere(hand_over(session, &flat) == INSITU_OK);
+            everywhere(submit(session, &flat) == INSITU_OK);
             step_is_good(session, 40 + 4 * type + layout);
             everywhere(insitu_last_report(session)->cells_flat == expected);
         }
     }
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 60);
     everywhere(insitu_last_report(session)->cells_flat == 0);
 }
@@ -456,10 +456,10 @@ static void message_stays_until_the_next_step(void **context)
     (void)context;
     const int64_t right = input.part.connectivity[0];
     input.part.connectivity[0] = -1;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     reported_everywhere(session, insitu_step(session, 70, 0), INSITU_ERROR_MESH, "vertex index -1");
     input.part.connectivity[0] = right;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     everywhere(insitu_keep_pictures(session, 0) == INSITU_OK);
     everywhere(insitu_last_report(session)->cycle == 70 && strstr(insitu_error(session), "vertex index -1"));
     everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
@@ -501,7 +501,7 @@ static void index_is_wrong(session_input *in)
 }
 
 /* Hands over the mesh "n" with the field "g", which may be wrong. */
-static void hand_over_other(const session_input *in)
+static void submit_other(const session_input *in)
 {
     insitu_field g = in->field;
     g.name = "g";
@@ -542,14 +542,14 @@ static void images_that_need_nothing_wrong_are_drawn(void **context)
     input_renew(&input);
     input_create(&other, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        everywhere(hand_over(session, &input) == INSITU_OK);
-        hand_over_other(&other);
+        everywhere(submit(session, &input) == INSITU_OK);
+        submit_other(&other);
         step_draws("fgms", INSITU_OK, "");
         if (own_rank == rank_count - 1) cases[i].spoil(&other);
-        hand_over_other(&other);
+        submit_other(&other);
         for (int again = 0; again < 2; again++) step_draws(cases[i].drawn, cases[i].status, cases[i].words);
         input_renew(&other);
-        hand_over_other(&other);
+        submit_other(&other);
         step_draws("fgms", INSITU_OK, "");
         everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
         step_draws("gms", INSITU_ERROR_FIELD, "its mesh \"none\" is not set");

@@ -42,7 +42,7 @@ static void take_part(test_mesh *whole, session_input *out)
 static void draw(insitu_session *session, const session_input *in, int cycle, caught_picture *out)
 {
     forget_pictures();
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
     if (own_rank != 0) return;
     *out = caught[0];

@@ -316,7 +316,7 @@ static void free_blocks(const levels *l, block blocks[MOST_BLOCKS])
     }
 }
 
-static bool hand_levels(insitu_session *session, const levels *l, const block blocks[MOST_BLOCKS])
+static bool submit_levels(insitu_session *session, const levels *l, const block blocks[MOST_BLOCKS])
 {
     bool is_set = true;
     for (int i = 0; i < l->count && is_set; i++)
@@ -419,7 +419,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const levels *l, bo
     block blocks[MOST_BLOCKS];
     insitu_session *session = open_session(comm, scene);
     make_blocks(l, blocks);
-    assert_true(hand_levels(session, l, blocks));
+    assert_true(submit_levels(session, l, blocks));
     const caught_picture picture = take_step(session, 0);
     int64_t ghosts = insitu_last_report(session)->cells_ghost;
     MPI_Allreduce(MPI_IN_PLACE, &ghosts, 1, MPI_INT64_T, MPI_SUM, comm);
@@ -499,13 +499,13 @@ static void outer_surfaces_have_no_wall_between_levels(void **state)
         plain.rank = own_rank;
         insitu_session *session = open_session(MPI_COMM_WORLD, scene);
         make_blocks(&l, blocks);
-        everywhere(hand_levels(session, &l, blocks));
+        everywhere(submit_levels(session, &l, blocks));
         caught_picture ours = take_step(session, 0);
         insitu_destroy(&session);
         free_blocks(&l, blocks);
         session = open_session(MPI_COMM_WORLD, scene);
         make_blocks(&plain, blocks);
-        everywhere(hand_levels(session, &plain, blocks));
+        everywhere(submit_levels(session, &plain, blocks));
         caught_picture expected = take_step(session, 0);
         insitu_destroy(&session);
         free_blocks(&plain, blocks);
@@ -534,7 +534,7 @@ static void levels_come_and_go(void **state)
         for (int i = 0; i < MOST_BLOCKS && cycle; i++)
             if (i < last.count && held[i].values && !(i < l.count && blocks[i].values))
                 is_set = is_set && !insitu_set_block(session, "m", i, NULL);
-        is_set = is_set && hand_levels(session, &l, blocks);
+        is_set = is_set && submit_levels(session, &l, blocks);
         everywhere(is_set);
         free_blocks(&last, held);
         memcpy(held, blocks, sizeof held);
@@ -567,7 +567,7 @@ static void blocks_beside_a_change_stay(void **state)
     const int gone = l.count - 1;
     rest = l;
     rest.count = gone;
-    everywhere(hand_levels(session, &l, blocks));
+    everywhere(submit_levels(session, &l, blocks));
     caught_picture picture = take_step(session, 0);
     free_caught(&picture);
     for (int i = 0; i < gone; i++)
@@ -600,12 +600,12 @@ static void blocks_that_do_not_fit_are_reported(void **state)
     make_blocks(&l, blocks);
     for (int i = 0; i < l.count; i++)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]++;
-    everywhere(hand_levels(session, &l, blocks));
+    everywhere(submit_levels(session, &l, blocks));
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[", "refinement along j is 4",
                     "begin and end at borders of coarser cells");
     for (int i = 0; i < l.count; i++)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]--;
-    everywhere(hand_levels(session, &l, blocks));
+    everywhere(submit_levels(session, &l, blocks));
     caught_picture picture = take_step(session, 1);
     everywhere(own_rank || count_slits(&picture) == 0);
     free_caught(&picture);

@@ -58,7 +58,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     field.count = in->part.cell_count;
     field.values = (insitu_array){values, INSITU_FLOAT64, 0};
     forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
+    assert_int_equal(submit(session, in), INSITU_OK);
     if (in->part.cell_count) assert_int_equal(insitu_set_field(session, "m", &field), INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -127,7 +127,7 @@ static void meshes_without_the_field_are_reported(void **state)
     field.count = other.vertex_count;
     field.values = (insitu_array){other.values, INSITU_FLOAT64, 0};
     forget_pictures();
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     if (own_rank == 0) {
         assert_int_equal(insitu_set_mesh(session, "n", &mesh), INSITU_OK);
         assert_int_equal(insitu_set_field(session, "n", &field), INSITU_OK);

@@ -400,7 +400,7 @@ static void check_warning(const struct warning_case *c)
     input_create(&in, c->kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     if (c->spoil) c->spoil(&in);
     for (int cycle = 0; cycle < 2; cycle++) {
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_is_good(session, cycle);
         everywhere(is_warned(session, cycle == 0 ? c->words : none));
         everywhere(is_reported_alike(insitu_last_report(session)->warnings));
@@ -431,7 +431,7 @@ static void warnings_come_back_with_what_they_are_about(void **context)
     for (int cycle = 0; cycle < 5; cycle++) {
         session_input now = in;
         if (is_bad[cycle]) now.field.values.data = values;
-        everywhere(hand_over(session, &now) == INSITU_OK);
+        everywhere(submit(session, &now) == INSITU_OK);
         step_is_good(session, cycle);
         everywhere(is_warned(session, is_reported[cycle] ? words : none));
     }
@@ -475,7 +475,7 @@ static void parameters_change_with_the_scene_on_all_ranks(void **context)
                insitu_parameter(session, "inflow", NULL) == INSITU_ERROR_ARGUMENT &&
                strcmp(insitu_error(session), "insitu_parameter: value is NULL") == 0);
     everywhere(insitu_parameter(NULL, "inflow", &(double){0}) == INSITU_ERROR_ARGUMENT);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_is_good(session, 0);
     everywhere(is_warned(session, none)); /* the code may ask later */
     step_is_good(session, 1);
@@ -515,7 +515,7 @@ static void meshes_with_ids_among_others_are_reported(void **context)
         everywhere(insitu_set_mesh(session, "n", &in.mesh) == INSITU_OK);
         everywhere(insitu_set_field(session, "n", &in.field) == INSITU_OK);
         if (cases[i].has_ids) in.mesh.vertex_ids = (insitu_array){ids, INSITU_INT64, 0};
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_is_good(session, 0);
         everywhere(is_warned(session, cases[i].words));
         insitu_destroy(&session);
@@ -538,7 +538,7 @@ static void faults_of_words_are_reported_at_once(void **context)
         insitu_session *session =
             open_session(MPI_COMM_WORLD,
                          write_scene(has_words ? IMAGE_OF_PNG("    decorations: {title: Words}\n") : IMAGE_OF_PNG("")));
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         for (int cycle = 0; cycle < 2; cycle++) {
             step_is_good(session, cycle);
             const char *warnings = insitu_last_report(session)->warnings;
@@ -578,7 +578,7 @@ static void pictures_that_would_take_hours_are_refused(void **context)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(refused[i].scene));
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         const insitu_status status = insitu_step(session, 0, 0);
         reported_everywhere(session, status, INSITU_ERROR_SCENE, refused[i].words[0], refused[i].words[1],
                         refused[i].words[2] ? refused[i].words[2] : "");
@@ -603,7 +603,7 @@ static void control_characters_are_escaped(void **context)
     reported_everywhere(session, status, INSITU_ERROR_FIELD, "field \"p\x9b\\x9b\\x09q\xc3\xa9\"", "\"no\\x0dmesh\"");
     session_input in;
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     in.field.name = "two\nlines";
     everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
     step_is_good(session, 1);

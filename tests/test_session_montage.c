@@ -61,7 +61,7 @@ static void cells_have_the_pictures_of_a_step(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     for (int cycle = 0; cycle < 3; cycle++) {
         forget_pictures();
-        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        assert_int_equal(submit(session, &in), INSITU_OK);
         assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
         everywhere(!strstr(insitu_last_report(session)->warnings, "all_"));
         everywhere(own_rank != 0 || is_montage(cycle, cycle % 2 == 0));
@@ -78,7 +78,7 @@ static void files_that_cannot_be_written_are_reported(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     forget_pictures();
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     unwritable = "all_0";
     const insitu_status status = insitu_step(session, 0, 0);
     unwritable = NULL;

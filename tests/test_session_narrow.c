@@ -47,7 +47,7 @@ static void ramp_free(ramp *r)
     test_free(r->singles);
 }
 
-static void ramp_hand_over(const ramp *r, insitu_session *session)
+static void ramp_submit(const ramp *r, insitu_session *session)
 {
     insitu_field field = r->in.field;
     everywhere(insitu_set_mesh(session, "m", &r->in.mesh) == INSITU_OK);
@@ -170,7 +170,7 @@ static void check_case(const narrow_case *c, int layer, bool is_given)
     ramp_create(&r, SIDE, c->low, c->high, c->is_single);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
     forget_pictures();
-    ramp_hand_over(&r, session);
+    ramp_submit(&r, session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     everywhere(!strstr(insitu_last_report(session)->warnings, "too near"));
     caught_picture picture = take_caught();
@@ -230,7 +230,7 @@ static caught_picture draw_range(const ramp *r, int layer, const char *scale, co
     snprintf(keys, sizeof keys, "%srange: %s", scale, range);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
     forget_pictures();
-    ramp_hand_over(r, session);
+    ramp_submit(r, session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     const caught_picture picture = take_caught();
     insitu_destroy(&session);
@@ -332,7 +332,7 @@ static void values_too_near_are_reported(void **state)
             ramp_create(&r, SIDE, near[i].low, near[i].high, false);
             insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
             for (int cycle = 0; cycle < 2; cycle++) {
-                ramp_hand_over(&r, session);
+                ramp_submit(&r, session);
                 everywhere(insitu_step(session, cycle, 0) == INSITU_OK);
                 const bool is_reported = strstr(insitu_last_report(session)->warnings, "too near") != NULL;
                 if (is_reported != (near[i].is_reported && cycle == 0)) fprintf(stderr, "layer %d, %s\n", layer, keys);
@@ -361,7 +361,7 @@ static void statistics_distinguish_narrow_fields(void **state)
         snprintf(scene, sizeof scene, "%sstatistics: [{field: f, path: narrow.csv, histogram: {bins: 4%s}}]\n",
                  scene_of(1, "range: data"), is_given ? ", range: [100000000, 100000000.01]" : "");
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-        ramp_hand_over(&r, session);
+        ramp_submit(&r, session);
         everywhere(insitu_step(session, 0, 0) == INSITU_OK);
         insitu_destroy(&session);
         read_file("narrow.csv", MOST, text);

@@ -37,7 +37,7 @@ static const overwrite_case cases[] = {
 
 static void check_step(insitu_session *session, int cycle, const char *const *words)
 {
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     everywhere(insitu_step(session, cycle, 0.4 * cycle) == INSITU_OK);
     forget_pictures();
     const char *warnings = insitu_last_report(session)->warnings;

@@ -48,7 +48,7 @@ static drawing draw(const char *scene, const session_input *in)
 {
     drawing out;
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    const insitu_status status = hand_over(session, in);
+    const insitu_status status = submit(session, in);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
     step_and_catch(session, 0, &out);
@@ -310,7 +310,7 @@ static void hexes_with_a_crossed_face_are_reported(void **state)
         int64_t *v = has_it ? in.part.face_connectivity + 4 * i : (int64_t[]){0, 0, 0};
         const int64_t first = v[1], second = v[2];
         v[1] = second, v[2] = first;
-        hand_over(session, &in);
+        submit(session, &in);
         reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH,
                         "mesh \"m\": cell 0 (polyhedron): ", "the surface is not closed");
         v[1] = first, v[2] = second;
@@ -324,7 +324,7 @@ static drawing draw_moved(const char *scene, session_input *in)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
     drawing before, after;
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     step_and_catch(session, 0, &before);
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
         in->part.coordinates[i] = 0.7 * in->part.coordinates[i] + 0.1;
@@ -370,7 +370,7 @@ static void memory_that_runs_out_is_reported(void **state)
     int reported = 0;
     for (int n = 1; n <= 12; n++) {
         insitu_session *s = open_session(MPI_COMM_WORLD, scene);
-        everywhere(hand_over(s, &in) == INSITU_OK);
+        everywhere(submit(s, &in) == INSITU_OK);
         base_memory_fail_nth(own_rank == rank_count - 1 ? n : 0);
         const insitu_status status = insitu_step(s, 0, 0);
         base_memory_fail_nth(0);

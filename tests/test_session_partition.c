@@ -100,7 +100,7 @@ static double draw(MPI_Comm comm, const char *scene, const session_input *in, ca
 {
     insitu_session *session = open_session(comm, scene);
     forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
+    assert_int_equal(submit(session, in), INSITU_OK);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     const double size = session->space.extent.cell_size;
     if (own_rank == 0) {

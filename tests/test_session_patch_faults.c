@@ -261,7 +261,7 @@ static void check_fault(insitu_session *session, const fault *c, int cycle)
     describe();
     if (is_last) c->spoil();
     forget_pictures();
-    const insitu_status at_once = hand_over(session, &input);
+    const insitu_status at_once = submit(session, &input);
     everywhere(at_once == (is_last && c->at_once ? c->status : INSITU_OK));
     const insitu_status status = insitu_step(session, cycle, 0);
     reported_everywhere(session, status, c->status, rank, c->words[0], c->words[1]);
@@ -269,7 +269,7 @@ static void check_fault(insitu_session *session, const fault *c, int cycle)
     input_free(&input);
     create();
     describe();
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, cycle + 1);
     input_free(&input);
 }
@@ -295,7 +295,7 @@ static void hexes_want_vertices(void **state)
     input.field.values = (insitu_array){cell_values, INSITU_FLOAT64, 0};
     input.field.patches = patches;
     input.field.patch_count = 1;
-    everywhere(hand_over(session, &input) == INSITU_ERROR_FIELD);
+    everywhere(submit(session, &input) == INSITU_ERROR_FIELD);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "patch 0: names faces by their numbers",
                     "the mesh has none");
     insitu_destroy(&session);

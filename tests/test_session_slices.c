@@ -399,7 +399,7 @@ static void distances_go_with_the_geometry(void **state)
     insitu_session *session = open_session(
         MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 1]}") SLICE("", "{normal: [0, 0, 1]}"))));
     part.mesh.changed = 0;
-    everywhere(hand_over(session, &part) == INSITU_OK);
+    everywhere(submit(session, &part) == INSITU_OK);
     step_is_good(session, 0);
     const bool has_cells = part.part.cell_count > 0;
     const int64_t bytes = insitu_last_report(session)->bytes_copied;

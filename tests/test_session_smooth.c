@@ -161,7 +161,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     insitu_session *session = NULL;
     forget_pictures();
     insitu_status status = insitu_create_from_text(comm, scene, &session);
-    if (!status) status = hand_over(session, in);
+    if (!status) status = submit(session, in);
     for (int k = 0; k < 3 && g && !status; k++) {
         insitu_field field;
         insitu_field_defaults(&field);

@@ -120,7 +120,7 @@ static void small_stacks_are_reported(void **context)
     session_input in;
     input_create(&in, TEST_MIXED, 5, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(layers[0]));
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) {
         const insitu_status status = insitu_step(session, cycle, 0);
         reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: OpenMP's threads have ",
@@ -140,7 +140,7 @@ static void suggested_stacks_suffice(void **context)
     session_input in;
     input_create(&in, TEST_MIXED, 5, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(layers[0]));
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_is_good(session, 0);
     insitu_destroy(&session);
     input_free(&in);

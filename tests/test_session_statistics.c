@@ -60,7 +60,7 @@ static void run_steps(const char *scene, const session_input *in, int first, int
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     forget_pictures();
     for (int cycle = first; cycle < end; cycle++) {
-        assert_int_equal(hand_over(session, in), INSITU_OK);
+        assert_int_equal(submit(session, in), INSITU_OK);
         const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
         everywhere(status == INSITU_OK);
@@ -169,7 +169,7 @@ static void files_do_not_depend_on_the_partition(void **state)
                 rank_count = 1;
                 make_part(kind, 0.2, way == 1, &whole);
                 insitu_session *session = open_session(MPI_COMM_SELF, scene);
-                assert_int_equal(hand_over(session, &whole), INSITU_OK);
+                assert_int_equal(submit(session, &whole), INSITU_OK);
                 assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
                 insitu_destroy(&session);
                 input_free(&whole);
@@ -217,14 +217,14 @@ static void files_that_cannot_be_written_are_reported(void **state)
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: f, path: other.csv}]\n"));
     forget_pictures();
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns", "cycle,time");
     everywhere(caught_count == (own_rank == 0));
     read_file("other.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(text, "a,b\n1,2\n") == 0);
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: g, path: g.csv}]\n"));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
     everywhere(caught_count == 2 * (own_rank == 0));
     insitu_destroy(&session);
@@ -248,7 +248,7 @@ static void others_of_a_missing_field_are_found(void **state)
                                                                    "statistics: [{field: g, path: g.csv}, {field: f, "
                                                                    "path: there.csv}]\n"));
     forget_pictures();
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
     everywhere(caught_count == (own_rank == 0) && insitu_last_report(session)->images == 1);
     insitu_destroy(&session);
@@ -271,7 +271,7 @@ static unsigned cycles_drawn(const char *scene)
         for (int64_t v = 0; v < in.part.vertex_count; v++)
             in.part.values[v] = cycle / 1.6 * test_linear(in.part.coordinates + 3 * v);
         forget_pictures();
-        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        assert_int_equal(submit(session, &in), INSITU_OK);
         const insitu_status status = insitu_step(session, cycle, cycle);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
         everywhere(status == INSITU_OK);

@@ -95,7 +95,7 @@ static void refuse(insitu_session *session, formed_mesh *m, const strided *s, bo
         snprintf(words[1], sizeof words[1], ": %lld of them lie outside of memory", (long long)s->count);
         forget_pictures();
         if (is_last) *s->stride = wild[i];
-        const insitu_status at_once = formed_hand_over(session, m, formed_has_corners(m->form));
+        const insitu_status at_once = formed_submit(session, m, formed_has_corners(m->form));
         *s->stride = right;
         char reported[1024];
         const insitu_status status = insitu_step(session, 1, 0);
@@ -131,7 +131,7 @@ static void strides_beyond_memory_are_refused(void **state)
         refuse_all(session, &m, list, list_of_mesh(&m.mesh, list));
         refuse_all(session, &m, list, list_of_fields(&m, list, 0));
         refuse_all(session, &m, list, list_of_patch(&m, list));
-        everywhere(formed_hand_over(session, &m, is_torn) == INSITU_OK);
+        everywhere(formed_submit(session, &m, is_torn) == INSITU_OK);
         const insitu_status status = insitu_step(session, 2, 0);
         reported_everywhere(session, status, INSITU_OK, "");
         insitu_destroy(&session);
@@ -152,18 +152,18 @@ static void rows_beyond_memory_are_refused(void **state)
         insitu_field *d = &m.fields[FORMED_D];
         snprintf(words, sizeof words, "connectivity_row is %lld", (long long)wild[i]);
         m.mesh.connectivity_row = wild[i];
-        everywhere(formed_hand_over(session, &m, false) == INSITU_ERROR_MESH);
+        everywhere(formed_submit(session, &m, false) == INSITU_ERROR_MESH);
         everywhere(insitu_set_mesh(session, "m", &m.mesh) == INSITU_ERROR_MESH);
         everywhere(strstr(insitu_error(session), wild[i] < 0 ? words : "too few for") != NULL);
         m.mesh.connectivity_row = 9;
-        everywhere(formed_hand_over(session, &m, true) == INSITU_OK);
+        everywhere(formed_submit(session, &m, true) == INSITU_OK);
         snprintf(words, sizeof words, "corner_row is %lld", (long long)wild[i]);
         d->corner_row = wild[i];
         everywhere(insitu_set_field(session, "m", d) == INSITU_ERROR_FIELD);
         everywhere(strstr(insitu_error(session), wild[i] == (int64_t)1 << 49 ? "has " : words) != NULL);
         d->corner_row = 0;
     }
-    everywhere(formed_hand_over(session, &m, true) == INSITU_OK);
+    everywhere(formed_submit(session, &m, true) == INSITU_OK);
     const insitu_status status = insitu_step(session, 2, 0);
     reported_everywhere(session, status, INSITU_OK, "");
     insitu_destroy(&session);
@@ -197,7 +197,7 @@ static int draw(const char *scene, const formed_mesh *m, caught_picture *out)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
     forget_pictures();
-    everywhere(formed_hand_over(session, m, formed_has_corners(m->form)) == INSITU_OK);
+    everywhere(formed_submit(session, m, formed_has_corners(m->form)) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     reported_everywhere(session, status, INSITU_OK, "");
     const int count = caught_count;

@@ -401,7 +401,7 @@ static void faces_are_found_once_for_the_cells(void **state)
     MPI_Allreduce(MPI_IN_PLACE, &highest, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
     everywhere(highest == 2);
     part.mesh.changed = INSITU_CHANGED_ALL;
-    everywhere(hand_over(session, &part) == INSITU_OK);
+    everywhere(submit(session, &part) == INSITU_OK);
     everywhere(mesh->outer_count == 0);
     step_is_good(session, 2);
     everywhere(mesh->outers[0]->are_faces_known);

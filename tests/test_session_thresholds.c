@@ -171,7 +171,7 @@ static void check(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
         part.mesh.changed = step ? 0 : INSITU_CHANGED_ALL;
         if (step == 0) session = open_session(MPI_COMM_WORLD, scene);
         forget_pictures();
-        assert_int_equal(hand_over(session, &part), INSITU_OK);
+        assert_int_equal(submit(session, &part), INSITU_OK);
         everywhere(insitu_step(session, step, step) == INSITU_OK);
         const face_set drawn = find_drawn(session);
         if ((!truth.count || drawn.sum != truth.sum) && own_rank == 0)
@@ -212,7 +212,7 @@ static void bounds_may_show_all_or_nothing(void **state)
         insitu_destroy(&session);
     }
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scenes[2]));
-    assert_int_equal(hand_over(session, &part), INSITU_OK);
+    assert_int_equal(submit(session, &part), INSITU_OK);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"");
     insitu_destroy(&session);
     input_free(&part);

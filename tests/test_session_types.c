@@ -372,7 +372,7 @@ static void components_may_be_set_again(void **state)
         in.mesh.changed = INSITU_CHANGED_NOTHING;
         in.field.changed = step == 2 ? INSITU_CHANGED_VALUES : INSITU_CHANGED_NOTHING;
         in.field.components = again;
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         memset(again, 0, sizeof again);
         step_is_good(session, step);
         caught_picture picture = take_caught();
@@ -407,7 +407,7 @@ static void forms_may_change_from_step_to_step(void **state)
             in.mesh.changed = INSITU_CHANGED_GEOMETRY;
             if (k) lay_out_places(&in, &forms[step % 5]);
             if (k) everywhere(lay_out(&in.field.values, in.field.count, &forms[step % 5]));
-            everywhere(hand_over(k ? session : plain, &in) == INSITU_OK);
+            everywhere(submit(k ? session : plain, &in) == INSITU_OK);
             step_is_good(k ? session : plain, step);
             pictures[k] = take_caught();
         }

@@ -46,7 +46,7 @@ static bool differ(test_mesh_kind kind, int a, int b)
 /* Warns of the order (NULL: does not), and of hands at most. */
 static void expect(insitu_session *session, const session_input *in, const char *words, const char *what)
 {
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     step_is_good(session, 0);
     const char *text = insitu_last_report(session)->warnings;
     const bool is_well = words ? strstr(text, words) && !strchr(text, '\n') : !strstr(text, "vertex_order");

@@ -50,7 +50,7 @@ static insitu_session *open_behind(const char *scene, const session_input *in, v
     before_writing = gate;
     session_writes_behind = true;
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     return session;
 }
 
@@ -211,7 +211,7 @@ static void failure_waits_for_an_error_of_the_step(void **state)
         reported_everywhere(session, insitu_step(session, cycle, 0.5), INSITU_ERROR_ARGUMENT, "vertex_count");
         usleep(10000);
     }
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     const insitu_status status = insitu_step(session, 4, 0.5);
     const insitu_status last = insitu_destroy(&session);
     everywhere((status == INSITU_ERROR_IO) != (last == INSITU_ERROR_IO));

@@ -56,7 +56,7 @@ static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_tor
     formed_fit_fields(m);
     const bool is_right = !is_mine || is_empty_and_right(&m->mesh);
     forget_pictures();
-    const insitu_status set = formed_hand_over(session, m, is_torn);
+    const insitu_status set = formed_submit(session, m, is_torn);
     const insitu_status status = insitu_step(session, 1, 0);
     if ((set && !status) || (is_right && status))
         fprintf(stderr, "%s mask %u %s: %s\n", mesh_form_name(m->form), mask, with_arrays ? "arrays" : "none",
@@ -86,7 +86,7 @@ static void check_form(mesh_form form, bool is_torn)
             draw_with_zeros(session, &m, is_torn, mask, way & 1, way & 2 || own_rank == rank_count - 1);
     }
     forget_pictures();
-    everywhere(formed_hand_over(session, &m, is_torn) == INSITU_OK);
+    everywhere(formed_submit(session, &m, is_torn) == INSITU_OK);
     const insitu_status status = insitu_step(session, 2, 0);
     reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == (is_torn ? FORMED_TORN_PICTURES : FORMED_PICTURES));

@@ -102,7 +102,7 @@ static void scenery_free(scenery *s)
 }
 
 /* The first status that is not OK; the rest is handed over all the same. */
-static insitu_status hand_over_scenery(insitu_session *session, const scenery *s)
+static insitu_status submit_scenery(insitu_session *session, const scenery *s)
 {
     insitu_status first = INSITU_OK;
     for (int i = 0; i < s->of->mesh_count; i++) {
@@ -173,7 +173,7 @@ static void step_draws(insitu_session *session, const picture_set *expected)
 static insitu_session *open_and_draw(const char *scene, const scenery *s, picture_set *out)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    everywhere(hand_over_scenery(session, s) == INSITU_OK);
+    everywhere(submit_scenery(session, s) == INSITU_OK);
     forget_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
     reported_everywhere(session, status, INSITU_OK, "");
@@ -235,7 +235,7 @@ static bool set_and_step_fail_well(const scenery *s, const failure *f, void *sta
     step_state *t = state;
     forget_pictures();
     arm(f);
-    const insitu_status set = hand_over_scenery(t->session, s);
+    const insitu_status set = submit_scenery(t->session, s);
     const insitu_status status = insitu_step(t->session, 1, 0);
     const bool is_over = disarm(f);
     check_reported(t->session, status);
@@ -244,7 +244,7 @@ static bool set_and_step_fail_well(const scenery *s, const failure *f, void *sta
     int is_set = set == INSITU_OK;
     MPI_Allreduce(MPI_IN_PLACE, &is_set, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     if (is_set) step_draws(t->session, &t->expected); /* what was taken is not lost */
-    everywhere(hand_over_scenery(t->session, s) == INSITU_OK);
+    everywhere(submit_scenery(t->session, s) == INSITU_OK);
     step_draws(t->session, &t->expected);
     return is_over;
 }
@@ -306,7 +306,7 @@ static bool creation_fails_well(const scenery *s, const failure *f, void *state)
     everywhere((status == INSITU_OK) == (session != NULL));
     check_reported(NULL, status);
     if (session) {
-        everywhere(hand_over_scenery(session, s) == INSITU_OK);
+        everywhere(submit_scenery(session, s) == INSITU_OK);
         step_draws(session, &t->expected);
     }
     insitu_destroy(&session);
@@ -339,7 +339,7 @@ static bool edit_fails_well(const scenery *s, const failure *f, void *state)
 {
     edit_state *t = state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
-    everywhere(hand_over_scenery(session, s) == INSITU_OK);
+    everywhere(submit_scenery(session, s) == INSITU_OK);
     write_scene(edited_scene);
     forget_pictures();
     arm(f);
