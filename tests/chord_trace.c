@@ -24,8 +24,8 @@ static void chord_note(const chord_state *state, vm mask, vf t_in, vf t_out)
     vf_store(out, t_out);
     for (unsigned bits = vm_bits(mask); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits), ray = state->first + lane;
-        const int at = state->rays->span_count[ray]++;
-        if (at < CHORD_MAX_SPANS) state->rays->spans[ray][at] = (chord_span){in[lane], out[lane]};
+        const int at = state->rays->interval_count[ray]++;
+        if (at < CHORD_MAX_INTERVALS) state->rays->ray_intervals[ray][at] = (chord_interval){in[lane], out[lane]};
     }
 }
 
@@ -136,7 +136,7 @@ static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays
                               .shear_y = flat ? 0 : (float)rays->centre_y,
                               .radius = (float)chord_radius(f, rays)};
     thread->serial++;
-    for (int i = 0; i < rays->count; i++) rays->span_count[i] = 0;
+    for (int i = 0; i < rays->count; i++) rays->interval_count[i] = 0;
     for (int first = 0; first < rays->count; first += SIMD_WIDTH) {
         kernel_packet p;
         chord_state state = {rays, first};

@@ -216,8 +216,8 @@ static double worst_of(integral *of, int count, double most, double tolerance, d
         make_transfer(&r, seed, most);
         const double v_in = 1.5 * coarse(1, seed + 7) - 0.25;
         const bool is_level = n % 11 == 0;
-        const double span = n % 3 == 0 ? 1 / 64.0 : 1.5,
-                     v_out = is_level ? v_in : v_in + span * (coarse(2, seed + 7) - 0.5);
+        const double interval = n % 3 == 0 ? 1 / 64.0 : 1.5,
+                     v_out = is_level ? v_in : v_in + interval * (coarse(2, seed + 7) - 0.5);
         const double length = ldexp(1, (int)(38 * test_uniform(3, seed)) - 28);
         long double truth[5];
         double found[4];

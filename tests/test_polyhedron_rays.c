@@ -48,11 +48,11 @@ typedef struct subject {
 } subject;
 
 /* A ray in a tet, from z[0] to z[1] with the values v; is_face: this end is on the cell's surface. */
-typedef struct span {
+typedef struct interval {
     double z[2], v[2], slope;
     bool is_face[2];
     int sign;
-} span;
+} interval;
 
 /* The field along a stay in the cell, jumps as two points in one place. */
 typedef struct path {
@@ -169,18 +169,18 @@ static reference_line line_of(const render_camera *camera, int x, int y)
 }
 
 /* value + slope z along the line. */
-static void along_line(const linear *f, const reference_line *line, double *value, double *slope)
+static void direction_along_line(const linear *f, const reference_line *line, double *value, double *slope)
 {
     *value = at_place(f, (const double[3]){line->base[0], line->base[1], 0});
     *slope = f->gradient[0] * line->slope[0] + f->gradient[1] * line->slope[1] + f->gradient[2];
 }
 
-static bool clip(const tet *t, const reference_line *line, span *out)
+static bool clip(const tet *t, const reference_line *line, interval *out)
 {
     double value, slope;
-    *out = (span){.z = {-(double)INFINITY, (double)INFINITY}, .slope = t->slope, .sign = t->sign};
+    *out = (interval){.z = {-(double)INFINITY, (double)INFINITY}, .slope = t->slope, .sign = t->sign};
     for (int i = 0; i < 4; i++) {
-        along_line(&t->inside[i], line, &value, &slope);
+        direction_along_line(&t->inside[i], line, &value, &slope);
         if (slope == 0 && value < 0) return false;
         if (slope == 0) continue;
         const int end = slope < 0;
@@ -189,7 +189,7 @@ static bool clip(const tet *t, const reference_line *line, span *out)
         out->z[end] = z;
         out->is_face[end] = i == 3;
     }
-    along_line(&t->value, line, &value, &slope);
+    direction_along_line(&t->value, line, &value, &slope);
     for (int end = 0; end < 2; end++) out->v[end] = value + slope * out->z[end];
     return out->z[0] < out->z[1];
 }
@@ -200,31 +200,31 @@ static int compare_numbers(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-static double span_at(const span *s, double z)
+static double interval_at(const interval *s, double z)
 {
     return s->v[0] + (z - s->z[0]) / (s->z[1] - s->z[0]) * (s->v[1] - s->v[0]);
 }
 
 /* The ray's spans, and their ends in order. */
-static int spans_of(const subject *s, const reference_line *line, span *spans, double *ends)
+static int intervals_of(const subject *s, const reference_line *line, interval *ray_intervals, double *ends)
 {
     int count = 0;
-    for (int i = 0; i < s->tet_count; i++) count += clip(&s->tets[i], line, &spans[count]);
-    for (int i = 0; i < 2 * count; i++) ends[i] = spans[i / 2].z[i % 2];
+    for (int i = 0; i < s->tet_count; i++) count += clip(&s->tets[i], line, &ray_intervals[count]);
+    for (int i = 0; i < 2 * count; i++) ends[i] = ray_intervals[i / 2].z[i % 2];
     qsort(ends, 2 * (size_t)count, sizeof *ends, compare_numbers);
     return count;
 }
 
 /* The value of the face that is met at z. */
-static double face_value(const span *spans, int count, double z)
+static double face_value(const interval *ray_intervals, int count, double z)
 {
     double nearest = (double)INFINITY, value = 0;
     for (int i = 0; i < count; i++)
         for (int end = 0; end < 2; end++) {
-            const double away = fabs(spans[i].z[end] - z);
-            if (!spans[i].is_face[end] || away >= nearest) continue;
+            const double away = fabs(ray_intervals[i].z[end] - z);
+            if (!ray_intervals[i].is_face[end] || away >= nearest) continue;
             nearest = away;
-            value = spans[i].v[end];
+            value = ray_intervals[i].v[end];
         }
     assert_true(nearest < 1e-9);
     return value;
@@ -238,36 +238,36 @@ static void add_point(path *p, double z, double v)
 }
 
 /* Add the field from one end of a tet to the next, where the place is in the cell. */
-static bool add_piece(const span *spans, int count, double z0, double z1, path *p)
+static bool add_piece(const interval *ray_intervals, int count, double z0, double z1, path *p)
 {
     const double middle = 0.5 * (z0 + z1);
     double v[2] = {0, 0};
     int cover = 0;
     for (int i = 0; i < count; i++) {
-        if (!(spans[i].z[0] < middle && middle < spans[i].z[1])) continue;
-        cover += spans[i].sign;
-        v[0] += spans[i].sign * span_at(&spans[i], z0);
-        v[1] += spans[i].sign * span_at(&spans[i], z1);
+        if (!(ray_intervals[i].z[0] < middle && middle < ray_intervals[i].z[1])) continue;
+        cover += ray_intervals[i].sign;
+        v[0] += ray_intervals[i].sign * interval_at(&ray_intervals[i], z0);
+        v[1] += ray_intervals[i].sign * interval_at(&ray_intervals[i], z1);
     }
     if (cover != 1) {
         if (cover && z1 - z0 > 1e-9) fail_msg("a place is in the cell %d times", cover);
         return false;
     }
-    if (!p->count) add_point(p, z0, face_value(spans, count, z0));
+    if (!p->count) add_point(p, z0, face_value(ray_intervals, count, z0));
     add_point(p, z0, v[0]);
     add_point(p, z1, v[1]);
     return true;
 }
 
 /* The next stay from the end number *next on; false where there is none. */
-static bool next_stay(const span *spans, int count, const double *ends, int *next, path *p)
+static bool next_stay(const interval *ray_intervals, int count, const double *ends, int *next, path *p)
 {
     p->count = 0;
     for (; *next + 1 < 2 * count; ++*next) {
         if (ends[*next + 1] - ends[*next] < 1e-13) continue;
-        if (!add_piece(spans, count, ends[*next], ends[*next + 1], p) && p->count) break;
+        if (!add_piece(ray_intervals, count, ends[*next], ends[*next + 1], p) && p->count) break;
     }
-    if (p->count) add_point(p, p->z[p->count - 1], face_value(spans, count, p->z[p->count - 1]));
+    if (p->count) add_point(p, p->z[p->count - 1], face_value(ray_intervals, count, p->z[p->count - 1]));
     return p->count > 0;
 }
 
@@ -352,19 +352,19 @@ static bool verify_path(const verify *j, const path *p, double band, const ray_h
 }
 
 /* Where tets overlap, the slopes of a sum's terms add up, mostly three of them. */
-static double band_of(const verify *j, const span *spans, int count)
+static double band_of(const verify *j, const interval *ray_intervals, int count)
 {
     double steepest = 0;
-    for (int i = 0; i < count; i++) steepest = fmax(steepest, spans[i].slope);
+    for (int i = 0; i < count; i++) steepest = fmax(steepest, ray_intervals[i].slope);
     return 2e-6 * (j->s->high - j->s->low) + j->place * steepest * (j->s->is_star ? 1 : 3);
 }
 
 static void verify_ray(const verify *j, const reference_line *line, ray_hits *hits)
 {
-    static span spans[REFERENCE_MAX_TRIANGLES];
+    static interval ray_intervals[REFERENCE_MAX_TRIANGLES];
     static double ends[2 * REFERENCE_MAX_TRIANGLES];
     static path p;
-    const int count = spans_of(j->s, line, spans, ends);
+    const int count = intervals_of(j->s, line, ray_intervals, ends);
     int next = 0;
     bool goes_on = true;
     if (!count && !hits->count) return;
@@ -373,8 +373,8 @@ static void verify_ray(const verify *j, const reference_line *line, ray_hits *hi
         return;
     }
     j->t->rays++;
-    const double band = band_of(j, spans, count);
-    while (next_stay(spans, count, ends, &next, &p)) {
+    const double band = band_of(j, ray_intervals, count);
+    while (next_stay(ray_intervals, count, ends, &next, &p)) {
         cut_at_eye(&p);
         if (!p.count) continue;
         mark_hits(j, &p, band, hits);
@@ -494,12 +494,12 @@ static void concave_polyhedra_miss_no_crossing(void **state)
 /* Tells whether the field passes the value on the ray. */
 static bool passes(const subject *s, const reference_line *line, double value)
 {
-    static span spans[REFERENCE_MAX_TRIANGLES];
+    static interval ray_intervals[REFERENCE_MAX_TRIANGLES];
     static double ends[2 * REFERENCE_MAX_TRIANGLES];
     static path p;
     int next = 0;
-    const int count = spans_of(s, line, spans, ends);
-    while (next_stay(spans, count, ends, &next, &p))
+    const int count = intervals_of(s, line, ray_intervals, ends);
+    while (next_stay(ray_intervals, count, ends, &next, &p))
         for (int k = 0; k < p.count; k++)
             if (p.v[k] > value) return true;
     return false;
