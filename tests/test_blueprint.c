@@ -286,11 +286,11 @@ static void cycles_are_counted(void **state)
 
 /* ---- what is left out ------------------------------------------------------------------------------------------- */
 
-typedef void spoil_node(conduit_node *node);
+typedef void corrupt_node(conduit_node *node);
 
 typedef struct left_out_case {
     const char *layout;
-    spoil_node *spoil;
+    corrupt_node *corrupt;
     const char *words;
     int meshes, fields;
 } left_out_case;
@@ -374,7 +374,7 @@ static void what_is_left_out_is_named(void **state)
         const left_out_case *c = &left_out_cases[i];
         layout_case layout;
         layout_make(find_layout(c->layout), &layout);
-        c->spoil(layout.node);
+        c->corrupt(layout.node);
         doorway d = open_door(path);
         const insitu_status status = insitu_blueprint_set(d.adaptor, "grid", layout.node);
         insitu_blueprint_step(d.adaptor, NULL, NULL);

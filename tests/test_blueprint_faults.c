@@ -148,7 +148,7 @@ static void replace(conduit_node *node, const node_fault *f, int id)
     stand_in_put(node, f->path, id, copy, count, 0);
 }
 
-static void spoil(conduit_node *node, const node_fault *f)
+static void corrupt(conduit_node *node, const node_fault *f)
 {
     static const char nothing[8];
     conduit_node *at = f->kind >= SHORT && f->kind != AN_OBJECT ? conduit_node_fetch_existing(node, f->path) : NULL;
@@ -218,7 +218,7 @@ static void wrong_nodes_are_reported_on_all_ranks(void **state)
         everywhere(insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor) == INSITU_OK);
         layout_make(find_layout(f->layout), &right);
         layout_make(find_layout(f->layout), &wrong);
-        if (own_rank == bad) spoil(wrong.node, f);
+        if (own_rank == bad) corrupt(wrong.node, f);
         forget_pictures();
         const insitu_status at_once = insitu_blueprint_set(adaptor, "grid", wrong.node);
         const bool is_reported =
@@ -249,7 +249,7 @@ static void wrong_indices_are_reported_on_all_ranks(void **state)
     insitu_blueprint *adaptor = NULL;
     insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor);
     layout_make(find_layout("tets"), &layout);
-    spoil(layout.node, &f);
+    corrupt(layout.node, &f);
     everywhere(insitu_blueprint_set(adaptor, "grid", layout.node) == INSITU_OK);
     const insitu_status status = insitu_blueprint_step(adaptor, NULL, NULL);
     const char *message = insitu_blueprint_error(adaptor);

@@ -176,23 +176,23 @@ static void robust_hits_are_on_the_surface(void **state)
 
 /* ---- ugly cells ---- */
 
-typedef enum ugly { UGLY_WARPED, UGLY_CONCAVE, UGLY_WEDGE, UGLY_APEX, UGLY_COUNT } ugly;
+typedef enum ill_shaped { ILL_SHAPED_WARPED, ILL_SHAPED_CONCAVE, ILL_SHAPED_WEDGE, ILL_SHAPED_APEX, ILL_SHAPED_COUNT } ill_shaped;
 
-static void make_ugly(ugly kind, uint64_t seed, test_mesh *out)
+static void make_ill_shaped(ill_shaped kind, uint64_t seed, test_mesh *out)
 {
-    static const test_cell_shape shapes[UGLY_COUNT] = {TEST_UNIT_HEX, TEST_UNIT_HEX, TEST_UNIT_WEDGE,
+    static const test_cell_shape shapes[ILL_SHAPED_COUNT] = {TEST_UNIT_HEX, TEST_UNIT_HEX, TEST_UNIT_WEDGE,
                                                        TEST_UNIT_PYRAMID};
     test_mesh_single(shapes[kind], test_linear, out);
     for (uint64_t i = 0; i < (uint64_t)out->vertex_count; i++) {
         double *p = out->coordinates + 3 * i;
-        const double amount = kind == UGLY_WARPED || kind == UGLY_APEX ? 0.2 : 0.1;
+        const double amount = kind == ILL_SHAPED_WARPED || kind == ILL_SHAPED_APEX ? 0.2 : 0.1;
         for (uint64_t a = 0; a < 3; a++) p[a] += test_uniform_in(3 * i + a, seed, -amount, amount);
         out->values[i] = test_uniform_in(i, seed + 1000, -1, 1.5);
         /* A corner pulled in almost to the plane of its neighbours: dents on both sides of its edges. Beyond that plane
          * the hex's map folds, and a point has several values. */
-        if (kind == UGLY_CONCAVE && i == 6)
+        if (kind == ILL_SHAPED_CONCAVE && i == 6)
             for (uint64_t a = 0; a < 3; a++) p[a] = test_uniform_in(a, seed + 2000, 0.24, 0.3);
-        if (kind == UGLY_WEDGE && i >= 3) {
+        if (kind == ILL_SHAPED_WEDGE && i >= 3) {
             const double angle = test_uniform_in(0, seed + 3000, -0.8, 0.8), x = p[0], y = p[1];
             p[0] = cos(angle) * x - sin(angle) * y;
             p[1] = sin(angle) * x + cos(angle) * y;
@@ -200,21 +200,21 @@ static void make_ugly(ugly kind, uint64_t seed, test_mesh *out)
     }
 }
 
-static void robust_hits_in_ugly_cells_are_the_reference(void **state)
+static void robust_hits_in_ill_shaped_cells_are_the_reference(void **state)
 {
     (void)state;
-    static const char *const names[UGLY_COUNT] = {"warped hexes", "concave hexes", "twisted wedges", "pyramid apexes"};
-    for (ugly kind = 0; kind < UGLY_COUNT; kind++) {
+    static const char *const names[ILL_SHAPED_COUNT] = {"warped hexes", "concave hexes", "twisted wedges", "pyramid apexes"};
+    for (ill_shaped kind = 0; kind < ILL_SHAPED_COUNT; kind++) {
         tally t = {.rays = 0};
         for (uint64_t seed = 0; seed < 24; seed++) {
             test_mesh mesh;
             render_fixture f;
-            make_ugly(kind, seed, &mesh);
+            make_ill_shaped(kind, seed, &mesh);
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                            (const double[]){0, 0, 0});
             fixture_look(&f, seed % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 31, 29);
             /* Close to the apex: the middle of the picture is its neighbourhood. */
-            if (kind == UGLY_APEX)
+            if (kind == ILL_SHAPED_APEX)
                 assert_true(render_camera_look_at(&f.job.camera, (const double[]){2.4, 1.6, 3.0},
                                                   mesh.coordinates + 3 * 4, (const double[]){0, 1, 0}, 2, 31, 29));
             add_many_robust(&f);
@@ -415,7 +415,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(robust_hits_are_on_the_surface),
-        cmocka_unit_test(robust_hits_in_ugly_cells_are_the_reference),
+        cmocka_unit_test(robust_hits_in_ill_shaped_cells_are_the_reference),
         cmocka_unit_test(cell_gradients_are_the_reference),
         cmocka_unit_test(differences_of_a_linear_field_are_exact),
         cmocka_unit_test(differences_of_a_quadratic_field_are_of_second_order),

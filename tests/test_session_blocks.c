@@ -423,29 +423,29 @@ static void wrong_calls_are_reported_at_once(void **state)
 /* One block is spoilt; then it is mended, and the picture is the truth. */
 static void faults_of_one_block_are_reported_on_all_ranks(void **state)
 {
-    const int spoilt = 5;
-    const bool is_mine = owner_of(spoilt) == own_rank;
+    const int corrupted = 5;
+    const bool is_mine = owner_of(corrupted) == own_rank;
     insitu_mesh mesh;
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, scene());
     set_all(session);
     insitu_mesh_defaults(&mesh);
     mesh.vertex_count = -1;
-    if (is_mine) insitu_set_block(session, "m", spoilt, &mesh);
+    if (is_mine) insitu_set_block(session, "m", corrupted, &mesh);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT, "mesh \"m[5]\": vertex_count is -1");
-    blocks[spoilt].a.hexes[77] = -4; /* by its number it is a list of cells */
-    if (is_mine) submit_block(session, &blocks[spoilt], INSITU_CHANGED_ALL);
+    blocks[corrupted].a.hexes[77] = -4; /* by its number it is a list of cells */
+    if (is_mine) submit_block(session, &blocks[corrupted], INSITU_CHANGED_ALL);
     reported_everywhere(session, insitu_step(session, 1, 1), INSITU_ERROR_MESH, "mesh \"m[5]\": cell 9 ");
-    blocks[spoilt].a.hexes[77] = blocks[spoilt].a.hexes[69] + 1;
-    if (is_mine) insitu_set_block(session, "m", spoilt, NULL);
-    destroy_block(&blocks[spoilt]);
-    make_block(spoilt, &blocks[spoilt]);
-    if (is_mine) set_block(session, &blocks[spoilt], INSITU_CHANGED_ALL); /* without its fields */
+    blocks[corrupted].a.hexes[77] = blocks[corrupted].a.hexes[69] + 1;
+    if (is_mine) insitu_set_block(session, "m", corrupted, NULL);
+    destroy_block(&blocks[corrupted]);
+    make_block(corrupted, &blocks[corrupted]);
+    if (is_mine) set_block(session, &blocks[corrupted], INSITU_CHANGED_ALL); /* without its fields */
     if (rank_count > 1 || is_mine)
         reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
                         "mesh \"m[5]\": field \"c\" is not set, other blocks have it");
     forget_pictures();
-    if (is_mine) submit_block(session, &blocks[spoilt], 0);
+    if (is_mine) submit_block(session, &blocks[corrupted], 0);
     step_well(session, 3);
     pictures_are_the_truth();
     insitu_destroy(&session);

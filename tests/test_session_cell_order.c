@@ -282,12 +282,12 @@ static void the_order_may_be_set_right(void **state)
 
 /* ---- errors --------------------------------------------------------------------------------------------------- */
 
-static moved spoilt;
+static moved corrupted;
 
 static void in_rows(session_input *in)
 {
-    free_moved(&spoilt);
-    spoilt = move_arrays(in, ROWS);
+    free_moved(&corrupted);
+    corrupted = move_arrays(in, ROWS);
 }
 static void unknown_order(session_input *in)
 {
@@ -333,19 +333,19 @@ static void vertex_in_row(session_input *in)
 {
     in_rows(in);
     in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
-    ((int64_t *)spoilt.connectivity)[3 * ROW + 2] = -5;
+    ((int64_t *)corrupted.connectivity)[3 * ROW + 2] = -5;
 }
 /* Cut to 4 bytes it would be a good index. */
 static void far_vertex_in_row(session_input *in)
 {
     in_rows(in);
-    ((int64_t *)spoilt.connectivity)[ROW + 1] = ((int64_t)1 << 32) + 1;
+    ((int64_t *)corrupted.connectivity)[ROW + 1] = ((int64_t)1 << 32) + 1;
 }
 static void vertex_before_one(session_input *in)
 {
     in->mesh.index_base = 1;
     in_rows(in);
-    ((int64_t *)spoilt.connectivity)[ROW + 7] = 0;
+    ((int64_t *)corrupted.connectivity)[ROW + 7] = 0;
 }
 static void offsets_in_order(session_input *in)
 {
@@ -363,7 +363,7 @@ static void type_in_order(session_input *in)
     in->part.types[1] = 99;
 }
 
-static const spoilt_case cases[] = {
+static const corrupted_case cases[] = {
     {"order", unknown_order, INSITU_ERROR_ARGUMENT, true, {"vertex_order is 6, expected 0 (VTK's), 1 (lexicographic)"}},
     {"row -8", negative_row, INSITU_ERROR_MESH, true, {"connectivity_row is -8, a cell has 8 vertices"}},
     {"row 7", short_row, INSITU_ERROR_MESH, true, {"connectivity_row is 7, a cell has 8 vertices"}},
@@ -387,7 +387,7 @@ static void what_is_wrong_is_reported_on_all_ranks(void **state)
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
     all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
-    free_moved(&spoilt);
+    free_moved(&corrupted);
 }
 
 int main(int argc, char **argv)

@@ -84,7 +84,7 @@ static char *copy_elsewhere(insitu_mesh *mesh, const moved_array *moved)
     return copy;
 }
 
-static void spoilt_arrays_elsewhere_are_reported(void **context)
+static void corrupted_arrays_elsewhere_are_reported(void **context)
 {
     (void)context;
     for (size_t i = 0; i < sizeof moved_arrays / sizeof moved_arrays[0]; i++) {
@@ -221,7 +221,7 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spoilt_arrays_elsewhere_are_reported),
+        cmocka_unit_test(corrupted_arrays_elsewhere_are_reported),
         cmocka_unit_test(vertices_elsewhere_are_drawn_there),
         cmocka_unit_test(cells_elsewhere_are_drawn_with_their_fields),
         cmocka_unit_test(values_elsewhere_are_drawn),

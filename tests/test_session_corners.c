@@ -377,7 +377,7 @@ static void unknown_centring(session_input *in)
     in->field.centring = (insitu_centring)3;
 }
 
-static const spoilt_case cases[] = {
+static const corrupted_case cases[] = {
     {"few", too_few, INSITU_ERROR_FIELD, true, {"field \"f\": has ", "corners of cells"}},
     {"polyhedra", of_owned_cells, INSITU_ERROR_FIELD, true, {"the mesh has polyhedra, whose corners have no order"}},
     {"short", in_short_rows, INSITU_ERROR_FIELD, true, {"corner_row is 7, a cell has 8 vertices"}},

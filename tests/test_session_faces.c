@@ -152,7 +152,7 @@ static void coordinate_nan(session_input *in)
 
 #define CELL_0 "cell 0 (polyhedron): "
 
-static const spoilt_case at_once[] = {
+static const corrupted_case at_once[] = {
     {"no face offsets", no_face_offsets, INSITU_ERROR_MESH, true, {"face offsets are not given"}},
     {"no face vertices", no_face_vertices, INSITU_ERROR_MESH, true, {"face vertex indices are not given"}},
     {"face count", face_count_negative, INSITU_ERROR_ARGUMENT, true, {"face_count is -5"}},
@@ -169,7 +169,7 @@ static const spoilt_case at_once[] = {
      {"offsets are not given: polyhedra need them"}},
 };
 
-static const spoilt_case at_the_step[] = {
+static const corrupted_case at_the_step[] = {
     {"no faces at all",
      no_faces_at_all,
      INSITU_ERROR_MESH,
@@ -250,30 +250,30 @@ static const spoilt_case at_the_step[] = {
     {"NaN", coordinate_nan, INSITU_ERROR_MESH, false, {CELL_0, "vertex 0 has a coordinate that is not finite"}},
 };
 
-static void spoilt_arrays_are_reported_at_once(void **context)
+static void corrupted_arrays_are_reported_at_once(void **context)
 {
     (void)context;
-    for (size_t i = 0; i < sizeof at_once / sizeof at_once[0]; i++) spoilt_is_reported_on_all_ranks(session, &input, &at_once[i]);
+    for (size_t i = 0; i < sizeof at_once / sizeof at_once[0]; i++) corrupted_is_reported_on_all_ranks(session, &input, &at_once[i]);
 }
 
-static void spoilt_faces_are_reported_at_the_step(void **context)
+static void corrupted_faces_are_reported_at_the_step(void **context)
 {
     (void)context;
     for (size_t i = 0; i < sizeof at_the_step / sizeof at_the_step[0]; i++)
-        spoilt_is_reported_on_all_ranks(session, &input, &at_the_step[i]);
+        corrupted_is_reported_on_all_ranks(session, &input, &at_the_step[i]);
 }
 
 /* A ghost is not drawn: its vertices may be anywhere, its faces must be faces all the same. */
 static void ghosts_are_proved_but_for_coordinates(void **context)
 {
     (void)context;
-    static const spoilt_case ghost = {
+    static const corrupted_case ghost = {
         "ghost", face_vertex_large, INSITU_ERROR_MESH, false, {CELL_0 "face 0: vertex index 1000000 is outside 0.."}};
     for (int64_t cell = 0; cell < input.part.cell_count; cell++) input.part.ghosts[cell] = 1;
     coordinate_nan(&input);
     everywhere(submit(session, &input) == INSITU_OK);
     everywhere(insitu_step(session, 3, 0) == INSITU_OK);
-    spoilt_is_reported_on_all_ranks(session, &input, &ghost);
+    corrupted_is_reported_on_all_ranks(session, &input, &ghost);
 }
 
 /* ---- cells of no volume -------------------------------------------------------------------------------------- */
@@ -371,8 +371,8 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spoilt_arrays_are_reported_at_once),
-        cmocka_unit_test(spoilt_faces_are_reported_at_the_step),
+        cmocka_unit_test(corrupted_arrays_are_reported_at_once),
+        cmocka_unit_test(corrupted_faces_are_reported_at_the_step),
         cmocka_unit_test(ghosts_are_proved_but_for_coordinates),
         cmocka_unit_test(flat_polyhedra_are_counted_and_change_no_picture),
         cmocka_unit_test(check_without_memory_is_reported_and_repeated),

@@ -26,7 +26,7 @@ typedef struct maker {
     double *values, scale;
     int calls;
     insitu_status status;
-    void (*spoil)(insitu_field *field);
+    void (*corrupt)(insitu_field *field);
     unsigned changed;
 } maker;
 
@@ -41,7 +41,7 @@ static insitu_status make(void *data, insitu_field *field)
     field->count = count;
     field->values = (insitu_array){m->values, INSITU_FLOAT64, 0};
     field->changed = m->changed;
-    if (m->spoil) m->spoil(field);
+    if (m->corrupt) m->corrupt(field);
     return m->status;
 }
 
@@ -157,7 +157,7 @@ static void what_goes_wrong_is_reported_on_all_ranks(void **state)
     (void)state;
     static const struct {
         insitu_status status;
-        void (*spoil)(insitu_field *field);
+        void (*corrupt)(insitu_field *field);
         const char *words;
     } cases[] = {{INSITU_ERROR_IO, NULL, "field \"f\": its fill returned 5 (INSITU_ERROR_IO)"},
                  {INSITU_OK, too_few, "field \"f\": has "},
@@ -175,12 +175,12 @@ static void what_goes_wrong_is_reported_on_all_ranks(void **state)
     for (int i = 0; i < 2; i++) everywhere(insitu_set_field(session, "m", &fields[i]) == INSITU_OK);
     for (int i = 0; i < (int)(sizeof cases / sizeof cases[0]); i++) {
         f.calls = g.calls = 0;
-        if (own_rank == rank_count - 1) f.status = cases[i].status, f.spoil = cases[i].spoil;
+        if (own_rank == rank_count - 1) f.status = cases[i].status, f.corrupt = cases[i].corrupt;
         forget_pictures();
         reported_everywhere(session, insitu_step(session, 2 * i, 0), INSITU_ERROR_FIELD, cases[i].words, "rank ");
         everywhere(caught_count == 0 && f.calls == 1 && g.calls == 1);
         f.status = INSITU_OK;
-        f.spoil = NULL;
+        f.corrupt = NULL;
         step_is_good(session, 2 * i + 1);
     }
     insitu_field both = fields[0];

@@ -171,13 +171,13 @@ void step_is_good(insitu_session *session, int cycle)
     everywhere(caught_count == (own_rank == 0));
 }
 
-void spoilt_is_reported_on_all_ranks(insitu_session *session, session_input *in, const spoilt_case *c)
+void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *in, const corrupted_case *c)
 {
     const int bad_rank = rank_count - 1;
     const bool is_bad = own_rank == bad_rank;
     char rank_words[32];
     snprintf(rank_words, sizeof rank_words, "rank %d: ", bad_rank);
-    if (is_bad) c->spoil(in);
+    if (is_bad) c->corrupt(in);
     const insitu_status at_once = submit(session, in);
     everywhere(at_once == (is_bad && c->at_once ? c->status : INSITU_OK));
     everywhere(!is_bad || !c->at_once || strstr(insitu_error(session), c->words[0]) != NULL);
@@ -207,10 +207,10 @@ void take_own_cells(const test_mesh *whole, test_partition_kind distributed, int
 const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
                            "    outputs: [{path: a.exr}]\n";
 
-void all_are_reported(session_input *in, const spoilt_case *cases, size_t count)
+void all_are_reported(session_input *in, const corrupted_case *cases, size_t count)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
-    for (size_t i = 0; i < count; i++) spoilt_is_reported_on_all_ranks(session, in, &cases[i]);
+    for (size_t i = 0; i < count; i++) corrupted_is_reported_on_all_ranks(session, in, &cases[i]);
     insitu_destroy(&session);
 }
 

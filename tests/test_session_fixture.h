@@ -84,24 +84,24 @@ insitu_status submit(insitu_session *session, const session_input *in);
 /* The step is well on every rank, and its one picture is drawn. */
 void step_is_good(insitu_session *session, int cycle);
 
-typedef void spoil_function(session_input *in);
+typedef void corrupt_function(session_input *in);
 
 /* A thing that a user gets wrong. */
-typedef struct spoilt_case {
+typedef struct corrupted_case {
     const char *name;
-    spoil_function *spoil;
+    corrupt_function *corrupt;
     insitu_status status;
     bool at_once;         /* the set call fails too */
     const char *words[2]; /* of the message */
-} spoilt_case;
+} corrupted_case;
 
 /* Spoilt on the last rank alone, at every step all ranks are told the same, with the rank and the words in it, and no
  * picture is drawn; once the input is renewed the next step draws. */
-void spoilt_is_reported_on_all_ranks(insitu_session *session, session_input *in, const spoilt_case *c);
+void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *in, const corrupted_case *c);
 
 /* A scene of one small picture of "f", to which that is told; and each of the cases in a session of it. */
 extern const char error_scene[];
-void all_are_reported(session_input *in, const spoilt_case *cases, size_t count);
+void all_are_reported(session_input *in, const corrupted_case *cases, size_t count);
 
 /* Pictures caught on rank 0 since the last forget_pictures(). */
 typedef struct caught_picture {

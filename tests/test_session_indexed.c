@@ -227,37 +227,37 @@ static void an_index_that_nobody_needs_is_left_alone(void **state)
 
 /* ---- errors --------------------------------------------------------------------------------------------------- */
 
-static int64_t *spoilt;
+static int64_t *corrupted;
 
 static void by_index(session_input *in)
 {
-    free(spoilt);
-    spoilt = malloc((size_t)(in->part.vertex_count + in->part.cell_count) * sizeof *spoilt);
-    assert_non_null(spoilt);
-    for (int64_t i = 0; i < in->part.vertex_count + in->part.cell_count; i++) spoilt[i] = i;
-    in->field.index = (insitu_array){spoilt, INSITU_INT64, 0};
+    free(corrupted);
+    corrupted = malloc((size_t)(in->part.vertex_count + in->part.cell_count) * sizeof *corrupted);
+    assert_non_null(corrupted);
+    for (int64_t i = 0; i < in->part.vertex_count + in->part.cell_count; i++) corrupted[i] = i;
+    in->field.index = (insitu_array){corrupted, INSITU_INT64, 0};
 }
 static void index_large(session_input *in)
 {
     by_index(in);
-    spoilt[7] = in->part.vertex_count;
-    spoilt[9] = -1; /* the first is told */
+    corrupted[7] = in->part.vertex_count;
+    corrupted[9] = -1; /* the first is told */
 }
 static void index_far(session_input *in)
 {
     by_index(in);
-    spoilt[2] = INT64_MAX;
+    corrupted[2] = INT64_MAX;
 }
 static void index_negative(session_input *in)
 {
     by_index(in);
-    spoilt[3] = -1;
+    corrupted[3] = -1;
 }
 static void index_before_one(session_input *in)
 {
     by_index(in);
     count_from_one(in);
-    for (int64_t i = 1; i < in->part.vertex_count; i++) spoilt[i]++;
+    for (int64_t i = 1; i < in->part.vertex_count; i++) corrupted[i]++;
 }
 static void fewer_values(session_input *in)
 {
@@ -295,7 +295,7 @@ static void type_alone(session_input *in)
     in->field.count++;
 }
 
-static const spoilt_case cases[] = {
+static const corrupted_case cases[] = {
     {"large", index_large, INSITU_ERROR_FIELD, false, {"field \"f\": the index of vertex 7 is ", "outside 0.."}},
     {"far", index_far, INSITU_ERROR_FIELD, false, {"the index of vertex 2 is 9223372036854775807, outside 0.."}},
     {"-1", index_negative, INSITU_ERROR_FIELD, false, {"the index of vertex 3 is -1, outside 0..", "index_base is 0"}},
@@ -316,7 +316,7 @@ static void what_is_wrong_is_reported_on_all_ranks(void **state)
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
     all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
-    free(spoilt);
+    free(corrupted);
 }
 
 /* The centring is one on all ranks, so this cannot be the last one's alone. */
@@ -328,17 +328,17 @@ static void cells_are_reported_too(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     by_index(&in);
     in.field.centring = INSITU_CELL;
-    if (own_rank == rank_count - 1) spoilt[in.part.cell_count - 1] = 1000000;
+    if (own_rank == rank_count - 1) corrupted[in.part.cell_count - 1] = 1000000;
     everywhere(submit(session, &in) == INSITU_OK);
     for (int step = 0; step < 2; step++)
         reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
                         "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
-    spoilt[in.part.cell_count - 1] = 0;
+    corrupted[in.part.cell_count - 1] = 0;
     step_is_good(session, 2); /* mended in place, for nothing was taken of it */
     insitu_destroy(&session);
     input_free(&in);
-    free(spoilt);
-    spoilt = NULL;
+    free(corrupted);
+    corrupted = NULL;
 }
 
 /* All cells are the first rank's: the others have no vertex, and hand over their halves of the vector all the same, by
@@ -362,8 +362,8 @@ static void ranks_without_vertices_have_values(void **state)
     step_is_good(session, 0);
     insitu_destroy(&session);
     input_free(&in);
-    free(spoilt);
-    spoilt = NULL;
+    free(corrupted);
+    corrupted = NULL;
 }
 
 int main(int argc, char **argv)

@@ -165,7 +165,7 @@ static void field_without_name(session_input *in)
     in->field.name = NULL;
 }
 
-static const spoilt_case cases[] = {
+static const corrupted_case cases[] = {
     {"index too large", index_too_large, INSITU_ERROR_MESH, false, {"cell 2 (hex): vertex index ", " is outside 0.."}},
     {"index negative", index_negative, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -3 is outside 0.."}},
     {"lowest cell", index_bad_in_two, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -9"}},
@@ -216,10 +216,10 @@ static const spoilt_case cases[] = {
     {"no components", no_components, INSITU_ERROR_ARGUMENT, true, {"field \"f\": component_count is 0"}},
 };
 
-static void spoilt_input_is_reported_on_all_ranks(void **context)
+static void corrupted_input_is_reported_on_all_ranks(void **context)
 {
     (void)context;
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_reported_on_all_ranks(session, &input, &cases[i]);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) corrupted_is_reported_on_all_ranks(session, &input, &cases[i]);
 }
 
 static void call_without_a_mesh_is_reported_once(void **context)
@@ -525,7 +525,7 @@ static void images_that_need_nothing_wrong_are_drawn(void **context)
 {
     (void)context;
     static const struct {
-        spoil_function *spoil;
+        corrupt_function *corrupt;
         insitu_status status;
         const char *drawn, *words;
     } cases[] = {
@@ -545,7 +545,7 @@ static void images_that_need_nothing_wrong_are_drawn(void **context)
         everywhere(submit(session, &input) == INSITU_OK);
         submit_other(&other);
         step_draws("fgms", INSITU_OK, "");
-        if (own_rank == rank_count - 1) cases[i].spoil(&other);
+        if (own_rank == rank_count - 1) cases[i].corrupt(&other);
         submit_other(&other);
         for (int again = 0; again < 2; again++) step_draws(cases[i].drawn, cases[i].status, cases[i].words);
         input_renew(&other);
@@ -578,7 +578,7 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spoilt_input_is_reported_on_all_ranks),
+        cmocka_unit_test(corrupted_input_is_reported_on_all_ranks),
         cmocka_unit_test(call_without_a_mesh_is_reported_once),
         cmocka_unit_test(field_missing_on_one_rank_names_it),
         cmocka_unit_test(field_of_two_centrings_is_refused),

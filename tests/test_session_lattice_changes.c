@@ -206,13 +206,13 @@ SPOIL(cell_field_short, b->c.count = CELLS - 1)
 
 typedef struct wrong_block {
     const char *name;
-    void (*spoil)(block *b);
+    void (*corrupt)(block *b);
     bool at_once; /* a set call fails too */
     const char *words;
     insitu_status status;
 } wrong_block;
 
-#define WRONG(spoil, at_once, words) #spoil, spoil, at_once, words, INSITU_ERROR_MESH
+#define WRONG(corrupt, at_once, words) #corrupt, corrupt, at_once, words, INSITU_ERROR_MESH
 
 static const wrong_block wrong_blocks[] = {
     {WRONG(no_cells_along_j_and_k, true, "0 and 0 along i, j and k, expected 0 along at most one of them")},
@@ -269,7 +269,7 @@ static void expect_report(insitu_session *session, const wrong_block *wrong, int
     block *b = make_block();
     char rank[32];
     snprintf(rank, sizeof rank, "rank %d", rank_count - 1);
-    if (is_last) wrong->spoil(b);
+    if (is_last) wrong->corrupt(b);
     const insitu_status at_once = set_block(session, b);
     if (is_last && (at_once != 0) != wrong->at_once) fprintf(stderr, "%s: %s\n", wrong->name, insitu_error(session));
     everywhere((at_once != 0) == (is_last && wrong->at_once));

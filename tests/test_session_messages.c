@@ -166,7 +166,7 @@ static void make_needles(session_input *in)
 static const struct warning_case {
     const char *name, *scene;
     test_mesh_kind kind;
-    spoil_function *spoil;
+    corrupt_function *corrupt;
     const char *words[3]; /* none: no warning */
 } warnings[] = {
     {"hexes by rows",
@@ -398,7 +398,7 @@ static void check_warning(const struct warning_case *c)
     session_input in;
     if (own_rank == 0) fprintf(stderr, "%s\n", c->name);
     input_create(&in, c->kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-    if (c->spoil) c->spoil(&in);
+    if (c->corrupt) c->corrupt(&in);
     for (int cycle = 0; cycle < 2; cycle++) {
         everywhere(submit(session, &in) == INSITU_OK);
         step_is_good(session, cycle);

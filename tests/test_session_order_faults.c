@@ -23,11 +23,11 @@ typedef struct input {
     double values[64];
 } input;
 
-typedef void spoil_input(input *in);
+typedef void corrupt_input(input *in);
 
 typedef struct fault {
     int kind; /* in kinds */
-    spoil_input *spoil;
+    corrupt_input *corrupt;
     insitu_status status;
     bool of_field, at_once;
     const char *words;
@@ -206,7 +206,7 @@ static void is_reported(insitu_session *session, const fault *f)
     order_mesh whole;
     input in;
     begin(&kinds[f->kind], &whole, &in);
-    if (is_bad) f->spoil(&in);
+    if (is_bad) f->corrupt(&in);
     const insitu_status of_mesh = insitu_set_mesh(session, "m", &in.mesh);
     insitu_status at_once = of_mesh;
     if (!of_mesh) at_once = insitu_set_field(session, "m", &in.field);

@@ -214,7 +214,7 @@ static void with_fill(void)
 }
 
 typedef struct fault {
-    void (*spoil)(void);
+    void (*corrupt)(void);
     insitu_status status;
     bool at_once; /* the set call fails too */
     const char *words[2];
@@ -259,7 +259,7 @@ static void check_fault(insitu_session *session, const fault *c, int cycle)
     snprintf(rank, sizeof rank, "rank %d: mesh \"m\": field \"f\"", rank_count - 1);
     create();
     describe();
-    if (is_last) c->spoil();
+    if (is_last) c->corrupt();
     forget_pictures();
     const insitu_status at_once = submit(session, &input);
     everywhere(at_once == (is_last && c->at_once ? c->status : INSITU_OK));

@@ -471,7 +471,7 @@ static void component_of_no_type(session_input *in)
     components[1].type = (insitu_type)77;
 }
 
-static const spoilt_case faults[] = {
+static const corrupted_case faults[] = {
     {"no type", numbers_without_type, INSITU_ERROR_MESH, false, {"cell 3", "type 7"}},
     {"no map", no_map, INSITU_ERROR_ARGUMENT, true, {"cell_type_map_count is 3, and cell_type_map is not given"}},
     {"open", offsets_half_open, INSITU_ERROR_ARGUMENT, true, {"open_offsets is 2, expected 0 or 1"}},

@@ -97,7 +97,7 @@ static void put_number(const input_array *a, int64_t i, double value)
 }
 
 /* Other contents of one to three elements. */
-static void spoil_elements(const input_array *a, dice *d)
+static void corrupt_elements(const input_array *a, dice *d)
 {
     const int64_t indices[] = {-1, 0, 1, -7, INT32_MIN, INT32_MAX, INT64_MIN, INT64_MAX, (int64_t)1 << 40, a->count};
     const double numbers[] = {NAN, INFINITY, -INFINITY, 1e200, -1e300, 1e30, 0, -0.0, 1e-310, 7};
@@ -111,7 +111,7 @@ static void spoil_elements(const input_array *a, dice *d)
     }
 }
 
-static void spoil_stride(const input_array *a, dice *d)
+static void corrupt_stride(const input_array *a, dice *d)
 {
     static const int64_t wild[] = {
         (int64_t)1 << 60, (int64_t)1 << 62, INT64_MIN, INT64_MAX, -((int64_t)1 << 50), 1, 3, 0};
@@ -119,7 +119,7 @@ static void spoil_stride(const input_array *a, dice *d)
 }
 
 /* Types of no more bytes, right ones and wrong ones, and numbers that are no type. */
-static void spoil_type(const input_array *a, dice *d)
+static void corrupt_type(const input_array *a, dice *d)
 {
     static const int types[] = {INSITU_FLOAT32, INSITU_FLOAT64, INSITU_INT32, INSITU_INT64, INSITU_UINT8, 0, -1, 77};
     const int type = PICK(d, types);
@@ -127,7 +127,7 @@ static void spoil_type(const input_array *a, dice *d)
     a->array->type = (insitu_type)type;
 }
 
-static void spoil_array(formed_mesh *m, const formed_mesh *right, dice *d)
+static void corrupt_array(formed_mesh *m, const formed_mesh *right, dice *d)
 {
     input_array arrays[ARRAYS];
     const int count = list_arrays(m, right, arrays);
@@ -135,12 +135,12 @@ static void spoil_array(formed_mesh *m, const formed_mesh *right, dice *d)
     const input_array *a = &arrays[roll(d, count)];
     switch (roll(d, 6)) {
     case 0: a->array->data = NULL; return;
-    case 1: spoil_stride(a, d); return;
-    case 2: spoil_type(a, d); return;
+    case 1: corrupt_stride(a, d); return;
+    case 2: corrupt_type(a, d); return;
     case 3:
         if (size_of(a->truth.type) > 1) a->array->data = (const char *)a->truth.data + 1;
         return;
-    default: spoil_elements(a, d);
+    default: corrupt_elements(a, d);
     }
 }
 
@@ -152,7 +152,7 @@ static int64_t other_count(int64_t count, dice *d)
     return roll(d, 2) ? PICK(d, huge) : roll(d, count > 0 ? count : 1);
 }
 
-static void spoil_count(formed_mesh *m, dice *d)
+static void corrupt_count(formed_mesh *m, dice *d)
 {
     insitu_mesh *a = &m->mesh;
     int64_t *const counts[] = {&a->vertex_count,
@@ -172,7 +172,7 @@ static void spoil_count(formed_mesh *m, dice *d)
     if (roll(d, 2)) formed_fit_fields(m);
 }
 
-static void spoil_choice(formed_mesh *m, dice *d)
+static void corrupt_choice(formed_mesh *m, dice *d)
 {
     static const int types[] = {0, 5, 7, 9, 10, 11, 12, 13, 14, 41, 42, -1};
     static const int64_t rows[] = {-1, 0, 3, 6, 9, 12, (int64_t)1 << 60, INT64_MIN, INT64_MAX};
@@ -211,14 +211,14 @@ static void leave_out(formed_mesh *m, dice *d)
 }
 
 /* The fault's own numbers do not depend on what the rank has. */
-static void spoil(formed_mesh *m, const formed_mesh *right, uint64_t number, int fault, bool is_mine)
+static void corrupt(formed_mesh *m, const formed_mesh *right, uint64_t number, int fault, bool is_mine)
 {
     dice d = {number, 1000 * (uint64_t)(fault + 1)};
     const int64_t kind = roll(&d, 8);
     if (!is_mine) return;
-    if (kind < 4) spoil_array(m, right, &d);
-    if (kind == 4 || kind == 5) spoil_count(m, &d);
-    if (kind == 6) spoil_choice(m, &d);
+    if (kind < 4) corrupt_array(m, right, &d);
+    if (kind == 4 || kind == 5) corrupt_count(m, &d);
+    if (kind == 6) corrupt_choice(m, &d);
     if (kind == 7) leave_out(m, &d);
 }
 
@@ -282,7 +282,7 @@ static bool draw_wrong(bench *b, int number)
     const int64_t faults = 1 + roll(&d, FAULTS), where = roll(&d, rank_count + 2);
     const bool is_mine = where >= rank_count || where == own_rank;
     const formed_mesh right = b->mesh;
-    for (int fault = 0; fault < faults; fault++) spoil(&b->mesh, &right, (uint64_t)number, fault, is_mine);
+    for (int fault = 0; fault < faults; fault++) corrupt(&b->mesh, &right, (uint64_t)number, fault, is_mine);
     forget_pictures();
     const insitu_status set = formed_submit(b->session, &b->mesh, b->is_torn);
     const insitu_status status = insitu_step(b->session, b->cycle++, 0);
