@@ -319,9 +319,9 @@ static void decided_crossings_are_right(void **state)
 
 enum { BOX_RAYS = 12 };
 
-typedef struct looks {
+typedef struct quad_counts {
     int64_t quads, convex, turned, wrong; /* rays too */
-} looks;
+} quad_counts;
 
 /* Slopes along which three neighbouring vertices of a quad are seen nearly in line; false where none are small. */
 static bool graze(const batch *b, int lane, double slope[2])
@@ -375,7 +375,7 @@ static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
     }
 }
 
-static bool turns_one_way(const vf x[8], const vf y[8], const signed char *loop, int lane)
+static bool is_convex_loop(const vf x[8], const vf y[8], const signed char *loop, int lane)
 {
     int left = 0, right = 0;
     for (int i = 0; i < 4; i++) {
@@ -411,7 +411,7 @@ static vm edges_are_wrong(const vf x[8], const vf y[8], const signed char *loop)
     return vm_and(known, vm_or(vm_xor(once, vm_sign(kernel_sides_agree(around, 4))), bends));
 }
 
-static void verify_quads(const batch *b, const kernel_rays *rays, vi dents, looks *n)
+static void verify_quads(const batch *b, const kernel_rays *rays, vi dents, quad_counts *n)
 {
     const kernel_shape *shape = kernel_cell_shape(b->type);
     vf x[8], y[8];
@@ -428,7 +428,7 @@ static void verify_quads(const batch *b, const kernel_rays *rays, vi dents, look
             n->quads++;
             if (dents[lane] >> face & 1) continue;
             n->convex++;
-            n->turned += !turns_one_way(x, y, loop, lane);
+            n->turned += !is_convex_loop(x, y, loop, lane);
             n->wrong += wrong >> lane & 1;
         }
     }
@@ -440,7 +440,7 @@ static void quads_that_look_convex_are(void **state)
     static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
     for (int k = 0; k < 3; k++)
         for (shape s = 0; s < SHAPE_COUNT; s++) {
-            looks n = {.quads = 0};
+            quad_counts n = {.quads = 0};
             while (n.quads < 4 * rays_wanted) {
                 batch b;
                 kernel_rays rays[BOX_RAYS];

@@ -23,7 +23,7 @@ static void cells_fixture(render_fixture *f)
 {
     fixture_create(f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.1, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(f, CAMERA_OUTSIDE, width, height);
+    fixture_set_camera(f, CAMERA_OUTSIDE, width, height);
 }
 
 static void surfaces_and_samples_are_the_reference(void **state)

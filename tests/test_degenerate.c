@@ -25,7 +25,7 @@ static void open_scene(render_fixture *f, const test_mesh *mesh, scene_kind scen
 {
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.5, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(f, camera, width, height);
+    fixture_set_camera(f, camera, width, height);
     if (scene != SEGMENTS) fixture_add_surface(f, values, 2, scene == OPAQUE ? 1 : 0.4f);
     if (scene != OPAQUE) fixture_set_volume(f, 0.3);
     if (scene == SEGMENTS) f->job.integration = RENDER_SEGMENTS;
@@ -137,7 +137,7 @@ static void add_point_faces(test_mesh *mesh)
 }
 
 /* All faces, or every second, the other way round. */
-static void turn_inside_out(test_mesh *mesh)
+static void reverse_faces(test_mesh *mesh)
 {
     for (int64_t face = 0; face < mesh->face_count; face++)
         for (int64_t i = mesh->face_offsets[face], k = mesh->face_offsets[face + 1] - 1; i < k; i++, k--) {
@@ -147,11 +147,11 @@ static void turn_inside_out(test_mesh *mesh)
         }
 }
 
-static void turn_every_second(test_mesh *mesh)
+static void reorder_every_second(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh), turned = begin_copy(mesh);
     copy_faces(mesh, &turned);
-    turn_inside_out(&turned);
+    reverse_faces(&turned);
     for (int64_t face = 0; face < mesh->face_count; face++) {
         const test_mesh *from = face % 2 ? mesh : &turned;
         test_mesh_add_face(&copy, from->face_connectivity + from->face_offsets[face], face_size(from, face));
@@ -280,8 +280,8 @@ static void faces_in_one_place_change_no_pixel(void **state)
 static void faces_turned_over_change_no_pixel(void **state)
 {
     (void)state;
-    assert_same_bits(turn_inside_out);
-    assert_same_bits(turn_every_second);
+    assert_same_bits(reverse_faces);
+    assert_same_bits(reorder_every_second);
 }
 
 static void polyhedra_of_no_volume_change_no_pixel(void **state)

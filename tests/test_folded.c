@@ -44,7 +44,7 @@ static void stage(render_fixture *f, const test_mesh *mesh, fixture_camera camer
 {
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(f, camera, WIDTH, HEIGHT);
+    fixture_set_camera(f, camera, WIDTH, HEIGHT);
     set_scene(f, scene);
 }
 
@@ -97,7 +97,7 @@ static void draw_distributed(const test_mesh *mesh, scene_kind scene, drawn_fram
         test_mesh part;
         test_mesh_part(mesh, owners, rank, &part);
         test_mesh_shuffle(&part, (uint64_t)rank + 20);
-        test_mesh_turn(&part, (uint64_t)rank + 40);
+        test_mesh_reorder_vertices(&part, (uint64_t)rank + 40);
         stage(&parts[rank], &part, CAMERA_OUTSIDE, scene);
         parts[rank].job.is_alone = false;
         parts[rank].job.separate_samples = scene == SAMPLES;

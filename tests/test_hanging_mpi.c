@@ -46,7 +46,7 @@ static void stage(render_fixture *f, const test_mesh *mesh, const drawing *d, fi
 {
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(f, camera, WIDTH, HEIGHT);
+    fixture_set_camera(f, camera, WIDTH, HEIGHT);
     if (d->value_count) fixture_add_surface(f, surface_values, d->value_count, d->opacity);
     if (d->has_volume) fixture_set_volume(f, 0.3);
     f->job.integration = d->max_error > 0 ? RENDER_SEGMENTS : RENDER_SAMPLES;
@@ -126,10 +126,10 @@ typedef struct hanging_case {
 
 static const hanging_case cases[] = {
     {TEST_HEXES, 2, TEST_HANGING_DYADIC, false}, {TEST_HEXES, 4, TEST_HANGING_DYADIC, false},
-    {TEST_HEXES, 2, TEST_HANGING_TURNED, false}, {TEST_HEXES, 4, TEST_HANGING_TURNED, false},
+    {TEST_HEXES, 2, TEST_HANGING_ROTATED, false}, {TEST_HEXES, 4, TEST_HANGING_ROTATED, false},
     {TEST_HEXES, 2, TEST_HANGING_CURVED, false}, {TEST_HEXES, 4, TEST_HANGING_CURVED, false},
-    {TEST_HEXES, 2, TEST_HANGING_TURNED, true},  {TEST_WEDGES, 2, TEST_HANGING_TURNED, false},
-    {TEST_TETS, 2, TEST_HANGING_TURNED, false},  {TEST_TETS, 4, TEST_HANGING_DYADIC, false},
+    {TEST_HEXES, 2, TEST_HANGING_ROTATED, true},  {TEST_WEDGES, 2, TEST_HANGING_ROTATED, false},
+    {TEST_TETS, 2, TEST_HANGING_ROTATED, false},  {TEST_TETS, 4, TEST_HANGING_DYADIC, false},
 };
 enum { CASE_COUNT = sizeof cases / sizeof cases[0] };
 

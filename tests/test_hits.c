@@ -161,7 +161,7 @@ static void robust_hits_are_on_the_surface(void **state)
             tally t = {.rays = 0};
             if (!test_is_whole() && (k + (int)camera) % 2) continue; /* a kind has one or two cameras */
             fixture_create_lattice(&f, kinds[k], kinds[k] == TEST_PYRAMIDS ? 3 : 4, 0.2, test_wave);
-            fixture_look(&f, camera, 53, 45);
+            fixture_set_camera(&f, camera, 53, 45);
             add_robust(&f, 0.4f); /* all crossings, not the first alone */
             verify_frame(&f, 1e-6, &t);
             print_tally(test_mesh_kind_name(kinds[k]), &t);
@@ -212,7 +212,7 @@ static void robust_hits_in_ill_shaped_cells_are_the_reference(void **state)
             make_ill_shaped(kind, seed, &mesh);
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                            (const double[]){0, 0, 0});
-            fixture_look(&f, seed % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 31, 29);
+            fixture_set_camera(&f, seed % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 31, 29);
             /* Close to the apex: the middle of the picture is its neighbourhood. */
             if (kind == ILL_SHAPED_APEX)
                 assert_true(render_camera_look_at(&f.job.camera, (const double[]){2.4, 1.6, 3.0},
@@ -298,7 +298,7 @@ static void cell_gradients_are_the_reference(void **state)
         render_light lights[3];
         int64_t checked = 0, rays = 0, left_out = 0;
         fixture_create_lattice(&f, kinds[k], 3, 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 43, 37);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 43, 37);
         add_robust(&f, 0.5f);
         light_by_axes(&f, lights);
         fixture_draw(&f, &drawn);
@@ -351,7 +351,7 @@ static void differences_of_a_linear_field_are_exact(void **state)
                 render_light lights[3];
                 double worst = 0;
                 fixture_create_lattice(&f, kind, 3, 0.2, test_linear);
-                fixture_look(&f, camera, 35, 31);
+                fixture_set_camera(&f, camera, 35, 31);
                 add_differences(&f, values, 3, opaque ? 1 : 0.5f, 0.5, lights);
                 fixture_draw(&f, &drawn);
                 for (int64_t i = 0; i < drawn.list.count; i++)
@@ -377,7 +377,7 @@ static double quadratic_error(int n, render_normal normal, double difference)
     render_light lights[3];
     double sum = 0;
     fixture_create_lattice(&f, TEST_HEXES, n, 0, quadratic);
-    fixture_look(&f, CAMERA_OUTSIDE, 64, 64);
+    fixture_set_camera(&f, CAMERA_OUTSIDE, 64, 64);
     add_differences(&f, value, 1, 1, difference, lights);
     f.surfaces[0].normal = normal;
     fixture_draw(&f, &drawn);

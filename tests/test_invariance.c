@@ -274,7 +274,7 @@ static void take_part(const test_mesh *mesh, const int *owners, int layers, inpu
     *out = (input){0};
     test_mesh_part(mesh, of_part, 0, &out->vertices.part);
     for (int i = 0; i < count; i++) out->vertices.part.ghosts[i] = owners[origin[i]] != own_rank;
-    test_mesh_turn(&out->vertices.part, 11 + (uint64_t)own_rank);
+    test_mesh_reorder_vertices(&out->vertices.part, 11 + (uint64_t)own_rank);
     describe(out, origin);
     free(taken);
     free(of_part);

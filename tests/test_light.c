@@ -108,7 +108,7 @@ static double size_of(const test_mesh *mesh, int64_t cell)
 
 /* Tells by brute force whether the ray meets something in front: 1, 0, or -1 where rounding may decide. Roots of the
  * hit's own surface lie behind the start by the lift less what hits are off by. */
-static int look(const render_fixture *f, const test_mesh *mesh, const double start[3], const double d[3], double reach)
+static int is_blocked_by_brute_force(const render_fixture *f, const test_mesh *mesh, const double start[3], const double d[3], double reach)
 {
     static const float nothing[4] = {0, 0, 0, 0};
     const double *across = fabs(d[1]) < 0.9 ? (const double[]){0, 1, 0} : (const double[]){1, 0, 0};
@@ -156,11 +156,11 @@ static void verify_hit(const render_fixture *f, const test_mesh *mesh, const hit
     start_of(f, hit, n, start);
     for (int k = 0; k < SAMPLES; k += 3) {
         test_hemisphere(hit->pixel, WIDTH, SAMPLES, k, n, d);
-        verify(look(f, mesh, start, d, radius), h->open[i].samples >> k & 1, what, t);
+        verify(is_blocked_by_brute_force(f, mesh, start, d, radius), h->open[i].samples >> k & 1, what, t);
     }
     for (int k = 0; k < LIGHTS; k++)
         if (h->rays[i].lights >> k & 1)
-            verify(look(f, mesh, start, f->lights[k].direction, INFINITY), h->open[i].lights >> k & 1, what, t);
+            verify(is_blocked_by_brute_force(f, mesh, start, f->lights[k].direction, INFINITY), h->open[i].lights >> k & 1, what, t);
 }
 
 static void verify_mesh(const test_mesh *mesh, fixture_camera camera, float contact, const char *what)
@@ -169,7 +169,7 @@ static void verify_mesh(const test_mesh *mesh, fixture_camera camera, float cont
     render_fixture f;
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(&f, camera, WIDTH, HEIGHT);
+    fixture_set_camera(&f, camera, WIDTH, HEIGHT);
     fixture_add_surface(&f, isovalues, 2, 1);
     f.surfaces[0].contact = contact;
     f.job.paint = RENDER_UNLIT;

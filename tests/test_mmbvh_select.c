@@ -44,7 +44,7 @@ static test_mesh make_mesh(test_mesh_kind kind, int side)
 }
 
 /* -1: not to be used; else whether the wish can show it. */
-static int look(const test_view *view, const mmbvh_query *query, int64_t cell)
+static int expected_selection(const test_view *view, const mmbvh_query *query, int64_t cell)
 {
     double low = (double)INFINITY, high = -(double)INFINITY;
     grid_walk walk = grid_walk_cell(&view->cells, cell);
@@ -72,7 +72,7 @@ static int64_t assert_selects(const test_view *view, const mmbvh_query *queries,
     for (int64_t cell = 0; cell < view->cells.cell_count; cell++) {
         bool shows = false;
         for (int i = 0; i < count && !grid_is_ghost(&view->cells, cell); i++) {
-            const int seen = look(view, &queries[i], cell);
+            const int seen = expected_selection(view, &queries[i], cell);
             shows |= seen > 0;
             unusable_by_hand[i] += seen < 0;
         }

@@ -25,7 +25,7 @@ static double nothing(const double p[3])
 }
 
 /* Axes in one of six orders, each with one of two signs. */
-static void turn(order_mesh *mesh, int way)
+static void permute_axes(order_mesh *mesh, int way)
 {
     static const signed char orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
     for (int64_t i = 0; i < mesh->vertex_count; i++) {
@@ -134,7 +134,7 @@ static void cut_and_verify(const order_kind *kind, int way, double bend)
     order_mesh mesh;
     base_error error = {.status = INSITU_OK};
     order_mesh_create(kind, SIDE, bend, nothing, 0, 1, &mesh);
-    turn(&mesh, way);
+    permute_axes(&mesh, way);
     session_mesh cut = {.name = (char[]){"m"}, .given = mesh.mesh};
     assert_int_equal(session_split_cells(&cut, 1, &error), INSITU_OK);
     const grid g = grid_of(&mesh, &cut.topology);

@@ -115,7 +115,7 @@ static void stage(staged *s, const test_mesh *mesh, const drawing *d)
 {
     fixture_create(&s->f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(&s->f, d->camera, WIDTH, HEIGHT);
+    fixture_set_camera(&s->f, d->camera, WIDTH, HEIGHT);
     if (d->scene == OPAQUE_VOLUME || d->scene == TRANSPARENT_VOLUME)
         fixture_add_surface(&s->f, surface_values, 2, d->scene == OPAQUE_VOLUME ? 1 : 0.4f);
     fixture_set_volume(&s->f, 0.3);

@@ -54,7 +54,7 @@ static void draw(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool 
     base_error error = {0};
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(&f, scene->camera, WIDTH, HEIGHT);
+    fixture_set_camera(&f, scene->camera, WIDTH, HEIGHT);
     if (scene->opacity > 0) fixture_add_surface(&f, values, 2, scene->opacity);
     if (scene->has_volume) fixture_set_volume(&f, 0.3);
     f.job.integration = scene->integration;

@@ -393,7 +393,7 @@ static void hits_of(const render_fixture *f, const drawn_frame *drawn, int64_t p
 /* ---- frames ---- */
 
 /* Looks from a random side, now and then from the inside or without perspective. */
-static void look_at_random(render_fixture *f, uint64_t seed)
+static void view_from_random_side(render_fixture *f, uint64_t seed)
 {
     const double angle = test_uniform_in(0, seed, 0, 6.283), height = test_uniform_in(1, seed, -0.9, 0.9);
     const double distance = seed % 8 == 7 ? 0.1 : 3, across = distance * sqrt(1 - height * height);
@@ -436,7 +436,7 @@ static void verify_cell(const test_mesh *mesh, uint64_t seed, tally *t)
     const double values[1] = {test_uniform_in(4, seed, -0.6, 0.6)};
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                    (const double[]){0, 0, 0});
-    look_at_random(&f, seed);
+    view_from_random_side(&f, seed);
     fixture_add_surface(&f, values, 1, seed % 2 ? 1 : 0.4f);
     verify_frame(&f, values[0], t);
     fixture_free(&f);
@@ -537,7 +537,7 @@ static void sums_beyond_the_vertices_show_no_surface(void **state)
                    (const double[]){0, 0, 0});
     fixture_add_surface(&f, &value, 1, 0.4f);
     for (uint64_t seed = 0; seed < 16; seed++) {
-        look_at_random(&f, seed);
+        view_from_random_side(&f, seed);
         make_subject(&f, &s);
         fixture_draw(&f, &drawn);
         assert_int_equal(drawn.list.count, 0);

@@ -41,7 +41,7 @@ static void surface_is_the_reference_for_every_kind_and_camera(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++) {
             render_fixture f;
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-            fixture_look(&f, camera, 39, 33);
+            fixture_set_camera(&f, camera, 39, 33);
             fixture_add_surface(&f, one_value, 1, 1);
             const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "one value"));
             assert_true(o.hits > 150);
@@ -64,7 +64,7 @@ static void surfaces_of_several_values_are_the_reference(void **state)
             render_fixture f;
             if (!is_due(kind, camera, 0)) continue;
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-            fixture_look(&f, camera, 27, 23);
+            fixture_set_camera(&f, camera, 27, 23);
             fixture_add_surface(&f, four_values, 4, 1);
             fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "four values"));
             f.surfaces[0].opacity = 0.4f;
@@ -79,7 +79,7 @@ static void transparent_surfaces_before_an_opaque_one_are_the_reference(void **s
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         render_fixture f;
         fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, four_values, 2, 0.3f);
         fixture_add_surface(&f, four_values + 2, 2, 1);
         fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "transparent before opaque"));
@@ -96,7 +96,7 @@ static void lights_behind_surfaces_leave_them_dark(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {
             render_fixture f;
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-            fixture_look(&f, camera, 33, 29);
+            fixture_set_camera(&f, camera, 33, 29);
             fixture_add_surface(&f, one_value, 1, 1);
             f.surfaces[0].material = (render_material){.ambient = 0.1f, .diffuse = 0.3f, .specular = 1, .shininess = 4};
             for (int a = 0; a < 3; a++) {
@@ -116,7 +116,7 @@ static void volume_is_the_reference_for_every_kind_and_camera(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++) {
             render_fixture f;
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-            fixture_look(&f, camera, 37, 31);
+            fixture_set_camera(&f, camera, 37, 31);
             fixture_set_volume(&f, 0.3);
             fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "volume"));
             fixture_free(&f);
@@ -132,7 +132,7 @@ static void volume_and_surfaces_are_the_reference_together(void **state)
                 render_fixture f;
                 if (!is_due(kind, camera, transparent)) continue;
                 fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-                fixture_look(&f, camera, 25, 21);
+                fixture_set_camera(&f, camera, 25, 21);
                 fixture_add_surface(&f, four_values + 1, 2, transparent ? 0.5f : 1);
                 fixture_set_volume(&f, 0.4);
                 const char *what = transparent ? "volume and transparent surfaces" : "volume and surfaces";
@@ -160,7 +160,7 @@ static void volume_between_many_surfaces_is_the_reference(void **state)
         drawn_frame drawn;
         int crowded = 0;
         fixture_create_lattice(&f, TEST_TETS, 7, 0.2, short_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 29, 27);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 29, 27);
         fixture_add_surface(&f, values, 16, 0.03f);
         f.surfaces[0].colours = colours;
         fixture_set_volume(&f, 0.2);
@@ -196,7 +196,7 @@ static void compare_plane(test_mesh_kind kind, fixture_camera camera, bool is_wa
     render_fixture f;
     drawn_frame drawn;
     fixture_create_lattice(&f, kind, 3, is_warped ? 0.2 : 0, test_linear);
-    fixture_look(&f, camera, 41, 37);
+    fixture_set_camera(&f, camera, 41, 37);
     fixture_add_surface(&f, linear_values, 3, 0.5f);
     fixture_draw(&f, &drawn);
     for (int64_t i = 0; i < drawn.list.count; i++) {
@@ -231,7 +231,7 @@ static void constant_volume_counts_every_sample_once(void **state)
             drawn_frame drawn;
             int off = 0, met = 0;
             fixture_create_lattice(&f, kind, 4, camera == CAMERA_ALONG_X ? 0 : 0.2, test_linear);
-            fixture_look(&f, camera, 43, 41);
+            fixture_set_camera(&f, camera, 43, 41);
             fixture_set_volume(&f, 0.23);
             f.transfer.opacity_count = 1;
             f.transfer.opacities = constant;
@@ -271,7 +271,7 @@ static void lattice_lines_have_no_holes(void **state)
         drawn_frame drawn;
         int met = 0;
         fixture_create_lattice(&f, kind, 4, 0, test_linear);
-        fixture_look(&f, CAMERA_ALONG_X, 43, 41);
+        fixture_set_camera(&f, CAMERA_ALONG_X, 43, 41);
         static const double value[1] = {0.1};
         fixture_add_surface(&f, value, 1, 0.5f);
         fixture_draw(&f, &drawn);
@@ -305,7 +305,7 @@ static void single_cells_are_the_reference(void **state)
             test_mesh_single(shape, test_linear, &mesh);
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                            (const double[]){0, 0, 0});
-            fixture_look(&f, camera, 39, 33);
+            fixture_set_camera(&f, camera, 39, 33);
             fixture_add_surface(&f, values, 3, 0.5f);
             fixture_set_volume(&f, 0.05);
             const bool is_thin = shape == TEST_SLIVER_TET || shape >= TEST_FLAT_TET;
@@ -327,7 +327,7 @@ static void surfaces_along_slivers_are_the_reference(void **state)
         for (int v = 0; v < 4; v++) mesh.values[v] = v == 3 ? 0.5 : -0.5;
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                        (const double[]){0, 0, 0});
-        fixture_look(&f, camera, 121, 101);
+        fixture_set_camera(&f, camera, 121, 101);
         fixture_add_surface(&f, values, 3, 0.5f);
         const fixture_outcome met = fixture_compare(&f, &fixture_usual_bounds, fixture_camera_name(camera));
         assert_true(met.hits > 100);
@@ -346,7 +346,7 @@ static void left_handed_cells_are_the_reference(void **state)
         test_mesh_mirror(&mesh, true);
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / 3, 1,
                        (const double[]){0, 0, 0});
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, one_value, 1, 0.5f);
         fixture_set_volume(&f, 0.3);
         fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "left-handed"));
@@ -367,7 +367,7 @@ static void far_coordinates_are_the_reference(void **state)
         test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
         test_mesh_transform(&mesh, 1000, far_away);
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 500, 1000, far_away);
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, one_value, 1, 0.5f);
         fixture_set_volume(&f, 0.3);
         fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "far away"));
@@ -386,7 +386,7 @@ static void two_volumes_share_their_light(void **state)
         test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
         test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &second);
         fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_set_volume(&f, 0.3);
         float *pairs = malloc((size_t)f.trees[0].node_count * 2 * sizeof *pairs);
         int64_t unusable;
@@ -429,7 +429,7 @@ static void cell_centred_volume_is_the_reference(void **state)
             assert_int_equal(
                 mmbvh_refit_ranges(&f.trees[0], &f.views[0].cells, &f.fields[0], &(mmbvh_options){.threads = 1}),
                 INSITU_OK);
-            fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+            fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
             fixture_set_volume(&f, 0.2);
             f.job.is_alone = is_alone;
             fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "cell-centred"));
@@ -457,7 +457,7 @@ static void values_of_any_size_are_the_reference(void **state)
             render_fixture f;
             const double scale = tiny ? 1e-30 : 1e30, tent[3] = {-0.6 * scale, 0, 0.6 * scale};
             fixture_create_lattice(&f, kind, 3, 0.2, tiny ? tiny_wave : huge_wave);
-            fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+            fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
             fixture_add_surface(&f, tiny ? tiny_values : huge_values, 1, 0.5f);
             fixture_set_volume(&f, 0.3);
             f.transfer.low *= scale;
@@ -478,7 +478,7 @@ static void surface_coloured_by_the_field_is_the_reference(void **state)
         test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
         test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
         fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_set_volume(&f, 0.3);
         f.job.volume_count = 0;
         fixture_add_surface(&f, four_values, 4, 1);
@@ -498,7 +498,7 @@ static void one_pixel_images_are_the_reference(void **state)
     for (int i = 0; i < 4; i++) {
         render_fixture f;
         fixture_create_lattice(&f, TEST_HEXES, 3, 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, sizes[i][0], sizes[i][1]);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, sizes[i][0], sizes[i][1]);
         fixture_add_surface(&f, one_value, 1, 0.5f);
         fixture_set_volume(&f, 0.3);
         fixture_compare(&f, &fixture_usual_bounds, "small images");
@@ -526,7 +526,7 @@ static void surfaces_of_cells_smaller_than_pixels_are_the_reference(void **state
             render_fixture f;
             drawn_frame drawn[2];
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-            fixture_look(&f, camera, 9, 5);
+            fixture_set_camera(&f, camera, 9, 5);
             fixture_add_surface(&f, four_values, 2, 1);
             fixture_add_surface(&f, one_value, 1, 1);
             if (camera % 2) build_reference_layout(&f);

@@ -73,7 +73,7 @@ void fixture_create(render_fixture *f, const test_mesh *meshes, int count, test_
     f->job.jitter = true;
     f->job.is_alone = true;
     f->job.threads = 1;
-    fixture_look(f, CAMERA_OUTSIDE, 48, 40);
+    fixture_set_camera(f, CAMERA_OUTSIDE, 48, 40);
 }
 
 void fixture_create_lattice(render_fixture *f, test_mesh_kind kind, int n, double jitter, test_function *field)
@@ -94,7 +94,7 @@ void fixture_free(render_fixture *f)
     memset(f, 0, sizeof *f);
 }
 
-void fixture_look(render_fixture *f, fixture_camera camera, int width, int height)
+void fixture_set_camera(render_fixture *f, fixture_camera camera, int width, int height)
 {
     static const double views[CAMERA_COUNT][2][3] = {{{2.4, 1.6, 3.0}, {0, 0, 0}},
                                                      {{2.4, 1.6, 3.0}, {0, 0, 0}},

@@ -44,7 +44,7 @@ void fixture_create(render_fixture *f, const test_mesh *meshes, int count, test_
 void fixture_create_lattice(render_fixture *f, test_mesh_kind kind, int n, double jitter, test_function *field);
 void fixture_free(render_fixture *f);
 
-void fixture_look(render_fixture *f, fixture_camera camera, int width, int height);
+void fixture_set_camera(render_fixture *f, fixture_camera camera, int width, int height);
 /* A further surface layer with isovalues (static). */
 void fixture_add_surface(render_fixture *f, const double *values, int count, float opacity);
 /* A volume of a tent of opacity for |value| < 0.6. step in cells. */

@@ -29,14 +29,14 @@ static void mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, 
                          fixture_camera camera)
 {
     fixture_create(f, meshes, count, wide, 2.0 / n, 1, origin);
-    fixture_look(f, camera, 61, 47);
+    fixture_set_camera(f, camera, 61, 47);
     add_layers(f, scene);
 }
 
 static void lattice_fixture(render_fixture *f, test_mesh_kind kind, scene_kind scene, fixture_camera camera)
 {
     fixture_create_lattice(f, kind, 4, 0.2, test_wave);
-    fixture_look(f, camera, 61, 47);
+    fixture_set_camera(f, camera, 61, 47);
     add_layers(f, scene);
 }
 
@@ -170,7 +170,7 @@ static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fix
     for (int64_t p = 0; p < WIDTH * HEIGHT; p++)
         if (p * p % 7 < 3) pixel_set_add(pixels, p);
     fixture_create_lattice(&f, kind, n, 0.2, test_wave);
-    fixture_look(&f, camera, WIDTH, HEIGHT);
+    fixture_set_camera(&f, camera, WIDTH, HEIGHT);
     add_layers(&f, scene);
     if (scene == TRANSPARENT && kind == TEST_HEXES) {
         f.surfaces[0].normal = RENDER_DIFFERENCES;
@@ -256,7 +256,7 @@ static double depth_difference(const drawn_frame *a, const drawn_frame *b)
 /* A cell written in another of its symmetries has the same faces, so exactly the same rays hit it. The map inside has
  * other coordinates and rounds differently: t to some 1e-7 times the conditioning, which is up to 30 among 61 × 47
  * rays. */
-static void turned_cells_draw_the_same(void **state)
+static void reordered_cells_draw_the_same(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -268,7 +268,7 @@ static void turned_cells_draw_the_same(void **state)
             mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &first);
             fixture_free(&f);
-            test_mesh_turn(&mesh, 78);
+            test_mesh_reorder_vertices(&mesh, 78);
             mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &other);
             if (getenv("INSITU_TEST_VERBOSE"))
@@ -297,7 +297,7 @@ static void layouts_do_not_change_a_bit(void **state)
             render_fixture f;
             drawn_frame other;
             fixture_create(&f, &mesh, 1, layout, 2.0 / 3, 1, origin);
-            fixture_look(&f, CAMERA_OUTSIDE, 29, 23);
+            fixture_set_camera(&f, CAMERA_OUTSIDE, 29, 23);
             add_layers(&f, TRANSPARENT_VOLUME);
             fixture_draw(&f, bits ? &other : &first);
             if (bits) {
@@ -380,7 +380,7 @@ static void compare_volume_traversals(test_mesh_kind kind, scene_kind scene, fix
     test_mesh_lattice(kind, 5, 0.2, test_wave, &mesh);
     distribute(&mesh, TEST_CHECKERBOARD, 5, 2, false, parts);
     fixture_create(&f, parts, 2, layout, 0.4, 1, origin);
-    fixture_look(&f, camera, 61, 47);
+    fixture_set_camera(&f, camera, 61, 47);
     add_layers(&f, scene);
     for (f.job.sample_group = 3; f.job.sample_group <= 64; f.job.sample_group += 61) draw_by_traversals(&f);
     fixture_free(&f);
@@ -592,7 +592,7 @@ static void isovalue_at_vertices_leaves_no_hole(void **state)
             int met = 0, several = 0;
             if (camera == CAMERA_INSIDE) continue; /* looks away from the plane */
             fixture_create_lattice(&f, kind, 4, 0, plane_field);
-            fixture_look(&f, camera, 43, 41);
+            fixture_set_camera(&f, camera, 43, 41);
             fixture_add_surface(&f, zero, 1, 0.5f);
             fixture_draw(&f, &drawn);
             for (int p = 0; p < 43 * 41; p++) {
@@ -641,7 +641,7 @@ int main(void)
         cmocka_unit_test(traversals_do_not_change_a_bit),
         cmocka_unit_test(sample_groups_draw_the_same),
         cmocka_unit_test(order_and_numbering_do_not_change_a_bit),
-        cmocka_unit_test(turned_cells_draw_the_same),
+        cmocka_unit_test(reordered_cells_draw_the_same),
         cmocka_unit_test(layouts_do_not_change_a_bit),
         cmocka_unit_test(traversals_of_volumes_do_not_change_a_bit),
         cmocka_unit_test(parts_and_ranks_draw_the_whole),

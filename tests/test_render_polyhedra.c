@@ -35,7 +35,7 @@ static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bo
     render_fixture f;
     test_mesh_polyhedron(shape, is_linear ? test_linear : test_wave, &mesh);
     mesh_fixture(&f, &mesh, 1, 1);
-    fixture_look(&f, camera, 49, 43);
+    fixture_set_camera(&f, camera, 49, 43);
     fixture_add_surface(&f, values, 3, 0.5f);
     fixture_set_volume(&f, 0.05);
     const fixture_outcome o =
@@ -142,7 +142,7 @@ static void draw_mesh(const test_mesh *mesh, fixture_camera camera, scene_set *s
 {
     render_fixture f;
     mesh_fixture(&f, mesh, 1, 0.5);
-    fixture_look(&f, camera, 61, 47);
+    fixture_set_camera(&f, camera, 61, 47);
     set(&f);
     fixture_draw(&f, out);
     fixture_free(&f);
@@ -198,7 +198,7 @@ static void polyhedra_beside_other_cells_are_the_reference(void **state)
                 test_mesh_lattice(kinds[i], 4, 0.2, test_wave, &mesh);
                 test_mesh_to_polyhedra(&mesh, half ? 0.5 : 1);
                 mesh_fixture(&f, &mesh, 1, 0.5);
-                fixture_look(&f, camera, 33, 29);
+                fixture_set_camera(&f, camera, 33, 29);
                 fixture_add_surface(&f, wave_values, 2, 0.5f);
                 fixture_set_volume(&f, 0.3);
                 fixture_compare(&f, &fixture_usual_bounds, case_name(test_mesh_kind_name(kinds[i]), camera));
@@ -217,7 +217,7 @@ static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
     test_mesh_lattice(TEST_HEXES, 4, 0.2, test_linear, &mesh);
     test_mesh_to_polyhedra(&mesh, 0.7);
     mesh_fixture(&f, &mesh, 1, 0.5);
-    fixture_look(&f, CAMERA_OUTSIDE, 61, 47);
+    fixture_set_camera(&f, CAMERA_OUTSIDE, 61, 47);
     fixture_add_surface(&f, values, 3, 0.5f);
     fixture_draw(&f, &drawn);
     for (int64_t i = 0; i < drawn.list.count; i++) {
@@ -247,9 +247,9 @@ static void draw_distributed(const test_mesh *mesh, bool is_turned, scene_set *s
         test_mesh part;
         test_mesh_part(mesh, owners, rank, &part);
         test_mesh_shuffle(&part, (uint64_t)rank + 20);
-        if (is_turned) test_mesh_turn(&part, (uint64_t)rank + 40);
+        if (is_turned) test_mesh_reorder_vertices(&part, (uint64_t)rank + 40);
         mesh_fixture(&parts[rank], &part, 1, 0.5);
-        fixture_look(&parts[rank], CAMERA_OUTSIDE, 61, 47);
+        fixture_set_camera(&parts[rank], CAMERA_OUTSIDE, 61, 47);
         set(&parts[rank]);
         parts[rank].job.is_alone = false;
         test_mesh_free(&part);

@@ -29,10 +29,10 @@ static const char *const aim_names[AIMS] = {"level", "blind", "any"};
 /* ---- what the looks say, as linear functions of the values at the vertices ---- */
 
 /* At the quarters and the middle how far the field is off the ends' chord, by vertex, and of that the mean. */
-typedef struct bend_looks {
+typedef struct chord_deviations {
     int count;
     double off[3][8], mean[8];
-} bend_looks;
+} chord_deviations;
 
 static void cell_of(const render_fixture *f, const test_mesh *mesh, reference_cell *cell)
 {
@@ -77,7 +77,7 @@ static bool is_unfolded(const test_mesh *mesh)
 static const reference_line middle_line = {{0, 0}, {0, 0}};
 
 /* False where the ray does not cross the cell from one face to another. */
-static bool look(const reference_cell *cell, bend_looks *out)
+static bool sample_deviations(const reference_cell *cell, chord_deviations *out)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
     out->count = cell->count;
@@ -110,7 +110,7 @@ static void take_out(int count, const double b[8], double a[8])
 }
 
 /* Values within 0 .. 1 for which the wanted functions are 0 and the mean is off by the most. */
-static void aim_values(const bend_looks *looks, bend_aim aim, double *values)
+static void aim_values(const chord_deviations *looks, bend_aim aim, double *values)
 {
     double found[3][8], largest = 0;
     int wanted = aim == BLIND ? 3 : 1;
@@ -140,7 +140,7 @@ static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doub
     render_fixture f;
     fixture_function function;
     reference_cell cell;
-    bend_looks looks;
+    chord_deviations looks;
     const double jitter = test_uniform_in(0, 100 * seed + 3, 0.1, 0.35);
     test_mesh_single(shape, test_linear, &mesh);
     for (uint64_t i = 0; i < 3 * (uint64_t)mesh.vertex_count; i++)
@@ -149,7 +149,7 @@ static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doub
         mesh.values[i] = test_uniform_in(i, 100 * seed + 2, 0, 1);
     step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, SIDE);
     cell_of(&f, &mesh, &cell);
-    bool is_seen = is_unfolded(&mesh) && look(&cell, &looks);
+    bool is_seen = is_unfolded(&mesh) && sample_deviations(&cell, &looks);
     if (is_seen && aim != ANY) aim_values(&looks, aim, mesh.values);
     fixture_free(&f);
     if (is_seen) {

@@ -135,7 +135,7 @@ static double hex_past_step(render_fixture *f, const test_mesh *mesh, double sid
 {
     static double values[SAMPLES];
     double most;
-    fixture_look(f, CAMERA_ORTHOGRAPHIC, 1, 1);
+    fixture_set_camera(f, CAMERA_ORTHOGRAPHIC, 1, 1);
     render_camera *c = &f->job.camera;
     for (int a = 0; a < 3; a++) c->eye[a] += sideways * c->right[a] + up * c->up[a];
     if (!values_on_ray(f, mesh, GRID_HEX, values) || !extreme_of(values, 1, &most)) return (double)NAN;
@@ -143,7 +143,7 @@ static double hex_past_step(render_fixture *f, const test_mesh *mesh, double sid
 }
 
 /* Move the eye to where the hex comes to 0.6 and so much beyond. */
-static void look_past_step(render_fixture *f, const test_mesh *mesh, double past)
+static void move_eye_past_step(render_fixture *f, const test_mesh *mesh, double past)
 {
     const double step = 0.05;
     for (double up = -1; up < 1; up += step) {
@@ -177,7 +177,7 @@ static void a_ray_on_which_it_barely_does(void **state)
         render_fixture f;
         step_make_hex(&mesh);
         step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
-        look_past_step(&f, &mesh, passes[n]);
+        move_eye_past_step(&f, &mesh, passes[n]);
         for (int k = 0; k < 2; k++) {
             step_function function = {.opacities = {0, 0, 0.9f, 0.9f}};
             double worst[3] = {0};

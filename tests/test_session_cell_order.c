@@ -32,7 +32,7 @@ static int place_in(insitu_vertex_order order, int type, int n)
     return n;
 }
 
-static void turn_cells(test_mesh *part, insitu_vertex_order order)
+static void reorder_cells(test_mesh *part, insitu_vertex_order order)
 {
     for (int64_t cell = 0; cell < part->cell_count; cell++) {
         int64_t *first = part->connectivity + part->offsets[cell], held[8];
@@ -158,7 +158,7 @@ static void free_drawing(drawing *d)
 }
 
 /* Tells whether any cell is another one in this order. */
-static bool has_turned(const test_mesh *part, insitu_vertex_order order)
+static bool has_reordered(const test_mesh *part, insitu_vertex_order order)
 {
     bool turned = false;
     for (int64_t cell = 0; cell < part->cell_count; cell++)
@@ -173,13 +173,13 @@ static void check(test_mesh_kind kind, insitu_vertex_order order, layout how, in
     session_input plain = {0}, in = {0};
     input_create(&plain, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-    turn_cells(&in.part, order);
+    reorder_cells(&in.part, order);
     in.mesh.vertex_order = order;
     in.mesh.index_base = base;
     moved plain_arrays = move_arrays(&plain, how >= NARROW ? NARROW : how == ROWS ? PACKED : how);
     moved arrays = move_arrays(&in, how);
     drawing expected = draw(&plain), drawn = draw(&in);
-    const bool is_copied = in.part.cell_count && (in.mesh.connectivity_row || has_turned(&in.part, order));
+    const bool is_copied = in.part.cell_count && (in.mesh.connectivity_row || has_reordered(&in.part, order));
     everywhere(are_same(&expected, &drawn));
     everywhere(drawn.copied == expected.copied + is_copied * 4 * (in.part.connectivity_count + 1));
     everywhere(drawn.gives_reason == is_copied && !drawn.is_warned);
@@ -212,7 +212,7 @@ static void recognised_cells_go_with_any_order(void **state)
     test_mesh_to_polyhedra(&in.part, 0.5);
     input_describe(&in);
     drawing expected = draw(&in);
-    turn_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
+    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
     in.mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     drawing drawn = draw(&in);
     everywhere(are_same(&expected, &drawn) && expected.copied == drawn.copied);
@@ -261,7 +261,7 @@ static void the_order_may_be_set_right(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     drawing expected = draw(&in);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
-    turn_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
+    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
     for (int step = 0; step < 3; step++) {
         in.mesh.changed = step == 2 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
         in.mesh.vertex_order = step ? INSITU_ORDER_LEXICOGRAPHIC : INSITU_ORDER_VTK;
@@ -272,7 +272,7 @@ static void the_order_may_be_set_right(void **state)
         free_drawing(&drawn);
     }
     insitu_destroy(&session);
-    turn_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC); /* back again */
+    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC); /* back again */
     drawing drawn = draw(&in);
     everywhere(drawn.is_warned);
     free_drawing(&drawn);

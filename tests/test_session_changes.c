@@ -174,7 +174,7 @@ static void values_elsewhere_are_drawn(void **context)
     free(values);
 }
 
-static void turn_values(void)
+static void invert_values(void)
 {
     for (int64_t v = 0; v < input.part.vertex_count; v++) input.part.values[v] = 0.5 - input.part.values[v];
 }
@@ -186,7 +186,7 @@ static void values_that_change_without_a_word_are_reported(void **context)
     static const char words[] = "mesh \"m\": field \"f\" has other values than in the last picture";
     for (int is_set = 0; is_set < 2; is_set++) {
         insitu_session *session = open_and_draw(), *fresh = open_session(MPI_COMM_WORLD, scene);
-        turn_values();
+        invert_values();
         insitu_field unchanged = input.field;
         unchanged.changed = INSITU_CHANGED_NOTHING;
         everywhere(!is_set || insitu_set_field(session, "m", &unchanged) == INSITU_OK);
@@ -194,7 +194,7 @@ static void values_that_change_without_a_word_are_reported(void **context)
         everywhere(strstr(insitu_last_report(session)->warnings, words) != NULL);
         step_is_good(session, 2);
         everywhere(!*insitu_last_report(session)->warnings);
-        turn_values();
+        invert_values();
         everywhere(insitu_set_field(session, "m", &input.field) == INSITU_OK);
         next_picture_is(session, &input, fresh);
         everywhere(!*insitu_last_report(session)->warnings);

@@ -301,7 +301,7 @@ static void concave_prisms_have_their_tops(void **state)
             const int around = (int)in.part.vertex_count / 2;
             for (int i = 0; i < around; i++)
                 add(&top, in.part.coordinates[3 * (around + i)], in.part.coordinates[3 * (around + i) + 1]);
-            if (turn) test_mesh_turn(&in.part, turn);
+            if (turn) test_mesh_reorder_vertices(&in.part, turn);
             input_describe(&in);
             bool is_good = true;
             if (own_rank == 0) {

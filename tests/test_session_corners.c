@@ -134,7 +134,7 @@ static void free_values(values *v)
 }
 
 /* Each cell's vertices in lexicographic order: a turn that is its own inverse. */
-static void turn_hexes(test_mesh *part)
+static void sort_hex_vertices(test_mesh *part)
 {
     for (int64_t i = 0; i + 3 < part->connectivity_count; i += 4) {
         const int64_t third = part->connectivity[i + 2];
@@ -261,7 +261,7 @@ static void check(test_mesh_kind kind, const form *of)
     session_input in = {0};
     input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     if (of->has_ids && rank_count > 1) return input_free(&in); /* the ids are of one rank */
-    if (of->is_lexicographic) turn_hexes(&in.part);
+    if (of->is_lexicographic) sort_hex_vertices(&in.part);
     values v = make_values(of, &in.part);
     drawing doubled = draw(&in, &v, of, true), torn = draw(&in, &v, of, false);
     /* coordinates and an index a corner, g, and f where it is not read in place */

@@ -336,7 +336,7 @@ static void partitions_do_not_show(void **state)
             test_mesh_lattice((test_mesh_kind)kind, SIDE, 0.2, test_wave, &whole.part);
             input_describe(&whole);
             take_own_cells(&whole.part, distributed, SIDE, kind == TEST_HEXES, &in.part);
-            if (kind != TEST_POLYHEDRA) test_mesh_turn(&in.part, (uint64_t)own_rank + 3);
+            if (kind != TEST_POLYHEDRA) test_mesh_reorder_vertices(&in.part, (uint64_t)own_rank + 3);
             input_describe(&in);
             make_vector(&in.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &u);
             make_vector(&whole.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &whole_u);

@@ -306,13 +306,13 @@ static void wrong_blocks_are_reported_on_all_ranks(void **state)
 
 /* ---- blocks that change ----------------------------------------------------------------------------------------- */
 
-static void turn_order(block *b)
+static void set_row_major_strides(block *b)
 {
     memcpy(b->lattice.vertex_strides, (int64_t[]){(NJ + 1) * (NK + 1), NK + 1, 1}, sizeof b->lattice.vertex_strides);
     memcpy(b->lattice.cell_strides, (int64_t[]){NJ * NK, NK, 1}, sizeof b->lattice.cell_strides);
 }
 
-static void turn_back(block *b)
+static void set_default_strides(block *b)
 {
     memset(b->lattice.vertex_strides, 0, sizeof b->lattice.vertex_strides);
     memset(b->lattice.cell_strides, 0, sizeof b->lattice.cell_strides);
@@ -384,8 +384,8 @@ static const change changes[] = {
     {CHANGE(mirror_back, INSITU_CHANGED_NOTHING, false)},
     {CHANGE(make_rectilinear, INSITU_CHANGED_NOTHING, false)},
     {CHANGE(move_axis, INSITU_CHANGED_GEOMETRY, false)},
-    {CHANGE(turn_order, INSITU_CHANGED_NOTHING, true)},
-    {CHANGE(turn_back, INSITU_CHANGED_NOTHING, true)},
+    {CHANGE(set_row_major_strides, INSITU_CHANGED_NOTHING, true)},
+    {CHANGE(set_default_strides, INSITU_CHANGED_NOTHING, true)},
     {CHANGE(make_curvilinear, INSITU_CHANGED_NOTHING, false)},
     {CHANGE(move_vertices, INSITU_CHANGED_GEOMETRY, false)},
     {CHANGE(make_hexes, INSITU_CHANGED_NOTHING, true)},

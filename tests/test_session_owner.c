@@ -94,7 +94,7 @@ static void create_polyhedra(session_input *in, test_mesh_kind kind, double shar
 {
     input_create(in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     if (kind != TEST_POLYHEDRA) test_mesh_to_polyhedra(&in->part, share);
-    test_mesh_turn(&in->part, 7);
+    test_mesh_reorder_vertices(&in->part, 7);
     input_describe(in);
 }
 

@@ -88,7 +88,7 @@ static void take_part(const test_mesh *whole, session_input *out)
     test_partition(whole, TEST_RANDOM, SIDE, rank_count, owners);
     test_mesh_part(whole, owners, own_rank, &out->part);
     test_free(owners);
-    test_mesh_turn(&out->part, 11 + (uint64_t)own_rank);
+    test_mesh_reorder_vertices(&out->part, 11 + (uint64_t)own_rank);
     test_mesh_shuffle(&out->part, 77 + (uint64_t)own_rank);
     input_describe(out);
 }

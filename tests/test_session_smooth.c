@@ -365,7 +365,7 @@ static void part_create(const test_mesh *whole, test_partition_kind distributed,
     test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, &out->part);
     for (int64_t cell = 0; cell < out->part.cell_count && with_ghosts; cell++)
         out->part.ghosts[cell] = owners[cell] != own_rank;
-    if (!with_ghosts) test_mesh_turn(&out->part, 77 + (uint64_t)own_rank);
+    if (!with_ghosts) test_mesh_reorder_vertices(&out->part, 77 + (uint64_t)own_rank);
     free(owners);
     free(all);
     describe(out);

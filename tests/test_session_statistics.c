@@ -109,7 +109,7 @@ static void bent_and_concave_cells_fill_their_cube(void **state)
         for (int way = 0; way < 2; way++) {
             session_input in = {0};
             make_part(kind, 0.15, false, &in); /* no tet is turned inside out */
-            if (way == 1 && kind == TEST_POLYHEDRA) test_mesh_turn(&in.part, 9);
+            if (way == 1 && kind == TEST_POLYHEDRA) test_mesh_reorder_vertices(&in.part, 9);
             if (way == 1 && kind != TEST_POLYHEDRA) test_mesh_to_polyhedra(&in.part, 0.5);
             input_describe(&in);
             in.mesh.keep_polyhedra = way;

@@ -28,7 +28,7 @@ static void make_whole(test_mesh_kind kind, session_input *out)
 static void take_part(const session_input *whole, test_partition_kind distributed, bool with_ghosts, session_input *out)
 {
     take_own_cells(&whole->part, distributed, SIDE, with_ghosts, &out->part);
-    if (!with_ghosts) test_mesh_turn(&out->part, 3 + (uint64_t)own_rank);
+    if (!with_ghosts) test_mesh_reorder_vertices(&out->part, 3 + (uint64_t)own_rank);
     test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);
     input_describe(out);
 }

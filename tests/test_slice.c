@@ -48,7 +48,7 @@ static void check_kind(test_mesh_kind kind)
     test_mesh_lattice(kind, SIDE, JITTER, test_wave, &mesh);
     test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
     fixture_create_lattice(&f, kind, SIDE, JITTER, distance);
-    fixture_look(&f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
+    fixture_set_camera(&f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
     fixture_set_volume(&f, 0.3); /* its colours serve the surface */
     f.job.volume_count = 0;
     fixture_add_surface(&f, &through, 1, 1);
