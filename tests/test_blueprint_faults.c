@@ -197,7 +197,7 @@ static bool check_message(const char *message, const node_fault *f, const char *
 /* The adaptor keeps no trace of the wrong node. */
 static void draw_mended(insitu_session *session, insitu_blueprint *adaptor, const conduit_node *node)
 {
-    forget_pictures();
+    discard_pictures();
     everywhere(insitu_blueprint_set(adaptor, "grid", node) == INSITU_OK);
     everywhere(insitu_blueprint_step(adaptor, NULL, NULL) == INSITU_OK);
     everywhere(insitu_last_report(session)->images == 1 && caught_count == (own_rank == 0));
@@ -219,7 +219,7 @@ static void wrong_nodes_are_reported_on_all_ranks(void **state)
         layout_make(find_layout(f->layout), &right);
         layout_make(find_layout(f->layout), &wrong);
         if (own_rank == bad) corrupt(wrong.node, f);
-        forget_pictures();
+        discard_pictures();
         const insitu_status at_once = insitu_blueprint_set(adaptor, "grid", wrong.node);
         const bool is_reported =
             own_rank != bad ? !at_once : at_once && check_message(insitu_blueprint_error(adaptor), f, "");

@@ -388,7 +388,7 @@ static void rays_from_inside_add_up_to_their_chords(void **state)
 /* The argument is the number of rays. */
 int main(int argc, char **argv)
 {
-    if (fixture_lacks_set()) return 77;
+    if (fixture_set_is_unavailable()) return 77;
     if (argc > 1) rays_wanted = atoll(argv[1]);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_rays_add_up_to_their_chords),

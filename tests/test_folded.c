@@ -158,7 +158,7 @@ static void maps_of_sound_cells_converge(void **state)
 
 int main(void)
 {
-    if (fixture_lacks_set()) return 77;
+    if (fixture_set_is_unavailable()) return 77;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(folded_cells_make_numbers),
         cmocka_unit_test(numbers_of_cells_and_ranks_do_not_show),

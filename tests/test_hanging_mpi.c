@@ -213,7 +213,7 @@ static void hanging_nodes_are_no_overlaps(void **state)
 
 /* Finds how far the ray of a pixel must go to the plane on which test_linear() has the value. Returns whether that
  * place is well within the mesh: all shapes hold the ball of radius 0.5. */
-static bool meets_plane(const render_camera *camera, int p, double value, double *depth)
+static bool intersects_plane(const render_camera *camera, int p, double value, double *depth)
 {
     double base[3], direction[3], end[3], distance = 0;
     render_camera_ray(camera, p % WIDTH, p / WIDTH, base, direction);
@@ -243,7 +243,7 @@ static bool is_plane_whole(const hanging_case *c, fixture_camera camera)
     draw_shares(&mesh, TEST_RANDOM, &plane, camera, &drawn);
     stage(&f, &mesh, &plane, camera);
     for (int p = 0; p < PIXELS && my_rank == 0; p++) {
-        if (!meets_plane(&f.job.camera, p, surface_values[0], &depth)) continue;
+        if (!intersects_plane(&f.job.camera, p, surface_values[0], &depth)) continue;
         met++;
         if (!(drawn.depth[p] < INFINITY))
             holes++;

@@ -82,7 +82,7 @@ static insitu_status write_picture(const picture_case *c, base_error *error)
 }
 
 /* EXR has the second in which it was written: a text behind its length. */
-static void forget_date(file_bytes *file)
+static void clear_date(file_bytes *file)
 {
     static const char before[] = "capDate\0string";
     enum { DATE = 19 };
@@ -97,7 +97,7 @@ static bool read_picture(const picture_case *c, file_bytes *out)
     FILE *file = fopen(path, "rb");
     out->count = file ? fread(out->bytes, 1, MOST_BYTES, file) : 0;
     if (file) fclose(file);
-    forget_date(out);
+    clear_date(out);
     return file;
 }
 
@@ -156,11 +156,11 @@ static insitu_status write_in_shortage(const picture_case *c, const shortage *s,
     tight = before;
     tight.rlim_cur = address_bytes() + s->spare;
     if (s->n)
-        heap_arm(s->n, false);
+        heap_start_failing(s->n, false);
     else
         setrlimit(RLIMIT_AS, &tight);
     const insitu_status status = write_picture(c, &error);
-    if (s->n) out->allocations = heap_disarm();
+    if (s->n) out->allocations = heap_stop_failing();
     setrlimit(RLIMIT_AS, &before);
     snprintf(out->message, sizeof out->message, "%.255s", error.message);
     return status;

@@ -258,7 +258,7 @@ static void free_input(input *in)
     free(in->cell_values);
 }
 
-static void take_part(const test_mesh *mesh, const int *owners, int layers, input *out)
+static void extract_rank_cells(const test_mesh *mesh, const int *owners, int layers, input *out)
 {
     const size_t cells = (size_t)mesh->cell_count;
     unsigned char *taken = calloc(cells, 1);
@@ -297,7 +297,7 @@ static void take_whole(const test_mesh *mesh, input *out)
 
 static void draw(insitu_session *session, const input *in, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     insitu_status status = submit(session, &in->vertices);
     if (!status) status = insitu_set_field(session, "m", &in->cells);
     if (!status) status = insitu_step(session, cycle, 0);
@@ -376,7 +376,7 @@ static bool verify_mesh(insitu_session *session, int kind, int side, const test_
             snprintf(what, sizeof what, "%s, %s, %d ghost layers", test_mesh_kind_name(kinds[kind]), distribution_names[how],
                      layers);
             distribute(mesh, (distribution)how, side, owners);
-            take_part(mesh, owners, layers, &part);
+            extract_rank_cells(mesh, owners, layers, &part);
             draw(session, &part, cycle++);
             if (own_rank == 0) are_well = are_the_same(whole, what) && are_well;
             free_input(&part);
@@ -392,7 +392,7 @@ static void draw_whole(const char *scene, const test_mesh *mesh, caught_picture 
     input whole;
     take_whole(mesh, &whole);
     insitu_session *session = open_session(MPI_COMM_SELF, scene);
-    forget_pictures();
+    discard_pictures();
     assert_int_equal(submit(session, &whole.vertices), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &whole.cells), INSITU_OK);
     assert_int_equal(insitu_step(session, cycle++, 0), INSITU_OK);

@@ -79,7 +79,7 @@ static void start_of(const render_fixture *f, const render_hit *hit, const doubl
 }
 
 typedef struct tally {
-    int64_t rays, blocked, unsure, wrong;
+    int64_t rays, blocked, undecided_rays, wrong;
 } tally;
 
 static void grow_box(const double place[3], double low[3], double high[3])
@@ -142,7 +142,7 @@ static void verify(int said, bool is_open, const char *what, tally *t)
 {
     t->rays++;
     t->blocked += said == 1;
-    t->unsure += said < 0;
+    t->undecided_rays += said < 0;
     if (said < 0 || said != is_open) return;
     if (!t->wrong++) fprintf(stderr, "%s: %s\n", what, said ? "a blocked ray is open" : "an open ray is blocked");
 }
@@ -189,9 +189,9 @@ static void verify_mesh(const test_mesh *mesh, fixture_camera camera, float cont
             if (test_is_whole() || i % (set + 1 == fixture_set_count() ? 2 : 7) == 0)
                 verify_hit(&f, mesh, &h, i, what, &t);
         free_hits(&h);
-        if (t.wrong || t.unsure * 4 > t.rays || t.blocked < t.rays / 20 || t.rays < 50)
+        if (t.wrong || t.undecided_rays * 4 > t.rays || t.blocked < t.rays / 20 || t.rays < 50)
             fail_msg("%s, %s: of %lld rays %lld blocked, %lld unsure, %lld wrong", what, fixture_set_name(set),
-                     (long long)t.rays, (long long)t.blocked, (long long)t.unsure, (long long)t.wrong);
+                     (long long)t.rays, (long long)t.blocked, (long long)t.undecided_rays, (long long)t.wrong);
     }
     fixture_free(&f);
 }

@@ -555,7 +555,7 @@ static void sums_beyond_the_vertices_show_no_surface(void **state)
 
 int main(int argc, char **argv)
 {
-    if (fixture_lacks_set()) return 77;
+    if (fixture_set_is_unavailable()) return 77;
     if (argc > 1) wanted_rays = atoll(argv[1]);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_polyhedra_miss_no_crossing),

@@ -205,7 +205,7 @@ static void lines_are_those_of_single_cells(void **state)
 
 int main(void)
 {
-    if (fixture_lacks_set()) return 77;
+    if (fixture_set_is_unavailable()) return 77;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(batches_draw_what_single_cells_do), cmocka_unit_test(cells_are_numbered_anyhow),
         cmocka_unit_test(meshes_and_layers_take_turns),      cmocka_unit_test(ties_are_kept),

@@ -207,7 +207,7 @@ void fixture_use_set(int set)
     render_isa_limit(set);
 }
 
-bool fixture_lacks_set(void)
+bool fixture_set_is_unavailable(void)
 {
     const char *query = getenv("INSITU_ISA");
     const bool is_lacking = query && strcmp(query, render_isa()) != 0;

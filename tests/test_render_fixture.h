@@ -81,7 +81,7 @@ const char *fixture_set_name(int set);
 void fixture_use_set(int set);
 /* For programs that run once for each set: tells whether INSITU_ISA names one that this machine lacks. They then return
  * 77. */
-bool fixture_lacks_set(void);
+bool fixture_set_is_unavailable(void);
 /* Each fixture drawn as a rank of its own, all their fragments merged. */
 void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *out);
 void drawn_free(drawn_frame *drawn);

@@ -60,16 +60,16 @@ static void threads_do_not_change_a_bit(void **state)
 
 /* ---- tile by tile -------------------------------------------------------------------------------------------- */
 
-typedef struct taken_tiles {
+typedef struct received_tiles {
     fragment_list list;
     unsigned char pixels[64 * 64]; /* how often a tile had them */
     int width, refuse_after;       /* tiles; negative: never */
-    bool is_astray;
-} taken_tiles;
+    bool has_stray_pixel;
+} received_tiles;
 
 static bool take_tile(void *state, int thread, const pixel_area *area, fragment *items, int64_t count)
 {
-    taken_tiles *t = state;
+    received_tiles *t = state;
     bool is_well;
     (void)thread;
 #pragma omp critical
@@ -79,7 +79,7 @@ static bool take_tile(void *state, int thread, const pixel_area *area, fragment 
             for (int x = area->x; x < area->x + area->width; x++) t->pixels[y * t->width + x]++;
         for (int64_t i = 0; i < count; i++) {
             const int x = (int)items[i].pixel % t->width - area->x, y = (int)items[i].pixel / t->width - area->y;
-            t->is_astray = t->is_astray || x < 0 || y < 0 || x >= area->width || y >= area->height;
+            t->has_stray_pixel = t->has_stray_pixel || x < 0 || y < 0 || x >= area->width || y >= area->height;
             t->list.items[t->list.count++] = items[i];
         }
     }
@@ -95,13 +95,13 @@ static void compare_tiles_with_list(render_fixture *f)
 {
     const render_camera *camera = &f->job.camera;
     const int64_t pixels = (int64_t)camera->width * camera->height;
-    taken_tiles t = {.width = camera->width, .refuse_after = -1};
+    received_tiles t = {.width = camera->width, .refuse_after = -1};
     fragment_list list = {0};
     base_error error = {0};
     assert_int_equal(render_frame(&f->job, &list, NULL, &error), INSITU_OK);
     t.list.items = malloc((size_t)list.count * sizeof *t.list.items + 1);
     assert_int_equal(render_frame_tiles(&f->job, take_tile, &t, NULL, &error), INSITU_OK);
-    assert_false(t.is_astray);
+    assert_false(t.has_stray_pixel);
     for (int64_t p = 0; p < pixels; p++) assert_int_equal(t.pixels[p], 1);
     assert_int_equal(t.list.count, list.count);
     qsort(list.items, (size_t)list.count, sizeof *list.items, by_bytes);
@@ -137,7 +137,7 @@ static void refused_tiles_end_the_frame(void **state)
     render_fixture f;
     lattice_fixture(&f, TEST_TETS, TRANSPARENT, CAMERA_OUTSIDE);
     for (int after = 0; after < 12; after += 5) {
-        taken_tiles t = {.width = f.job.camera.width, .refuse_after = after};
+        received_tiles t = {.width = f.job.camera.width, .refuse_after = after};
         base_error error = {0};
         t.list.items = malloc(sizeof(fragment) * 61 * 47 * 64);
         assert_int_equal(render_frame_tiles(&f.job, take_tile, &t, NULL, &error), INSITU_ERROR_MEMORY);

@@ -1181,7 +1181,7 @@ static void scene_huge_file_is_refused(void **state)
 }
 
 /* Each prefix of a good file is cut somewhere else: most are errors, none may be worse. */
-static void scene_truncated_files_end_well(void **state)
+static void scene_truncated_files_fail_cleanly(void **state)
 {
     (void)state;
     const int64_t held = base_memory_held();
@@ -1395,7 +1395,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_bad_files_are_reported_line_key_and_expectation),
         cmocka_unit_test(scene_whole_file_faults_are_reported),
         cmocka_unit_test(scene_huge_file_is_refused),
-        cmocka_unit_test(scene_truncated_files_end_well),
+        cmocka_unit_test(scene_truncated_files_fail_cleanly),
         cmocka_unit_test(scene_every_failed_allocation_is_an_error_without_a_leak),
         cmocka_unit_test(scene_numbers_do_not_follow_the_locale),
         cmocka_unit_test(scene_texts_have_their_placeholders_replaced),

@@ -23,7 +23,7 @@ static session_input input;
 
 static void step_draws(insitu_session *session, int64_t cycle, int images)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0.5 * (double)cycle);
     reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == images);
@@ -425,7 +425,7 @@ static void missing_field_leaves_the_other_picture(void **context)
         MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", "isosurface: {field: presure, values: [1]}", "") IMAGE(
                             "b", "1", SURFACE, "") IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
     everywhere(submit(session, &input) == INSITU_OK);
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
     reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"; there are",
                     "\"f\" (mesh \"m\")");
@@ -459,7 +459,7 @@ static void images_are_drawn_when_their_time_has_passed(void **context)
     everywhere(submit(session, &input) == INSITU_OK);
     double time = 0;
     for (int cycle = 0; cycle < 11; cycle++, time += 0.1) {
-        forget_pictures();
+        discard_pictures();
         reported_everywhere(session, insitu_step(session, cycle, time), INSITU_OK, "");
         everywhere(insitu_last_report(session)->images == expected[cycle]);
     }
@@ -470,7 +470,7 @@ static void images_are_drawn_when_their_time_has_passed(void **context)
         reported_everywhere(session, insitu_step(session, 11 + i, later[i]), INSITU_OK, "");
         everywhere(insitu_last_report(session)->images == then[i]);
     }
-    forget_pictures();
+    discard_pictures();
     insitu_destroy(&session);
 }
 
@@ -492,7 +492,7 @@ static void picture_that_cannot_be_written_is_reported_on_all_ranks(void **conte
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", SURFACE, "") IMAGE("b", "1", VOLUME, "")));
     everywhere(submit(session, &input) == INSITU_OK);
-    forget_pictures();
+    discard_pictures();
     unwritable = "a_";
     const insitu_status status = insitu_step(session, 3, 0);
     unwritable = NULL;
@@ -536,7 +536,7 @@ static void images_without_outputs_are_for_memory(void **context)
     everywhere(submit(session, &input) == INSITU_OK);
     for (int cycle = 0; cycle < 4; cycle++) {
         if (cycle == 2) everywhere(insitu_keep_pictures(session, 1) == INSITU_OK);
-        forget_pictures();
+        discard_pictures();
         everywhere(insitu_step(session, cycle, 0) == INSITU_OK && caught_count == 0);
         everywhere(insitu_last_report(session)->images == (cycle > 1));
         const insitu_picture *kept = insitu_last_pictures(session, &count);

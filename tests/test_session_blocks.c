@@ -266,7 +266,7 @@ static block blocks[BLOCKS];
 static caught_picture truth[IMAGES];
 static char true_numbers[4096];
 
-static void step_well(insitu_session *session, int cycle)
+static void step_ok(insitu_session *session, int cycle)
 {
     const insitu_status status = insitu_step(session, cycle, cycle);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -283,7 +283,7 @@ static int begin_tests(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, scene());
     everywhere(set_list(session, &list));
     if (!own_rank) remove("numbers.csv");
-    step_well(session, 0);
+    step_ok(session, 0);
     everywhere(own_rank || caught_count == IMAGES);
     for (int i = 0; i < caught_count; i++) truth[i] = caught[i];
     caught_count = 0;
@@ -316,7 +316,7 @@ static void pictures_are_the_truth(void)
         assert_true(covered(&truth[i]) > 100);
         assert_true(same_pictures(&caught[i], &truth[i]));
     }
-    forget_pictures();
+    discard_pictures();
 }
 
 static void blocks_are_the_list_of_their_cells(void **state)
@@ -329,7 +329,7 @@ static void blocks_are_the_list_of_their_cells(void **state)
         if (owner_of(number) == own_rank) is_set = is_set && submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
     everywhere(is_set);
     if (!own_rank) remove("numbers.csv");
-    step_well(session, 0);
+    step_ok(session, 0);
     pictures_are_the_truth();
     read_file("numbers.csv", sizeof numbers, numbers);
     everywhere(strcmp(numbers, true_numbers) == 0);
@@ -362,7 +362,7 @@ static void blocks_come_and_go(void **state)
                 is_set = is_set && submit_block(session, &blocks[number], was_here ? 0 : INSITU_CHANGED_ALL);
         }
         everywhere(is_set);
-        step_well(session, cycle);
+        step_ok(session, cycle);
         pictures_are_the_truth();
     }
     insitu_destroy(&session);
@@ -383,7 +383,7 @@ static void whole_and_blocks_replace_each_other(void **state)
         if (cycle % 2 && BLOCKS <= own_rank) is_set = is_set && !insitu_set_mesh(session, "m", NULL);
         if (cycle % 2 == 0) is_set = set_list(session, &list);
         everywhere(is_set);
-        step_well(session, cycle);
+        step_ok(session, cycle);
         pictures_are_the_truth();
     }
     destroy(&list);
@@ -444,9 +444,9 @@ static void faults_of_one_block_are_reported_on_all_ranks(void **state)
     if (rank_count > 1 || is_mine)
         reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
                         "mesh \"m[5]\": field \"c\" is not set, other blocks have it");
-    forget_pictures();
+    discard_pictures();
     if (is_mine) submit_block(session, &blocks[corrupted], 0);
-    step_well(session, 3);
+    step_ok(session, 3);
     pictures_are_the_truth();
     insitu_destroy(&session);
 }

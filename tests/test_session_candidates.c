@@ -34,7 +34,7 @@ static insitu_session *open_tree(scene_tree tree, const char *scene)
 /* A step of the one and of the other, which have their meshes: is the picture the same? */
 static void step_both(insitu_session *full, insitu_session *other, int64_t cycle)
 {
-    forget_pictures();
+    discard_pictures();
     reported_everywhere(full, insitu_step(full, cycle, 0), INSITU_OK, "");
     reported_everywhere(other, insitu_step(other, cycle, 0), INSITU_OK, "");
     if (own_rank == 0) {
@@ -131,7 +131,7 @@ static void partial_trees_are_of_the_cells_that_show(void **context)
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(tree_cells(session) == all);
     everywhere(in.part.cell_count == 0 || strstr(insitu_last_report(session)->left_out, "show nothing in this step"));
-    forget_pictures();
+    discard_pictures();
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -157,7 +157,7 @@ static void standing_cells_get_a_full_tree(void **context)
         change_values(&in, 1e-6);
         everywhere(submit(session, &in) == INSITU_OK);
         reported_everywhere(session, insitu_step(session, cycle++, 0), INSITU_OK, "");
-        forget_pictures();
+        discard_pictures();
     }
     everywhere(tree_cells(session) == all);
     change_values(&in, 1e-6);
@@ -165,7 +165,7 @@ static void standing_cells_get_a_full_tree(void **context)
     reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
     everywhere(insitu_last_report(session)->build_ms == 0 &&
                (insitu_last_report(session)->refit_ms > 0 || in.part.cell_count == 0));
-    forget_pictures();
+    discard_pictures();
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -184,7 +184,7 @@ static void full_trees_are_built_where_most_cells_show(void **context)
     everywhere(submit(session, &in) == INSITU_OK);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(tree_cells(session) == all && !session->meshes.items[0]->is_partial);
-    forget_pictures();
+    discard_pictures();
     insitu_destroy(&session);
     input_free(&in);
 }

@@ -29,7 +29,7 @@ static void make_input(session_input *in)
     input_create(in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
 }
 
-static void forget_files(void)
+static void remove_files(void)
 {
     if (own_rank != 0) return;
     unlink("out/a.cdb/data.csv");
@@ -52,7 +52,7 @@ static void run_steps(const char *scene, const session_input *in, int first, int
     double *values = calloc((size_t)in->part.vertex_count + 1, sizeof *values);
     assert_non_null(values);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    forget_pictures();
+    discard_pictures();
     for (int cycle = first; cycle < end; cycle++) {
         assert_int_equal(submit(session, in), INSITU_OK);
         set_second_field(session, in, values);
@@ -114,7 +114,7 @@ static void tables_have_a_line_a_picture(void **state)
     (void)state;
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     run_steps(swept, &in, 0, 5);
     everywhere(is_table(0, 5));
     everywhere(caught_count == (own_rank == 0 ? 24 : 0));
@@ -155,7 +155,7 @@ static void runs_that_begin_again_go_on_with_the_table(void **state)
     static char text[MOST];
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     run_steps(swept, &in, 0, 7);
     run_steps(swept, &in, 3, 7); /* the first picture is of cycle 4 */
     everywhere(is_table(0, 7));
@@ -185,7 +185,7 @@ static void lines_go_from_the_first_step_on(void **state)
     (void)state;
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     run_steps(swept, &in, 0, 5);
     static const char late[] = "images:\n" IMAGE(
         "a", "    camera: {orbit: {views: 2, elevation: [-20, 10.5]}}\n    sweep: {isovalues: true}\n    every: 6\n",
@@ -206,11 +206,11 @@ static void steps_that_go_back_drop_what_was_after(void **state)
     (void)state;
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
     static const int cycles[] = {0, 2, 4, 6, 2, 2};
     for (int i = 0; i < 6; i++) {
-        forget_pictures();
+        discard_pictures();
         assert_int_equal(submit(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycles[i], 0.5 * cycles[i]) == INSITU_OK);
         everywhere(is_table(0, cycles[i] + 1));
@@ -226,20 +226,20 @@ static void tables_that_cannot_be_written_are_reported_and_written_later(void **
     (void)state;
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     if (own_rank == 0) mkdir("out/a.cdb/data.csv", 0777);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
     assert_int_equal(submit(session, &in), INSITU_OK);
-    forget_pictures();
+    discard_pictures();
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv", "cannot be");
     everywhere(caught_count == (own_rank == 0 ? 8 : 0));
     if (own_rank == 0) rmdir("out/a.cdb/data.csv");
     put_file("out/a.cdb/data.csv", "a,b\n1,2\n");
     reported_everywhere(session, insitu_step(session, 2, 1), INSITU_ERROR_IO, "out/a.cdb/data.csv", "other columns",
                     "\"cycle,time,phi,theta,isovalue,FILE\"");
-    forget_files();
+    remove_files();
     if (own_rank == 0) mkdir("out/a.cdb/data.js", 0777);
-    forget_pictures();
+    discard_pictures();
     reported_everywhere(session, insitu_step(session, 4, 2), INSITU_ERROR_IO, "cinema: out/a.cdb/data.js", "written");
     if (own_rank == 0) rmdir("out/a.cdb/data.js");
     everywhere(insitu_step(session, 6, 3) == INSITU_OK);
@@ -254,10 +254,10 @@ static void pictures_that_cannot_be_written_have_no_line(void **state)
     static char text[MOST];
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
     assert_int_equal(submit(session, &in), INSITU_OK);
-    forget_pictures();
+    discard_pictures();
     unwritable = "_002_";
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "image \"a\"", "a_000000_002_0.25.png");
     unwritable = NULL;
@@ -275,12 +275,12 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
     static char text[MOST];
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
     assert_int_equal(submit(session, &in), INSITU_OK);
     int cycle = 0, failures = 0;
     for (int n = 1; n < 1500; n += 7, cycle += 2) {
-        forget_pictures();
+        discard_pictures();
         if (own_rank == 0) base_memory_fail_nth(n);
         const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
         base_memory_fail_nth(0);
@@ -295,10 +295,10 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
         }
         everywhere(is_whole);
         if (status == INSITU_OK && cycle > 40) break;
-        if (cycle > 80) forget_files(), cycle = 0;
+        if (cycle > 80) remove_files(), cycle = 0;
     }
     everywhere(failures > 3);
-    forget_pictures();
+    discard_pictures();
     everywhere(insitu_step(session, 1000, 500) == INSITU_OK);
     read_file("out/a.cdb/data.csv", MOST, text);
     everywhere(own_rank != 0 || strstr(text, "a_001000_003_-0.5.png\n"));
@@ -478,7 +478,7 @@ static void conditions_hold_for_all_pictures_of_an_image(void **state)
                         IMAGE("b", "    when: {field: f, below: 50}\n", SURFACE, "{path: b.png}")));
     static const int drawn[] = {1, 6, 0, 1};
     for (int cycle = 0; cycle < 4; cycle++) {
-        forget_pictures();
+        discard_pictures();
         for (int64_t v = 0; v < in.part.vertex_count; v++)
             in.part.values[v] = (cycle == 1 || cycle == 2 ? 100 : 1) * test_linear(in.part.coordinates + 3 * v);
         assert_int_equal(submit(session, &in), INSITU_OK);
@@ -503,7 +503,7 @@ static void warnings_of_swept_isovalues_are_reported_once(void **state)
                          "a", "    camera: {orbit: {views: 2}}\n    sweep: {isovalues: true}\n",
                          "{isosurface: {field: f, values: [0.25, 1e6, 2e6]}}", "{path: \"a{view}{isovalue}.png\"}")));
     for (int cycle = 0; cycle < 3; cycle++) {
-        forget_pictures();
+        discard_pictures();
         assert_int_equal(submit(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
         const char *warnings = insitu_last_report(session)->warnings;

@@ -80,7 +80,7 @@ static interval cut(const ray *r, const half_space *planes, size_t count)
     return out;
 }
 
-static interval meet_ball(const ray *r, double radius)
+static interval intersect_ball(const ray *r, double radius)
 {
     double from[3];
     for (int a = 0; a < 3; a++) from[a] = ball[a] - r->base[a];
@@ -89,7 +89,7 @@ static interval meet_ball(const ray *r, double radius)
     return left > 0 ? (interval){nearest - sqrt(left), nearest + sqrt(left)} : (interval){INFINITY, -INFINITY};
 }
 
-static interval meet_both(interval a, interval b)
+static interval intersect_both(interval a, interval b)
 {
     return (interval){fmax(a.begin, b.begin), fmin(a.end, b.end)};
 }
@@ -97,12 +97,12 @@ static interval meet_both(interval a, interval b)
 static interval visible_interval(const region *g, const ray *r)
 {
     const interval within = cut(r, g->planes, g->plane_count);
-    return g->radius > 0 && !g->is_outside ? meet_both(within, meet_ball(r, g->radius)) : within;
+    return g->radius > 0 && !g->is_outside ? intersect_both(within, intersect_ball(r, g->radius)) : within;
 }
 
 static interval hole_interval(const region *g, const ray *r)
 {
-    if (g->is_outside) return meet_ball(r, g->radius);
+    if (g->is_outside) return intersect_ball(r, g->radius);
     return g->hole_count ? cut(r, g->hole, g->hole_count) : (interval){INFINITY, -INFINITY};
 }
 
@@ -188,9 +188,9 @@ static bool has_medium(const caught_picture *picture, const region *g, double me
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         const ray r = ray_of(pixel);
-        const interval within = meet_both(cube_range(&r), visible_interval(g, &r));
+        const interval within = intersect_both(cube_range(&r), visible_interval(g, &r));
         const double length =
-            (length_of(within) - length_of(meet_both(within, hole_interval(g, &r)))) * sqrt(dot(r.direction, r.direction));
+            (length_of(within) - length_of(intersect_both(within, hole_interval(g, &r)))) * sqrt(dot(r.direction, r.direction));
         const double alpha = 1 - pow(0.5, media * length), own = (double)picture->rgba[4 * pixel + 3];
         hits += alpha > 0.1;
         if (fabs(own - alpha) < tolerance) continue;
@@ -330,7 +330,7 @@ static void layers_are_clipped(void **state)
         memset(inputs, 0, sizeof inputs);
         test_mesh_lattice(kind, SIDE, 0.2, test_linear, &inputs[0].part);
         input_describe(&inputs[0]);
-        take_own_cells(&inputs[0].part, TEST_RANDOM, SIDE, kind % 2, &inputs[1].part);
+        extract_own_cells(&inputs[0].part, TEST_RANDOM, SIDE, kind % 2, &inputs[1].part);
         input_describe(&inputs[1]);
         verify_all(kind, inputs);
         input_free(&inputs[0]);

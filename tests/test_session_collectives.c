@@ -135,7 +135,7 @@ static void count_steps(const counted_scene *s)
     everywhere(insitu_destroy(&session) == INSITU_OK);
     input_free(&in);
     free(values);
-    forget_pictures();
+    discard_pictures();
 }
 
 static void a_step_waits_few_times(void **state)
@@ -173,7 +173,7 @@ static void schedules_change_no_bit_and_are_reported(void **context)
                                    : !strcmp(report->schedule, names[i]));
         if (own_rank == 0 && i == 0) memcpy(first, caught[0].rgba, BYTES);
         everywhere(own_rank != 0 || memcmp(first, caught[0].rgba, BYTES) == 0);
-        forget_pictures();
+        discard_pictures();
         insitu_destroy(&session);
     }
     input_free(&in);

@@ -33,7 +33,7 @@ static const char *scene_with(const char *surface_keys, const char *volume_keys)
 static caught_picture draw_step(insitu_session *session, int cycle)
 {
     step_is_good(session, cycle);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     return picture;
 }
 
@@ -235,7 +235,7 @@ static void broken_file_of_ranges_is_reported_on_all_ranks(void **state)
                         "delete the file to begin anew");
         remove_ranges();
         step_is_good(session, 1);
-        forget_pictures();
+        discard_pictures();
         insitu_destroy(&session);
         remove_ranges();
     }

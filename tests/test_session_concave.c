@@ -120,7 +120,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shells *s)
     insitu_session *session = open_session(comm, scene);
     insitu_mesh mesh;
     insitu_field field;
-    forget_pictures();
+    discard_pictures();
     insitu_mesh_defaults(&mesh);
     mesh.vertex_count = s->vertex_count;
     insitu_mesh_interleaved(&mesh, s->coordinates, INSITU_FLOAT64);
@@ -138,7 +138,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shells *s)
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -220,7 +220,7 @@ static bool is_clipped(const truth *t, const double at[2], const float *rgba, fl
     return is_value(&cut, at, rgba, depth);
 }
 
-static bool is_well(const tile tiles[TILES], const caught_picture *picture, verify_function *verify, const char *what)
+static bool is_correct(const tile tiles[TILES], const caught_picture *picture, verify_function *verify, const char *what)
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
@@ -277,7 +277,7 @@ static void concave_shells_are_what_they_are(void **state)
         bool is_good = true;
         if (own_rank == 0) {
             alone = draw(MPI_COMM_SELF, scene, &whole);
-            is_good = is_well(tiles, &alone, cases[i].verify, cases[i].what) && are_one(&ours, &alone, cases[i].what);
+            is_good = is_correct(tiles, &alone, cases[i].verify, cases[i].what) && are_one(&ours, &alone, cases[i].what);
         }
         everywhere(is_good);
         free_caught(&ours);
@@ -306,7 +306,7 @@ static void concave_prisms_have_their_tops(void **state)
             bool is_good = true;
             if (own_rank == 0) {
                 insitu_session *session = open_drawn(MPI_COMM_SELF, scene, &in);
-                caught_picture picture = take_caught();
+                caught_picture picture = pop_caught_picture();
                 for (int pixel = 0; pixel < PIXELS && is_good; pixel++) {
                     double at[3] = {0, 0, 0.45}, margin = INFINITY;
                     place_of(pixel, at);

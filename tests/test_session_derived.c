@@ -335,7 +335,7 @@ static void partitions_do_not_show(void **state)
             vector_field u, c, whole_u, whole_c;
             test_mesh_lattice((test_mesh_kind)kind, SIDE, 0.2, test_wave, &whole.part);
             input_describe(&whole);
-            take_own_cells(&whole.part, distributed, SIDE, kind == TEST_HEXES, &in.part);
+            extract_own_cells(&whole.part, distributed, SIDE, kind == TEST_HEXES, &in.part);
             if (kind != TEST_POLYHEDRA) test_mesh_reorder_vertices(&in.part, (uint64_t)own_rank + 3);
             input_describe(&in);
             make_vector(&in.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &u);
@@ -615,7 +615,7 @@ static void what_is_wrong_is_reported_on_all_ranks(void **state)
         insitu_session *session = begin(MPI_COMM_WORLD, scene, &in, &u);
         assert_int_equal(insitu_set_field(session, "m", &velocity.field), INSITU_OK);
         for (int cycle = 0; cycle < 2; cycle++) {
-            forget_pictures();
+            discard_pictures();
             const insitu_status status = insitu_step(session, cycle, 0);
             if (is_right)
                 everywhere(status == INSITU_OK);

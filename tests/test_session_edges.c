@@ -170,7 +170,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
 {
     insitu_session *session = open_drawn(comm, scene, in);
     if (b) *b = make_body(&session_find_mesh(&session->meshes, "m")->cells, in->part.cell_count > 1);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }

@@ -187,7 +187,7 @@ static insitu_status step(insitu_session *session, int cycle)
 {
     input_renew(&input);
     for (int64_t v = 0; v < input.part.vertex_count; v++) input.part.values[v] *= 1 + cycle;
-    forget_pictures();
+    discard_pictures();
     everywhere(submit(session, &input) == INSITU_OK);
     return insitu_step(session, cycle, cycle);
 }

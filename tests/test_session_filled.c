@@ -105,7 +105,7 @@ static album draw(const session_input *in, bool is_filled)
             const insitu_field field = describe(names[k], &makers[k], is_filled);
             if (!is_filled) everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
         }
-        forget_pictures();
+        discard_pictures();
         const insitu_status status = insitu_step(session, step, 0);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
         everywhere(status == INSITU_OK);
@@ -176,7 +176,7 @@ static void what_goes_wrong_is_reported_on_all_ranks(void **state)
     for (int i = 0; i < (int)(sizeof cases / sizeof cases[0]); i++) {
         f.calls = g.calls = 0;
         if (own_rank == rank_count - 1) f.status = cases[i].status, f.corrupt = cases[i].corrupt;
-        forget_pictures();
+        discard_pictures();
         reported_everywhere(session, insitu_step(session, 2 * i, 0), INSITU_ERROR_FIELD, cases[i].words, "rank ");
         everywhere(caught_count == 0 && f.calls == 1 && g.calls == 1);
         f.status = INSITU_OK;
@@ -254,7 +254,7 @@ static void calls_of_a_fill_are_refused(void **state)
         snprintf(words, sizeof words, "field \"f\": its fill called %s() of its session", calls[i % CALLS]);
         f.call = calls_now ? i % CALLS : -1;
         f.is_refused = false;
-        forget_pictures();
+        discard_pictures();
         reported_everywhere(f.session, insitu_step(f.session, 2 * i, 0), INSITU_ERROR_ARGUMENT, words, "rank ");
         everywhere(f.is_refused == calls_now && caught_count == 0 && insitu_last_report(f.session)->cycle == 2 * i);
         f.call = -1;

@@ -76,7 +76,7 @@ int run_session_group(int argc, char **argv, const struct CMUnitTest *tests, siz
     if (argc > 1) folder = argv[1];
     snprintf(scene_name, sizeof scene_name, "%s/%s_np%d.yaml", folder, name, rank_count);
     const int failed = _cmocka_run_group_tests(name, tests, count, begin, end);
-    forget_pictures();
+    discard_pictures();
     MPI_Finalize();
     return failed;
 }
@@ -164,7 +164,7 @@ insitu_status submit(insitu_session *session, const session_input *in)
 
 void step_is_good(insitu_session *session, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == 1);
@@ -182,7 +182,7 @@ void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *
     everywhere(at_once == (is_bad && c->at_once ? c->status : INSITU_OK));
     everywhere(!is_bad || !c->at_once || strstr(insitu_error(session), c->words[0]) != NULL);
     for (int again = 0; again < 2; again++) { /* it stays wrong until it is mended */
-        forget_pictures();
+        discard_pictures();
         const insitu_status status = insitu_step(session, 1, 0);
         reported_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
                         c->words[1] ? c->words[1] : "");
@@ -193,7 +193,7 @@ void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *
     step_is_good(session, 2);
 }
 
-void take_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts, test_mesh *out)
+void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts, test_mesh *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
     int *all = test_calloc((size_t)whole->cell_count, sizeof *all);
@@ -243,13 +243,13 @@ void free_caught(caught_picture *picture)
     *picture = (caught_picture){0};
 }
 
-void forget_pictures(void)
+void discard_pictures(void)
 {
     for (int i = 0; i < caught_count; i++) free_caught(&caught[i]);
     caught_count = 0;
 }
 
-caught_picture take_caught(void)
+caught_picture pop_caught_picture(void)
 {
     caught_picture picture = {0};
     if (own_rank == 0) picture = caught[0];
@@ -257,9 +257,9 @@ caught_picture take_caught(void)
     return picture;
 }
 
-static void draw_well(insitu_session *session, const session_input *in)
+static void draw_ok(insitu_session *session, const session_input *in)
 {
-    forget_pictures();
+    discard_pictures();
     assert_int_equal(submit(session, in), INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -269,14 +269,14 @@ static void draw_well(insitu_session *session, const session_input *in)
 insitu_session *open_drawn(MPI_Comm comm, const char *scene, const session_input *in)
 {
     insitu_session *session = open_session(comm, scene);
-    draw_well(session, in);
+    draw_ok(session, in);
     return session;
 }
 
 caught_picture draw_once(insitu_session **session, const session_input *in)
 {
-    draw_well(*session, in);
-    const caught_picture picture = take_caught();
+    draw_ok(*session, in);
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(session);
     return picture;
 }

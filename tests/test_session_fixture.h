@@ -76,7 +76,7 @@ void input_renew(session_input *in);
 void input_free(session_input *in);
 
 /* This rank's cells of the whole; with ghosts: all cells, of which the others' are ghosts. */
-void take_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts, test_mesh *out);
+void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts, test_mesh *out);
 
 /* Set the mesh "m" and its field; the first status that is not OK. */
 insitu_status submit(insitu_session *session, const session_input *in);
@@ -103,7 +103,7 @@ void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *
 extern const char error_scene[];
 void all_are_reported(session_input *in, const corrupted_case *cases, size_t count);
 
-/* Pictures caught on rank 0 since the last forget_pictures(). */
+/* Pictures caught on rank 0 since the last discard_pictures(). */
 typedef struct caught_picture {
     int width, height;
     float *rgba, *depth; /* depth NULL where none was given */
@@ -119,11 +119,11 @@ typedef struct caught_picture {
 enum { MAX_CAUGHT = 64 };
 extern caught_picture caught[MAX_CAUGHT];
 extern int caught_count;
-void forget_pictures(void);
+void discard_pictures(void);
 void free_caught(caught_picture *picture);
 
 /* The first picture caught on rank 0, from now on the caller's, and the only one; on other ranks one of nothing. */
-caught_picture take_caught(void);
+caught_picture pop_caught_picture(void);
 
 /* Opens a session, hands the input over, and takes a step, which is to be well. */
 insitu_session *open_drawn(MPI_Comm comm, const char *scene, const session_input *in);

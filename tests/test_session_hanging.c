@@ -185,11 +185,11 @@ static void set_part(insitu_session *session, const char *name, const part *p)
 
 static caught_picture take_step(insitu_session *session)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
-    return take_caught();
+    return pop_caught_picture();
 }
 
 static caught_picture draw(MPI_Comm comm, const char *scene, const amr *a)

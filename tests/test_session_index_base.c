@@ -68,7 +68,7 @@ static void free_narrow(narrow_arrays *n)
 static void draw(const char *scene, const session_input *in, caught_picture out[PICTURES])
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    forget_pictures();
+    discard_pictures();
     everywhere(submit(session, in) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));

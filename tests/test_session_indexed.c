@@ -128,7 +128,7 @@ static void count_from_one(session_input *in)
 
 static void step_and_catch(insitu_session *session, int cycle, caught_picture out[PICTURES])
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -219,7 +219,7 @@ static void an_index_that_nobody_needs_is_left_alone(void **state)
     everywhere(insitu_set_field(session, "m", &other) == INSITU_OK);
     everywhere(insitu_step(session, 1, 0) == INSITU_OK);
     everywhere(insitu_last_report(session)->bytes_copied == copied);
-    forget_pictures();
+    discard_pictures();
     insitu_destroy(&session);
     free_twice(&t);
     input_free(&in);

@@ -513,7 +513,7 @@ static void submit_other(const session_input *in)
 static void step_draws(const char *names, insitu_status expected, const char *words)
 {
     char drawn[8] = "";
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
     reported_everywhere(session, status, expected, words);
     for (int i = 0; i < caught_count && i < 7; i++) drawn[i] = caught[i].path[0];

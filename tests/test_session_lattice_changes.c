@@ -286,16 +286,16 @@ static void wrong_blocks_are_reported_on_all_ranks(void **state)
     (void)state;
     block *right = make_block();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(blocks_scene));
-    forget_pictures();
+    discard_pictures();
     everywhere(set_block(session, right) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
-    caught_picture truth = take_caught();
+    caught_picture truth = pop_caught_picture();
     for (size_t i = 0; i < sizeof wrong_blocks / sizeof wrong_blocks[0]; i++) {
         expect_report(session, &wrong_blocks[i], (int)(3 * i + 1));
-        forget_pictures();
+        discard_pictures();
         everywhere(set_block(session, right) == INSITU_OK);
         everywhere(insitu_step(session, (int64_t)(3 * i + 3), 0) == INSITU_OK);
-        caught_picture healed = take_caught();
+        caught_picture healed = pop_caught_picture();
         everywhere(own_rank || is_same(&healed, &truth));
         free_caught(&healed);
     }
@@ -398,11 +398,11 @@ static const change changes[] = {
 
 static bool draw(insitu_session *session, int cycle, caught_picture *out)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
-    *out = take_caught();
+    *out = pop_caught_picture();
     return true;
 }
 

@@ -406,11 +406,11 @@ static int count_slits(const caught_picture *picture)
 
 static caught_picture take_step(insitu_session *session, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, cycle);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
-    return take_caught();
+    return pop_caught_picture();
 }
 
 /* Draws the levels in a session of their own. */

@@ -227,7 +227,7 @@ static int corner_blocks(const corner *c, const double from[3], const double d[3
 }
 
 typedef struct sky {
-    int pixels, wrong, unsure;
+    int pixels, wrong, undecided_rays;
     double sum; /* of the shares that are open, as drawn */
 } sky;
 
@@ -237,7 +237,7 @@ static sky verify_sky(const corner *c, const caught_picture *drawn, const caught
     sky out = {0};
     for (int p = 0; p < PIXELS; p++) {
         double place[3], n[3], d[3];
-        int open = 0, unsure = 0;
+        int open = 0, undecided_rays = 0;
         if (!isfinite(drawn->depth[p])) continue;
         place_at(p, (double)drawn->depth[p], place);
         normal_at(drawn, p, n);
@@ -245,15 +245,15 @@ static sky verify_sky(const corner *c, const caught_picture *drawn, const caught
             test_hemisphere((uint32_t)p, WIDTH, SAMPLES, k, n, d);
             const int blocked = corner_blocks(c, place, d);
             open += blocked == 0;
-            unsure += blocked < 0;
+            undecided_rays += blocked < 0;
         }
         const double share = (double)drawn->rgba[4 * p] / (double)plain->rgba[4 * p], counted = SAMPLES * share;
         out.pixels++;
-        out.unsure += unsure > 0;
+        out.undecided_rays += undecided_rays > 0;
         out.sum += share;
-        if (fabs(counted - round(counted)) < 1e-4 && round(counted) >= open && round(counted) <= open + unsure)
+        if (fabs(counted - round(counted)) < 1e-4 && round(counted) >= open && round(counted) <= open + undecided_rays)
             continue;
-        if (!out.wrong++) fprintf(stderr, "pixel %d: %.6g open, expected %d to %d\n", p, counted, open, open + unsure);
+        if (!out.wrong++) fprintf(stderr, "pixel %d: %.6g open, expected %d to %d\n", p, counted, open, open + undecided_rays);
     }
     return out;
 }
@@ -290,10 +290,10 @@ static void corners_are_as_dark_as_disk_segments(void **context)
              * the pixels at most. */
             const double off = fabs(s.sum - expected) / count;
             is_right =
-                s.wrong == 0 && s.pixels > 200 && s.unsure < s.pixels / 10 && off < 5 * 0.125 / sqrt(count) + 0.02;
+                s.wrong == 0 && s.pixels > 200 && s.undecided_rays < s.pixels / 10 && off < 5 * 0.125 / sqrt(count) + 0.02;
             if (!is_right)
                 fprintf(stderr, "%s: %d pixels, %d wrong, %d unsure, mean off by %g\n", test_mesh_kind_name(kind),
-                        s.pixels, s.wrong, s.unsure, off);
+                        s.pixels, s.wrong, s.undecided_rays, off);
         }
         free_caught(&drawn);
         free_caught(&plain);
@@ -337,10 +337,10 @@ static void valleys_are_dark_to_the_ground(void **context)
                 const double height = fmax(above(&valley, 0, at), above(&valley, 1, at));
                 near += height > valley.least && height < 2 * valley.least;
             }
-            is_right = s.wrong == 0 && s.pixels > 200 && near > 12 && s.unsure < s.pixels / 10;
+            is_right = s.wrong == 0 && s.pixels > 200 && near > 12 && s.undecided_rays < s.pixels / 10;
             if (!is_right)
                 fprintf(stderr, "%s: %d pixels, %d wrong, %d unsure, %d near\n", test_mesh_kind_name(kind), s.pixels,
-                        s.wrong, s.unsure, near);
+                        s.wrong, s.undecided_rays, near);
         }
         free_caught(&drawn);
         free_caught(&plain);

@@ -60,7 +60,7 @@ static void cells_have_the_pictures_of_a_step(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     for (int cycle = 0; cycle < 3; cycle++) {
-        forget_pictures();
+        discard_pictures();
         assert_int_equal(submit(session, &in), INSITU_OK);
         assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
         everywhere(!strstr(insitu_last_report(session)->warnings, "all_"));
@@ -68,7 +68,7 @@ static void cells_have_the_pictures_of_a_step(void **state)
     }
     insitu_destroy(&session);
     input_free(&in);
-    forget_pictures();
+    discard_pictures();
 }
 
 static void files_that_cannot_be_written_are_reported(void **state)
@@ -77,7 +77,7 @@ static void files_that_cannot_be_written_are_reported(void **state)
     session_input in;
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    forget_pictures();
+    discard_pictures();
     assert_int_equal(submit(session, &in), INSITU_OK);
     unwritable = "all_0";
     const insitu_status status = insitu_step(session, 0, 0);
@@ -86,7 +86,7 @@ static void files_that_cannot_be_written_are_reported(void **state)
     everywhere(own_rank != 0 || (caught_count == 4 && find("a.png") && find("c.png")));
     insitu_destroy(&session);
     input_free(&in);
-    forget_pictures();
+    discard_pictures();
 }
 
 int main(int argc, char **argv)

@@ -169,11 +169,11 @@ static void check_case(const narrow_case *c, int layer, bool is_given)
         snprintf(keys, sizeof keys, "%srange: data", c->scale);
     ramp_create(&r, SIDE, c->low, c->high, c->is_single);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
-    forget_pictures();
+    discard_pictures();
     ramp_submit(&r, session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     everywhere(!strstr(insitu_last_report(session)->warnings, "too near"));
-    caught_picture picture = take_caught();
+    caught_picture picture = pop_caught_picture();
     const bool is_volume = layer == 3; /* to max_error, in linear light */
     const double allowed = allowed_of(c) + (is_volume ? 0.01 : 0);
     const double off = colours_are_off(&picture, is_volume, c->place, c->low, c->high);
@@ -229,10 +229,10 @@ static caught_picture draw_range(const ramp *r, int layer, const char *scale, co
     char keys[256];
     snprintf(keys, sizeof keys, "%srange: %s", scale, range);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
-    forget_pictures();
+    discard_pictures();
     ramp_submit(r, session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -341,7 +341,7 @@ static void values_too_near_are_reported(void **state)
             insitu_destroy(&session);
             ramp_free(&r);
         }
-    forget_pictures();
+    discard_pictures();
 }
 
 /* ---- statistics ------------------------------------------------------------------------------------------------ */
@@ -375,7 +375,7 @@ static void statistics_distinguish_narrow_fields(void **state)
         if (own_rank == 0 && !is_well) fprintf(stderr, "%s", text);
         everywhere(own_rank != 0 || is_well);
         ramp_free(&r);
-        forget_pictures();
+        discard_pictures();
     }
 }
 

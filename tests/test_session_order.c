@@ -61,9 +61,9 @@ static drawn take_drawn(void)
     return out;
 }
 
-static bool step_well(insitu_session *session, int cycle)
+static bool step_ok(insitu_session *session, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     return status == INSITU_OK;
@@ -77,7 +77,7 @@ static drawn draw(MPI_Comm comm, const char *scene, const order_mesh *mesh, cons
     assert_int_equal(insitu_set_mesh(session, "m", &mesh->mesh), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &mesh->field), INSITU_OK);
     if (more) assert_int_equal(insitu_set_field(session, "m", more), INSITU_OK);
-    const bool is_well = step_well(session, 0);
+    const bool is_well = step_ok(session, 0);
     if (report) *report = *insitu_last_report(session);
     assert_true(is_well);
     const drawn out = take_drawn();
@@ -380,12 +380,12 @@ static drawn draw_rotated(const order_kind *kind, unsigned changed)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_scene));
     assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
-    everywhere(step_well(session, 0));
+    everywhere(step_ok(session, 0));
     rotate_nodes(&mesh);
     mesh.mesh.changed = changed;
     assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
     if (changed == INSITU_CHANGED_ALL) assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
-    everywhere(step_well(session, 1));
+    everywhere(step_ok(session, 1));
     const drawn out = take_drawn();
     insitu_destroy(&session);
     order_mesh_free(&mesh);

@@ -216,7 +216,7 @@ static void is_reported(insitu_session *session, const fault *f)
     everywhere(!is_bad || !f->at_once || strstr(insitu_error(session), f->words) != NULL);
     everywhere(!is_bad || !f->of_field || of_mesh == INSITU_OK);
     for (int again = 0; again < 2; again++) {
-        forget_pictures();
+        discard_pictures();
         const insitu_status status = insitu_step(session, 1, 0);
         if (!strstr(insitu_error(session), f->words)) fprintf(stderr, "%s: %s\n", f->words, insitu_error(session));
         reported_everywhere(session, status, f->status, "mesh \"m\"", f->words);

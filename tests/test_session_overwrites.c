@@ -39,7 +39,7 @@ static void check_step(insitu_session *session, int cycle, const char *const *wo
 {
     everywhere(submit(session, &input) == INSITU_OK);
     everywhere(insitu_step(session, cycle, 0.4 * cycle) == INSITU_OK);
-    forget_pictures();
+    discard_pictures();
     const char *warnings = insitu_last_report(session)->warnings;
     bool is_well = words[0] || !strstr(warnings, "overwritten");
     for (int i = 0; i < 4 && words[i]; i++) is_well = is_well && strstr(warnings, words[i]);

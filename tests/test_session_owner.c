@@ -33,7 +33,7 @@ typedef struct drawing {
 
 static void step_and_catch(insitu_session *session, int cycle, drawing *out)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -82,7 +82,7 @@ static void free_drawing(drawing *d)
     for (int i = 0; i < PICTURES; i++) free(d->pictures[i].rgba), free(d->pictures[i].depth);
 }
 
-static int64_t everyones(int64_t mine)
+static int64_t sum_over_ranks(int64_t mine)
 {
     int64_t sum = 0;
     MPI_Allreduce(&mine, &sum, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
@@ -239,7 +239,7 @@ static void hexes_among_polyhedra_are_hexes(void **state)
     int64_t kept = 0;
     for (int64_t cell = 0; cell < hexes.part.cell_count; cell++) kept += is_cut[cell];
     everywhere(drawn.recognised == hexes.part.cell_count - kept);
-    everywhere(everyones(kept) > 0 && everyones(drawn.recognised) > 0);
+    everywhere(sum_over_ranks(kept) > 0 && sum_over_ranks(drawn.recognised) > 0);
     everywhere(are_same(&expected, &drawn));
     free_drawing(&drawn);
     owned faces = make_owned(&cut.part, 1);

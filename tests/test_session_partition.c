@@ -82,7 +82,7 @@ static void make_mesh(mesh_kind kind, test_mesh *out)
 }
 
 /* Dealt at random, and listed in the rank's own way. */
-static void take_part(const test_mesh *whole, session_input *out)
+static void extract_rank_cells(const test_mesh *whole, session_input *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
     test_partition(whole, TEST_RANDOM, SIDE, rank_count, owners);
@@ -99,7 +99,7 @@ static void take_part(const test_mesh *whole, session_input *out)
 static double draw(MPI_Comm comm, const char *scene, const session_input *in, caught_picture *out)
 {
     insitu_session *session = open_session(comm, scene);
-    forget_pictures();
+    discard_pictures();
     assert_int_equal(submit(session, in), INSITU_OK);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     const double size = session->space.extent.cell_size;
@@ -134,7 +134,7 @@ static void verify(mesh_kind kind)
     bool is_one = true;
     make_mesh(kind, &whole.part);
     input_describe(&whole);
-    take_part(&whole.part, &part);
+    extract_rank_cells(&whole.part, &part);
     for (int i = kind == FLAT_AMONG_HEXES ? FIRST_SAMPLED : 0; i < SCENES; i++)
         is_one = is_one_picture(&scenes[i], write_scene(scenes[i].text), kind, &whole, &part) && is_one;
     everywhere(is_one);
@@ -169,7 +169,7 @@ static void default_volumes_are_off_by_a_hundredth_at_most(void **context)
         for (size_t i = 0; i < sizeof layers / sizeof *layers; i++) {
             session_input whole = {0}, part = {0};
             make_mesh(kind, &whole.part);
-            take_part(&whole.part, &part);
+            extract_rank_cells(&whole.part, &part);
             everywhere(is_near(layers[i], &part));
             input_free(&part);
             test_mesh_free(&whole.part);

@@ -260,7 +260,7 @@ static void check_fault(insitu_session *session, const fault *c, int cycle)
     create();
     describe();
     if (is_last) c->corrupt();
-    forget_pictures();
+    discard_pictures();
     const insitu_status at_once = submit(session, &input);
     everywhere(at_once == (is_last && c->at_once ? c->status : INSITU_OK));
     const insitu_status status = insitu_step(session, cycle, 0);

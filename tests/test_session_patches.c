@@ -279,7 +279,7 @@ static bool are_means_right(const insitu_session *session)
 
 static insitu_status draw(insitu_session *session, const part_input *in, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     insitu_status status = insitu_set_mesh(session, "m", &in->mesh);
     if (!status) status = insitu_set_field(session, "m", &in->field);
     if (status) fprintf(stderr, "rank %d: %s\n", own_rank, insitu_error(session));

@@ -113,7 +113,7 @@ static insitu_session *open_with(MPI_Comm comm, const char *scene, const plate *
 {
     insitu_session *session = open_session(comm, scene);
     const insitu_mesh mesh = describe(p, with_z);
-    forget_pictures();
+    discard_pictures();
     assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_OK);
     set_field(session, "f", INSITU_VERTEX, MAX_VERTICES, 1, p->f);
     set_field(session, "c", INSITU_CELL, p->cell_count, 1, p->c);
@@ -128,7 +128,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const plate *p, boo
 {
     insitu_session *session = open_with(comm, scene, p, with_z);
     if (insitu_last_report(session)->warnings[0]) fail_msg("warnings: %s", insitu_last_report(session)->warnings);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }

@@ -140,7 +140,7 @@ static bool are_means_right(const insitu_session *session, const part_input *in)
 
 static insitu_status draw(insitu_session *session, const part_input *in, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     insitu_status status = INSITU_OK;
     if (in) status = insitu_set_mesh(session, "m", &in->mesh);
     if (in && !status) status = insitu_set_field(session, "m", &in->field);
@@ -340,7 +340,7 @@ static caught_picture draw_smooth(const char *scene, const part_input *in, const
     everywhere(insitu_set_field(session, "m", &in->field) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &v) == INSITU_OK);
     everywhere(draw(session, NULL, 0) == INSITU_OK);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }

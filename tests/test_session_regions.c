@@ -64,7 +64,7 @@ static caught_picture draw(const char *scene, const char *warning)
     const char *warnings = insitu_last_report(session)->warnings;
     if (warning ? !strstr(warnings, warning) : *warnings) fprintf(stderr, "warnings: %s\n", warnings);
     everywhere(warning ? strstr(warnings, warning) != NULL : !*warnings);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }

@@ -58,7 +58,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     insitu_session *session = open_drawn(comm, scene, in);
     const char *warnings = insitu_last_report(session)->warnings;
     if (warning ? !strstr(warnings, warning) : *warnings) fail_msg("warnings: %s", warnings);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -112,9 +112,9 @@ static void make_whole(test_mesh_kind kind, double jitter, session_input *out)
 }
 
 /* The rank's cells; with ghosts: all cells, of which the others' are ghosts. */
-static void take_part(const session_input *whole, test_partition_kind distributed, bool with_ghosts, session_input *out)
+static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts, session_input *out)
 {
-    take_own_cells(&whole->part, distributed, SIDE, with_ghosts, &out->part);
+    extract_own_cells(&whole->part, distributed, SIDE, with_ghosts, &out->part);
     test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);
     input_describe(out);
 }
@@ -164,7 +164,7 @@ static void planes_are_one_picture_of(test_mesh_kind kind)
     everywhere(is_well);
     for (int way = 0; way < 3; way++) {
         session_input part = {0};
-        take_part(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
+        extract_rank_cells(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
         everywhere(own_rank != 0 || same_pictures(&picture, &alone));
         free_caught(&picture);
@@ -249,7 +249,7 @@ static void many_isovalues_and_planes_are_all_drawn(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         session_input whole = {0}, part = {0};
         make_whole(kind, 0.2, &whole);
-        take_part(&whole, TEST_RANDOM, false, &part);
+        extract_rank_cells(&whole, TEST_RANDOM, false, &part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
         everywhere(own_rank != 0 || has_many(&picture));
         free_caught(&picture);
@@ -284,7 +284,7 @@ static void draw_in_faces(test_mesh_kind kind, const char *scene, const plane *p
 {
     session_input whole = {0}, part = {0};
     make_whole(kind, 0, &whole);
-    take_part(&whole, TEST_RANDOM, false, &part);
+    extract_rank_cells(&whole, TEST_RANDOM, false, &part);
     caught_picture picture = draw(MPI_COMM_WORLD, write_scene(scene), &part, NULL);
     everywhere(own_rank != 0 || is_once(&picture, p));
     free_caught(&picture);
@@ -357,7 +357,7 @@ static void cells_have_their_values_and_no_number_is_grey(void **state)
     (void)state;
     session_input whole = {0}, part = {0};
     make_whole(TEST_HEXES, 0, &whole);
-    take_part(&whole, TEST_RANDOM, false, &part);
+    extract_rank_cells(&whole, TEST_RANDOM, false, &part);
     double *values = test_calloc((size_t)part.part.cell_count + 1, sizeof *values);
     for (int64_t cell = 0; cell < part.part.cell_count; cell++) {
         double at[3] = {0};

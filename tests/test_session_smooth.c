@@ -159,7 +159,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
 {
     static const char *const names[] = {"gx", "gy", "gz"};
     insitu_session *session = NULL;
-    forget_pictures();
+    discard_pictures();
     insitu_status status = insitu_create_from_text(comm, scene, &session);
     if (!status) status = submit(session, in);
     for (int k = 0; k < 3 && g && !status; k++) {
@@ -173,7 +173,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     if (!status) status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }

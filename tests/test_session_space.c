@@ -239,7 +239,7 @@ static void depth_is_of_the_nearest_surface(void **context)
         insitu_destroy(&session);
         input_free(&in);
     }
-    forget_pictures();
+    discard_pictures();
 }
 
 int main(int argc, char **argv)

@@ -58,7 +58,7 @@ enum { CELLS = 2, VOLUME, LEAST, MOST_VALUE, MEAN, DEVIATION, LOW, HIGH, FIRST_B
 static void run_steps(const char *scene, const session_input *in, int first, int end)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    forget_pictures();
+    discard_pictures();
     for (int cycle = first; cycle < end; cycle++) {
         assert_int_equal(submit(session, in), INSITU_OK);
         const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
@@ -216,7 +216,7 @@ static void files_that_cannot_be_written_are_reported(void **state)
     put_file("other.csv", "a,b\n1,2\n");
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: f, path: other.csv}]\n"));
-    forget_pictures();
+    discard_pictures();
     assert_int_equal(submit(session, &in), INSITU_OK);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns", "cycle,time");
     everywhere(caught_count == (own_rank == 0));
@@ -247,14 +247,14 @@ static void others_of_a_missing_field_are_found(void **state)
                                                                    "[0.1]}}]\n    outputs: [{path: b.png}]\n"
                                                                    "statistics: [{field: g, path: g.csv}, {field: f, "
                                                                    "path: there.csv}]\n"));
-    forget_pictures();
+    discard_pictures();
     assert_int_equal(submit(session, &in), INSITU_OK);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
     everywhere(caught_count == (own_rank == 0) && insitu_last_report(session)->images == 1);
     insitu_destroy(&session);
     read_file("there.csv", MOST, text);
     everywhere(own_rank != 0 || strstr(text, "\n0,0,"));
-    forget_pictures();
+    discard_pictures();
     input_free(&in);
 }
 
@@ -270,7 +270,7 @@ static unsigned cycles_drawn(const char *scene)
     for (int cycle = 0; cycle < 10; cycle++) {
         for (int64_t v = 0; v < in.part.vertex_count; v++)
             in.part.values[v] = cycle / 1.6 * test_linear(in.part.coordinates + 3 * v);
-        forget_pictures();
+        discard_pictures();
         assert_int_equal(submit(session, &in), INSITU_OK);
         const insitu_status status = insitu_step(session, cycle, cycle);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));

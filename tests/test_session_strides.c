@@ -93,7 +93,7 @@ static void refuse(insitu_session *session, formed_mesh *m, const strided *s, bo
         const int64_t right = *s->stride;
         snprintf(words[0], sizeof words[0], "%s have a stride of %lld bytes", s->name, (long long)wild[i]);
         snprintf(words[1], sizeof words[1], ": %lld of them lie outside of memory", (long long)s->count);
-        forget_pictures();
+        discard_pictures();
         if (is_last) *s->stride = wild[i];
         const insitu_status at_once = formed_submit(session, m, formed_has_corners(m->form));
         *s->stride = right;
@@ -196,7 +196,7 @@ static void *reverse(const strided *s, int64_t bytes)
 static int draw(const char *scene, const formed_mesh *m, caught_picture *out)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    forget_pictures();
+    discard_pictures();
     everywhere(formed_submit(session, m, formed_has_corners(m->form)) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     reported_everywhere(session, status, INSITU_OK, "");

@@ -27,7 +27,7 @@ static void draw(const char *text, int side)
     totals.bytes_peak = most[2];
     insitu_destroy(&session);
     input_free(&in);
-    forget_pictures();
+    discard_pictures();
 }
 
 static void one_volume_needs_no_turns(void **context)

@@ -138,12 +138,12 @@ static void create(session_input *in, test_mesh_kind kind)
 /* What the step copied, and its picture. */
 static caught_picture draw(const char *path, const session_input *in, int64_t *copied)
 {
-    forget_pictures();
+    discard_pictures();
     insitu_session *session = open_drawn(MPI_COMM_WORLD, path, in);
     *copied = insitu_last_report(session)->bytes_copied;
     everywhere(in->part.cell_count == 0 || insitu_last_report(session)->bytes_borrowed > 0);
     insitu_destroy(&session);
-    return take_caught();
+    return pop_caught_picture();
 }
 
 /* Draws the input and compares; is_in_place: no more is copied than of the truth. */
@@ -365,7 +365,7 @@ static void components_may_be_set_again(void **state)
     create(&in, TEST_MIXED);
     make_field(APART, INSITU_CELL, &in);
     insitu_session *session = open_drawn(MPI_COMM_WORLD, write_scene(recentred), &in);
-    caught_picture first = take_caught();
+    caught_picture first = pop_caught_picture();
     for (int step = 1; step < 4; step++) {
         insitu_array again[COMPONENTS];
         memcpy(again, components, sizeof again);
@@ -375,7 +375,7 @@ static void components_may_be_set_again(void **state)
         everywhere(submit(session, &in) == INSITU_OK);
         memset(again, 0, sizeof again);
         step_is_good(session, step);
-        caught_picture picture = take_caught();
+        caught_picture picture = pop_caught_picture();
         const bool is_same = own_rank || same_pictures(&picture, &first);
         everywhere(is_same);
         free_caught(&picture);
@@ -409,7 +409,7 @@ static void forms_may_change_from_step_to_step(void **state)
             if (k) everywhere(lay_out(&in.field.values, in.field.count, &forms[step % 5]));
             everywhere(submit(k ? session : plain, &in) == INSITU_OK);
             step_is_good(k ? session : plain, step);
-            pictures[k] = take_caught();
+            pictures[k] = pop_caught_picture();
         }
         const bool is_same = own_rank || same_pictures(&pictures[0], &pictures[1]);
         everywhere(is_same);

@@ -64,7 +64,7 @@ static void check(test_mesh_kind kind, insitu_vertex_order stand, insitu_vertex_
     test_mesh_lattice(kind, SIDE, jitter, test_wave, &whole);
     if (mirrored) test_mesh_mirror(&whole, false);
     bring_into(&whole, stand);
-    take_own_cells(&whole, TEST_RANDOM, SIDE, false, &in.part);
+    extract_own_cells(&whole, TEST_RANDOM, SIDE, false, &in.part);
     test_mesh_free(&whole);
     input_describe(&in);
     in.mesh.vertex_order = said;

@@ -56,7 +56,7 @@ static insitu_session *open_behind(const char *scene, const session_input *in, v
 
 static void make_input(session_input *in)
 {
-    forget_pictures();
+    discard_pictures();
     session_writes_behind = false;
     before_writing = NULL;
     unwritable = NULL;
@@ -183,7 +183,7 @@ static void failure_is_reported_by_a_later_step_or_the_end(void **state)
     for (int cycle = 3; cycle < 1000 && !status; cycle += 2) {
         status = insitu_step(session, cycle, 0.5);
         usleep(status ? 0 : 1000);
-        forget_pictures();
+        discard_pictures();
     }
     reported_everywhere(session, status, INSITU_ERROR_IO, "cycle 2: image \"a\": a2.png: cannot be written");
     everywhere(insitu_last_report(session)->images == 1); /* what is due is drawn all the same */

@@ -248,7 +248,7 @@ static int count_differing(const bench *b)
 
 static void draw_right(bench *b, bool is_first, int number)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status set = formed_submit(b->session, &b->mesh, b->is_torn);
     const insitu_status status = insitu_step(b->session, b->cycle++, 0);
     if (set || status) fprintf(stderr, "case %d: not healed: %s\n", number, insitu_error(b->session));
@@ -283,7 +283,7 @@ static bool draw_wrong(bench *b, int number)
     const bool is_mine = where >= rank_count || where == own_rank;
     const formed_mesh right = b->mesh;
     for (int fault = 0; fault < faults; fault++) corrupt(&b->mesh, &right, (uint64_t)number, fault, is_mine);
-    forget_pictures();
+    discard_pictures();
     const insitu_status set = formed_submit(b->session, &b->mesh, b->is_torn);
     const insitu_status status = insitu_step(b->session, b->cycle++, 0);
     const int images = insitu_last_report(b->session)->images;

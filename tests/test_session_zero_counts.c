@@ -55,7 +55,7 @@ static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_tor
     if (is_mine && !with_arrays) drop_arrays(&m->mesh, mask);
     formed_fit_fields(m);
     const bool is_right = !is_mine || is_empty_and_right(&m->mesh);
-    forget_pictures();
+    discard_pictures();
     const insitu_status set = formed_submit(session, m, is_torn);
     const insitu_status status = insitu_step(session, 1, 0);
     if ((set && !status) || (is_right && status))
@@ -85,7 +85,7 @@ static void check_form(mesh_form form, bool is_torn)
         for (int way = 0; way < 4; way++)
             draw_with_zeros(session, &m, is_torn, mask, way & 1, way & 2 || own_rank == rank_count - 1);
     }
-    forget_pictures();
+    discard_pictures();
     everywhere(formed_submit(session, &m, is_torn) == INSITU_OK);
     const insitu_status status = insitu_step(session, 2, 0);
     reported_everywhere(session, status, INSITU_OK, "");

@@ -127,7 +127,7 @@ typedef struct picture_set {
 } picture_set;
 
 /* Rank 0's pictures, which are forgotten. */
-static picture_set take_pictures(void)
+static picture_set pop_pictures(void)
 {
     picture_set set = {.count = caught_count};
     memcpy(set.pictures, caught, (size_t)caught_count * sizeof *caught);
@@ -164,7 +164,7 @@ static bool name_allocation(bool is_well)
 
 static void step_draws(insitu_session *session, const picture_set *expected)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
     reported_everywhere(session, status, INSITU_OK, "");
     at_allocation(own_rank != 0 || (are_of(expected) && caught_count == expected->count));
@@ -174,10 +174,10 @@ static insitu_session *open_and_draw(const char *scene, const scenery *s, pictur
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     everywhere(submit_scenery(session, s) == INSITU_OK);
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
     reported_everywhere(session, status, INSITU_OK, "");
-    *out = take_pictures();
+    *out = pop_pictures();
     return session;
 }
 
@@ -188,15 +188,15 @@ typedef struct failure {
     bool is_armed; /* on this rank */
 } failure;
 
-static void arm(const failure *f)
+static void start_failing(const failure *f)
 {
-    if (f->is_armed) heap_arm(f->n, false);
+    if (f->is_armed) heap_start_failing(f->n, false);
 }
 
 /* Tells whether the allocation was beyond the last one on every rank. */
-static bool disarm(const failure *f)
+static bool stop_failing(const failure *f)
 {
-    int is_over = !f->is_armed || heap_disarm() < f->n;
+    int is_over = !f->is_armed || heap_stop_failing() < f->n;
     MPI_Allreduce(MPI_IN_PLACE, &is_over, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     return is_over;
 }
@@ -212,12 +212,12 @@ static void check_reported(const insitu_session *session, insitu_status status)
     reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
 }
 
-static void run_failures(bool (*fails_well)(const scenery *s, const failure *f, void *state), const scenery *s,
+static void run_failures(bool (*fails_cleanly)(const scenery *s, const failure *f, void *state), const scenery *s,
                          int first, void *state)
 {
     for (int with_all = 0; with_all < (rank_count > 1 ? 2 : 1); with_all++) {
         failure f = {.n = first, .is_armed = with_all || own_rank == rank_count - 1};
-        for (allocation = f.n; !fails_well(s, &f, state); allocation = f.n) f.n += stride();
+        for (allocation = f.n; !fails_cleanly(s, &f, state); allocation = f.n) f.n += stride();
         if (own_rank == 0) fprintf(stderr, "%s: to allocation %lld\n", s->of->name, (long long)f.n);
     }
 }
@@ -230,14 +230,14 @@ typedef struct step_state {
 } step_state;
 
 /* Returns whether there are no more to fail. */
-static bool set_and_step_fail_well(const scenery *s, const failure *f, void *state)
+static bool set_and_step_fail_cleanly(const scenery *s, const failure *f, void *state)
 {
     step_state *t = state;
-    forget_pictures();
-    arm(f);
+    discard_pictures();
+    start_failing(f);
     const insitu_status set = submit_scenery(t->session, s);
     const insitu_status status = insitu_step(t->session, 1, 0);
-    const bool is_over = disarm(f);
+    const bool is_over = stop_failing(f);
     check_reported(t->session, status);
     at_allocation(own_rank != 0 || are_of(&t->expected));
     at_allocation(own_rank != 0 || status != INSITU_OK || caught_count == t->expected.count);
@@ -258,7 +258,7 @@ static void failing_step_is_the_same_picture_or_an_error(void **context)
         step_state t;
         scenery_create(&s, &cases[i]);
         t.session = open_and_draw(full_scene, &s, &t.expected);
-        run_failures(set_and_step_fail_well, &s, 1 + i % stride(), &t);
+        run_failures(set_and_step_fail_cleanly, &s, 1 + i % stride(), &t);
         insitu_destroy(&t.session);
         free_pictures(&t.expected);
         scenery_free(&s);
@@ -267,11 +267,11 @@ static void failing_step_is_the_same_picture_or_an_error(void **context)
 
 /* ---- first steps: a new session each --------------------------------------------------------------------------- */
 
-static bool first_step_fails_well(const scenery *s, const failure *f, void *state)
+static bool first_step_fails_cleanly(const scenery *s, const failure *f, void *state)
 {
     step_state *t = state;
     t->session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
-    const bool is_over = set_and_step_fail_well(s, f, t);
+    const bool is_over = set_and_step_fail_cleanly(s, f, t);
     insitu_destroy(&t->session);
     return is_over;
 }
@@ -286,7 +286,7 @@ static void failing_first_step_is_the_same_picture_or_an_error(void **context)
         scenery_create(&s, &cases[i]);
         t.session = open_and_draw(full_scene, &s, &t.expected);
         insitu_destroy(&t.session);
-        run_failures(first_step_fails_well, &s, 1 + i % stride(), &t);
+        run_failures(first_step_fails_cleanly, &s, 1 + i % stride(), &t);
         free_pictures(&t.expected);
         scenery_free(&s);
     }
@@ -294,15 +294,15 @@ static void failing_first_step_is_the_same_picture_or_an_error(void **context)
 
 /* ---- sessions --------------------------------------------------------------------------------------------------- */
 
-static bool creation_fails_well(const scenery *s, const failure *f, void *state)
+static bool creation_fails_cleanly(const scenery *s, const failure *f, void *state)
 {
     step_state *t = state;
     const int64_t held = base_memory_held();
     const char *scene = write_scene(full_scene);
     insitu_session *session = NULL;
-    arm(f);
+    start_failing(f);
     const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &session);
-    const bool is_over = disarm(f);
+    const bool is_over = stop_failing(f);
     everywhere((status == INSITU_OK) == (session != NULL));
     check_reported(NULL, status);
     if (session) {
@@ -323,7 +323,7 @@ static void failing_creation_opens_the_session_or_none(void **context)
     scenery_create(&s, &cases[0]);
     t.session = open_and_draw(full_scene, &s, &t.expected);
     insitu_destroy(&t.session);
-    run_failures(creation_fails_well, &s, 1, &t);
+    run_failures(creation_fails_cleanly, &s, 1, &t);
     free_pictures(&t.expected);
     scenery_free(&s);
 }
@@ -335,16 +335,16 @@ typedef struct edit_state {
 } edit_state;
 
 /* A step in which the edit is not taken says so, and the next one takes it. */
-static bool edit_fails_well(const scenery *s, const failure *f, void *state)
+static bool edit_fails_cleanly(const scenery *s, const failure *f, void *state)
 {
     edit_state *t = state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
     everywhere(submit_scenery(session, s) == INSITU_OK);
     write_scene(edited_scene);
-    forget_pictures();
-    arm(f);
+    discard_pictures();
+    start_failing(f);
     const insitu_status status = insitu_step(session, 1, 0);
-    const bool is_over = disarm(f);
+    const bool is_over = stop_failing(f);
     check_reported(session, status);
     const bool is_taken = are_of(&t->after);
     at_allocation(own_rank != 0 || is_taken || are_of(&t->before));
@@ -365,7 +365,7 @@ static void failing_edit_is_reported_and_taken_later(void **context)
     insitu_destroy(&session);
     session = open_and_draw(edited_scene, &s, &t.after);
     insitu_destroy(&session);
-    run_failures(edit_fails_well, &s, 1, &t);
+    run_failures(edit_fails_cleanly, &s, 1, &t);
     free_pictures(&t.before);
     free_pictures(&t.after);
     scenery_free(&s);
