@@ -91,8 +91,8 @@ static fragment *fold_run(const render_folding *folding, fragment *run, int64_t 
         end -= error_at(end);
     }
     for (int64_t i = 0, n; i < count; i += n) {
-        const int32_t stretch = fragment_interval_number(run[i].t_in);
-        for (n = 1; i + n < count && fragment_interval_number(run[i + n].t_in) == stretch;) n++;
+        const int32_t interval_number = fragment_interval_number(run[i].t_in);
+        for (n = 1; i + n < count && fragment_interval_number(run[i + n].t_in) == interval_number;) n++;
         const int64_t made = fragment_fold_between(run + i, n, begin, end, run + i);
         shorten(folding, run + i, made);
         for (int64_t k = i; k < i + made; k++)

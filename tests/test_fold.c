@@ -72,8 +72,8 @@ static int64_t send(const ray *r, int rank, fragment *out)
                r->items[i + n].t_in == r->items[i + n - 1].t_out)
             n++;
         for (int64_t k = i, m; k < i + n; k += m) {
-            const int32_t stretch = fragment_interval_number(r->items[k].t_in);
-            for (m = 1; k + m < i + n && fragment_interval_number(r->items[k + m].t_in) == stretch;) m++;
+            const int32_t interval_number = fragment_interval_number(r->items[k].t_in);
+            for (m = 1; k + m < i + n && fragment_interval_number(r->items[k + m].t_in) == interval_number;) m++;
             count += fragment_fold_between(r->items + k, m, r->items[i].t_in, r->items[i + n - 1].t_out, out + count);
         }
     }

@@ -458,12 +458,12 @@ static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool 
 
 /* Returns the rays for which the sheet lies in the interval: between the crossings of triangles, and between those of
  * faces. Sheets beyond the triangles belong to tets that extend out of the cell, and are not part of its field. */
-SIMD_INLINE vm kernel_polyhedron_interval_contains(const kernel_polyhedron_interval *stay,
+SIMD_INLINE vm kernel_polyhedron_interval_contains(const kernel_polyhedron_interval *polyhedron_interval,
                                                    const kernel_triangle_crossings *sheet)
 {
-    const vm inside = vm_and(vf_lt(stay->interval.t_in, sheet->t), vf_lt(sheet->t, stay->interval.t_out));
-    const vm within = vm_and(vf_lt(stay->in.t, sheet->t), vf_lt(sheet->t, stay->out.t));
-    return vm_and(vm_and(stay->interval.mask, sheet->mask), vm_and(inside, within));
+    const vm inside = vm_and(vf_lt(polyhedron_interval->interval.t_in, sheet->t), vf_lt(sheet->t, polyhedron_interval->interval.t_out));
+    const vm within = vm_and(vf_lt(polyhedron_interval->in.t, sheet->t), vf_lt(sheet->t, polyhedron_interval->out.t));
+    return vm_and(vm_and(polyhedron_interval->interval.mask, sheet->mask), vm_and(inside, within));
 }
 
 /* Computes the field just inside an end of the interval: the face's value, plus the fields of all tets other than the
@@ -479,17 +479,17 @@ SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays
 
 /* Prepares the profile of the interval, which is the piecewise linear field along each ray: computes the field at the
  * crossed sheets and at both ends. */
-static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_interval *stay)
+static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_interval *polyhedron_interval)
 {
-    kernel_interval *i = &stay->interval;
+    kernel_interval *i = &polyhedron_interval->interval;
     kernel_poly_sheets(r);
     if (r->cell->is_star) return;
     kernel_poly_segments(r);
-    kernel_poly_inner_value(r, i->mask, &stay->in, false, &stay->u_in, &i->w_in);
-    kernel_poly_inner_value(r, i->mask, &stay->out, true, &stay->u_out, &i->w_out);
+    kernel_poly_inner_value(r, i->mask, &polyhedron_interval->in, false, &polyhedron_interval->u_in, &i->w_in);
+    kernel_poly_inner_value(r, i->mask, &polyhedron_interval->out, true, &polyhedron_interval->u_out, &i->w_out);
     for (int n = 0; n < r->sheet_count; n++) {
         kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
-        const vm held = kernel_polyhedron_interval_contains(stay, sheet);
+        const vm held = kernel_polyhedron_interval_contains(polyhedron_interval, sheet);
         vf v = sheet->v, w = sheet->w;
         if (!vm_any(held)) continue;
         kernel_poly_sum(r, held, sheet->t, false, &v, &w);
@@ -500,21 +500,21 @@ static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_inte
 
 /* Returns a piece of length zero at the begin of each ray's profile, which is the piecewise linear field along the
  * ray. */
-SIMD_INLINE kernel_profile_piece kernel_profile_begin(const kernel_polyhedron_interval *stay, vf v_in)
+SIMD_INLINE kernel_profile_piece kernel_profile_begin(const kernel_polyhedron_interval *polyhedron_interval, vf v_in)
 {
-    const kernel_interval *i = &stay->interval;
+    const kernel_interval *i = &polyhedron_interval->interval;
     return (kernel_profile_piece){i->t_in, i->t_in, v_in, v_in, i->w_in, i->w_in};
 }
 
 /* Replaces *piece by the next linear piece of the field along each ray. v_out is the value at the end of the ray's
  * interval. */
-SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r, const kernel_polyhedron_interval *stay, vf v_out,
+SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r, const kernel_polyhedron_interval *polyhedron_interval, vf v_out,
                                      kernel_profile_piece *piece)
 {
-    vf t = stay->interval.t_out, v = v_out, w = stay->interval.w_out;
+    vf t = polyhedron_interval->interval.t_out, v = v_out, w = polyhedron_interval->interval.w_out;
     for (int n = 0; n < r->sheet_count; n++) {
         const kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
-        const vm nearer = vm_and(kernel_polyhedron_interval_contains(stay, sheet),
+        const vm nearer = vm_and(kernel_polyhedron_interval_contains(polyhedron_interval, sheet),
                                  vm_and(vf_lt(piece->t1, sheet->t), vf_lt(sheet->t, t)));
         t = vf_select(nearer, sheet->t, t);
         v = vf_select(nearer, sheet->v_face, v);
@@ -524,9 +524,9 @@ SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r, const kerne
 }
 
 /* Returns those of the given rays on which the field has further linear pieces behind the given one. */
-SIMD_INLINE vm kernel_profile_open(const kernel_polyhedron_interval *stay, const kernel_profile_piece *piece, vm mask)
+SIMD_INLINE vm kernel_profile_open(const kernel_polyhedron_interval *polyhedron_interval, const kernel_profile_piece *piece, vm mask)
 {
-    return vm_and(mask, vf_lt(piece->t1, stay->interval.t_out));
+    return vm_and(mask, vf_lt(piece->t1, polyhedron_interval->interval.t_out));
 }
 
 #endif

@@ -114,13 +114,13 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
 }
 
 static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r,
-                                      kernel_polyhedron_interval *stay)
+                                      kernel_polyhedron_interval *polyhedron_interval)
 {
     kernel_profile_walk walk;
-    kernel_poly_profile(r, stay);
-    kernel_profile_walk_begin(stay, wanted, &walk);
+    kernel_poly_profile(r, polyhedron_interval);
+    kernel_profile_walk_begin(polyhedron_interval, wanted, &walk);
     do {
-        const vm found = kernel_profile_walk_next(r, stay, &walk);
+        const vm found = kernel_profile_walk_next(r, polyhedron_interval, &walk);
         walk.open = vm_andnot(walk.open, kernel_occlusion_block(p, o, found, walk.t));
     } while (vm_any(walk.open));
 }
@@ -128,13 +128,13 @@ static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *
 static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion *o, polyhedron *c, vm rays)
 {
     kernel_poly_crossings r;
-    kernel_polyhedron_interval stay;
+    kernel_polyhedron_interval polyhedron_interval;
     if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r, &stay)) {
-        const vm changes = kernel_changes_sign(&stay.interval);
+    while (kernel_poly_next(&r, &polyhedron_interval)) {
+        const vm changes = kernel_changes_sign(&polyhedron_interval.interval);
         const vm wanted =
-            vm_and(kernel_is_near(p, &stay.interval), vm_or(changes, kernel_polyhedron_may_cross(p, c, &r, &stay)));
-        if (vm_any(wanted)) kernel_occlusion_interval(p, o, wanted, &r, &stay);
+            vm_and(kernel_is_near(p, &polyhedron_interval.interval), vm_or(changes, kernel_polyhedron_may_cross(p, c, &r, &polyhedron_interval)));
+        if (vm_any(wanted)) kernel_occlusion_interval(p, o, wanted, &r, &polyhedron_interval);
     }
 }
 

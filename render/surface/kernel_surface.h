@@ -490,18 +490,18 @@ SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
  * valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or the reverse; such rays are always
  * returned. */
 SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c, const kernel_poly_crossings *r,
-                                           const kernel_polyhedron_interval *stay)
+                                           const kernel_polyhedron_interval *polyhedron_interval)
 {
-    const kernel_interval *i = &stay->interval;
+    const kernel_interval *i = &polyhedron_interval->interval;
     const vm longer = vm_and(i->mask, vf_lt(i->t_in, i->t_out));
     if (!c->is_star || !p->is_pencil) return longer;
     if (!c->has_slopes) kernel_polyhedron_slopes(c, p);
     const vf zero = vf_set(0), fall = kernel_slope_of(c, c->fall), rise = kernel_slope_of(c, c->rise);
-    const vf in = stay->in.v, out = stay->out.v;
+    const vf in = polyhedron_interval->in.v, out = polyhedron_interval->out.v;
     const vm below = vf_lt(i->v_in, zero);
     const vm differs = vm_or(vm_xor(vf_lt(in, zero), below), vm_xor(vf_lt(out, zero), below));
     const vf away = vf_select(below, fall, rise) * vf_abs(in) + vf_select(below, rise, fall) * vf_abs(out);
-    const vm turns = vf_lt(away, fall * rise * (stay->out.t - stay->in.t));
+    const vm turns = vf_lt(away, fall * rise * (polyhedron_interval->out.t - polyhedron_interval->in.t));
     return vm_and(longer, vm_or(turns, vm_or(differs, r->uneven)));
 }
 
@@ -519,16 +519,16 @@ typedef struct kernel_profile_walk {
     vf t, w;                    /* depth of the crossing that was found, and the colour field there */
 } kernel_profile_walk;
 
-static void kernel_profile_walk_begin(const kernel_polyhedron_interval *stay, vm rays, kernel_profile_walk *walk)
+static void kernel_profile_walk_begin(const kernel_polyhedron_interval *polyhedron_interval, vm rays, kernel_profile_walk *walk)
 {
-    const kernel_interval *i = &stay->interval;
+    const kernel_interval *i = &polyhedron_interval->interval;
     const vf zero = vf_set(0);
     const vm below = vf_lt(i->v_in, zero);
     walk->open = rays;
-    walk->below = vf_lt(stay->u_in, zero);
+    walk->below = vf_lt(polyhedron_interval->u_in, zero);
     walk->jump_in = vm_and(rays, vm_xor(walk->below, below));
-    walk->jump_out = vm_and(rays, vm_xor(vf_lt(stay->u_out, zero), vf_lt(i->v_out, zero)));
-    walk->piece = kernel_profile_begin(stay, stay->u_in);
+    walk->jump_out = vm_and(rays, vm_xor(vf_lt(polyhedron_interval->u_out, zero), vf_lt(i->v_out, zero)));
+    walk->piece = kernel_profile_begin(polyhedron_interval, polyhedron_interval->u_in);
 }
 
 SIMD_INLINE void kernel_piece_select(vm rays, const kernel_profile_piece *from, kernel_profile_piece *to)
@@ -545,18 +545,18 @@ SIMD_INLINE void kernel_piece_select(vm rays, const kernel_profile_piece *from, 
  * face counts as a piece. A value inside the cell that equals the isovalue up to rounding is treated as if it were on
  * the side from which the ray comes: a ray may meet several sheets at one point, each with its own rounding, and their
  * signs would alternate. The values at the faces are not changed. */
-SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, const kernel_polyhedron_interval *stay,
+SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, const kernel_polyhedron_interval *polyhedron_interval,
                                            vm left, kernel_profile_walk *walk)
 {
     kernel_profile_piece next = walk->piece;
     const vf zero = vf_set(0);
-    const vm inside = kernel_profile_open(stay, &next, left);
-    kernel_profile_next(r, stay, vf_select(inside, stay->u_out, stay->interval.v_out), &next);
+    const vm inside = kernel_profile_open(polyhedron_interval, &next, left);
+    kernel_profile_next(r, polyhedron_interval, vf_select(inside, polyhedron_interval->u_out, polyhedron_interval->interval.v_out), &next);
     const vm rounding =
-        vm_and(kernel_profile_open(stay, &next, inside), vf_le(vf_abs(next.v1), vf_set(KERNEL_ROOT_BAND)));
+        vm_and(kernel_profile_open(polyhedron_interval, &next, inside), vf_le(vf_abs(next.v1), vf_set(KERNEL_ROOT_BAND)));
     next.v1 = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v1);
     kernel_piece_select(left, &next, &walk->piece);
-    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(stay, &next, inside)));
+    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(polyhedron_interval, &next, inside)));
 }
 
 /* Returns a number that is one or two roundings above t. */
@@ -566,14 +566,14 @@ SIMD_INLINE vf kernel_next_float(vf t)
 }
 
 /* Finds the next crossing of each open ray; returns the rays that have one. */
-static vm kernel_profile_walk_next(const kernel_poly_crossings *r, const kernel_polyhedron_interval *stay,
+static vm kernel_profile_walk_next(const kernel_poly_crossings *r, const kernel_polyhedron_interval *polyhedron_interval,
                                    kernel_profile_walk *walk)
 {
     const vm jump = walk->jump_in;
     vm found = jump, left = vm_andnot(walk->open, jump);
     walk->jump_in = vm_none();
     while (vm_any(left)) {
-        const vm on = kernel_profile_walk_advance(r, stay, left, walk);
+        const vm on = kernel_profile_walk_advance(r, polyhedron_interval, left, walk);
         const vm cross = vm_and(left, vm_xor(vf_lt(walk->piece.v1, vf_set(0)), walk->below));
         walk->below = vm_xor(walk->below, cross);
         walk->open = vm_andnot(walk->open, vm_andnot(left, on));
@@ -647,13 +647,13 @@ static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *sta
 
 /* Accepts the crossings of one interval. A ray ends at the first crossing of an opaque surface in front of the eye. */
 static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, int value, vm wanted,
-                                    kernel_poly_crossings *r, kernel_polyhedron_interval *stay)
+                                    kernel_poly_crossings *r, kernel_polyhedron_interval *polyhedron_interval)
 {
     kernel_profile_walk walk;
-    kernel_poly_profile(r, stay);
-    kernel_profile_walk_begin(stay, wanted, &walk);
+    kernel_poly_profile(r, polyhedron_interval);
+    kernel_profile_walk_begin(polyhedron_interval, wanted, &walk);
     do {
-        const vm found = kernel_profile_walk_next(r, stay, &walk);
+        const vm found = kernel_profile_walk_next(r, polyhedron_interval, &walk);
         const vm kept = kernel_unclipped_hits(p, state->surface, found, walk.t);
         kernel_polyhedron_accept(p, state, value, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
         if (state->is_opaque) walk.open = vm_andnot(walk.open, kept);
@@ -664,14 +664,14 @@ static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *st
 {
     const render_surface_layer *layer = state->surface->layer;
     kernel_poly_crossings r;
-    kernel_polyhedron_interval stay;
+    kernel_polyhedron_interval polyhedron_interval;
     if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, layer->colour_map != NULL)) return;
-    while (kernel_poly_next(&r, &stay)) {
-        const vm near = kernel_is_near(p, &stay.interval);
+    while (kernel_poly_next(&r, &polyhedron_interval)) {
+        const vm near = kernel_is_near(p, &polyhedron_interval.interval);
         if (!vm_any(near)) continue;
         const vm wanted =
-            vm_and(near, vm_or(kernel_changes_sign(&stay.interval), kernel_polyhedron_may_cross(p, c, &r, &stay)));
-        if (vm_any(wanted)) kernel_polyhedron_cross(p, state, value, wanted, &r, &stay);
+            vm_and(near, vm_or(kernel_changes_sign(&polyhedron_interval.interval), kernel_polyhedron_may_cross(p, c, &r, &polyhedron_interval)));
+        if (vm_any(wanted)) kernel_polyhedron_cross(p, state, value, wanted, &r, &polyhedron_interval);
     }
 }
 

@@ -68,7 +68,7 @@ typedef struct kernel_exact_point {
 /* State of the bisection of one ray's interval. */
 typedef struct kernel_bisection {
     const kernel_segment_state *state;
-    const kernel_cell_interval *span;
+    const kernel_cell_interval *cell_interval;
     const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
     double u, v, slope, shift;   /* constants of the ray: at depth t it is at (u, v) * (slope * t + shift) */
     kernel_exact_point in, out;         /* ends of the interval, at the crossings of the faces */
@@ -260,8 +260,8 @@ static double kernel_subinterval_error(const kernel_bisection *h, const kernel_s
 /* Returns a step of the opacity whose value is strictly between low and high, or NULL if there is none. */
 static const kernel_step *kernel_step_between(const kernel_bisection *h, double low, double high)
 {
-    const kernel_step *steps = h->state->pieces->steps + h->span->first_step;
-    for (int i = 0; i < h->span->step_count; i++)
+    const kernel_step *steps = h->state->pieces->steps + h->cell_interval->first_step;
+    for (int i = 0; i < h->cell_interval->step_count; i++)
         if (low < steps[i].at && steps[i].at < high) return &steps[i];
     return NULL;
 }
@@ -418,22 +418,22 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
 /* Adds the segments of the rays' intervals from t0 to t1 by bisection; only those that begin in the window are kept. */
 static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_packet *p,
                                                                         const kernel_segment_state *state,
-                                                                        const kernel_cell_interval *span, vm rays,
+                                                                        const kernel_cell_interval *cell_interval, vm rays,
                                                                         vf t0, vf t1)
 {
-    const kernel_interval *i = span->interval;
+    const kernel_interval *i = cell_interval->interval;
     const kernel_frame *f = p->frame;
     const bool is_flat = f->job->camera.is_orthographic;
     kernel_exact_map map;
     kernel_lanes at;
     kernel_packet_lanes(p, &at);
     const kernel_transfer *transfer = &f->volumes[state->volume];
-    if (span->map) kernel_exact_setup(&map, p, span->cell, transfer);
+    if (cell_interval->map) kernel_exact_setup(&map, p, cell_interval->cell, transfer);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int n = __builtin_ctz(bits);
         kernel_bisection h = {.state = state,
-                              .span = span,
-                              .map = span->map ? &map : NULL,
+                              .cell_interval = cell_interval,
+                              .map = cell_interval->map ? &map : NULL,
                               .u = at.px[n] - p->tile->centre_x,
                               .v = at.py[n] - p->tile->centre_y,
                               .slope = is_flat ? 0 : 1,
@@ -444,11 +444,11 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
                               .length = (double)((t1[n] - t0[n]) * state->list->per_t[n]),
                               .light = 1,
                               .map_failures = &p->thread->map_failures};
-        for (int a = 0; a < 3 && span->map; a++) {
+        for (int a = 0; a < 3 && cell_interval->map; a++) {
             h.in.r[a] = (double)i->r_in[a][n];
             h.out.r[a] = (double)i->r_out[a][n];
         }
-        if (!span->map && span->cell) h.in.v = h.out.v = kernel_double_domain(transfer, span->cell->values[0]);
+        if (!cell_interval->map && cell_interval->cell) h.in.v = h.out.v = kernel_double_domain(transfer, cell_interval->cell->values[0]);
         const double whole = h.out.t - h.in.t;
         if (!(whole > 0)) continue;
         const double a = ((double)t0[n] - h.in.t) / whole, b = ((double)t1[n] - h.in.t) / whole;
@@ -458,7 +458,7 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
         begin.t = (double)t0[n];
         sub.end.t = (double)t1[n];
         sub.middle = kernel_exact_point_between(&h, &from, &sub.end, 0.5);
-        sub.is_monotone = !span->map;
+        sub.is_monotone = !cell_interval->map;
         kernel_subinterval_halve(p, &h, n, begin, sub);
     }
 }
@@ -467,7 +467,7 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
 
 /* The state while an interval's equal subintervals are processed in order: the field at three consecutive ends. */
 typedef struct kernel_parts {
-    vf t0, t1, span, count;
+    vf t0, t1, cell_interval, count;
     vf last;     /* field at the interval's end t1 */
     vf from, to; /* depths of the current subinterval's ends */
     /* field at the begin and the end of the current subinterval, and at the end of the next one */
@@ -476,13 +476,13 @@ typedef struct kernel_parts {
 } kernel_parts;
 
 /* Returns t at the n-th boundary between subintervals, and stores the field there in *value. */
-SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_cell_interval *span, const kernel_parts *s, vm rays,
+SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_cell_interval *cell_interval, const kernel_parts *s, vm rays,
                                 int n, vf *value)
 {
     const vm inner = vm_and(rays, vf_lt(vf_set((float)n), s->count));
-    const vf t = vf_select(inner, s->t0 + s->span * (float)n, s->t1);
+    const vf t = vf_select(inner, s->t0 + s->cell_interval * (float)n, s->t1);
     *value = s->last;
-    if (vm_any(inner)) *value = vf_select(inner, kernel_cell_interval_value(p, span, inner, t), s->last);
+    if (vm_any(inner)) *value = vf_select(inner, kernel_cell_interval_value(p, cell_interval, inner, t), s->last);
     return t;
 }
 
@@ -497,11 +497,11 @@ SIMD_INLINE vf kernel_parts_chord_offset(const kernel_parts *s, vm is_first, vm 
 }
 
 /* Adds a tet's interval from t0 to t1 as one segment, computed in double, if it begins in the window. */
-SIMD_INLINE void kernel_cell_interval_double(kernel_segment_state *state, const kernel_cell_interval *span, vm rays,
+SIMD_INLINE void kernel_cell_interval_double(kernel_segment_state *state, const kernel_cell_interval *cell_interval, vm rays,
                                              vf t0, vf t1)
 {
-    const kernel_interval *i = span->interval;
-    const kernel_precise_interval *precise = span->precise;
+    const kernel_interval *i = cell_interval->interval;
+    const kernel_precise_interval *precise = cell_interval->precise;
     const kernel_unit_segment whole = {precise->length, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
     const kernel_unit_segment run = kernel_unit_segment_part(&whole, kernel_share(i, t0), kernel_share(i, t1));
     const kernel_interval sub = {.t_in = t0, .t_out = t1, .v_in = run.v_in, .v_out = run.v_out};
@@ -512,31 +512,31 @@ SIMD_INLINE void kernel_cell_interval_double(kernel_segment_state *state, const 
 
 /* Adds the segments of the interval from t0 to t1 that begin in the window. */
 SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segment_state *state,
-                                               const kernel_cell_interval *span, vm rays, vf t0, vf t1)
+                                               const kernel_cell_interval *cell_interval, vm rays, vf t0, vf t1)
 {
     kernel_segments *list = state->list;
     kernel_parts s = {.t0 = t0, .t1 = t1, .from = t0};
-    if (span->precise) {
-        kernel_cell_interval_double(state, span, rays, t0, t1);
+    if (cell_interval->precise) {
+        kernel_cell_interval_double(state, cell_interval, rays, t0, t1);
         return;
     }
-    s.before = kernel_cell_interval_value(p, span, rays, t0);
-    s.last = kernel_cell_interval_value(p, span, rays, t1);
+    s.before = kernel_cell_interval_value(p, cell_interval, rays, t0);
+    s.last = kernel_cell_interval_value(p, cell_interval, rays, t1);
     vm halved;
     const kernel_interval stretch = {.t_in = t0, .t_out = t1, .v_in = s.before, .v_out = s.last};
-    s.count = kernel_cell_interval_subdivisions(p, state, span, rays, &stretch, &halved);
+    s.count = kernel_cell_interval_subdivisions(p, state, cell_interval, rays, &stretch, &halved);
     if (__builtin_expect(vm_any(halved), 0)) {
-        kernel_cell_interval_bisect(p, state, span, halved, t0, t1);
+        kernel_cell_interval_bisect(p, state, cell_interval, halved, t0, t1);
         rays = vm_andnot(rays, halved);
         if (!vm_any(rays)) return;
     }
-    s.span = (t1 - t0) / s.count;
-    s.to = kernel_parts_end(p, span, &s, rays, 1, &s.after);
+    s.cell_interval = (t1 - t0) / s.count;
+    s.to = kernel_parts_end(p, cell_interval, &s, rays, 1, &s.after);
     s.bend = vf_set(0);
     vm open = rays;
     for (int n = 1; vm_any(open); n++) {
         const vm inner = vm_and(open, vf_lt(vf_set((float)n), s.count));
-        const vf next = kernel_parts_end(p, span, &s, inner, n + 1, &s.ahead);
+        const vf next = kernel_parts_end(p, cell_interval, &s, inner, n + 1, &s.ahead);
         s.next_bend = (s.before - s.after) + (s.ahead - s.after);
         const vf lift = kernel_parts_chord_offset(&s, n == 1 ? rays : vm_none(), vm_not(inner));
         const vm mine = vm_and(vf_le(list->t_begin, s.from), vf_lt(s.from, list->t_end));
@@ -561,9 +561,9 @@ SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segment_
 
 /* Divides the interval at surfaces, and adds the segments of its parts that begin in the window. */
 SIMD_INLINE void kernel_cell_interval_integrate(kernel_packet *p, kernel_segment_state *state,
-                                                const kernel_cell_interval *span)
+                                                const kernel_cell_interval *cell_interval)
 {
-    const kernel_interval *i = span->interval;
+    const kernel_interval *i = cell_interval->interval;
     const kernel_segments *list = state->list;
     vf from = vf_max(i->t_in, p->t_near);
     /* Segments that are to be mixed are not cut at this rank's surfaces, so that they are the same on any partition. */
@@ -573,7 +573,7 @@ SIMD_INLINE void kernel_cell_interval_integrate(kernel_packet *p, kernel_segment
         vf to = end;
         if (list->cuts.row_count) to = vf_min(end, kernel_next_cut(p, &list->cuts, from, true));
         const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
-        if (vm_any(mine)) kernel_cell_interval_segments(p, state, span, mine, from, to);
+        if (vm_any(mine)) kernel_cell_interval_segments(p, state, cell_interval, mine, from, to);
         from = to;
         open = vm_and(open, vf_lt(from, end));
     }
@@ -586,15 +586,15 @@ static __attribute__((noinline)) void kernel_tet_segments_general(kernel_packet 
                                                                   const kernel_double_cell *double_cell,
                                                                   kernel_interval i)
 {
-    kernel_cell_interval span = {.interval = &i};
+    kernel_cell_interval cell_interval = {.interval = &i};
     kernel_precise_interval precise;
     if (state->mixing > 0) {
-        kernel_cell_interval_bound(state, c->f, c->count, &span);
+        kernel_cell_interval_bound(state, c->f, c->count, &cell_interval);
     } else if (state->list->is_double) {
         precise = kernel_tet_double(p, c, double_cell, &state->list->rays, &i);
-        span.precise = &precise;
+        cell_interval.precise = &precise;
     }
-    kernel_cell_interval_integrate(p, state, &span);
+    kernel_cell_interval_integrate(p, state, &cell_interval);
 }
 
 /* Adds a tet's interval as one segment, which only surfaces cut. double_cell is read only if the list is in double. */
@@ -633,12 +633,12 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, k
                                                              const kernel_cell *c, const kernel_map *map)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_cell_interval span = {.map = map, .cell = c};
+    kernel_cell_interval cell_interval = {.map = map, .cell = c};
     const int intervals = kernel_curved_intervals(p, c, p->active, list);
-    if (intervals && (map || state->pieces->has_rests)) kernel_cell_interval_bound(state, c->f, c->count, &span);
+    if (intervals && (map || state->pieces->has_rests)) kernel_cell_interval_bound(state, c->f, c->count, &cell_interval);
     for (int k = 0; k < intervals; k++) {
-        span.interval = &list[k];
-        kernel_cell_interval_integrate(p, state, &span);
+        cell_interval.interval = &list[k];
+        kernel_cell_interval_integrate(p, state, &cell_interval);
     }
 }
 
@@ -651,7 +651,7 @@ SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *
 
 /* Sets the window's samples begin .. end - 1 that lie in the piece of the profile and in the interval. A sample that
  * another cell has already set keeps its value, as in kernel_fill(). */
-static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state, const kernel_polyhedron_interval *stay,
+static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state, const kernel_polyhedron_interval *polyhedron_interval,
                                    const kernel_profile_piece *piece, int begin, int end)
 {
     kernel_samples *s = state->samples;
@@ -659,34 +659,34 @@ static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state,
     const vf slope = vf_select(vf_lt(vf_set(0), length), (piece->v1 - piece->v0) / length, vf_set(0));
     for (int n = begin; n < end; n++) {
         const vf t = kernel_sample_t(p, s->first + n);
-        vm own = vm_and(stay->interval.mask, vm_andnot(vf_lt(t, piece->t1), vf_lt(t, piece->t0)));
+        vm own = vm_and(polyhedron_interval->interval.mask, vm_andnot(vf_lt(t, piece->t1), vf_lt(t, piece->t0)));
         if (!vm_any(own)) continue;
         const vf value = piece->v0 + slope * (t - piece->t0), active = s->value[state->volume][n];
         const vm apart = vm_and(own, vf_eq(active, active));
         if (__builtin_expect(vm_any(apart), 0)) {
-            kernel_emit_sample(p, state, &stay->interval, apart, t, value);
+            kernel_emit_sample(p, state, &polyhedron_interval->interval, apart, t, value);
             own = vm_andnot(own, apart);
         }
         s->value[state->volume][n] = vf_select(own, value, active);
         if (p->frame->needs_contact) {
-            s->t_in[n] = vf_select(own, stay->interval.t_in, s->t_in[n]);
-            s->t_out[n] = vf_select(own, stay->interval.t_out, s->t_out[n]);
+            s->t_in[n] = vf_select(own, polyhedron_interval->interval.t_in, s->t_in[n]);
+            s->t_out[n] = vf_select(own, polyhedron_interval->interval.t_out, s->t_out[n]);
         }
     }
 }
 
 static void kernel_polyhedron_interval_integrate(kernel_packet *p, kernel_volume_state *state, kernel_poly_crossings *r,
-                                                 kernel_polyhedron_interval *stay)
+                                                 kernel_polyhedron_interval *polyhedron_interval)
 {
-    const kernel_interval *i = &stay->interval;
+    const kernel_interval *i = &polyhedron_interval->interval;
     int begin, end;
     kernel_sample_range(p, state->samples, i, &begin, &end);
     if (begin >= end) return;
-    if (!r->cell->is_constant) kernel_poly_profile(r, stay);
-    kernel_profile_piece piece = kernel_profile_begin(stay, stay->u_in);
-    while (vm_any(kernel_profile_open(stay, &piece, i->mask))) {
-        kernel_profile_next(r, stay, stay->u_out, &piece);
-        kernel_polyhedron_fill(p, state, stay, &piece, begin, end);
+    if (!r->cell->is_constant) kernel_poly_profile(r, polyhedron_interval);
+    kernel_profile_piece piece = kernel_profile_begin(polyhedron_interval, polyhedron_interval->u_in);
+    while (vm_any(kernel_profile_open(polyhedron_interval, &piece, i->mask))) {
+        kernel_profile_next(r, polyhedron_interval, polyhedron_interval->u_out, &piece);
+        kernel_polyhedron_fill(p, state, polyhedron_interval, &piece, begin, end);
     }
 }
 
@@ -711,9 +711,9 @@ static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *stat
 {
     const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
     kernel_poly_crossings r;
-    kernel_polyhedron_interval stay;
+    kernel_polyhedron_interval polyhedron_interval;
     if (!c || !kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r, &stay)) kernel_polyhedron_interval_integrate(p, state, &r, &stay);
+    while (kernel_poly_next(&r, &polyhedron_interval)) kernel_polyhedron_interval_integrate(p, state, &r, &polyhedron_interval);
 }
 
 /* Adds the segments of a polyhedron: the pieces of the ray's profile, on which the field is exactly linear. */
@@ -721,21 +721,21 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *s
 {
     const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
     kernel_poly_crossings r;
-    kernel_polyhedron_interval stay;
+    kernel_polyhedron_interval polyhedron_interval;
     if (!c || !kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    kernel_cell_interval span = {.map = NULL};
-    if (state->mixing > 0) kernel_cell_interval_bound(state, c->f, c->vertex_count, &span);
-    while (kernel_poly_next(&r, &stay)) {
-        if (!c->is_constant) kernel_poly_profile(&r, &stay);
-        kernel_profile_piece piece = kernel_profile_begin(&stay, stay.u_in);
-        vm open = kernel_profile_open(&stay, &piece, stay.interval.mask);
+    kernel_cell_interval cell_interval = {.map = NULL};
+    if (state->mixing > 0) kernel_cell_interval_bound(state, c->f, c->vertex_count, &cell_interval);
+    while (kernel_poly_next(&r, &polyhedron_interval)) {
+        if (!c->is_constant) kernel_poly_profile(&r, &polyhedron_interval);
+        kernel_profile_piece piece = kernel_profile_begin(&polyhedron_interval, polyhedron_interval.u_in);
+        vm open = kernel_profile_open(&polyhedron_interval, &piece, polyhedron_interval.interval.mask);
         while (vm_any(open)) {
-            kernel_profile_next(&r, &stay, stay.u_out, &piece);
+            kernel_profile_next(&r, &polyhedron_interval, polyhedron_interval.u_out, &piece);
             const kernel_interval i = {
                 .mask = open, .t_in = piece.t0, .t_out = piece.t1, .v_in = piece.v0, .v_out = piece.v1};
-            span.interval = &i;
-            kernel_cell_interval_integrate(p, state, &span);
-            open = kernel_profile_open(&stay, &piece, open);
+            cell_interval.interval = &i;
+            kernel_cell_interval_integrate(p, state, &cell_interval);
+            open = kernel_profile_open(&polyhedron_interval, &piece, open);
         }
     }
 }

@@ -200,32 +200,32 @@ SIMD_INLINE kernel_segment_constants kernel_segment_constants_of(const kernel_un
 }
 
 /* Sets the positions of the rays in `fresh`, which enter the piece with the given ends. */
-SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *way, const kernel_segment_constants *leg, vm fresh,
+SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *piece_state, const kernel_segment_constants *constants, vm fresh,
                                           const kernel_piece_ends *ends)
 {
-    const vf v = way->edge, zero = vf_set(0);
-    const vf below = vf_max((v - ends->low) + (way->rest - ends->low_rest), zero);
-    const vf above = vf_max((ends->high - v) + (ends->high_rest - way->rest), zero);
-    const vf ahead = vf_abs((leg->v_out - v) + (leg->rest_out - way->rest));
-    const vf most = vf_select(leg->falling, below, above), todo = vf_min(most, ahead);
-    way->below = vf_select(fresh, below, way->below);
-    way->above = vf_select(fresh, above, way->above);
-    way->todo = vf_select(fresh, todo, way->todo);
-    const vf left = vf_select(leg->level, leg->length, todo * leg->per_value);
-    way->left = vf_select(fresh, left, way->left);
-    way->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, way->shortest);
-    way->edge = vf_select(fresh, vf_select(leg->falling, ends->low, ends->high), way->edge);
-    way->rest = vf_select(fresh, vf_select(leg->falling, ends->low_rest, ends->high_rest), way->rest);
-    way->is_last = vm_or(vm_andnot(way->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
+    const vf v = piece_state->edge, zero = vf_set(0);
+    const vf below = vf_max((v - ends->low) + (piece_state->rest - ends->low_rest), zero);
+    const vf above = vf_max((ends->high - v) + (ends->high_rest - piece_state->rest), zero);
+    const vf ahead = vf_abs((constants->v_out - v) + (constants->rest_out - piece_state->rest));
+    const vf most = vf_select(constants->falling, below, above), todo = vf_min(most, ahead);
+    piece_state->below = vf_select(fresh, below, piece_state->below);
+    piece_state->above = vf_select(fresh, above, piece_state->above);
+    piece_state->todo = vf_select(fresh, todo, piece_state->todo);
+    const vf left = vf_select(constants->level, constants->length, todo * constants->per_value);
+    piece_state->left = vf_select(fresh, left, piece_state->left);
+    piece_state->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, piece_state->shortest);
+    piece_state->edge = vf_select(fresh, vf_select(constants->falling, ends->low, ends->high), piece_state->edge);
+    piece_state->rest = vf_select(fresh, vf_select(constants->falling, ends->low_rest, ends->high_rest), piece_state->rest);
+    piece_state->is_last = vm_or(vm_andnot(piece_state->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
 /* Interpolates between at_low and at_high from both ends of the piece. Near an end with value 0 the result is as exact
  * as the distance to that end. */
-SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *way, vf inverse, vf at_low, vf at_high)
+SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *piece_state, vf inverse, vf at_low, vf at_high)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    const vf from_low = at_low * vf_clamp(way->above * inverse, zero, one);
-    const vf from_high = at_high * vf_clamp(way->below * inverse, zero, one);
+    const vf from_low = at_low * vf_clamp(piece_state->above * inverse, zero, one);
+    const vf from_high = at_high * vf_clamp(piece_state->below * inverse, zero, one);
     return vf_min(from_low + from_high, one);
 }
 
@@ -239,15 +239,15 @@ typedef struct kernel_integration_step {
 } kernel_integration_step;
 
 SIMD_INLINE kernel_integration_step kernel_integration_step_begin(const kernel_pieces *t, const kernel_piece_index *at,
-                                                                  const kernel_piece_state *way, vf turn)
+                                                                  const kernel_piece_state *piece_state, vf turn)
 {
     const vf inverse = kernel_piece_entry(t, at, KERNEL_PIECE_INVERSE);
     kernel_integration_step out;
-    out.opacity = kernel_piece_state_interpolate(way, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
+    out.opacity = kernel_piece_state_interpolate(piece_state, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
                                                  kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
-    out.clear = kernel_piece_state_interpolate(way, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
+    out.clear = kernel_piece_state_interpolate(piece_state, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
                                                kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
-    out.rise = turn * way->todo * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
+    out.rise = turn * piece_state->todo * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
     return out;
 }
 
@@ -313,29 +313,29 @@ SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_in
 /* Integrates the segment and adds its light behind that in *light. */
 SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_unit_segment *run, kernel_light *light)
 {
-    const kernel_segment_constants leg = kernel_segment_constants_of(run);
+    const kernel_segment_constants constants = kernel_segment_constants_of(run);
     const vf zero = vf_set(0);
-    kernel_piece_state way = {zero, zero, zero, zero, zero, run->v_in, run->rest_in, vm_none()};
-    vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, leg.falling);
+    kernel_piece_state piece_state = {zero, zero, zero, zero, zero, run->v_in, run->rest_in, vm_none()};
+    vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, constants.falling);
     vm open = rays, fresh = rays;
     while (vm_any(open)) {
         const kernel_piece_index at = kernel_piece_index_of(t, open, piece);
         if (vm_any(fresh)) {
             const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
-            kernel_piece_state_enter(&way, &leg, fresh, &ends);
+            kernel_piece_state_enter(&piece_state, &constants, fresh, &ends);
         }
-        kernel_integration_step st = kernel_integration_step_begin(t, &at, &way, leg.turn);
-        kernel_integration_step_limit(&st, way.left, way.shortest);
-        const vf size = way.todo * st.share, move = leg.turn * size;
-        kernel_light_step(t, &at, open, way.below, move, &st, light);
-        way.below += move;
-        way.above -= move;
-        way.todo -= size;
-        way.left -= st.length;
+        kernel_integration_step st = kernel_integration_step_begin(t, &at, &piece_state, constants.turn);
+        kernel_integration_step_limit(&st, piece_state.left, piece_state.shortest);
+        const vf size = piece_state.todo * st.share, move = constants.turn * size;
+        kernel_light_step(t, &at, open, piece_state.below, move, &st, light);
+        piece_state.below += move;
+        piece_state.above -= move;
+        piece_state.todo -= size;
+        piece_state.left -= st.length;
         const vm through = vf_le(vf_set(1), st.share);
-        open = vm_and(vm_andnot(open, vm_and(through, way.is_last)), vf_lt(vf_set(KERNEL_BLACK), light->transmittance));
+        open = vm_and(vm_andnot(open, vm_and(through, piece_state.is_last)), vf_lt(vf_set(KERNEL_BLACK), light->transmittance));
         fresh = vm_and(open, through);
-        piece = vf_select(fresh, piece + leg.turn, piece);
+        piece = vf_select(fresh, piece + constants.turn, piece);
     }
 }
 

@@ -129,7 +129,7 @@ static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_
 {
     const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].value,
              v1 = p->ends[1].value;
-    const vf share = 1.0f / p->count, span = t1 - t0, rise = v1 - v0;
+    const vf share = 1.0f / p->count, cell_interval = t1 - t0, rise = v1 - v0;
     kernel_local_polynomial f = {.a = 4.0f * d[1], .b = (32.0f / 3) * (d[2] - d[0])};
     f.c = 16.0f * ((8.0f / 3) * (d[0] + d[2]) - f.a);
     vf from = t0, u0 = vf_set(-0.5f), off0 = vf_set(0), sum0 = kernel_local_primitive(&f, u0);
@@ -138,7 +138,7 @@ static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_
         const vf number = vf_set((float)n), along = number * share;
         const vm inner = vm_and(open, vf_lt(number, p->count));
         const vf u1 = vf_select(inner, along - 0.5f, vf_set(0.5f)), sum1 = kernel_local_primitive(&f, u1);
-        const vf to = vf_select(inner, t0 + span * along, t1), off1 = kernel_local_deviation(&f, u1);
+        const vf to = vf_select(inner, t0 + cell_interval * along, t1), off1 = kernel_local_deviation(&f, u1);
         const vf lift = (sum1 - sum0) * p->count - 0.5f * (off0 + off1);
         const vf in = (v0 + (u0 + 0.5f) * rise) + (off0 + lift), out = (v1 - (0.5f - u1) * rise) + (off1 + lift);
         const vf ends[4] = {from, to, in, out};

@@ -161,7 +161,7 @@ typedef struct kernel_blend {
     /* Used if all samples and segments are folded (render_fold.h). stretch: number of the last sample's interval of
      * length 1 / FRAGMENT_INTERVALS; within: light that passes all samples so far. `light` is then the light at the end
      * of the last interval. */
-    vf stretch, within;
+    vf interval_number, within;
 } kernel_blend;
 
 /* Ends the current fragments of the rays in mask, and emits them if they are visible. */
@@ -184,10 +184,10 @@ SIMD_INLINE void kernel_blend_separate(kernel_packet *p, kernel_blend *b, vm has
     const kernel_fragments own = {
         t_in, t_out, {colour[0], colour[1], colour[2]}, clear, vf_select(fresh, vf_set(FRAGMENT_EARLY), vf_set(0))};
     kernel_emit(p, vm_and(has, vm_or(fresh, kernel_fragment_is_visible(colour, clear))), FRAGMENT_VOLUME, &own);
-    const vf stretch = vf_floor(t_in * (float)FRAGMENT_INTERVALS);
-    const vm next = vm_andnot(has, vf_eq(stretch, b->stretch));
+    const vf interval_number = vf_floor(t_in * (float)FRAGMENT_INTERVALS);
+    const vm next = vm_andnot(has, vf_eq(interval_number, b->interval_number));
     b->light = vf_select(next, b->within, b->light);
-    b->stretch = vf_select(has, stretch, b->stretch);
+    b->interval_number = vf_select(has, interval_number, b->interval_number);
     b->within = vf_select(has, b->within * clear, b->within);
     b->t_first = vf_select(fresh, t_in, b->t_first);
     b->t_last = vf_select(has, vf_select(fresh, t_out, vf_max(b->t_last, t_out)), b->t_last);

@@ -381,10 +381,10 @@ SIMD_INLINE void kernel_cell_interval_bound(const kernel_segment_state *state, c
     }
 }
 
-SIMD_INLINE vf kernel_cell_interval_value(kernel_packet *p, const kernel_cell_interval *span, vm rays, vf t)
+SIMD_INLINE vf kernel_cell_interval_value(kernel_packet *p, const kernel_cell_interval *cell_interval, vm rays, vf t)
 {
-    const kernel_interval *i = span->interval;
-    return span->map ? kernel_value_at(p, span->map, i, rays, t) : kernel_line_value(i, t);
+    const kernel_interval *i = cell_interval->interval;
+    return cell_interval->map ? kernel_value_at(p, cell_interval->map, i, rays, t) : kernel_line_value(i, t);
 }
 
 /* Returns the rays whose values from low to high meet a steep ramp, or, if is_narrow is set, a narrow one. */
@@ -400,12 +400,12 @@ SIMD_INLINE vm kernel_cell_interval_is_steep(const kernel_segment_state *state, 
 }
 
 /* Returns the rays whose values from low to high contain a step of the opacity. */
-SIMD_INLINE vm kernel_cell_interval_steps(const kernel_segment_state *state, const kernel_cell_interval *span, vf low,
+SIMD_INLINE vm kernel_cell_interval_steps(const kernel_segment_state *state, const kernel_cell_interval *cell_interval, vf low,
                                           vf high)
 {
     vm any = vm_none();
-    for (int i = 0; i < span->step_count; i++) {
-        const vf cut = vf_set(state->pieces->steps[span->first_step + i].cut);
+    for (int i = 0; i < cell_interval->step_count; i++) {
+        const vf cut = vf_set(state->pieces->steps[cell_interval->first_step + i].cut);
         any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
     }
     return any;
@@ -443,7 +443,7 @@ SIMD_INLINE vf kernel_cell_interval_curvature(const vf off[KERNEL_DEVIATION_SAMP
 }
 
 SIMD_INLINE void kernel_cell_interval_deviate(kernel_packet *p, const kernel_segment_state *state,
-                                              const kernel_cell_interval *span, vm rays, const kernel_interval *stretch,
+                                              const kernel_cell_interval *cell_interval, vm rays, const kernel_interval *stretch,
                                               kernel_cell_interval_deviation *out)
 {
     const vf t0 = stretch->t_in, length = stretch->t_out - t0, v0 = stretch->v_in, v1 = stretch->v_out;
@@ -453,7 +453,7 @@ SIMD_INLINE void kernel_cell_interval_deviate(kernel_packet *p, const kernel_seg
     out->opacity = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
     for (int i = 1; i < KERNEL_DEVIATION_SAMPLES; i++) {
         const float share = (1.0f / KERNEL_DEVIATION_SAMPLES) * (float)i;
-        const vf v = kernel_value_at(p, span->map, span->interval, rays, t0 + length * share);
+        const vf v = kernel_value_at(p, cell_interval->map, cell_interval->interval, rays, t0 + length * share);
         off[i] = v - (v0 + (v1 - v0) * share);
         out->most = vf_max(out->most, vf_abs(off[i]));
         if (i % 2 == 0) out->opacity += 0.25f * kernel_opacity(transfer, v);
@@ -473,30 +473,30 @@ SIMD_INLINE void kernel_cell_interval_deviate(kernel_packet *p, const kernel_seg
  * subintervals would be needed; or if a narrow ramp does in which the values' rounding alone would use an eighth of the
  * allowed error. */
 SIMD_INLINE vf kernel_cell_interval_subdivisions_curved(kernel_packet *p, const kernel_segment_state *state,
-                                                        const kernel_cell_interval *span, vm rays,
+                                                        const kernel_cell_interval *cell_interval, vm rays,
                                                         const kernel_interval *stretch, vf *deviation)
 {
     const vf length = stretch->t_out - stretch->t_in, v0 = stretch->v_in, v1 = stretch->v_out;
     kernel_cell_interval_deviation off;
-    kernel_cell_interval_deviate(p, state, span, rays, stretch, &off);
+    kernel_cell_interval_deviate(p, state, cell_interval, rays, stretch, &off);
     const vf largest = vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
     const vf bend = vf_max(off.most, off.bend - 0.5f * KERNEL_VALUE_ROUNDING * largest);
     const vf distance = length * state->list->per_t, depth = distance * off.opacity;
     const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
-    const vf made = bend * span->cost * distance; /* the product of 3/2 and 2/3 is 1 */
+    const vf made = bend * cell_interval->cost * distance; /* the product of 3/2 and 2/3 is 1 */
     *deviation = off.most;
     const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
     const vf subdivisions = vf_min(wanted, vf_set(KERNEL_MAX_SUBDIVISIONS));
-    if (!span->step_count && !span->is_steep) return subdivisions;
+    if (!cell_interval->step_count && !cell_interval->is_steep) return subdivisions;
     const vf wide = 1.5f * off.most + KERNEL_VALUE_ROUNDING * largest, low = vf_min(v0, v1) - wide,
              high = vf_max(v0, v1) + wide;
-    vm too_few = kernel_cell_interval_steps(state, span, low, high);
-    if (span->is_steep) {
+    vm too_few = kernel_cell_interval_steps(state, cell_interval, low, high);
+    if (cell_interval->is_steep) {
         const vm many = vf_lt(vf_set(KERNEL_MAX_SUBDIVISIONS), wanted);
         too_few = vm_or(too_few, vm_and(many, kernel_cell_interval_is_steep(state, low, high, false)));
     }
-    if (span->is_narrow) {
-        const vf rounded = (8 * KERNEL_VALUE_ROUNDING) * largest * span->cost * distance;
+    if (cell_interval->is_narrow) {
+        const vf rounded = (8 * KERNEL_VALUE_ROUNDING) * largest * cell_interval->cost * distance;
         const vm shows = vf_lt(allowed, rounded);
         too_few = vm_or(too_few, vm_and(shows, kernel_cell_interval_is_steep(state, low, high, true)));
     }
@@ -509,39 +509,39 @@ SIMD_INLINE vf kernel_cell_interval_subdivisions_curved(kernel_packet *p, const 
  * interval. That depth, times the light that arrives there, sums to 1 over a ray; so d v / 4 may be the whole error
  * allowed. */
 SIMD_INLINE vf kernel_cell_interval_subdivisions_mixed(const kernel_segment_state *state,
-                                                       const kernel_cell_interval *span, vf length, vf change)
+                                                       const kernel_cell_interval *cell_interval, vf length, vf change)
 {
-    const vf moved = change * span->cost * (length * state->list->per_t) * 0.25f;
+    const vf moved = change * cell_interval->cost * (length * state->list->per_t) * 0.25f;
     return vf_sqrt(vf_min(moved / state->mixing, vf_set(1e6f)));
 }
 
 /* Returns the number of equal subintervals into which each ray's interval is divided. *halved receives the rays for
  * which no number is accurate enough, so that their intervals must be divided by bisection. */
 SIMD_INLINE vf kernel_cell_interval_subdivisions(kernel_packet *p, const kernel_segment_state *state,
-                                                 const kernel_cell_interval *span, vm rays,
+                                                 const kernel_cell_interval *cell_interval, vm rays,
                                                  const kernel_interval *stretch, vm *halved)
 {
     const vf length = stretch->t_out - stretch->t_in, most = vf_set(KERNEL_MAX_SUBDIVISIONS);
     const vf v0 = stretch->v_in, v1 = stretch->v_out;
     vf subdivisions = vf_set(1), off = vf_set(0);
     *halved = vm_none();
-    if (span->map && state->allowance > 0) {
-        subdivisions = kernel_cell_interval_subdivisions_curved(p, state, span, rays, stretch, &off);
+    if (cell_interval->map && state->allowance > 0) {
+        subdivisions = kernel_cell_interval_subdivisions_curved(p, state, cell_interval, rays, stretch, &off);
         *halved = vm_and(rays, vf_lt(most, subdivisions));
-    } else if (span->map) {
+    } else if (cell_interval->map) {
         subdivisions = length / p->sample_step;
-        if (span->step_count && state->mixing > 0) {
-            const vf wanted = kernel_cell_interval_subdivisions_curved(p, state, span, rays, stretch, &off);
+        if (cell_interval->step_count && state->mixing > 0) {
+            const vf wanted = kernel_cell_interval_subdivisions_curved(p, state, cell_interval, rays, stretch, &off);
             *halved = vm_and(rays, vf_lt(most, wanted));
         }
-    } else if (span->step_count && state->mixing > 0) {
-        *halved = vm_and(rays, kernel_cell_interval_steps(state, span, vf_min(v0, v1), vf_max(v0, v1)));
-    } else if (span->is_narrow && span->cell) {
+    } else if (cell_interval->step_count && state->mixing > 0) {
+        *halved = vm_and(rays, kernel_cell_interval_steps(state, cell_interval, vf_min(v0, v1), vf_max(v0, v1)));
+    } else if (cell_interval->is_narrow && cell_interval->cell) {
         *halved = rays;
     }
     if (state->mixing > 0)
         subdivisions = vf_max(
-            subdivisions, kernel_cell_interval_subdivisions_mixed(state, span, length, vf_abs(v1 - v0) + 2.0f * off));
+            subdivisions, kernel_cell_interval_subdivisions_mixed(state, cell_interval, length, vf_abs(v1 - v0) + 2.0f * off));
     return vf_clamp(-vf_floor(-subdivisions), vf_set(1), most);
 }
 
