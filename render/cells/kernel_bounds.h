@@ -26,11 +26,11 @@
  * the coefficients of N. The field is L + middle + the terms `field`, which multiply the same products of
  * coordinates. */
 typedef struct kernel_contractions {
-    float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], bent[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
+    float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], nonlinear_part[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
     /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
      * iteration is not a contraction */
     float grow[SIMD_WIDTH];
-    float error_bound[SIMD_WIDTH], rim[SIMD_WIDTH];
+    float error_bound[SIMD_WIDTH], domain_margin[SIMD_WIDTH];
 } kernel_contractions;
 
 /* Bounds for one cell and isovalue per lane. */
@@ -44,7 +44,7 @@ typedef struct kernel_bounds {
     /* Inverse of the map's Jacobian at the cell's centre. The cell lies between pairs of planes: low <= normal . (X -
      * vertex 0) <= high. */
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
-    float bent[3][4][SIMD_WIDTH]; /* coefficients 4 to 7 of the nonlinear part N of the map */
+    float nonlinear_part[3][4][SIMD_WIDTH]; /* coefficients 4 to 7 of the nonlinear part N of the map */
     /* upper bounds from kernel_roots.h: L, by which reference coordinates are stretched, and G, of the field's
      * gradient */
     float stretch[SIMD_WIDTH], slope[SIMD_WIDTH];
@@ -58,7 +58,7 @@ typedef struct kernel_bounds {
 typedef struct kernel_bounds_lanes {
     /* polynomial coefficients of positions and field, and positions relative to vertex 0 */
     kernel_doubles exact[4][8], apart[3][8];
-    kernel_doubles bent[3][4], inverse[3][3], reach[3];
+    kernel_doubles nonlinear_part[3][4], inverse[3][3], reach[3];
     kernel_doubles_mask is_solid;
 } kernel_bounds_lanes;
 
@@ -116,15 +116,15 @@ SIMD_INLINE kernel_doubles kernel_doubles_slope(int type, const kernel_doubles c
 
 /* Returns the difference between the derivative along axis a at the reference coordinates r and that at the domain's
  * centre, for a polynomial whose coefficients 4 to 7 are `bent`. */
-SIMD_INLINE kernel_doubles kernel_doubles_bend(int type, const kernel_doubles bent[4], int a, const double r[3])
+SIMD_INLINE kernel_doubles kernel_doubles_bend(int type, const kernel_doubles nonlinear_part[4], int a, const double r[3])
 {
     const double *centre = kernel_domain_of(type)->centre;
     const int next = (a + 1) % 3, last = (a + 2) % 3;
     kernel_doubles out = {0};
-    if (kernel_has_apex(type)) return bent[0] * (a == 2 ? centre[2] - r[2] : r[a] - centre[a]);
+    if (kernel_has_apex(type)) return nonlinear_part[0] * (a == 2 ? centre[2] - r[2] : r[a] - centre[a]);
     for (int j = kernel_is_box(type) ? 0 : 1; j < 3; j++)
-        if (a != 2 - j) out += bent[j] * (r[3 - a - (2 - j)] - centre[3 - a - (2 - j)]);
-    return kernel_is_box(type) ? out + bent[3] * (r[next] * r[last] - centre[next] * centre[last]) : out;
+        if (a != 2 - j) out += nonlinear_part[j] * (r[3 - a - (2 - j)] - centre[3 - a - (2 - j)]);
+    return kernel_is_box(type) ? out + nonlinear_part[3] * (r[next] * r[last] - centre[next] * centre[last]) : out;
 }
 
 /* Computes the polynomial coefficients of the map and of the field from the vertices' positions and values. */
@@ -175,9 +175,9 @@ SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
             b->inverse[i][a] = kernel_doubles_select(b->is_solid, kernel_doubles_rounded(inverse[a]), zero);
         }
         for (int j = 0; j < 4; j++) {
-            b->bent[i][j] = zero;
+            b->nonlinear_part[i][j] = zero;
             for (int a = 0; a < 3; a++)
-                b->bent[i][j] += kernel_doubles_select(b->is_solid, inverse[a] * position[a][4 + j], zero);
+                b->nonlinear_part[i][j] += kernel_doubles_select(b->is_solid, inverse[a] * position[a][4 + j], zero);
         }
     }
 }
@@ -233,7 +233,7 @@ SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int ty
             const double *r = kernel_domain_of(type)->corners[(int)table->first[a][n]];
             out->df[a][n] = kernel_doubles_slope(type, field, a, r);
             out->de[a][n] = kernel_doubles_slope(type, e, a, r);
-            for (int i = 0; i < 3; i++) out->bend[i][a][n] = kernel_doubles_bend(type, b->bent[i], a, r);
+            for (int i = 0; i < 3; i++) out->bend[i][a][n] = kernel_doubles_bend(type, b->nonlinear_part[i], a, r);
         }
 }
 
@@ -242,7 +242,7 @@ typedef struct kernel_lanes_most {
     kernel_doubles bend; /* upper bound of the 8th power of the matrix norm of N's derivative */
     /* squares of maxima over the corners: of |grad F|, of grad E . w, of |grad E|, and of |N' w|, where F is the field,
      * E = F - L, N the map's nonlinear part and w a ray's direction in reference coordinates */
-    kernel_doubles df, along, steep, bent;
+    kernel_doubles df, along, steep, nonlinear_part;
 } kernel_lanes_most;
 
 SIMD_INLINE kernel_doubles kernel_doubles_length(const kernel_doubles v[3])
@@ -273,7 +273,7 @@ SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, int type, co
 {
     const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
     for (int n = 0; n < table->corner_count; n++) {
-        kernel_doubles bend[3][3], df[3], de[3], along = {0}, steep = {0}, bent = {0};
+        kernel_doubles bend[3][3], df[3], de[3], along = {0}, steep = {0}, nonlinear_part = {0};
         for (int a = 0; a < 3; a++) {
             const int at = table->at[a][n];
             df[a] = s->df[a][at];
@@ -284,16 +284,16 @@ SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, int type, co
             const kernel_doubles term = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
             along += de[i] * w[i];
             steep += de[i] * de[i];
-            bent += term * term;
+            nonlinear_part += term * term;
         }
         const kernel_doubles eighth = kernel_doubles_eighth((const kernel_doubles(*)[3])bend),
                              slope = kernel_doubles_length(df);
-        if (!n) *out = (kernel_lanes_most){eighth, slope, along * along, steep, bent};
+        if (!n) *out = (kernel_lanes_most){eighth, slope, along * along, steep, nonlinear_part};
         out->bend = kernel_doubles_more(eighth, out->bend);
         out->df = kernel_doubles_more(slope, out->df);
         out->along = kernel_doubles_more(along * along, out->along);
         out->steep = kernel_doubles_more(steep, out->steep);
-        out->bent = kernel_doubles_more(bent, out->bent);
+        out->nonlinear_part = kernel_doubles_more(nonlinear_part, out->nonlinear_part);
     }
 }
 
@@ -322,13 +322,13 @@ SIMD_INLINE void kernel_doubles_planes(const kernel_bounds_lanes *b, int type, i
 
 /* Converts the nonlinear coefficients of a polynomial to coordinates about the domain's middle. They multiply the
  * products of two coordinates, and for a hex also of all three. */
-SIMD_INLINE void kernel_doubles_terms(int type, const kernel_doubles bent[4], kernel_doubles out[4])
+SIMD_INLINE void kernel_doubles_terms(int type, const kernel_doubles nonlinear_part[4], kernel_doubles out[4])
 {
     const int first = kernel_is_prism(type) ? 1 : 0;
     for (int j = 0; j < 4; j++) out[j] = (kernel_doubles){0};
-    for (int j = 0; j < kernel_bent_terms(type); j++) out[j] = bent[first + j];
+    for (int j = 0; j < kernel_bent_terms(type); j++) out[j] = nonlinear_part[first + j];
     if (kernel_has_triangles(type)) return;
-    for (int j = 0; j < 3; j++) out[j] += 0.5 * bent[3];
+    for (int j = 0; j < 3; j++) out[j] += 0.5 * nonlinear_part[3];
 }
 
 /* Results of kernel_doubles_bounds() that kernel_doubles_rate() and the contraction need. */
@@ -371,13 +371,13 @@ SIMD_INLINE void kernel_doubles_rate(const kernel_bounds_lanes *b, int type, con
     value += kernel_doubles_abs(r->gradient[2]) * extent[2];
     const kernel_doubles face = r->gap + speed * (r->slope * r->gap + 1e-6);
     const kernel_doubles error_bound = kernel_doubles_sqrt(own) + speed * value * 5e-7 + 1e-6;
-    const kernel_doubles rim = 2 * ((face + error_bound) / rest) + 4e-6;
+    const kernel_doubles domain_margin = 2 * ((face + error_bound) / rest) + 4e-6;
     const kernel_doubles_mask contracts = r->is_regular & (kernel_doubles_mask)(r->rise > 0) &
-                                          (kernel_doubles_mask)(rate < 0.9) & (kernel_doubles_mask)(rim < 0.015625);
+                                          (kernel_doubles_mask)(rate < 0.9) & (kernel_doubles_mask)(domain_margin < 0.015625);
     kernel_doubles_store(out->grow, half,
                          kernel_doubles_select(contracts, 1.0001 * rate / rest, kernel_doubles_set((double)INFINITY)));
     kernel_doubles_store(out->error_bound, half, error_bound);
-    kernel_doubles_store(out->rim, half, rim);
+    kernel_doubles_store(out->domain_margin, half, domain_margin);
 }
 
 SIMD_INLINE void kernel_doubles_contraction_of(const kernel_bounds_lanes *b, const kernel_doubles_rates *r, int half,
@@ -397,8 +397,8 @@ SIMD_INLINE void kernel_doubles_contraction_of(const kernel_bounds_lanes *b, con
         const kernel_doubles offset =
             -(b->inverse[i][0] * middle[0] + b->inverse[i][1] * middle[1] + b->inverse[i][2] * middle[2]);
         kernel_doubles_store(out->offset[i], half, offset);
-        kernel_doubles_terms(type, b->bent[i], terms);
-        for (int j = 0; j < kernel_bent_terms(type); j++) kernel_doubles_store(out->bent[j][i], half, terms[j]);
+        kernel_doubles_terms(type, b->nonlinear_part[i], terms);
+        for (int j = 0; j < kernel_bent_terms(type); j++) kernel_doubles_store(out->nonlinear_part[j][i], half, terms[j]);
     }
     kernel_doubles_store(out->middle, half, middle[3]);
     kernel_doubles_terms(type, r->e + 4, terms);
@@ -428,8 +428,8 @@ SIMD_INLINE void kernel_doubles_limits(const kernel_bounds_lanes *b, int type, k
 {
     kernel_doubles twist = {0}, field[4];
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 4; j++) kernel_doubles_store(out->bent[i][j], half, b->bent[i][j]);
-        twist += kernel_doubles_hessian(type, b->bent[i]);
+        for (int j = 0; j < 4; j++) kernel_doubles_store(out->nonlinear_part[i][j], half, b->nonlinear_part[i][j]);
+        twist += kernel_doubles_hessian(type, b->nonlinear_part[i]);
     }
     for (int j = 0; j < 4; j++) field[j] = kernel_doubles_rounded(b->exact[3][4 + j]);
     kernel_doubles_store(out->stretch, half, stretch);
@@ -488,7 +488,7 @@ SIMD_INLINE void kernel_doubles_bounds(const float at[4][8][SIMD_WIDTH], int hal
     const kernel_doubles whole = slant * stretch * (length + off);
     const kernel_doubles apart =
         kernel_doubles_sqrt(most.along) +
-        slant * (kernel_doubles_sqrt(most.bent) + theta * theta * stretch * (length + off) + (one + theta) * off);
+        slant * (kernel_doubles_sqrt(most.nonlinear_part) + theta * theta * stretch * (length + off) + (one + theta) * off);
     const kernel_doubles rise =
         kernel_doubles_abs(g[2]) - spread * (kernel_doubles_abs(g[0]) + kernel_doubles_abs(g[1]));
     const kernel_doubles least = kernel_doubles_select((kernel_doubles_mask)(whole < apart), whole, apart);

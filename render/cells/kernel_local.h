@@ -40,7 +40,7 @@ enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
 typedef struct kernel_local_cells {
     /* affine approximation y of the reference coordinates of a position X: y = inverse (X - origin) + offset */
     float origin[3][SIMD_WIDTH], inverse[3][3][SIMD_WIDTH], offset[3][SIMD_WIDTH];
-    float bent[KERNEL_BENT_TERMS][3][SIMD_WIDTH];
+    float nonlinear_part[KERNEL_BENT_TERMS][3][SIMD_WIDTH];
     float field[4 + KERNEL_BENT_TERMS][SIMD_WIDTH];
     /* bounds, over all points inside the cell, of the affine approximation y of the reference coordinates */
     float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
@@ -87,12 +87,12 @@ SIMD_INLINE void kernel_wedge_terms(const vf v[6], vf out[8])
 
 SIMD_INLINE void kernel_pyramid_terms(const vf v[5], vf out[8])
 {
-    const vf along = v[1] - v[0], across = v[3] - v[0], bent = (v[0] - v[1]) + (v[2] - v[3]);
+    const vf along = v[1] - v[0], across = v[3] - v[0], nonlinear_part = (v[0] - v[1]) + (v[2] - v[3]);
     out[0] = v[4];
-    out[1] = along + 0.5f * bent;
-    out[2] = across + 0.5f * bent;
+    out[1] = along + 0.5f * nonlinear_part;
+    out[2] = across + 0.5f * nonlinear_part;
     out[3] = 0.25f * ((v[0] + v[1]) + (v[2] + v[3])) - v[4];
-    out[4] = bent;
+    out[4] = nonlinear_part;
 }
 
 SIMD_INLINE void kernel_tet_terms(const vf v[4], vf out[8])
@@ -268,7 +268,7 @@ SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
 /* ---- cells ---- */
 
 /* Returns the square of the largest Frobenius norm of n's derivative over the cell's corners. */
-SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
+SIMD_INLINE vf kernel_local_bent(int type, const vf nonlinear_part[KERNEL_BENT_TERMS][3])
 {
     static const float corners[2][8][3] = {{{-0.5f, -0.5f, -0.5f},
                                             {0.5f, -0.5f, -0.5f},
@@ -284,7 +284,7 @@ SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
                                             {-1.0f / 3, -1.0f / 3, 0.5f},
                                             {2.0f / 3, -1.0f / 3, 0.5f},
                                             {-1.0f / 3, 2.0f / 3, 0.5f}}};
-    const vf *b0 = bent[0];
+    const vf *b0 = nonlinear_part[0];
     vf most = vf_set(0);
     /* The derivatives of αβ / k along k, α and β are at most 1/4, 1/2 and 1/2. */
     if (kernel_has_apex(type)) return 0.5625f * ((b0[0] * b0[0] + b0[1] * b0[1]) + b0[2] * b0[2]);
@@ -297,7 +297,7 @@ SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
         for (int i = 0; i < 3; i++)
             for (int a = 0; a < 3; a++) {
                 vf slope = vf_set(0);
-                for (int k = 0; k < kernel_bent_terms(type); k++) slope += bent[k][a] * b.along[k][i];
+                for (int k = 0; k < kernel_bent_terms(type); k++) slope += nonlinear_part[k][a] * b.along[k][i];
                 sum += slope * slope;
             }
         most = vf_max(sum, most);
@@ -365,7 +365,7 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
                                   kernel_local_cells *out)
 {
     const int count = grid_type_vertices(type), bends = kernel_bent_terms(type);
-    vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], bent[KERNEL_BENT_TERMS][3];
+    vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], nonlinear_part[KERNEL_BENT_TERMS][3];
     for (int a = 0; a < 3; a++) {
         for (int n = 0; n < count; n++) at[a][n] = places[a][n] - places[a][0];
         kernel_local_terms(type, at[a], terms[a]);
@@ -379,16 +379,16 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
         offset[i] = -((inverse[i][0] * terms[0][0] + inverse[i][1] * terms[1][0]) + inverse[i][2] * terms[2][0]);
         vf_store(out->offset[i], offset[i]);
         for (int k = 0; k < bends; k++) {
-            bent[k][i] = inverse[i][0] * terms[0][4 + k] + inverse[i][1] * terms[1][4 + k];
-            bent[k][i] += inverse[i][2] * terms[2][4 + k];
-            vf_store(out->bent[k][i], bent[k][i]);
+            nonlinear_part[k][i] = inverse[i][0] * terms[0][4 + k] + inverse[i][1] * terms[1][4 + k];
+            nonlinear_part[k][i] += inverse[i][2] * terms[2][4 + k];
+            vf_store(out->nonlinear_part[k][i], nonlinear_part[k][i]);
         }
     }
     kernel_local_error_bound(count, places, (const vf(*)[3])inverse, out);
     kernel_local_reach(count, (const vf(*)[8])at, (const vf(*)[3])inverse, offset, out);
     const vm sharp = vf_lt(vf_load(out->error_bound), vf_set(0.05f));
     if (!bends) return sharp;
-    const vf bend = kernel_local_bent(type, (const vf(*)[3])bent);
+    const vf bend = kernel_local_bent(type, (const vf(*)[3])nonlinear_part);
     vf_store(out->bend, bend);
     return vm_and(sharp, vf_lt(bend, vf_set(most_bent)));
 }
@@ -397,7 +397,7 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
 
 /* Points, one per lane, each in the cell of its lane. */
 typedef struct kernel_local_points {
-    vf y[3], r[3], bent[KERNEL_BENT_TERMS][3];
+    vf y[3], r[3], nonlinear_part[KERNEL_BENT_TERMS][3];
     kernel_nonlinear_terms bend;     /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
     vf column[3][3], det; /* columns of the adjugate of the derivatives' matrix, and 1 / its determinant in det */
 } kernel_local_points;
@@ -408,7 +408,7 @@ SIMD_INLINE void kernel_local_left(int type, const kernel_local_points *p, vf ou
 {
     for (int a = 0; a < 3; a++) {
         out[a] = p->y[a] - p->r[a];
-        for (int k = 0; k < kernel_bent_terms(type); k++) out[a] = vf_muladd(-p->bent[k][a], p->bend.term[k], out[a]);
+        for (int k = 0; k < kernel_bent_terms(type); k++) out[a] = vf_muladd(-p->nonlinear_part[k][a], p->bend.term[k], out[a]);
     }
 }
 
@@ -421,7 +421,7 @@ SIMD_INLINE void kernel_local_derive(int type, kernel_local_points *p)
         for (int a = 0; a < 3; a++) {
             j[i][a] = vf_set(i == a);
             for (int k = 0; k < kernel_bent_terms(type); k++)
-                j[i][a] = vf_muladd(p->bent[k][a], p->bend.along[k][i], j[i][a]);
+                j[i][a] = vf_muladd(p->nonlinear_part[k][a], p->bend.along[k][i], j[i][a]);
         }
     for (int i = 0; i < 3; i++) {
         const vf *u = j[(i + 1) % 3], *v = j[(i + 2) % 3];
@@ -467,7 +467,7 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
     }
     if (kernel_is_linear(type)) return vm_all_lanes();
     for (int k = 0; k < kernel_bent_terms(type); k++)
-        for (int a = 0; a < 3; a++) p->bent[k][a] = kernel_gather_lane(cells->bent[k][a], lane);
+        for (int a = 0; a < 3; a++) p->nonlinear_part[k][a] = kernel_gather_lane(cells->nonlinear_part[k][a], lane);
     vf left[3];
     kernel_nonlinear_terms_at(type, p->r, &p->bend);
     kernel_local_left(type, p, left);

@@ -373,9 +373,9 @@ SIMD_INLINE vm kernel_patch_arrived(const kernel_patch *p, vf s, vf r)
     const vf one = vf_set(1);
     const kernel_patch_at at = kernel_patch_evaluate(p, s, r);
     const vf e = vf_abs(p->ex) + vf_abs(p->ey), g = vf_abs(p->gx) + vf_abs(p->gy);
-    const vf rim = vf_min(vf_min(s, one - s), vf_min(r, one - r));
+    const vf domain_margin = vf_min(vf_min(s, one - s), vf_min(r, one - r));
     const vm open = vf_lt(e * (p->gz + 0.5f * g) + g * p->ez, vf_abs(at.det) * 8.0f);
-    const vm inside = vm_and(open, vf_lt(vf_set(1.0f / 1024), rim));
+    const vm inside = vm_and(open, vf_lt(vf_set(1.0f / 1024), domain_margin));
     return vm_and(inside, vf_le(vf_abs(at.dx) + vf_abs(at.dy), (e + g) * 1.2e-7f));
 }
 
@@ -489,8 +489,8 @@ SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const
     const vm outside = vm_and(rays, vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3])));
     const vf across = vf_diff_of_products(x[a], y[c], x[c], y[a]), other = vf_diff_of_products(x[d], y[b], x[b], y[d]);
     const vf slack = 2e-6f * (vf_abs(across) + vf_abs(other)), sum = across + other, difference = across - other;
-    const vm bent = vf_le(vf_select(side[0], -sum, sum), slack);
-    const vm bends = vm_and(outside, vm_and(bent, vf_le(vf_select(side[3], difference, -difference), slack)));
+    const vm nonlinear_part = vf_le(vf_select(side[0], -sum, sum), slack);
+    const vm bends = vm_and(outside, vm_and(nonlinear_part, vf_le(vf_select(side[3], difference, -difference), slack)));
     return __builtin_expect(vm_any(bends), 0)
                ? kernel_curved_may_cross_twice_by_discriminant(x, y, loop, bends, across, other)
                : bends;

@@ -79,7 +79,7 @@ SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type
     vf most = vf_set(0);
     for (int k = 0; k < kernel_bent_terms(type); k++) {
         vf own = vf_load(c->field[4 + k]);
-        for (int a = 0; a < 3; a++) own = vf_muladd(-vf_load(c->field[1 + a]), vf_load(c->bent[k][a]), own);
+        for (int a = 0; a < 3; a++) own = vf_muladd(-vf_load(c->field[1 + a]), vf_load(c->nonlinear_part[k][a]), own);
         vf_store(out->terms[k], own);
         most += vf_abs(own) * kernel_local_bent_slope(type, k);
     }
@@ -99,7 +99,7 @@ typedef struct kernel_local_chord {
     vf middle[3], span[3];
     /* the nonlinear terms' chords: value at the middle, and difference between the ends */
     vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS];
-    vf bent[KERNEL_BENT_TERMS][3], own[KERNEL_BENT_TERMS];
+    vf nonlinear_part[KERNEL_BENT_TERMS][3], own[KERNEL_BENT_TERMS];
     vf tolerance, residual_limit;
 } kernel_local_chord;
 
@@ -137,7 +137,7 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
         out->mean[k] = 0.5f * (first[k] + last[k]);
         out->rise[k] = last[k] - first[k];
         out->own[k] = kernel_gather_lane(nonlinear->terms[k], lane);
-        for (int a = 0; a < 3; a++) out->bent[k][a] = kernel_gather_lane(cells->bent[k][a], lane);
+        for (int a = 0; a < 3; a++) out->nonlinear_part[k][a] = kernel_gather_lane(cells->nonlinear_part[k][a], lane);
     }
     out->tolerance = kernel_gather_lane(nonlinear->tolerance, lane);
     out->residual_limit = kernel_gather_lane(nonlinear->residual_limit, lane);
@@ -152,7 +152,7 @@ SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, i
     for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(c->span[a], vf_set(u), c->middle[a]) - p->r[a];
     for (int k = 0; k < kernel_bent_terms(type); k++) {
         term[k] -= vf_muladd(c->rise[k], vf_set(u), c->mean[k]);
-        for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(-c->bent[k][a], term[k], p->residual[a]);
+        for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(-c->nonlinear_part[k][a], term[k], p->residual[a]);
     }
     p->deviation = c->own[0] * term[0];
     for (int k = 1; k < kernel_bent_terms(type); k++) p->deviation = vf_muladd(c->own[k], term[k], p->deviation);

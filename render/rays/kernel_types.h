@@ -90,7 +90,7 @@ typedef struct kernel_pre_entry {
     int32_t before[4]; /* sums over all earlier bins */
     float own[4];
     int32_t colour; /* colour at the bin's middle, 10 bits per channel */
-    float rough;    /* variation of extinction and emission within the bin, as light */
+    float table_error;    /* variation of extinction and emission within the bin, as light */
     float unused[2];
 } kernel_pre_entry;
 

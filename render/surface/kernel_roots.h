@@ -56,7 +56,7 @@ typedef struct kernel_piece_class {
 
 /* The bounds of kernel_bounds, gathered for each ray's own cell. */
 typedef struct kernel_limits {
-    vf bent[3][8], inverse[3][3], stretch, slope, curve, twist;
+    vf nonlinear_part[3][8], inverse[3][3], stretch, slope, curve, twist;
     vf coarsest; /* pieces longer than this share of the interval are always halved */
     vm is_monotone;
 } kernel_limits;
@@ -65,8 +65,8 @@ SIMD_INLINE void kernel_limits_of(const kernel_bounds *b, vi lane, kernel_limits
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++) {
-            out->bent[i][j] = vf_set(0);
-            out->bent[i][4 + j] = kernel_gather_lane(b->bent[i][j], lane);
+            out->nonlinear_part[i][j] = vf_set(0);
+            out->nonlinear_part[i][4 + j] = kernel_gather_lane(b->nonlinear_part[i][j], lane);
         }
     for (int i = 0; i < 3; i++)
         for (int a = 0; a < 3; a++) out->inverse[i][a] = kernel_gather_lane(b->normal[i][a], lane);
@@ -94,10 +94,10 @@ SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, cons
     vf first = vf_set(0), second = first, between = first;
     for (int i = 0; i < 3; i++) {
         vf g0[3], g1[3];
-        kernel_gradient_of(b->bent[i], is_pyramid, &c->m[0], from, g0);
-        kernel_gradient_of(b->bent[i], is_pyramid, &c->m[1], to, g1);
-        const vf rise = kernel_value_of(b->bent[i], is_pyramid, &c->m[1], to) -
-                        kernel_value_of(b->bent[i], is_pyramid, &c->m[0], from);
+        kernel_gradient_of(b->nonlinear_part[i], is_pyramid, &c->m[0], from, g0);
+        kernel_gradient_of(b->nonlinear_part[i], is_pyramid, &c->m[1], to, g1);
+        const vf rise = kernel_value_of(b->nonlinear_part[i], is_pyramid, &c->m[1], to) -
+                        kernel_value_of(b->nonlinear_part[i], is_pyramid, &c->m[0], from);
         const vf e1 = (kernel_dot(g0, c->move) - rise) * (1.0f / 3), e2 = (rise - kernel_dot(g1, c->move)) * (1.0f / 3);
         first += e1 * e1;
         second += e2 * e2;

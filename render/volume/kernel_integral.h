@@ -172,7 +172,7 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
 /* A ray's position in a piece of the transfer function. */
 typedef struct kernel_piece_state {
     vf below, above; /* distances of the value to the piece's low and high end */
-    vf todo;         /* remaining change of the value within this piece */
+    vf remaining;         /* remaining change of the value within this piece */
     vf left;         /* length of the ray over which this change takes place, in unit distances */
     vf shortest;     /* lower limit of a step's length, in unit distances */
     /* value at the end of the piece that the ray is approaching, and its rounding error; initially the value at the
@@ -207,11 +207,11 @@ SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *piece_state, const
     const vf below = vf_max((v - ends->low) + (piece_state->rest - ends->low_rest), zero);
     const vf above = vf_max((ends->high - v) + (ends->high_rest - piece_state->rest), zero);
     const vf ahead = vf_abs((constants->v_out - v) + (constants->rest_out - piece_state->rest));
-    const vf most = vf_select(constants->falling, below, above), todo = vf_min(most, ahead);
+    const vf most = vf_select(constants->falling, below, above), remaining = vf_min(most, ahead);
     piece_state->below = vf_select(fresh, below, piece_state->below);
     piece_state->above = vf_select(fresh, above, piece_state->above);
-    piece_state->todo = vf_select(fresh, todo, piece_state->todo);
-    const vf left = vf_select(constants->level, constants->length, todo * constants->per_value);
+    piece_state->remaining = vf_select(fresh, remaining, piece_state->remaining);
+    const vf left = vf_select(constants->level, constants->length, remaining * constants->per_value);
     piece_state->left = vf_select(fresh, left, piece_state->left);
     piece_state->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, piece_state->shortest);
     piece_state->edge = vf_select(fresh, vf_select(constants->falling, ends->low, ends->high), piece_state->edge);
@@ -247,16 +247,16 @@ SIMD_INLINE kernel_integration_step kernel_integration_step_begin(const kernel_p
                                                  kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
     out.clear = kernel_piece_state_interpolate(piece_state, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
                                                kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
-    out.rise = turn * piece_state->todo * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
+    out.rise = turn * piece_state->remaining * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
     return out;
 }
 
 SIMD_INLINE void kernel_integration_step_limit(kernel_integration_step *st, vf left, vf shortest)
 {
     const vf zero = vf_set(0), one = vf_set(1), rise = vf_abs(st->rise), ratio = st->clear * KERNEL_STEP_RATIO;
-    const vm bent = vf_lt(ratio, rise);
+    const vm nonlinear_part = vf_lt(ratio, rise);
     st->share = one;
-    if (vm_any(bent)) st->share = vf_select(bent, vf_min(vf_max(ratio / rise, shortest / left), one), one);
+    if (vm_any(nonlinear_part)) st->share = vf_select(nonlinear_part, vf_min(vf_max(ratio / rise, shortest / left), one), one);
     st->is_opaque = vm_and(vf_eq(st->clear, zero), vf_eq(rise, zero));
     const vf up = vf_max(st->share * st->rise, zero), clear = vf_max(st->clear - up, vf_set(KERNEL_TINY));
     const vf most = kernel_extinction(vf_min(st->opacity + up, one), clear), length = left * st->share;
@@ -326,11 +326,11 @@ SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_
         }
         kernel_integration_step st = kernel_integration_step_begin(t, &at, &piece_state, constants.turn);
         kernel_integration_step_limit(&st, piece_state.left, piece_state.shortest);
-        const vf size = piece_state.todo * st.share, move = constants.turn * size;
+        const vf size = piece_state.remaining * st.share, move = constants.turn * size;
         kernel_light_step(t, &at, open, piece_state.below, move, &st, light);
         piece_state.below += move;
         piece_state.above -= move;
-        piece_state.todo -= size;
+        piece_state.remaining -= size;
         piece_state.left -= st.length;
         const vm through = vf_le(vf_set(1), st.share);
         open = vm_and(vm_andnot(open, vm_and(through, piece_state.is_last)), vf_lt(vf_set(KERNEL_BLACK), light->transmittance));

@@ -43,7 +43,7 @@
 typedef struct kernel_pre_end {
     /* place: position within the bin, 0 .. 1; it may be outside this range in the first and the last bin */
     vf value, bin, place;
-    vf own[4], rough;     /* own: the bin's sums of extinction and emission; rough: the error bound of the bin */
+    vf own[4], table_error;     /* own: the bin's sums of extinction and emission; rough: the error bound of the bin */
     vi before[4], colour; /* before: the sums of all earlier bins */
 } kernel_pre_end;
 
@@ -51,7 +51,7 @@ typedef struct kernel_pre_end {
 typedef struct kernel_pre_subinterval {
     vf colour[3], depth, absorbed;
     /* error: due to absorption within the segment; rough: due to the tables; allowed: error budget */
-    vf error, rough, allowed;
+    vf error, table_error, allowed;
 } kernel_pre_subinterval;
 
 SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_pre_end *e)
@@ -69,7 +69,7 @@ SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_p
     vf_gather_rows(entries + 4, at, e->own);
     vf_gather_rows(entries + 8, at, rest);
     for (int i = 0; i < 4; i++) e->before[i] = vi_from_bits(before[i]);
-    e->rough = rest[1];
+    e->table_error = rest[1];
     e->colour = vi_from_bits(rest[0]);
 }
 
@@ -131,9 +131,9 @@ SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pr
         change = vf_max(change, vf_abs(rise));
         out->colour[c] = sum[1 + c] * mean - (0.25f * rise) * square;
     }
-    const vf rough = (a->rough + b->rough) * vf_min(one, 0.5f * inverse);
+    const vf table_error = (a->table_error + b->table_error) * vf_min(one, 0.5f * inverse);
     out->error = (0.25f * change + kernel_pre_bend(t, a->value, b->value)) * square;
-    out->rough = rough * length;
+    out->table_error = table_error * length;
     out->allowed = out->absorbed * t->allowed_absorbed + length * t->allowed_length;
 }
 
@@ -145,7 +145,7 @@ static __attribute__((noinline)) void kernel_pre_subdivide(const kernel_preinteg
 {
     const vf zero = vf_set(0), share = 1.0f / count, rise = (v_out - from->value) * share;
     kernel_pre_end ends[2] = {*from};
-    vf clear = vf_set(1), rough = zero;
+    vf clear = vf_set(1), table_error = zero;
     *all = (kernel_pre_subinterval){{zero, zero, zero}, zero, zero, zero, zero, zero};
     for (int n = 1; n <= most; n++) {
         const vf number = vf_set((float)n);
@@ -156,11 +156,11 @@ static __attribute__((noinline)) void kernel_pre_subdivide(const kernel_preinteg
         for (int c = 0; c < 3; c++) all->colour[c] += clear * sub.colour[c];
         all->depth += sub.depth;
         all->error += clear * sub.error;
-        rough += sub.rough;
+        table_error += sub.table_error;
         clear -= clear * sub.absorbed;
     }
     all->absorbed = 1.0f - clear;
-    all->rough = all->absorbed * rough;
+    all->table_error = all->absorbed * table_error;
 }
 
 static __attribute__((noinline)) void kernel_integrate_apart(const kernel_pieces *t, vm rays,
@@ -183,7 +183,7 @@ static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pie
                                                         const kernel_pre_end *from, const kernel_unit_segment *run,
                                                         const kernel_pre_subinterval *whole, kernel_light *light)
 {
-    const vf room = vf_max(whole->allowed - whole->rough, vf_set(1e-30f));
+    const vf room = vf_max(whole->allowed - whole->table_error, vf_set(1e-30f));
     const vf wanted = vf_sqrt(vf_min(whole->error / room, vf_set(1e6f))) * 1.1f;
     const vm few = vm_and(rays, vf_le(wanted, vf_set(KERNEL_PRE_PARTS)));
     vm left = rays;
@@ -192,7 +192,7 @@ static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pie
         const vf count = vf_select(few, 1.0f + vf_floor(wanted), vf_set(1));
         kernel_pre_subdivide(pieces->preintegral, from, run->v_out, run->length, count, (int)vf_reduce_max(count),
                              &subdivisions);
-        const vm good = vm_and(few, vf_le(subdivisions.error + subdivisions.rough, whole->allowed - whole->rough));
+        const vm good = vm_and(few, vf_le(subdivisions.error + subdivisions.table_error, whole->allowed - whole->table_error));
         *light = kernel_light_select(good, &subdivisions, light);
         left = vm_andnot(rays, good);
     }
@@ -217,7 +217,7 @@ SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm ra
     if (vm_any(vm_andnot(rays, vf_eq(end->value, run->v_in)))) kernel_pre_find(pieces->preintegral, run->v_in, end);
     kernel_pre_find(pieces->preintegral, run->v_out, &next);
     kernel_pre_between(pieces->preintegral, end, &next, run->length, &sub);
-    const vm good = vf_le(sub.error + sub.rough, sub.allowed);
+    const vm good = vf_le(sub.error + sub.table_error, sub.allowed);
     light = kernel_light_select(good, &sub, &light);
     if (vm_any(vm_andnot(rays, good))) kernel_pre_finely(pieces, vm_andnot(rays, good), end, run, &sub, &light);
     *end = next;

@@ -199,7 +199,7 @@ SIMD_INLINE void kernel_blend_separate(kernel_packet *p, kernel_blend *b, vm has
 SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_samples *s, int n,
                                    const kernel_hits *hits, vf t)
 {
-    vm broken = hits->crowded;
+    vm broken = hits->overflowed;
     for (int i = 0; i < hits->cut_count; i++)
         broken = vm_or(broken, vm_and(vf_lt(b->t_last, hits->cut[i]), vf_le(hits->cut[i], t)));
     if (p->frame->needs_contact) {
