@@ -172,7 +172,7 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *
     kernel_tile_queue_set_part(t, m, part);
     const int type = kernel_arrays_type(&m->arrays, candidate->cell);
     if (kernel_is_for_vectors(m, candidate, type)) {
-        kernel_tile_queue_put(t, m, &m->pending[kernel_found_number(type)], candidate, value);
+        kernel_tile_queue_put(t, m, &m->pending[kernel_lane_type_index(type)], candidate, value);
         return;
     }
     if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_trace_singly(t, m);
@@ -304,7 +304,7 @@ static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *
 {
     kernel_finder *finder = t->thread->finder;
     if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
-    if (finder->frame) kernel_find_rest(finder);
+    if (finder->frame) kernel_find_flush(finder);
     kernel_finder_begin(finder, t->frame, &(kernel_subtree){.surface = t->layer, .part = part});
     finder->list = &s->list;
     finder->grow = kernel_tile_find_flush;
@@ -333,7 +333,7 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
     for (int layer = 0; layer < t->frame->surface_count; layer++) {
         kernel_tile_set_layer(t, layer);
         kernel_tile_surface(t);
-        if (t->thread->finder->frame) kernel_find_rest(t->thread->finder);
+        if (t->thread->finder->frame) kernel_find_flush(t->thread->finder);
         kernel_tile_find_flush(&s->list);
         kernel_tile_queue_end(t, &s->queue);
     }

@@ -405,7 +405,7 @@ static vm edges_are_wrong(const vf x[8], const vf y[8], const signed char *loop)
         around[i] = edge_of(x, y, loop[i], loop[(i + 1) & 3], &least);
         side[i] = vm_sign(around[i]);
     }
-    const vm once = kernel_halves_once(side, vm_sign(edge_of(x, y, loop[0], loop[2], &least)));
+    const vm once = kernel_cross_one_triangle(side, vm_sign(edge_of(x, y, loop[0], loop[2], &least)));
     const vm known = vf_lt(vf_set(KERNEL_EDGE_LEAST), least);
     const vm bends = kernel_curved_may_cross_twice(x, y, loop, vm_all_lanes(), side);
     return vm_and(known, vm_or(vm_xor(once, vm_sign(kernel_sides_agree(around, 4))), bends));

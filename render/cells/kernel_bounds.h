@@ -326,7 +326,7 @@ SIMD_INLINE void kernel_doubles_terms(int type, const kernel_doubles nonlinear_p
 {
     const int first = kernel_is_prism(type) ? 1 : 0;
     for (int j = 0; j < 4; j++) out[j] = (kernel_doubles){0};
-    for (int j = 0; j < kernel_bent_terms(type); j++) out[j] = nonlinear_part[first + j];
+    for (int j = 0; j < kernel_nonlinear_count(type); j++) out[j] = nonlinear_part[first + j];
     if (kernel_has_triangles(type)) return;
     for (int j = 0; j < 3; j++) out[j] += 0.5 * nonlinear_part[3];
 }
@@ -398,11 +398,11 @@ SIMD_INLINE void kernel_doubles_contraction_of(const kernel_bounds_lanes *b, con
             -(b->inverse[i][0] * middle[0] + b->inverse[i][1] * middle[1] + b->inverse[i][2] * middle[2]);
         kernel_doubles_store(out->offset[i], half, offset);
         kernel_doubles_terms(type, b->nonlinear_part[i], terms);
-        for (int j = 0; j < kernel_bent_terms(type); j++) kernel_doubles_store(out->nonlinear_part[j][i], half, terms[j]);
+        for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_doubles_store(out->nonlinear_part[j][i], half, terms[j]);
     }
     kernel_doubles_store(out->middle, half, middle[3]);
     kernel_doubles_terms(type, r->e + 4, terms);
-    for (int j = 0; j < kernel_bent_terms(type); j++) kernel_doubles_store(out->field[j], half, terms[j]);
+    for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_doubles_store(out->field[j], half, terms[j]);
     kernel_doubles_rate(b, type, r, half, out);
 }
 

@@ -77,13 +77,13 @@ SIMD_INLINE vi kernel_curved_around(const kernel_curved_sides *sides, int type)
 
 /* Returns the rays that cross just one half of a quad, even if it does not look convex; the result does not depend on
  * which diagonal halves it. Adds the rays that may cross its patch twice to *alone. */
-SIMD_INLINE vm kernel_curved_once(const kernel_projected *s, const kernel_curved_sides *sides,
+SIMD_INLINE vm kernel_curved_cross_one_triangle(const kernel_projected *s, const kernel_curved_sides *sides,
                                   const kernel_shape *shape, int face, vm rays, vm *alone)
 {
     vm side[4];
     kernel_quad_around(shape, face, sides, side);
     *alone = vm_or(*alone, kernel_curved_may_cross_twice(s->x, s->y, shape->faces[face].vertices, rays, side));
-    return kernel_halves_once(side, vm_sign(sides->side[shape->edge_count + face]));
+    return kernel_cross_one_triangle(side, vm_sign(sides->side[shape->edge_count + face]));
 }
 
 /* Finds the two faces that each ray crosses once. Any other ray is marked to be traced in its cell alone (out->alone).
@@ -101,7 +101,7 @@ SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kern
     vi faces = kernel_curved_around(&sides, type);
     for (int face = 0; nonconvex && face < shape->face_count; face++) {
         if (shape->faces[face].count == 3 || !vm_any(vm_and(rays, vm_sign(*nonconvex << (31 - face))))) continue;
-        const vm once = kernel_curved_once(&seen, &sides, shape, face, rays, &alone);
+        const vm once = kernel_curved_cross_one_triangle(&seen, &sides, shape, face, rays, &alone);
         faces = (faces & ~vi_set(1 << face)) | vi_select(once, vi_set(1 << face), vi_set(0));
     }
     kernel_curved_count(faces, rays, alone, out);
@@ -135,10 +135,10 @@ SIMD_INLINE void kernel_curved_quad_gather(const kernel_transformed_curved *h, c
     for (int i = 0; i < 4; i++) {
         const vi corner = word >> (4 * i) & 7;
         out->corner[i] = corner;
-        q->z[i] = kernel_curved_pick(h->at[2], count, p->lane, corner);
-        q->x[i] = (kernel_curved_pick(h->at[0], count, p->lane, corner) - p->rays.origin_x) - p->rays.slope_x * q->z[i];
-        q->y[i] = (kernel_curved_pick(h->at[1], count, p->lane, corner) - p->rays.origin_y) - p->rays.slope_y * q->z[i];
-        out->f[i] = kernel_curved_pick(h->at[3], count, p->lane, corner);
+        q->z[i] = kernel_curved_gather_vertex(h->at[2], count, p->lane, corner);
+        q->x[i] = (kernel_curved_gather_vertex(h->at[0], count, p->lane, corner) - p->rays.origin_x) - p->rays.slope_x * q->z[i];
+        q->y[i] = (kernel_curved_gather_vertex(h->at[1], count, p->lane, corner) - p->rays.origin_y) - p->rays.slope_y * q->z[i];
+        out->f[i] = kernel_curved_gather_vertex(h->at[3], count, p->lane, corner);
     }
 }
 
@@ -150,7 +150,7 @@ SIMD_INLINE void kernel_curved_quad_reference(int type, const kernel_curved_quad
     for (int a = 0; a < 3; a++) {
         vf at[4];
         for (int i = 0; i < 4; i++)
-            at[i] = kernel_curved_own(kernel_cell_shape(type), grid_type_vertices(type), a, own->corner[i]);
+            at[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, own->corner[i]);
         out->r[a] = (at[0] + place->s * (at[1] - at[0])) + place->r * (at[3] - at[0]);
     }
 }
@@ -222,12 +222,12 @@ SIMD_INLINE void kernel_curved_triangle_reference(const kernel_transformed_curve
     const int count = grid_type_vertices(type);
     const vf inverse = 1.0f / kernel_weight(own->e[0], own->e[1], own->e[2]);
     vf v[3];
-    for (int i = 0; i < 3; i++) v[i] = kernel_curved_pick(h->at[2], count, lane, own->corner[i]);
+    for (int i = 0; i < 3; i++) v[i] = kernel_curved_gather_vertex(h->at[2], count, lane, own->corner[i]);
     out->t = kernel_curved_weighted_mean(own, v, inverse);
-    for (int i = 0; i < 3; i++) v[i] = kernel_curved_pick(h->at[3], count, lane, own->corner[i]);
+    for (int i = 0; i < 3; i++) v[i] = kernel_curved_gather_vertex(h->at[3], count, lane, own->corner[i]);
     out->value = kernel_curved_weighted_mean(own, v, inverse);
     for (int a = 0; a < 3; a++) {
-        for (int i = 0; i < 3; i++) v[i] = kernel_curved_own(kernel_cell_shape(type), count, a, own->corner[i]);
+        for (int i = 0; i < 3; i++) v[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), count, a, own->corner[i]);
         out->r[a] = kernel_curved_weighted_mean(own, v, inverse);
     }
 }

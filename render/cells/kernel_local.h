@@ -50,7 +50,7 @@ typedef struct kernel_local_cells {
     float error_bound[SIMD_WIDTH];
 } kernel_local_cells;
 
-SIMD_INLINE int kernel_bent_terms(int type)
+SIMD_INLINE int kernel_nonlinear_count(int type)
 {
     return kernel_is_box(type) ? 4 : kernel_is_prism(type) ? 2 : kernel_has_apex(type) ? 1 : 0;
 }
@@ -297,7 +297,7 @@ SIMD_INLINE vf kernel_local_bent(int type, const vf nonlinear_part[KERNEL_BENT_T
         for (int i = 0; i < 3; i++)
             for (int a = 0; a < 3; a++) {
                 vf slope = vf_set(0);
-                for (int k = 0; k < kernel_bent_terms(type); k++) slope += nonlinear_part[k][a] * b.along[k][i];
+                for (int k = 0; k < kernel_nonlinear_count(type); k++) slope += nonlinear_part[k][a] * b.along[k][i];
                 sum += slope * slope;
             }
         most = vf_max(sum, most);
@@ -364,7 +364,7 @@ SIMD_INLINE void kernel_local_error_bound(int count, const vf places[3][8], cons
 SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf values[8], float most_bent,
                                   kernel_local_cells *out)
 {
-    const int count = grid_type_vertices(type), bends = kernel_bent_terms(type);
+    const int count = grid_type_vertices(type), bends = kernel_nonlinear_count(type);
     vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], nonlinear_part[KERNEL_BENT_TERMS][3];
     for (int a = 0; a < 3; a++) {
         for (int n = 0; n < count; n++) at[a][n] = places[a][n] - places[a][0];
@@ -408,7 +408,7 @@ SIMD_INLINE void kernel_local_left(int type, const kernel_local_points *p, vf ou
 {
     for (int a = 0; a < 3; a++) {
         out[a] = p->y[a] - p->r[a];
-        for (int k = 0; k < kernel_bent_terms(type); k++) out[a] = vf_muladd(-p->nonlinear_part[k][a], p->bend.term[k], out[a]);
+        for (int k = 0; k < kernel_nonlinear_count(type); k++) out[a] = vf_muladd(-p->nonlinear_part[k][a], p->bend.term[k], out[a]);
     }
 }
 
@@ -420,7 +420,7 @@ SIMD_INLINE void kernel_local_derive(int type, kernel_local_points *p)
     for (int i = 0; i < 3; i++)
         for (int a = 0; a < 3; a++) {
             j[i][a] = vf_set(i == a);
-            for (int k = 0; k < kernel_bent_terms(type); k++)
+            for (int k = 0; k < kernel_nonlinear_count(type); k++)
                 j[i][a] = vf_muladd(p->nonlinear_part[k][a], p->bend.along[k][i], j[i][a]);
         }
     for (int i = 0; i < 3; i++) {
@@ -466,7 +466,7 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
         p->r[i] = p->y[i];
     }
     if (kernel_is_linear(type)) return vm_all_lanes();
-    for (int k = 0; k < kernel_bent_terms(type); k++)
+    for (int k = 0; k < kernel_nonlinear_count(type); k++)
         for (int a = 0; a < 3; a++) p->nonlinear_part[k][a] = kernel_gather_lane(cells->nonlinear_part[k][a], lane);
     vf left[3];
     kernel_nonlinear_terms_at(type, p->r, &p->bend);
@@ -488,7 +488,7 @@ SIMD_INLINE vf kernel_local_value(int type, const kernel_local_cells *cells, vi 
 {
     vf v = kernel_gather_lane(cells->field[0], lane);
     for (int i = 0; i < 3; i++) v = vf_muladd(kernel_gather_lane(cells->field[1 + i], lane), p->r[i], v);
-    for (int k = 0; k < kernel_bent_terms(type); k++)
+    for (int k = 0; k < kernel_nonlinear_count(type); k++)
         v = vf_muladd(kernel_gather_lane(cells->field[4 + k], lane), p->bend.term[k], v);
     return v;
 }

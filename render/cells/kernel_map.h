@@ -314,7 +314,7 @@ SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
 }
 
 /* Returns the fraction of the interval that lies before t, in [0, 1]. */
-SIMD_INLINE vf kernel_share(const kernel_interval *i, vf t)
+SIMD_INLINE vf kernel_interval_fraction(const kernel_interval *i, vf t)
 {
     const vf length = i->t_out - i->t_in;
     return vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
@@ -324,12 +324,12 @@ SIMD_INLINE vf kernel_share(const kernel_interval *i, vf t)
  * reference coordinates. */
 SIMD_INLINE vf kernel_line_value(const kernel_interval *i, vf t)
 {
-    return i->v_in + kernel_share(i, t) * (i->v_out - i->v_in);
+    return i->v_in + kernel_interval_fraction(i, t) * (i->v_out - i->v_in);
 }
 
-SIMD_INLINE void kernel_guess(const kernel_interval *i, vf t, vf r[3])
+SIMD_INLINE void kernel_reference_on_chord(const kernel_interval *i, vf t, vf r[3])
 {
-    const vf along = kernel_share(i, t);
+    const vf along = kernel_interval_fraction(i, t);
     for (int a = 0; a < 3; a++) r[a] = i->r_in[a] + along * (i->r_out[a] - i->r_in[a]);
 }
 
@@ -342,7 +342,7 @@ SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map *map
     const bool has_failed = vm_any(failed);
     if (has_failed) {
         vf line[3];
-        kernel_guess(i, t, line);
+        kernel_reference_on_chord(i, t, line);
         for (int a = 0; a < 3; a++) r[a] = vf_select(failed, line[a], r[a]);
         *failures += __builtin_popcount(vm_bits(failed));
     }
@@ -361,7 +361,7 @@ SIMD_INLINE vf kernel_solve(kernel_packet *p, const kernel_map *map, const kerne
 SIMD_INLINE vf kernel_value_at(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t)
 {
     vf r[3];
-    kernel_guess(i, t, r);
+    kernel_reference_on_chord(i, t, r);
     return kernel_solve(p, map, i, rays, t, r);
 }
 

@@ -145,7 +145,7 @@ static inline void kernel_scalar_point(const kernel_scalar_quad *q, const kernel
 }
 
 /* Computes the point of a ray that crosses exactly one of the two triangles. */
-static inline void kernel_scalar_once(const kernel_scalar_quad *q, double place[3])
+static inline void kernel_scalar_single_point(const kernel_scalar_quad *q, double place[3])
 {
     const kernel_scalar_quadratic a = kernel_scalar_a(q), b = kernel_scalar_b(q);
     const bool by_b = kernel_scalar_turns(&b);
@@ -162,7 +162,7 @@ static inline bool kernel_scalar_may_have_two_roots(const kernel_scalar_quadrati
 }
 
 /* Computes the two points of a ray that crosses both triangles or none. Returns false if it does not meet the patch. */
-static inline bool kernel_scalar_twice(const kernel_scalar_quad *q, double places[2][3])
+static inline bool kernel_scalar_two_points(const kernel_scalar_quad *q, double places[2][3])
 {
     const kernel_scalar_quadratic a = kernel_scalar_a(q), b = kernel_scalar_b(q);
     if (!kernel_scalar_may_have_two_roots(&a) || !kernel_scalar_may_have_two_roots(&b)) return false;
@@ -235,7 +235,7 @@ SIMD_INLINE kernel_doubles kernel_doubles_root(const kernel_doubles_quadratic *c
 
 /* Computes the patch's point for the wanted rays in one half of the lanes. Each of these rays crosses one triangle.
  * Returns the rays for which one of the quadratics A and B vanishes, whose points must be computed one by one. */
-SIMD_INLINE kernel_doubles_mask kernel_doubles_once(const kernel_quad *quad, vm wanted, int half,
+SIMD_INLINE kernel_doubles_mask kernel_doubles_single_point(const kernel_quad *quad, vm wanted, int half,
                                                     kernel_quad_point *out)
 {
     const kernel_doubles zero = {0}, one = zero + 1;
@@ -278,19 +278,19 @@ static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad 
         const int lane = __builtin_ctz(bits);
         const kernel_scalar_quad flat = kernel_scalar_of(q, lane);
         double place[3];
-        kernel_scalar_once(&flat, place);
+        kernel_scalar_single_point(&flat, place);
         kernel_quad_put(out, lane, place);
     }
 }
 
-static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm wanted, kernel_quad_point *out)
+static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_quad_point *out)
 {
     unsigned vanishing = 0;
     for (int half = 0; half < 2; half++) {
         const unsigned lanes = ((1u << KERNEL_HALF) - 1) << half * KERNEL_HALF;
         int64_t rays[KERNEL_HALF], any = 0;
         if (!(vm_bits(wanted) & lanes)) continue;
-        const kernel_doubles_mask vanish = kernel_doubles_once(q, wanted, half, out);
+        const kernel_doubles_mask vanish = kernel_doubles_single_point(q, wanted, half, out);
         memcpy(rays, &vanish, sizeof rays);
         for (int i = 0; i < KERNEL_HALF; i++) any |= rays[i];
         if (!any) continue;
@@ -301,14 +301,14 @@ static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm 
 
 /* Computes the points of the wanted rays that meet the patch twice: one in out[0], the other in out[1]. Returns these
  * rays. */
-static __attribute__((noinline, cold)) vm kernel_quad_twice(const kernel_quad *q, vm wanted, kernel_quad_point out[2])
+static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_quad *q, vm wanted, kernel_quad_point out[2])
 {
     unsigned found = 0;
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
         const kernel_scalar_quad flat = kernel_scalar_of(q, lane);
         double places[2][3];
-        if (!kernel_scalar_twice(&flat, places)) continue;
+        if (!kernel_scalar_two_points(&flat, places)) continue;
         kernel_quad_put(&out[0], lane, places[0]);
         kernel_quad_put(&out[1], lane, places[1]);
         found |= 1u << lane;
@@ -389,14 +389,14 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
 }
 
 /* Computes the points of rays that meet no edge. The edge functions are computed from the projected corners. */
-static __attribute__((noinline)) void kernel_quad_once_beside(const kernel_quad *q, vm wanted, kernel_quad_point *out)
+static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const kernel_quad *q, vm wanted, kernel_quad_point *out)
 {
     kernel_quad own = *q;
     own.e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
     own.e03 = vf_diff_of_products(q->x[0], q->y[3], q->x[3], q->y[0]);
     own.e12 = vf_diff_of_products(q->x[1], q->y[2], q->x[2], q->y[1]);
     own.e32 = vf_diff_of_products(q->x[3], q->y[2], q->x[2], q->y[3]);
-    kernel_quad_once(&own, wanted, out);
+    kernel_quad_single_point(&own, wanted, out);
 }
 
 /* Computes the points at which rays meet the patches of `count` quads. once[n] has the rays that cross exactly one
@@ -419,9 +419,9 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
         out[n] = (kernel_quad_point){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
         if (__builtin_expect(!vm_any(left), 1)) continue;
         if (are_beside)
-            kernel_quad_once_beside(&q[n], left, &out[n]);
+            kernel_quad_single_point_off_edges(&q[n], left, &out[n]);
         else
-            kernel_quad_once(&q[n], left, &out[n]);
+            kernel_quad_single_point(&q[n], left, &out[n]);
     }
 }
 
@@ -459,7 +459,7 @@ SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
 
 /* Returns the rays that cross exactly one of a quad's two triangles. around[i]: sides of the quad's edges in cyclic
  * order from the begin of its diagonal; side: the side of the diagonal. */
-SIMD_INLINE vm kernel_halves_once(const vm around[4], vm side)
+SIMD_INLINE vm kernel_cross_one_triangle(const vm around[4], vm side)
 {
     const vm half0 = vm_andnot(vm_xor(around[1], side), vm_xor(around[0], around[1]));
     const vm half1 = vm_not(vm_or(vm_xor(side, around[2]), vm_xor(around[2], around[3])));
@@ -511,7 +511,7 @@ SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kern
     if (__builtin_expect(!vm_any(bends), 1)) return count;
     if (!count) out[0] = (kernel_quad_point){vm_none(), zero, zero, zero};
     out[1] = (kernel_quad_point){vm_none(), zero, zero, zero};
-    out[1].mask = kernel_quad_twice(q, bends, out);
+    out[1].mask = kernel_quad_two_points(q, bends, out);
     out[0].mask = vm_or(out[0].mask, out[1].mask);
     return vm_any(out[1].mask) ? 2 : count;
 }
@@ -536,13 +536,13 @@ typedef struct kernel_ray_box {
 } kernel_ray_box;
 
 /* A cell's edges as seen by the middle ray of the box, and the squares of their lengths in space. */
-typedef struct kernel_seen_edges {
+typedef struct kernel_projected_edges {
     vf at[12][2], square[12];
     vf spread; /* half width plus half height of the range of the rays' slopes */
     vf margin; /* upper bound of the rounding error of a cross product of two edges */
-} kernel_seen_edges;
+} kernel_projected_edges;
 
-SIMD_INLINE void kernel_seen_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type, kernel_seen_edges *out)
+SIMD_INLINE void kernel_projected_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type, kernel_projected_edges *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf middle[2], steep[2], reach[2], longest = vf_set(0);
@@ -571,7 +571,7 @@ SIMD_INLINE void kernel_seen_edges_of(vf (*const at)[8], const kernel_ray_box *b
 
 /* Returns the lanes whose quad looks convex along all rays of the box. sides: the quad's edges in cyclic order, and
  * whether each is reversed. */
-SIMD_INLINE vm kernel_quad_is_convex(const kernel_seen_edges *e, const signed char (*sides)[2])
+SIMD_INLINE vm kernel_quad_is_convex(const kernel_projected_edges *e, const signed char (*sides)[2])
 {
     const int n[4] = {sides[0][0], sides[1][0], sides[2][0], sides[3][0]};
     const vf along = vf_max(e->square[n[0]], e->square[n[2]]), across = vf_max(e->square[n[1]], e->square[n[3]]);
@@ -591,9 +591,9 @@ SIMD_INLINE vm kernel_quad_is_convex(const kernel_seen_edges *e, const signed ch
 SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], const kernel_ray_box *box, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_seen_edges edges;
+    kernel_projected_edges edges;
     vi nonconvex = vi_set(0);
-    kernel_seen_edges_of(at, box, type, &edges);
+    kernel_projected_edges_of(at, box, type, &edges);
     for (int face = 0; face < shape->face_count; face++) {
         if (shape->faces[face].count == 3) continue;
         const vm convex = kernel_quad_is_convex(&edges, shape->faces[face].sides);

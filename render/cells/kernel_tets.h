@@ -58,7 +58,7 @@ SIMD_INLINE void kernel_tets_edges_projected(const kernel_tets *t, vf e[KERNEL_T
 }
 
 /* Computes the edge functions whose sign is in doubt again, from projected vertices, so that their sign is exact. */
-static __attribute__((noinline)) void kernel_tets_exactly(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
+static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
 {
     vf exact[KERNEL_TET_EDGES];
     kernel_tets_edges_projected(t, exact);
@@ -87,7 +87,7 @@ SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil
     if (__builtin_expect(vm_any(vm_andnot(rays, vf_lt(KERNEL_TET_NUMBER(t, doubt, doubt), least))), 0)) {
         kernel_lane_rays own;
         const kernel_tets copy = kernel_tets_copy(t, &own);
-        kernel_tets_exactly(&copy, e);
+        kernel_tets_in_double(&copy, e);
     }
 }
 
@@ -163,7 +163,7 @@ SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf we
 }
 
 /* Chooses as kernel_tets_choose() does, with edges projected again for rays whose weights are not good enough. */
-SIMD_INLINE kernel_ends kernel_tets_choose_exactly(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
+SIMD_INLINE kernel_ends kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
                                                    bool has_colour)
 {
     vf x[4], y[4];
@@ -192,8 +192,8 @@ static __attribute__((noinline, cold)) kernel_ends kernel_tets_recompute(const k
 {
     const kernel_tets one = {.is_one = true, .packet = t->packet, .one = t->one};
     const kernel_tets several = {.own = t->own, .transformed = t->transformed};
-    return t->is_one ? kernel_tets_choose_exactly(&one, rays, e, has_colour)
-                     : kernel_tets_choose_exactly(&several, rays, e, false);
+    return t->is_one ? kernel_tets_choose_in_double(&one, rays, e, has_colour)
+                     : kernel_tets_choose_in_double(&several, rays, e, false);
 }
 
 /* Computes where the rays enter and leave their tets, and the values there. It computes the sums of all four faces

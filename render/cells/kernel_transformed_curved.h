@@ -55,7 +55,7 @@ SIMD_INLINE int kernel_first_triangle(int type)
 
 /* Returns of[corner][lane] for each ray: a number of vertex (or face) `corner` of the cell in `lane`, which has `count`
  * of them. With 16 lanes, permutations of all rows are faster than a gather; with 8 they are slower. */
-SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi lane, vi corner)
+SIMD_INLINE vf kernel_curved_gather_vertex(const float (*of)[SIMD_WIDTH], int count, vi lane, vi corner)
 {
     if (SIMD_WIDTH < 16) return vf_gather(of[0], corner * SIMD_WIDTH + lane);
     const vi in_two = lane | (corner & 1) * SIMD_WIDTH;

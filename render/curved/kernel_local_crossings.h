@@ -191,14 +191,14 @@ SIMD_INLINE void kernel_local_corners_gather(const kernel_local_faces *f, const 
     const float *const first = pair ? pair->rows[0][0] : NULL, *const last = pair ? pair->rows[1][0] : NULL;
     const vi word = pair ? vi_from_bits(vf_permute_pair(vf_load(first + WORDS * KERNEL_LOCAL_ROW),
                                                         vf_load(last + WORDS * KERNEL_LOCAL_ROW), face | pair->second))
-                         : vi_from_bits(kernel_curved_pick(f->words, kernel_cell_shape(type)->face_count, lane, face));
+                         : vi_from_bits(kernel_curved_gather_vertex(f->words, kernel_cell_shape(type)->face_count, lane, face));
     for (int i = 0; i < 4; i++) {
         out->vertex[i] = word >> (4 * i) & 7;
         for (int n = 0; n < 4; n++) {
             const int row = n / 2 * KERNEL_LOCAL_ROW;
             out->at[i][n] = pair ? vf_permute_pair(vf_load(first + row), vf_load(last + row),
                                                    (out->vertex[i] | pair->second) + n % 2 * HALF)
-                                 : kernel_curved_pick(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
+                                 : kernel_curved_gather_vertex(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
         }
     }
 }
@@ -220,7 +220,7 @@ SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kern
 }
 
 /* Returns a vertex's reference coordinate on an axis, relative to the middle of the cell. */
-SIMD_INLINE vf kernel_local_own(int type, int axis, vi vertex)
+SIMD_INLINE vf kernel_local_vertex_coordinate(int type, int axis, vi vertex)
 {
     static const float own[3][3][KERNEL_LOCAL_ROW] = {
         {{-0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f},
@@ -252,9 +252,9 @@ SIMD_INLINE void kernel_local_quad_end(const kernel_local_corners *c, int type, 
     out->t = place->t;
     out->value = kernel_bilinear(f, place->s, place->r);
     for (int a = 0; a < 3; a++) {
-        const vf base = kernel_local_own(type, a, c->vertex[0]);
-        const vf along = kernel_local_own(type, a, c->vertex[1]) - base;
-        const vf across = kernel_local_own(type, a, c->vertex[3]) - base;
+        const vf base = kernel_local_vertex_coordinate(type, a, c->vertex[0]);
+        const vf along = kernel_local_vertex_coordinate(type, a, c->vertex[1]) - base;
+        const vf across = kernel_local_vertex_coordinate(type, a, c->vertex[3]) - base;
         out->r[a] = (base + place->s * along) + place->r * across;
     }
 }
@@ -276,8 +276,8 @@ SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int ty
     out->value = kernel_local_weighted_mean(e, inverse, i[3], j[3], k[3]);
     for (int a = 0; a < 3; a++)
         out->r[a] =
-            kernel_local_weighted_mean(e, inverse, kernel_local_own(type, a, c->vertex[0]),
-                               kernel_local_own(type, a, c->vertex[1]), kernel_local_own(type, a, c->vertex[2]));
+            kernel_local_weighted_mean(e, inverse, kernel_local_vertex_coordinate(type, a, c->vertex[0]),
+                               kernel_local_vertex_coordinate(type, a, c->vertex[1]), kernel_local_vertex_coordinate(type, a, c->vertex[2]));
 }
 
 /* Computes the crossings of the rays in on_quad[n] with quads; the points of other rays are undefined. */

@@ -77,7 +77,7 @@ SIMD_INLINE float kernel_local_bent_unseen(int type)
 SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type, kernel_local_nonlinear *out)
 {
     vf most = vf_set(0);
-    for (int k = 0; k < kernel_bent_terms(type); k++) {
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
         vf own = vf_load(c->field[4 + k]);
         for (int a = 0; a < 3; a++) own = vf_muladd(-vf_load(c->field[1 + a]), vf_load(c->nonlinear_part[k][a]), own);
         vf_store(out->terms[k], own);
@@ -133,7 +133,7 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
         out->middle[a] = 0.5f * (ends[0].r[a] + ends[1].r[a]);
         out->span[a] = ends[1].r[a] - ends[0].r[a];
     }
-    for (int k = 0; k < kernel_bent_terms(type); k++) {
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
         out->mean[k] = 0.5f * (first[k] + last[k]);
         out->rise[k] = last[k] - first[k];
         out->own[k] = kernel_gather_lane(nonlinear->terms[k], lane);
@@ -150,12 +150,12 @@ SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, i
     vf term[KERNEL_BENT_TERMS];
     kernel_local_bent_at(type, p->r, term);
     for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(c->span[a], vf_set(u), c->middle[a]) - p->r[a];
-    for (int k = 0; k < kernel_bent_terms(type); k++) {
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
         term[k] -= vf_muladd(c->rise[k], vf_set(u), c->mean[k]);
         for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(-c->nonlinear_part[k][a], term[k], p->residual[a]);
     }
     p->deviation = c->own[0] * term[0];
-    for (int k = 1; k < kernel_bent_terms(type); k++) p->deviation = vf_muladd(c->own[k], term[k], p->deviation);
+    for (int k = 1; k < kernel_nonlinear_count(type); k++) p->deviation = vf_muladd(c->own[k], term[k], p->deviation);
 }
 
 SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)

@@ -175,7 +175,7 @@ SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const ker
     l->usual = vm_all_lanes();
     for (int i = 0; i < count; i++) {
         vf from_eye[3];
-        kernel_found_positions(s, kernel_cells_vertex(c, i), from_eye);
+        kernel_finder_positions(s, kernel_cells_vertex(c, i), from_eye);
         l->usual = kernel_usual_position(l->usual, from_eye);
         kernel_rotate_to_camera(s, from_eye, l->at[i]);
     }
@@ -283,7 +283,7 @@ static void kernel_find_all_crossed(kernel_finder *s)
  * changes, the queue is processed first. */
 SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
 {
-    kernel_crossed *h = &s->crossed[kernel_found_number(from->type)];
+    kernel_crossed *h = &s->crossed[kernel_lane_type_index(from->type)];
     if (lanes && value != h->value) kernel_find_crossed(s, h);
     for (; lanes; lanes &= lanes - 1) {
         if (h->cells.count == SIMD_WIDTH) kernel_find_crossed(s, h);

@@ -53,7 +53,7 @@ SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
 }
 
 /* Returns the position of a cell type in the list kernel_lane_types. */
-SIMD_INLINE int kernel_found_number(int type)
+SIMD_INLINE int kernel_lane_type_index(int type)
 {
     return kernel_is_linear(type) ? KERNEL_CURVED_TYPES : kernel_shape_number(type);
 }
@@ -84,7 +84,7 @@ typedef struct kernel_finder {
     kernel_cell cell;
     uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is being prefetched */
     int queued_count;
-    /* per type (kernel_found_number()), cells whose vertices are being prefetched */
+    /* per type (kernel_lane_type_index()), cells whose vertices are being prefetched */
     kernel_cells pending[KERNEL_LANE_TYPES];
     kernel_crossed crossed[KERNEL_CURVED_TYPES];
     kernel_arrays arrays;
@@ -261,7 +261,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
 }
 
 /* Adds the fetched cell to the candidates, with the pixels of its vertices' bounding box. */
-static __attribute__((noinline)) void kernel_find_whole(kernel_finder *s, kernel_cell *c, uint32_t source)
+static __attribute__((noinline)) void kernel_add_whole_cell(kernel_finder *s, kernel_cell *c, uint32_t source)
 {
     kernel_outline o;
     kernel_candidate candidate = {.cell = c->index, .source = source};
@@ -274,13 +274,13 @@ static __attribute__((noinline)) void kernel_find_whole(kernel_finder *s, kernel
 SIMD_INLINE void kernel_find_surface(kernel_finder *s, kernel_cell *c, int value)
 {
     if (c->is_finite && kernel_values_straddle(c->values, c->count, s->surface->layer->values[value]))
-        kernel_find_whole(s, c, s->source + (uint32_t)value);
+        kernel_add_whole_cell(s, c, s->source + (uint32_t)value);
 }
 
 /* Adds the fetched cell to the candidates if its values are visible in the volume. */
 SIMD_INLINE void kernel_find_volume(kernel_finder *s)
 {
-    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer)) kernel_find_whole(s, &s->cell, s->source);
+    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer)) kernel_add_whole_cell(s, &s->cell, s->source);
 }
 
 /* ---- cells in lanes ---- */
@@ -292,7 +292,7 @@ typedef struct kernel_ends_lanes {
 } kernel_ends_lanes;
 
 /* Reads each lane's vertex as a position relative to the eye, multiplied by the space's scale. */
-SIMD_INLINE void kernel_found_positions(const kernel_finder *s, vi vertex, vf out[3])
+SIMD_INLINE void kernel_finder_positions(const kernel_finder *s, vi vertex, vf out[3])
 {
     const render_job *job = s->frame->job;
     for (int a = 0; a < 3; a++) {

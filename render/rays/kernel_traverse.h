@@ -15,7 +15,7 @@
 typedef void kernel_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays);
 
 /* Returns whether the right child is nearer than the left one along the packet's direction. */
-SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh *tree, int64_t left)
+SIMD_INLINE bool kernel_right_child_first(const kernel_packet *p, const mmbvh *tree, int64_t left)
 {
     float lower[2][4], upper[2][4], along = 0;
     for (int side = 0; side < 2; side++) mmbvh_node_box(tree, left + side, lower[side], upper[side]);
@@ -52,7 +52,7 @@ SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbv
             continue;
         }
         const int64_t left = mmbvh_node_ref(tree, node);
-        const bool swap = kernel_right_first(p, tree, left);
+        const bool swap = kernel_right_child_first(p, tree, left);
         const int64_t near = left + swap, far = left + !swap;
         if (!visible_values || kernel_node_is_visible(visible_values, ranges, far)) stack[top++] = far;
         if (!visible_values || kernel_node_is_visible(visible_values, ranges, near)) stack[top++] = near;

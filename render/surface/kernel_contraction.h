@@ -83,7 +83,7 @@ SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type
 {
     const kernel_contractions *c = &b->contractions;
     for (int i = 0; i < 3; i++) out->offset[i] = kernel_gather_lane(c->offset[i], lane);
-    for (int k = 0; k < kernel_bent_terms(type); k++) {
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
         for (int i = 0; i < 3; i++) out->nonlinear_part[k][i] = kernel_gather_lane(c->nonlinear_part[k][i], lane);
         out->field[k] = kernel_gather_lane(c->field[k], lane);
     }
@@ -165,7 +165,7 @@ SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, co
 SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_ray *ray, vm rays, kernel_contracted *out,
                                  int type)
 {
-    const int terms = kernel_bent_terms(type);
+    const int terms = kernel_nonlinear_count(type);
     const vf over = 1.0f / ray->rise, t = (ray->level + c->middle) * over;
     vf a[3], slope[4][3], q[3], s[3], local[3];
     kernel_nonlinear_terms bend;

@@ -125,14 +125,14 @@ static __attribute__((noinline)) void kernel_curved_line_field(const kernel_pack
 }
 
 /* The share of each hit's pixel that the nearest line covers, and the index of that line. */
-typedef struct kernel_cover {
+typedef struct kernel_line_coverage {
     vf share;
     vi line;
-} kernel_cover;
+} kernel_line_coverage;
 
 /* Computes which line is nearest to each hit, and the share of the pixel that it covers: 0 if the field is constant or
  * NaN. */
-static __attribute__((noinline)) kernel_cover kernel_lines_cover(const kernel_frame *f, const kernel_tile *tile,
+static __attribute__((noinline)) kernel_line_coverage kernel_lines_cover(const kernel_frame *f, const kernel_tile *tile,
                                                                  const kernel_surface *s, const kernel_rays *rays, vf t,
                                                                  const kernel_line_field *at)
 {
@@ -144,7 +144,7 @@ static __attribute__((noinline)) kernel_cover kernel_lines_cover(const kernel_fr
     const vf dx = rays->slope_x + tile->shear_x, dy = rays->slope_y + tile->shear_y;
     const vf turn = ((g[0] * dx + g[1] * dy) + g[2]), tilt = ((n[0] * dx + n[1] * dy) + n[2]);
     const vf change[3] = {(g[0] - n[0] / tilt * turn) * pixel, (g[1] - n[1] / tilt * turn) * pixel, zero};
-    kernel_cover out = {zero, vi_set(0)};
+    kernel_line_coverage out = {zero, vi_set(0)};
     vf distance = vf_set(INFINITY), gap = distance;
     vm still;
     const vf inverse = kernel_inverse_length(change, &still);
@@ -167,7 +167,7 @@ SIMD_INLINE vf kernel_draw_lines(const kernel_frame *f, const kernel_tile *tile,
                                  const kernel_rays *rays, vf t, const kernel_line_field *at, vf colour[3])
 {
     const float *colours = s->layer->lines->colours;
-    const kernel_cover cover = kernel_lines_cover(f, tile, s, rays, t, at);
+    const kernel_line_coverage cover = kernel_lines_cover(f, tile, s, rays, t, at);
     for (int a = 0; a < 3 && colours; a++) {
         const vf own = vf_gather(colours + a, cover.line * 3);
         colour[a] = s->layer->lines->is_alone ? own : (vf)(colour[a] + cover.share * (own - colour[a]));

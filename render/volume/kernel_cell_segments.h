@@ -503,7 +503,7 @@ SIMD_INLINE void kernel_cell_interval_double(kernel_segment_state *state, const 
     const kernel_interval *i = cell_interval->interval;
     const kernel_precise_interval *precise = cell_interval->precise;
     const kernel_unit_segment whole = {precise->length, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
-    const kernel_unit_segment run = kernel_unit_segment_part(&whole, kernel_share(i, t0), kernel_share(i, t1));
+    const kernel_unit_segment run = kernel_unit_segment_part(&whole, kernel_interval_fraction(i, t0), kernel_interval_fraction(i, t1));
     const kernel_interval sub = {.t_in = t0, .t_out = t1, .v_in = run.v_in, .v_out = run.v_out};
     const kernel_precise_interval own = {run.length, run.rest_in, run.rest_out};
     const vm mine = vm_and(vf_le(state->list->t_begin, t0), vf_lt(t0, state->list->t_end));

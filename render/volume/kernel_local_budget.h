@@ -80,7 +80,7 @@ typedef struct kernel_local_budget {
 /* ---- cells ---- */
 
 /* Sets the lanes' bounds from the values at their vertices. The ends of chords may lie outside the cell's values: those
- * of one chord by at most three sixteenths of the values' range (kernel_local_strays()), those of several by a sixth of
+ * of one chord by at most three sixteenths of the values' range (kernel_local_leaves_range()), those of several by a sixth of
  * the parabola's maximum, which is less than that range. */
 SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values)[SIMD_WIDTH], int type)
 {
@@ -130,7 +130,7 @@ SIMD_INLINE vf kernel_local_chord_offset(const kernel_local_pairs *p)
 
 /* Returns the rays for which a single segment is not possible: the values at its ends, raised so that its mean equals
  * the field's, are outside the range of values for which the error bounds hold. */
-SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_local_pairs *p)
+SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_budget *b, const kernel_local_pairs *p)
 {
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_chord_offset(p);
     const vf low = vf_min(v0, v1) + lift, high = vf_max(v0, v1) + lift;
@@ -176,7 +176,7 @@ SIMD_INLINE vf kernel_local_single_segment_error(const kernel_local_errors *w, v
 
 /* Computes the upper bounds of the change of light by a field error, over the range of the ray's own values, which
  * includes those of raised chords (see the top of this file). */
-SIMD_INLINE void kernel_local_own_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic,
+SIMD_INLINE void kernel_local_ray_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic,
                                         vf *error_variation, vf *cost)
 {
     const vf *d = p->off_chord.field, v0 = p->ends[0].value, v1 = p->ends[1].value, zero = vf_set(0);
@@ -200,7 +200,7 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
         const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + p->off_chord.field[i];
         opacities += 0.25f * kernel_opacity(transfer, value);
     }
-    kernel_local_own_bound(b->pieces, p, wrong->quartic, &error_variation, &cost);
+    kernel_local_ray_bound(b->pieces, p, wrong->quartic, &error_variation, &cost);
     /* The error allowed per unit distance. */
     const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(wrong->length, opacities, one));
     const vm few = vf_le(kernel_local_single_segment_error(wrong, error_variation, cost), allowed);
@@ -222,7 +222,7 @@ SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local
     const vf one = vf_set(1), allowed = vf_set(b->allowance * (1 / b->reach));
     const vf error_variation = kernel_gather_lane(b->bounds.error_variation, p->rays.lane),
              cost = kernel_gather_lane(b->bounds.cost, p->rays.lane);
-    const vm strays = kernel_local_strays(b, p);
+    const vm strays = kernel_local_leaves_range(b, p);
     const vm enough =
         vm_andnot(vf_le(kernel_local_single_segment_error(&wrong, error_variation, cost), allowed), strays);
     p->count = one;

@@ -89,7 +89,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
                                   const kernel_segments *list)
 {
     kernel_sorted sorted;
-    kernel_pre_end end;
+    kernel_preint_end end;
     end.value = vf_set(NAN);
     kernel_segments_sort(list, &sorted);
     for (int n = 0; n < sorted.row_count; n++) {

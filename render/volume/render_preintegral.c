@@ -193,7 +193,7 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
     const double units[2] = {fmax(total[0], 1e-30) / most_units, fmax(total[1], 1e-30) / most_units};
     for (int i = 0; i < out->bin_count + 2; i++) {
         const bin_sums *bin = &bins[i];
-        kernel_pre_entry *e = &out->entries[i];
+        kernel_preint_entry *e = &out->entries[i];
         for (int n = 0; n < CHANNELS; n++) {
             const int32_t begin = (int32_t)(before[n] / units[n > 0]);
             before[n] += bin->sum[n];
