@@ -91,7 +91,7 @@ static hit_location place_of(const render_camera *camera, const render_pending_h
     return (hit_location){tile << 8 | block, hit->kind, y % KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_BLOCK, index};
 }
 
-static void put_in_order(const render_camera *camera, render_pending_list *list, int64_t first, int64_t count,
+static void sort_hits(const render_camera *camera, render_pending_list *list, int64_t first, int64_t count,
                          hit_location *places, render_pending_list *room)
 {
     for (int64_t i = 0; i < count; i++) places[i] = place_of(camera, &list->items[first + i], i);
@@ -113,7 +113,7 @@ bool render_differences_sort(const render_job *job, render_pending_list *list)
     const bool has_room = places && room.items && room.shadings;
     for (int64_t first = 0; first < list->count && has_room; first += most) {
         const int64_t left = list->count - first;
-        put_in_order(&job->camera, list, first, left < most ? left : most, places, &room);
+        sort_hits(&job->camera, list, first, left < most ? left : most, places, &room);
     }
     base_free(places);
     base_free(room.items);
@@ -135,7 +135,7 @@ typedef struct chunk_work {
     fragment *out;
 } chunk_work;
 
-static void work_on(chunk_work *work, kernel_thread *thread, int64_t first, int64_t count)
+static void process_chunk(chunk_work *work, kernel_thread *thread, int64_t first, int64_t count)
 {
     if (work->list)
         work->kernels->light_pending(&work->frame, thread, work->list, work->merged, first, count, work->out);
@@ -143,7 +143,7 @@ static void work_on(chunk_work *work, kernel_thread *thread, int64_t first, int6
         work->kernels->sample_pending(&work->frame, thread, work->hits + first, work->samples + first, count);
 }
 
-static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_t first, int64_t count,
+static insitu_status process_chunks(const render_job *job, chunk_work *work, int64_t first, int64_t count,
                                  base_error *error)
 {
     work->kernels = render_kernels();
@@ -162,7 +162,7 @@ static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_
 #pragma omp for schedule(dynamic, 1) nowait
         for (int64_t at = first; at < first + count; at += CHUNK_HITS) {
             const int64_t left = first + count - at;
-            if (thread.memory) work_on(work, &thread, at, left < CHUNK_HITS ? left : CHUNK_HITS);
+            if (thread.memory) process_chunk(work, &thread, at, left < CHUNK_HITS ? left : CHUNK_HITS);
         }
         base_free(thread.memory);
         region_leave();
@@ -179,7 +179,7 @@ insitu_status render_differences_sample(const render_job *job, const render_pend
     chunk_work work = {.hits = hits, .samples = out};
     if (count && !job->part_count) memset(out, 0, (size_t)count * sizeof *out);
     if (!count || !job->part_count) return INSITU_OK;
-    return work_on_all(job, &work, 0, count, error);
+    return process_chunks(job, &work, 0, count, error);
 }
 
 void render_differences_merge(render_difference_samples *into, const render_difference_samples *other)
@@ -199,5 +199,5 @@ insitu_status render_differences_light(const render_job *job, const render_pendi
     /* With a list that begins at hit `first`, hits, samples and fragments have the same indices, from 0 on. */
     const render_pending_list some = {list->items + first, list->shadings + first, count, count};
     chunk_work work = {.list = &some, .merged = samples, .out = out};
-    return count ? work_on_all(job, &work, 0, count, error) : INSITU_OK;
+    return count ? process_chunks(job, &work, 0, count, error) : INSITU_OK;
 }

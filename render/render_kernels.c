@@ -431,7 +431,7 @@ static bool has_surface(const kernel_frame *f, const kernel_thread *thread, int 
     return f->candidates ? thread->bin.count : is_covered(f, x0, y0);
 }
 
-static bool begins_run(const kernel_frame *f, int x0, int y0)
+static bool begins_task(const kernel_frame *f, int x0, int y0)
 {
     const int columns = (f->job->camera.width - 1) / KERNEL_TILE + 1;
     return (y0 / KERNEL_TILE * columns + x0 / KERNEL_TILE) % KERNEL_TILES_PER_TASK == 0;
@@ -440,7 +440,7 @@ static bool begins_run(const kernel_frame *f, int x0, int y0)
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
 {
     thread->serial++;
-    if (begins_run(f, x0, y0)) kernel_depth_reset(&thread->tile_volume->depth);
+    if (begins_task(f, x0, y0)) kernel_depth_reset(&thread->tile_volume->depth);
     kernel_tile_trace *t = thread->tile;
     const bool fogs = has_volume(f, thread, x0, y0);
     if (!fogs && !has_surface(f, thread, x0, y0)) return;

@@ -79,7 +79,7 @@ static const double golden[2] = {-0.7373688780783197, 0.6754902942615239};
 
 /* Computes `count` unit directions with z along the normal. The last ones are kept away from the horizon, where a
  * rounding error of the surface would become a large error of distance. */
-static void spread(const hemisphere *h, int count, double (*out)[3])
+static void hemisphere_directions(const hemisphere *h, int count, double (*out)[3])
 {
     double x = h->cosine, y = h->sine;
     for (int k = 0; k < count; k++) {
@@ -95,7 +95,7 @@ static void spread(const hemisphere *h, int count, double (*out)[3])
 void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3])
 {
     const hemisphere h = hemisphere_of(job, pixel);
-    spread(&h, job->occlusion->samples, out);
+    hemisphere_directions(&h, job->occlusion->samples, out);
 }
 
 void hit_directions(const render_job *job, uint32_t pixel, const hit_axes *a, double (*out)[3])
