@@ -205,7 +205,7 @@ static const scale_case volume_looks[] = {
 
 /* Samples have the bound of other transfer functions, and one for the rounding of a place, 3e-7 of the scale's value,
  * which moves the colour by less than 1e-5. */
-static void sampled_volumes_are_the_reference(void **state)
+static void sampled_volumes_match_the_reference(void **state)
 {
     (void)state;
     for (int i = 0; i < 3; i++) {
@@ -367,7 +367,7 @@ int main(void)
         cmocka_unit_test(scales_and_their_inverses_agree),
         cmocka_unit_test(surfaces_without_light_have_the_maps_colours),
         cmocka_unit_test(what_is_not_a_number_has_its_colour),
-        cmocka_unit_test(sampled_volumes_are_the_reference),
+        cmocka_unit_test(sampled_volumes_match_the_reference),
         cmocka_unit_test(integrated_volumes_keep_their_error),
         cmocka_unit_test(ramps_along_scales_keep_max_error),
     };

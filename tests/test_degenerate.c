@@ -293,7 +293,7 @@ static void polyhedra_of_no_volume_change_no_pixel(void **state)
 /* ---- the reference --------------------------------------------------------------------------------------------- */
 
 /* Compares pictures of surfaces and samples, and for segments every ray's integral: float32's values err by some 1e-6,
- * and so does the length in a steep stretch of the function (see sums_through_spokes_are_the_reference). */
+ * and so does the length in a steep stretch of the function (see sums_through_spokes_match_the_reference). */
 static void assert_reference(const test_mesh *mesh, fixture_camera camera, const char *what)
 {
     render_fixture f;
@@ -420,7 +420,7 @@ static int hang_middles(test_mesh *mesh)
 /* Vertices amid edges that some faces do not have, with the value of the edge there; in jittered lattices they are off
  * the edges by rounding. With other values the field's definition has a jump at the face without area, and a ray's
  * profile may take either side up to the next sheet: the picture must still be finite numbers. */
-static void faces_of_no_area_are_the_reference(void **state)
+static void faces_of_no_area_match_the_reference(void **state)
 {
     (void)state;
     for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++)
@@ -442,7 +442,7 @@ static void faces_of_no_area_are_the_reference(void **state)
 }
 
 /* Two tets on one face that passes a vertex twice, where they meet. */
-static void face_through_a_vertex_twice_is_the_reference(void **state)
+static void face_through_a_vertex_twice_matches_the_reference(void **state)
 {
     (void)state;
     static const double places[7][3] = {{0, 0, -0.3},     {-0.7, -0.5, -0.3}, {-0.6, 0.6, -0.3}, {0.7, -0.6, -0.3},
@@ -494,8 +494,8 @@ int main(void)
         cmocka_unit_test(faces_in_one_place_change_no_pixel),
         cmocka_unit_test(faces_turned_over_change_no_pixel),
         cmocka_unit_test(polyhedra_of_no_volume_change_no_pixel),
-        cmocka_unit_test(faces_of_no_area_are_the_reference),
-        cmocka_unit_test(face_through_a_vertex_twice_is_the_reference),
+        cmocka_unit_test(faces_of_no_area_match_the_reference),
+        cmocka_unit_test(face_through_a_vertex_twice_matches_the_reference),
         cmocka_unit_test(flat_polyhedra_are_finite),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

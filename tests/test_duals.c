@@ -42,7 +42,7 @@ static void duals_are_their_own_tets(void **state)
     }
 }
 
-static void duals_are_the_reference(void **state)
+static void duals_match_the_reference(void **state)
 {
     static const double values[2] = {-0.2, 0.3};
     (void)state;
@@ -65,7 +65,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(duals_are_their_own_tets),
-        cmocka_unit_test(duals_are_the_reference),
+        cmocka_unit_test(duals_match_the_reference),
     };
     if (argc > 1) cubes = atoi(argv[1]), width = 1280, height = 960;
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -260,7 +260,7 @@ static bool is_plane_whole(const hanging_case *c, fixture_camera camera)
     return good;
 }
 
-static void surfaces_go_on_over_hanging_nodes(void **state)
+static void surfaces_continue_across_hanging_nodes(void **state)
 {
     (void)state;
     bool good = true;
@@ -303,7 +303,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(hanging_nodes_are_no_overlaps),
-        cmocka_unit_test(surfaces_go_on_over_hanging_nodes),
+        cmocka_unit_test(surfaces_continue_across_hanging_nodes),
         cmocka_unit_test(nodes_off_the_coarse_face_overlap),
     };
     MPI_Init(&argc, &argv);

@@ -200,7 +200,7 @@ static void make_ill_shaped(ill_shaped kind, uint64_t seed, test_mesh *out)
     }
 }
 
-static void robust_hits_in_ill_shaped_cells_are_the_reference(void **state)
+static void robust_hits_in_ill_shaped_cells_match_the_reference(void **state)
 {
     (void)state;
     static const char *const names[ILL_SHAPED_COUNT] = {"warped hexes", "concave hexes", "twisted wedges", "pyramid apexes"};
@@ -289,7 +289,7 @@ static void verify_normal(const render_fixture *f, const reference_scene *scene,
     ++*checked;
 }
 
-static void cell_gradients_are_the_reference(void **state)
+static void cell_gradients_match_the_reference(void **state)
 {
     (void)state;
     for (int k = 0; k < 4; k++) {
@@ -415,8 +415,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(robust_hits_are_on_the_surface),
-        cmocka_unit_test(robust_hits_in_ill_shaped_cells_are_the_reference),
-        cmocka_unit_test(cell_gradients_are_the_reference),
+        cmocka_unit_test(robust_hits_in_ill_shaped_cells_match_the_reference),
+        cmocka_unit_test(cell_gradients_match_the_reference),
         cmocka_unit_test(differences_of_a_linear_field_are_exact),
         cmocka_unit_test(differences_of_a_quadratic_field_are_of_second_order),
     };

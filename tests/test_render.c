@@ -34,7 +34,7 @@ static int lattice_side(test_mesh_kind kind)
     return kind == TEST_HEXES ? 6 : kind == TEST_WEDGES ? 5 : 4;
 }
 
-static void surface_is_the_reference_for_every_kind_and_camera(void **state)
+static void surface_matches_the_reference_for_every_kind_and_camera(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -56,7 +56,7 @@ static bool is_due(test_mesh_kind kind, fixture_camera camera, int variant)
     return test_is_whole() || ((int)kind + (int)camera + variant) % 3 == 0;
 }
 
-static void surfaces_of_several_values_are_the_reference(void **state)
+static void surfaces_of_several_values_match_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -73,7 +73,7 @@ static void surfaces_of_several_values_are_the_reference(void **state)
         }
 }
 
-static void transparent_surfaces_before_an_opaque_one_are_the_reference(void **state)
+static void transparent_surfaces_before_an_opaque_one_match_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
@@ -109,7 +109,7 @@ static void lights_behind_surfaces_leave_them_dark(void **state)
         }
 }
 
-static void volume_is_the_reference_for_every_kind_and_camera(void **state)
+static void volume_matches_the_reference_for_every_kind_and_camera(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -123,7 +123,7 @@ static void volume_is_the_reference_for_every_kind_and_camera(void **state)
         }
 }
 
-static void volume_and_surfaces_are_the_reference_together(void **state)
+static void volume_and_surfaces_match_the_reference_together(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -149,7 +149,7 @@ static double short_wave(const double p[3])
 }
 
 /* Rays that cross more surfaces than a packet keeps: their fragments of volume end at every sample. */
-static void volume_between_many_surfaces_is_the_reference(void **state)
+static void volume_between_many_surfaces_matches_the_reference(void **state)
 {
     static const float colours[48] = {0.8f, 0.2f, 0.1f};
     double values[16];
@@ -292,7 +292,7 @@ static void lattice_lines_have_no_holes(void **state)
 
 /* ---- single cells, ugly ones too ---- */
 
-static void single_cells_are_the_reference(void **state)
+static void single_cells_match_the_reference(void **state)
 {
     (void)state;
     static const double values[3] = {-0.25, 0.1, 0.35};
@@ -316,7 +316,7 @@ static void single_cells_are_the_reference(void **state)
 }
 
 /* A field across the thickness, whose surfaces lie along the sliver: met where the sliver is, and where it is known. */
-static void surfaces_along_slivers_are_the_reference(void **state)
+static void surfaces_along_slivers_match_the_reference(void **state)
 {
     (void)state;
     static const double values[3] = {-0.25, 0.1, 0.35};
@@ -336,7 +336,7 @@ static void surfaces_along_slivers_are_the_reference(void **state)
     }
 }
 
-static void left_handed_cells_are_the_reference(void **state)
+static void left_handed_cells_match_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
@@ -357,7 +357,7 @@ static void left_handed_cells_are_the_reference(void **state)
 
 /* Far from the origin, in double: the same picture relative to the cells. The double coordinates themselves round by
  * 5.8e6 · 1e-16 = 6e-10 of cells of 2000 / 4 and the camera's as much. */
-static void far_coordinates_are_the_reference(void **state)
+static void far_coordinates_match_the_reference(void **state)
 {
     (void)state;
     static const double far_away[3] = {5.8e6, -4.9e5, 3.1e6};
@@ -414,7 +414,7 @@ static void two_volumes_share_their_light(void **state)
 
 /* A value a cell: a volume of blocks. A sample near a face may be either cell's, which the margin leaves out: 2 · 1e-6
  * of each of some 20 cells a ray. */
-static void cell_centred_volume_is_the_reference(void **state)
+static void cell_centred_volume_matches_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -448,7 +448,7 @@ static double tiny_wave(const double p[3])
     return 1e-30 * test_wave(p);
 }
 
-static void values_of_any_size_are_the_reference(void **state)
+static void values_of_any_size_match_the_reference(void **state)
 {
     (void)state;
     static const double huge_values[1] = {0.3e30}, tiny_values[1] = {0.3e-30};
@@ -468,7 +468,7 @@ static void values_of_any_size_are_the_reference(void **state)
         }
 }
 
-static void surface_coloured_by_the_field_is_the_reference(void **state)
+static void surface_coloured_by_the_field_matches_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
@@ -491,7 +491,7 @@ static void surface_coloured_by_the_field_is_the_reference(void **state)
     }
 }
 
-static void one_pixel_images_are_the_reference(void **state)
+static void one_pixel_images_match_the_reference(void **state)
 {
     (void)state;
     static const int sizes[4][2] = {{1, 1}, {1, 9}, {17, 1}, {3, 5}};
@@ -518,7 +518,7 @@ static void build_reference_layout(render_fixture *f)
 }
 
 /* Where cells are smaller than pixels, tiles go down the trees themselves and leave out what is hidden. */
-static void surfaces_of_cells_smaller_than_pixels_are_the_reference(void **state)
+static void surfaces_of_cells_smaller_than_pixels_match_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -546,27 +546,27 @@ static void surfaces_of_cells_smaller_than_pixels_are_the_reference(void **state
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(surface_is_the_reference_for_every_kind_and_camera),
-        cmocka_unit_test(surfaces_of_several_values_are_the_reference),
-        cmocka_unit_test(transparent_surfaces_before_an_opaque_one_are_the_reference),
+        cmocka_unit_test(surface_matches_the_reference_for_every_kind_and_camera),
+        cmocka_unit_test(surfaces_of_several_values_match_the_reference),
+        cmocka_unit_test(transparent_surfaces_before_an_opaque_one_match_the_reference),
         cmocka_unit_test(lights_behind_surfaces_leave_them_dark),
-        cmocka_unit_test(volume_is_the_reference_for_every_kind_and_camera),
-        cmocka_unit_test(volume_and_surfaces_are_the_reference_together),
+        cmocka_unit_test(volume_matches_the_reference_for_every_kind_and_camera),
+        cmocka_unit_test(volume_and_surfaces_match_the_reference_together),
         cmocka_unit_test(linear_surface_is_a_plane_in_every_kind),
-        cmocka_unit_test(single_cells_are_the_reference),
-        cmocka_unit_test(surfaces_along_slivers_are_the_reference),
-        cmocka_unit_test(left_handed_cells_are_the_reference),
-        cmocka_unit_test(far_coordinates_are_the_reference),
+        cmocka_unit_test(single_cells_match_the_reference),
+        cmocka_unit_test(surfaces_along_slivers_match_the_reference),
+        cmocka_unit_test(left_handed_cells_match_the_reference),
+        cmocka_unit_test(far_coordinates_match_the_reference),
         cmocka_unit_test(two_volumes_share_their_light),
-        cmocka_unit_test(cell_centred_volume_is_the_reference),
-        cmocka_unit_test(values_of_any_size_are_the_reference),
-        cmocka_unit_test(surface_coloured_by_the_field_is_the_reference),
-        cmocka_unit_test(one_pixel_images_are_the_reference),
-        cmocka_unit_test(surfaces_of_cells_smaller_than_pixels_are_the_reference),
+        cmocka_unit_test(cell_centred_volume_matches_the_reference),
+        cmocka_unit_test(values_of_any_size_match_the_reference),
+        cmocka_unit_test(surface_coloured_by_the_field_matches_the_reference),
+        cmocka_unit_test(one_pixel_images_match_the_reference),
+        cmocka_unit_test(surfaces_of_cells_smaller_than_pixels_match_the_reference),
     };
     /* Tests that draw by themselves, by each instruction set. */
     const struct CMUnitTest of_a_set[] = {
-        cmocka_unit_test(volume_between_many_surfaces_is_the_reference),
+        cmocka_unit_test(volume_between_many_surfaces_matches_the_reference),
         cmocka_unit_test(constant_volume_counts_every_sample_once),
         cmocka_unit_test(lattice_lines_have_no_holes),
     };

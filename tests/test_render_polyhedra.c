@@ -46,7 +46,7 @@ static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bo
     test_mesh_free(&mesh);
 }
 
-static void shapes_are_the_reference(void **state)
+static void shapes_match_the_reference(void **state)
 {
     (void)state;
     for (test_polyhedron_shape shape = 0; shape < TEST_POLYHEDRON_COUNT; shape++)
@@ -76,7 +76,7 @@ static void aim_at_spoke(render_fixture *f, const test_mesh *mesh, uint64_t ray)
  * neighbours in the wrong order, as it does on rays through the line that many of them share. A wrong sum would be off
  * by another tet's value, some tenths; float32's values err by some 1e-6, and so does the length in a steep stretch of
  * the function. As the field is continuous, the ray's own rounding changes the sum by no more than that. */
-static void sums_through_spokes_are_the_reference(void **state)
+static void sums_through_spokes_match_the_reference(void **state)
 {
     static const test_polyhedron_shape shapes[3] = {TEST_L_PRISM, TEST_BENT_SPIKES, TEST_CAVITY};
     (void)state;
@@ -186,7 +186,7 @@ static void intervals_of_polyhedra_are_those_of_the_types(void **state)
             assert_same_as_polyhedra(kind, pass % 2 ? 0.5 : 1, pass / 2 ? 0 : 0.2, set_constant_volume);
 }
 
-static void polyhedra_beside_other_cells_are_the_reference(void **state)
+static void polyhedra_beside_other_cells_match_the_reference(void **state)
 {
     (void)state;
     static const test_mesh_kind kinds[3] = {TEST_HEXES, TEST_WEDGES, TEST_MIXED};
@@ -285,11 +285,11 @@ static void random_ownership_changes_nothing(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shapes_are_the_reference),
-        cmocka_unit_test(sums_through_spokes_are_the_reference),
+        cmocka_unit_test(shapes_match_the_reference),
+        cmocka_unit_test(sums_through_spokes_match_the_reference),
         cmocka_unit_test(tets_given_as_polyhedra_are_tets),
         cmocka_unit_test(intervals_of_polyhedra_are_those_of_the_types),
-        cmocka_unit_test(polyhedra_beside_other_cells_are_the_reference),
+        cmocka_unit_test(polyhedra_beside_other_cells_match_the_reference),
         cmocka_unit_test(linear_surface_of_warped_polyhedra_is_a_plane),
         cmocka_unit_test(random_ownership_changes_nothing),
     };

@@ -460,7 +460,7 @@ static void check(levels l)
 /* By default each set of ratios is on one or on several ranks, and has values of cells or of vertices, in turn.
  *
  * With the ratio of 3, vertices of every other block differ from those at the same places in their last bits. */
-static void a_sphere_goes_on_over_levels(void **state)
+static void a_sphere_continues_across_levels(void **state)
 {
     static const int refinements[][LEVELS] = {{1, 2, 4}, {1, 4, 8}, {1, 2, 8}, {1, 3, 6}};
     (void)state;
@@ -630,7 +630,7 @@ static int begin_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sphere_goes_on_over_levels), cmocka_unit_test(outer_surfaces_have_no_wall_between_levels),
+        cmocka_unit_test(a_sphere_continues_across_levels), cmocka_unit_test(outer_surfaces_have_no_wall_between_levels),
         cmocka_unit_test(levels_come_and_go), cmocka_unit_test(blocks_beside_a_change_stay),
         cmocka_unit_test(blocks_that_do_not_fit_are_reported)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);

@@ -178,25 +178,25 @@ static void default_volumes_are_off_by_a_hundredth_at_most(void **context)
 
 /* ---- one picture --------------------------------------------------------------------------------------------- */
 
-static void default_volumes_of_honeycombs_are_one_picture(void **context)
+static void default_volumes_of_honeycombs_give_one_picture(void **context)
 {
     (void)context;
     verify(HONEYCOMB);
 }
 
-static void default_volumes_of_warped_polyhedra_are_one_picture(void **context)
+static void default_volumes_of_warped_polyhedra_give_one_picture(void **context)
 {
     (void)context;
     verify(WARPED_POLYHEDRA);
 }
 
-static void default_volumes_of_polyhedra_among_others_are_one_picture(void **context)
+static void default_volumes_of_polyhedra_among_others_give_one_picture(void **context)
 {
     (void)context;
     verify(WARPED_MIXED);
 }
 
-static void default_volumes_of_hexes_are_one_picture(void **context)
+static void default_volumes_of_hexes_give_one_picture(void **context)
 {
     (void)context;
     verify(HEXES);
@@ -212,10 +212,10 @@ static void flat_cells_do_not_change_the_default_step(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(default_volumes_of_honeycombs_are_one_picture),
-        cmocka_unit_test(default_volumes_of_warped_polyhedra_are_one_picture),
-        cmocka_unit_test(default_volumes_of_polyhedra_among_others_are_one_picture),
-        cmocka_unit_test(default_volumes_of_hexes_are_one_picture),
+        cmocka_unit_test(default_volumes_of_honeycombs_give_one_picture),
+        cmocka_unit_test(default_volumes_of_warped_polyhedra_give_one_picture),
+        cmocka_unit_test(default_volumes_of_polyhedra_among_others_give_one_picture),
+        cmocka_unit_test(default_volumes_of_hexes_give_one_picture),
         cmocka_unit_test(flat_cells_do_not_change_the_default_step),
         cmocka_unit_test(default_volumes_are_off_by_a_hundredth_at_most),
     };

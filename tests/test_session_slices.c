@@ -150,7 +150,7 @@ static void planes_in_numbers_are_true(void **state)
     input_free(&whole);
 }
 
-static void planes_are_one_picture_of(test_mesh_kind kind)
+static void planes_give_the_picture_of(test_mesh_kind kind)
 {
     session_input whole = {0};
     caught_picture alone = {0};
@@ -174,10 +174,10 @@ static void planes_are_one_picture_of(test_mesh_kind kind)
     input_free(&whole);
 }
 
-static void planes_are_true_and_one_picture_on_any_ranks(void **state)
+static void planes_are_true_and_the_same_on_any_ranks(void **state)
 {
     (void)state;
-    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) planes_are_one_picture_of(kind);
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) planes_give_the_picture_of(kind);
 }
 
 /* ---- many ---------------------------------------------------------------------------------------------------- */
@@ -424,7 +424,7 @@ static void distances_go_with_the_geometry(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(planes_are_true_and_one_picture_on_any_ranks),
+        cmocka_unit_test(planes_are_true_and_the_same_on_any_ranks),
         cmocka_unit_test(planes_in_numbers_are_true),
         cmocka_unit_test(many_isovalues_and_planes_are_all_drawn),
         cmocka_unit_test(planes_in_faces_are_drawn_once),

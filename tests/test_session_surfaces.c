@@ -237,7 +237,7 @@ static void cube_is_one_picture_of(test_mesh_kind kind)
     input_free(&whole);
 }
 
-static void cubes_are_true_and_one_picture_on_any_ranks(void **state)
+static void cubes_are_true_and_the_same_on_any_ranks(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) cube_is_one_picture_of(kind);
@@ -459,7 +459,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(outer_faces_are_the_cube_s),
         cmocka_unit_test(faces_are_one_by_ids),
-        cmocka_unit_test(cubes_are_true_and_one_picture_on_any_ranks),
+        cmocka_unit_test(cubes_are_true_and_the_same_on_any_ranks),
         cmocka_unit_test(warped_faces_are_bilinear_patches),
         cmocka_unit_test(faces_are_found_once_for_the_cells),
         cmocka_unit_test(rays_along_the_diagonals_of_polygons_hit),

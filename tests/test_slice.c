@@ -64,7 +64,7 @@ static void check_kind(test_mesh_kind kind)
     fixture_free(&f);
 }
 
-static void slices_of_warped_cells_are_the_reference_s(void **state)
+static void slices_of_warped_cells_match_the_reference_s(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) check_kind(kind);
@@ -73,7 +73,7 @@ static void slices_of_warped_cells_are_the_reference_s(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(slices_of_warped_cells_are_the_reference_s),
+        cmocka_unit_test(slices_of_warped_cells_match_the_reference_s),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
