@@ -134,7 +134,7 @@ static double nothing(const double p[3])
     return (double)NAN;
 }
 
-static void what_is_not_a_number_has_its_colour(void **state)
+static void nan_has_its_colour(void **state)
 {
     (void)state;
     static const double values[] = {0.3};
@@ -366,7 +366,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scales_and_their_inverses_agree),
         cmocka_unit_test(surfaces_without_light_have_the_maps_colours),
-        cmocka_unit_test(what_is_not_a_number_has_its_colour),
+        cmocka_unit_test(nan_has_its_colour),
         cmocka_unit_test(sampled_volumes_match_the_reference),
         cmocka_unit_test(integrated_volumes_keep_their_error),
         cmocka_unit_test(ramps_along_scales_keep_max_error),

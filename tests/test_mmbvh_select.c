@@ -159,7 +159,7 @@ static void fields_of_other_kinds_are_selected_by(void **state)
     }
 }
 
-static void what_nobody_wishes_is_not_selected(void **state)
+static void cells_without_a_query_are_not_selected(void **state)
 {
     (void)state;
     test_mesh mesh = make_mesh(TEST_TETS, SIDE);
@@ -179,7 +179,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(just_the_cells_that_can_show_are_selected),
         cmocka_unit_test(fields_of_other_kinds_are_selected_by),
-        cmocka_unit_test(what_nobody_wishes_is_not_selected),
+        cmocka_unit_test(cells_without_a_query_are_not_selected),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

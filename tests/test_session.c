@@ -200,7 +200,7 @@ static void plain_layouts_are_not_copied(void **context)
     input_free(&in);
 }
 
-static void what_no_picture_shows_is_left_out(void **context)
+static void cells_that_no_picture_shows_are_left_out(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
@@ -736,7 +736,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(changed_values_are_noticed),
         cmocka_unit_test(moved_mesh_gives_the_moved_picture),
         cmocka_unit_test(plain_layouts_are_not_copied),
-        cmocka_unit_test(what_no_picture_shows_is_left_out),
+        cmocka_unit_test(cells_that_no_picture_shows_are_left_out),
         cmocka_unit_test(mirrored_cells_are_counted),
         cmocka_unit_test(ghosts_are_counted_and_not_drawn),
         cmocka_unit_test(no_cells_anywhere_give_the_background),

@@ -380,7 +380,7 @@ static const corrupted_case cases[] = {
     {"bad type", type_in_order, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 99"}},
 };
 
-static void what_is_wrong_is_reported_on_all_ranks(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -395,6 +395,6 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_order_and_layout_draws_the_same), cmocka_unit_test(recognised_cells_go_with_any_order),
         cmocka_unit_test(quads_are_shells_in_any_order), cmocka_unit_test(the_order_may_be_set_right),
-        cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks)};
+        cmocka_unit_test(wrong_input_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

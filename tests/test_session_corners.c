@@ -386,7 +386,7 @@ static const corrupted_case cases[] = {
     {"centring", unknown_centring, INSITU_ERROR_ARGUMENT, true, {"unknown centring 3"}},
 };
 
-static void what_is_wrong_is_reported_on_all_ranks(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -396,7 +396,7 @@ static void what_is_wrong_is_reported_on_all_ranks(void **state)
 }
 
 /* These are seen by a step; the centring is one on all ranks. */
-static void what_arrays_hold_is_reported_on_all_ranks(void **state)
+static void wrong_array_contents_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -434,7 +434,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {cmocka_unit_test(torn_cells_are_those_of_doubled_vertices),
                                        cmocka_unit_test(corners_in_rows_and_other_orders_are_plain_ones),
                                        cmocka_unit_test(joined_corners_have_their_means),
-                                       cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks),
-                                       cmocka_unit_test(what_arrays_hold_is_reported_on_all_ranks)};
+                                       cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
+                                       cmocka_unit_test(wrong_array_contents_are_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

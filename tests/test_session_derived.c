@@ -597,7 +597,7 @@ static const wrong_case wrong[] = {
 };
 
 /* Each is told in the step, to all ranks alike, with the line; an image of other fields is drawn all the same. */
-static void what_is_wrong_is_reported_on_all_ranks(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -678,7 +678,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(partitions_do_not_show),          cmocka_unit_test(blocks_show_no_seam),
         cmocka_unit_test(gradients_of_shells_lie_in_them), cmocka_unit_test(velocities_of_cells_and_corners_are_taken),
         cmocka_unit_test(what_stays_is_not_made_again),    cmocka_unit_test(an_edited_scene_has_its_own),
-        cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks),    cmocka_unit_test(clashes_are_reported_on_all_ranks),
+        cmocka_unit_test(wrong_input_is_reported_on_all_ranks),    cmocka_unit_test(clashes_are_reported_on_all_ranks),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

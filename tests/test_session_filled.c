@@ -152,7 +152,7 @@ static void other_centring(insitu_field *field)
     field->centring = INSITU_CELL;
 }
 
-static void what_goes_wrong_is_reported_on_all_ranks(void **state)
+static void errors_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     static const struct {
@@ -269,7 +269,7 @@ static void calls_of_a_fill_are_refused(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_a_function_makes_is_drawn_and_nothing_else_made),
-                                       cmocka_unit_test(what_goes_wrong_is_reported_on_all_ranks),
+                                       cmocka_unit_test(errors_are_reported_on_all_ranks),
                                        cmocka_unit_test(calls_of_a_fill_are_refused)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

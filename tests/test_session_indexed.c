@@ -309,7 +309,7 @@ static const corrupted_case cases[] = {
     {"type alone", type_alone, INSITU_ERROR_FIELD, true, {"values, the mesh has "}},
 };
 
-static void what_is_wrong_is_reported_on_all_ranks(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -372,6 +372,6 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(an_index_that_nobody_needs_is_left_alone),
                                        cmocka_unit_test(ranks_without_vertices_have_values),
                                        cmocka_unit_test(cells_are_reported_too),
-                                       cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks)};
+                                       cmocka_unit_test(wrong_input_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -156,7 +156,7 @@ static void disks_throw_ellipses(void **context)
 
 /* A transparent disk, a disk that is cut away, a light that casts none, one below that casts none and has no highlight.
  */
-static void what_casts_no_shadow_casts_none(void **context)
+static void transparent_layers_cast_no_shadow(void **context)
 {
     static const char *const scenes[][2] = {
         {IMAGE(LIGHT("") "    shadows: true\n", FLOOR DISK(", opacity: 0.5")),
@@ -428,7 +428,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(disks_throw_ellipses),
-        cmocka_unit_test(what_casts_no_shadow_casts_none),
+        cmocka_unit_test(transparent_layers_cast_no_shadow),
         cmocka_unit_test(corners_are_as_dark_as_disk_segments),
         cmocka_unit_test(valleys_are_dark_to_the_ground),
         cmocka_unit_test(lit_pictures_are_the_same_on_any_partition),

@@ -409,7 +409,7 @@ static void check_warning(const struct warning_case *c)
     input_free(&in);
 }
 
-static void what_is_hardly_meant_is_reported_once(void **context)
+static void likely_mistakes_are_reported_once(void **context)
 {
     (void)context;
     cell_value = 5;
@@ -615,7 +615,7 @@ static void control_characters_are_escaped(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_hardly_meant_is_reported_once),
+        cmocka_unit_test(likely_mistakes_are_reported_once),
         cmocka_unit_test(warnings_come_back_with_what_they_are_about),
         cmocka_unit_test(meshes_with_ids_among_others_are_reported),
         cmocka_unit_test(pictures_that_would_take_hours_are_refused),

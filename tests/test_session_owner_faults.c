@@ -331,7 +331,7 @@ static const corrupted_case cases[] = {
     {"floats", float_lists, INSITU_ERROR_ARGUMENT, true, {"face lists are of element type 1, not int32 or int64"}},
 };
 
-static void what_is_wrong_is_reported_on_all_ranks(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -343,6 +343,6 @@ static void what_is_wrong_is_reported_on_all_ranks(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_input_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

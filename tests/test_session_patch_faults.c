@@ -274,7 +274,7 @@ static void check_fault(insitu_session *session, const fault *c, int cycle)
     input_free(&input);
 }
 
-static void what_is_wrong_is_reported_on_all_ranks(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -304,7 +304,7 @@ static void hexes_want_vertices(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_reported_on_all_ranks),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
                                        cmocka_unit_test(hexes_want_vertices)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -211,7 +211,7 @@ static void warning_of_grey_is_reported_once(void **context)
     insitu_destroy(&session);
 }
 
-static void what_no_rank_has_is_refused(void **context)
+static void fields_that_no_rank_has_are_refused(void **context)
 {
     (void)context;
     static const struct {
@@ -267,7 +267,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(surfaces_without_the_colour_field_are_grey),
         cmocka_unit_test(colours_that_are_not_numbers_are_grey),
         cmocka_unit_test(warning_of_grey_is_reported_once),
-        cmocka_unit_test(what_no_rank_has_is_refused),
+        cmocka_unit_test(fields_that_no_rank_has_are_refused),
     };
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

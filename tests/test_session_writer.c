@@ -129,7 +129,7 @@ static void *open_gate_later(void *unused)
 }
 
 /* Four pictures of 32 MiB wait; the fifth is not drawn before the gate is open. */
-static void what_waits_is_bounded(void **state)
+static void pending_pictures_are_bounded(void **state)
 {
     (void)state;
     static const char scene[] = "images:\n  - name: a\n    size: [2048, 1024]\n    layers: [{isosurface: {field: f, "
@@ -294,7 +294,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pictures_are_those_written_in_the_step),
         cmocka_unit_test(simulation_goes_on_while_pictures_wait),
-        cmocka_unit_test(what_waits_is_bounded),
+        cmocka_unit_test(pending_pictures_are_bounded),
         cmocka_unit_test(failure_is_reported_by_a_later_step_or_the_end),
         cmocka_unit_test(failure_waits_for_an_error_of_the_step),
         cmocka_unit_test(scene_is_kept_until_its_pictures_are_written),
