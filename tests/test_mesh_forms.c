@@ -19,7 +19,7 @@ const char formed_scene[] =
                     IMAGE("g", "      - surface: {threshold: {field: f, from: -0.5, to: 0.5}, colour_by: {field: i}}\n"
                                "      - isosurface: {field: i, values: [0.3], normals: differences}\n");
 
-const char formed_torn_scene[] = "threads: 1\nimages:\n" IMAGE("a", "      - isosurface: {field: d, values: [0.1]}\n"
+const char formed_corner_scene[] = "threads: 1\nimages:\n" IMAGE("a", "      - isosurface: {field: d, values: [0.1]}\n"
                                                                     "      - surface: {colour_by: {field: d}}\n")
     IMAGE("b", "      - volume: {field: "
                "d}\n");

@@ -272,7 +272,7 @@ static void check(test_mesh_kind kind, const form *of)
     input_free(&in);
 }
 
-static void torn_cells_are_those_of_doubled_vertices(void **state)
+static void corner_fields_match_duplicated_vertices(void **state)
 {
     (void)state;
     static const form forms[] = {{0}, {.is_by_index = true}, {.has_ids = true}};
@@ -431,7 +431,7 @@ static void wrong_array_contents_are_reported_on_all_ranks(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(torn_cells_are_those_of_doubled_vertices),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(corner_fields_match_duplicated_vertices),
                                        cmocka_unit_test(corners_in_rows_and_other_orders_are_plain_ones),
                                        cmocka_unit_test(joined_corners_have_their_means),
                                        cmocka_unit_test(wrong_input_is_reported_on_all_ranks),

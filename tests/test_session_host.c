@@ -280,7 +280,7 @@ static void a_step_opens_few_regions(void **context)
     }
 }
 
-static void smaller_teams_draw_the_same(void **context)
+static void fewer_threads_draw_the_same(void **context)
 {
     (void)context;
     cores = 5;
@@ -380,7 +380,7 @@ int main(int argc, char **argv)
         cmocka_unit_test_setup(an_edit_of_the_scene_starts_no_more_than_can_be, begin_test),
         cmocka_unit_test_setup(threads_that_ended_are_tried_again, begin_test),
         cmocka_unit_test_setup(a_step_opens_few_regions, begin_test),
-        cmocka_unit_test_setup(smaller_teams_draw_the_same, begin_test),
+        cmocka_unit_test_setup(fewer_threads_draw_the_same, begin_test),
         cmocka_unit_test_setup(teams_of_any_size_are_the_callers_own_affair, begin_test),
         cmocka_unit_test_setup(a_parallel_region_of_the_caller_gets_one_thread, begin_test),
         cmocka_unit_test_setup(a_number_too_large_for_a_scene_is_no_trap, begin_test),

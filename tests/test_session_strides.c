@@ -127,7 +127,7 @@ static void strides_beyond_memory_are_refused(void **state)
         formed_mesh m;
         formed_create(form, SIDE, own_rank, rank_count, &m);
         const bool is_torn = formed_has_corners(form);
-        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_torn_scene : formed_scene));
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_corner_scene : formed_scene));
         refuse_all(session, &m, list, list_of_mesh(&m.mesh, list));
         refuse_all(session, &m, list, list_of_fields(&m, list, 0));
         refuse_all(session, &m, list, list_of_patch(&m, list));
@@ -146,7 +146,7 @@ static void rows_beyond_memory_are_refused(void **state)
     (void)state;
     formed_mesh m;
     formed_create(MESH_ROWS, SIDE, own_rank, rank_count, &m);
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(formed_torn_scene));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(formed_corner_scene));
     for (size_t i = 0; i < sizeof wild / sizeof wild[0]; i++) {
         char words[64];
         insitu_field *d = &m.fields[FORMED_D];
@@ -241,7 +241,7 @@ static void arrays_are_read_backwards_as_forwards(void **state)
     (void)state;
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++) {
         draw_backwards(form, write_scene(formed_scene));
-        if (formed_has_corners(form)) draw_backwards(form, write_scene(formed_torn_scene));
+        if (formed_has_corners(form)) draw_backwards(form, write_scene(formed_corner_scene));
     }
 }
 

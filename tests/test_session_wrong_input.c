@@ -227,7 +227,7 @@ static void corrupt(formed_mesh *m, const formed_mesh *right, uint64_t number, i
 typedef struct bench {
     insitu_session *session;
     formed_mesh mesh;
-    bool is_torn;
+    bool has_corner_fields;
     int pictures, cycle;
     float truth[FORMED_PICTURES][MOST_PIXELS * 4];
 } bench;
@@ -249,7 +249,7 @@ static int count_differing(const bench *b)
 static void draw_right(bench *b, bool is_first, int number)
 {
     discard_pictures();
-    const insitu_status set = formed_submit(b->session, &b->mesh, b->is_torn);
+    const insitu_status set = formed_submit(b->session, &b->mesh, b->has_corner_fields);
     const insitu_status status = insitu_step(b->session, b->cycle++, 0);
     if (set || status) fprintf(stderr, "case %d: not healed: %s\n", number, insitu_error(b->session));
     everywhere(set == INSITU_OK && status == INSITU_OK);
@@ -260,11 +260,11 @@ static void draw_right(bench *b, bool is_first, int number)
     everywhere(differing <= 4);
 }
 
-static void open_bench(bench *b, mesh_form form, bool is_torn)
+static void open_bench(bench *b, mesh_form form, bool has_corner_fields)
 {
-    *b = (bench){.is_torn = is_torn && formed_has_corners(form)};
-    b->session = open_session(MPI_COMM_WORLD, write_scene(b->is_torn ? formed_torn_scene : formed_scene));
-    b->pictures = b->is_torn ? FORMED_TORN_PICTURES : FORMED_PICTURES;
+    *b = (bench){.has_corner_fields = has_corner_fields && formed_has_corners(form)};
+    b->session = open_session(MPI_COMM_WORLD, write_scene(b->has_corner_fields ? formed_corner_scene : formed_scene));
+    b->pictures = b->has_corner_fields ? FORMED_CORNER_PICTURES : FORMED_PICTURES;
     formed_create(form, SIDE, own_rank, rank_count, &b->mesh);
     draw_right(b, true, -1);
 }
@@ -284,7 +284,7 @@ static bool draw_wrong(bench *b, int number)
     const formed_mesh right = b->mesh;
     for (int fault = 0; fault < faults; fault++) corrupt(&b->mesh, &right, (uint64_t)number, fault, is_mine);
     discard_pictures();
-    const insitu_status set = formed_submit(b->session, &b->mesh, b->is_torn);
+    const insitu_status set = formed_submit(b->session, &b->mesh, b->has_corner_fields);
     const insitu_status status = insitu_step(b->session, b->cycle++, 0);
     const int images = insitu_last_report(b->session)->images;
     const bool is_well = status ? *insitu_error(b->session) != '\0' : !set && images == b->pictures;
@@ -297,12 +297,12 @@ static bool draw_wrong(bench *b, int number)
 }
 
 /* INSITU_TEST_CASE: the number of the only case to do. Returns how many steps failed. */
-static int run_cases(mesh_form form, bool is_torn, int first, int end)
+static int run_cases(mesh_form form, bool has_corner_fields, int first, int end)
 {
     const char *only = getenv("INSITU_TEST_CASE");
     bench b;
     int failed = 0;
-    open_bench(&b, form, is_torn);
+    open_bench(&b, form, has_corner_fields);
     for (int number = first; number < end; number++) {
         if (only && number != atoi(only)) continue;
         failed += draw_wrong(&b, number);

@@ -74,7 +74,7 @@ static void check_form(mesh_form form, bool is_torn)
 {
     formed_mesh m;
     formed_create(form, SIDE, own_rank, rank_count, &m);
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_torn_scene : formed_scene));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_corner_scene : formed_scene));
     int64_t *counts[COUNTS];
     counts_of(&m.mesh, counts);
     unsigned given = 0;
@@ -89,7 +89,7 @@ static void check_form(mesh_form form, bool is_torn)
     everywhere(formed_submit(session, &m, is_torn) == INSITU_OK);
     const insitu_status status = insitu_step(session, 2, 0);
     reported_everywhere(session, status, INSITU_OK, "");
-    everywhere(insitu_last_report(session)->images == (is_torn ? FORMED_TORN_PICTURES : FORMED_PICTURES));
+    everywhere(insitu_last_report(session)->images == (is_torn ? FORMED_CORNER_PICTURES : FORMED_PICTURES));
     insitu_destroy(&session);
     formed_free(&m);
 }
@@ -100,7 +100,7 @@ static void any_counts_are_an_error_or_a_picture(void **state)
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++) check_form(form, false);
 }
 
-static void and_for_torn_meshes(void **state)
+static void and_for_meshes_with_corner_fields(void **state)
 {
     (void)state;
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++)
@@ -111,7 +111,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_counts_are_an_error_or_a_picture),
-        cmocka_unit_test(and_for_torn_meshes),
+        cmocka_unit_test(and_for_meshes_with_corner_fields),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }
