@@ -19,27 +19,27 @@ typedef struct kernel_tets {
     bool is_one;
     const kernel_packet *packet;
     const kernel_cell *one;
-    const kernel_lane_rays *own;
+    const kernel_lane_rays *lane_rays;
     const kernel_transformed_tets *transformed;
 } kernel_tets;
 
 /* Returns a number of each ray's tet: a member of kernel_cell, or one of kernel_transformed_tets. */
 #define KERNEL_TET_NUMBER(t, of_one, of_placed)                                                                        \
-    ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->transformed->of_placed, (t)->own->lane))
+    ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->transformed->of_placed, (t)->lane_rays->lane))
 
 /* Returns a copy for a function that is not inlined, so that the original stays in registers. */
 SIMD_INLINE kernel_tets kernel_tets_copy(const kernel_tets *t, kernel_lane_rays *rays)
 {
     kernel_tets out = *t;
     if (t->is_one) return out;
-    *rays = *t->own;
-    out.own = rays;
+    *rays = *t->lane_rays;
+    out.lane_rays = rays;
     return out;
 }
 
 SIMD_INLINE void kernel_tets_project(const kernel_tets *t, vf x[4], vf y[4])
 {
-    const kernel_rays rays = t->is_one ? kernel_packet_rays(t->packet) : t->own->rays;
+    const kernel_rays rays = t->is_one ? kernel_packet_rays(t->packet) : t->lane_rays->rays;
     for (int i = 0; i < 4; i++) {
         const vf z = KERNEL_TET_NUMBER(t, z[i], at[2][i]);
         x[i] = (KERNEL_TET_NUMBER(t, x[i], at[0][i]) - rays.origin_x) - rays.slope_x * z;
@@ -71,7 +71,7 @@ static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t
 /* Computes the edge functions on the rays. is_pencil: the edges have lines for these rays. */
 SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil, vf e[KERNEL_TET_EDGES])
 {
-    const vf u = t->is_one ? t->packet->u : t->own->u, v = t->is_one ? t->packet->v : t->own->v;
+    const vf u = t->is_one ? t->packet->u : t->lane_rays->u, v = t->is_one ? t->packet->v : t->lane_rays->v;
     vf least = vf_set(INFINITY);
     if (!is_pencil) {
         kernel_tets_edges_projected(t, e);
@@ -85,8 +85,8 @@ SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil
         least = vf_min(vf_abs(e[n]), least);
     }
     if (__builtin_expect(vm_any(vm_andnot(rays, vf_lt(KERNEL_TET_NUMBER(t, doubt, doubt), least))), 0)) {
-        kernel_lane_rays own;
-        const kernel_tets copy = kernel_tets_copy(t, &own);
+        kernel_lane_rays lane_rays;
+        const kernel_tets copy = kernel_tets_copy(t, &lane_rays);
         kernel_tets_in_double(&copy, e);
     }
 }
@@ -191,7 +191,7 @@ static __attribute__((noinline, cold)) kernel_ends kernel_tets_recompute(const k
                                                                     const vf e[KERNEL_TET_EDGES], bool has_colour)
 {
     const kernel_tets one = {.is_one = true, .packet = t->packet, .one = t->one};
-    const kernel_tets several = {.own = t->own, .transformed = t->transformed};
+    const kernel_tets several = {.lane_rays = t->lane_rays, .transformed = t->transformed};
     return t->is_one ? kernel_tets_choose_in_double(&one, rays, e, has_colour)
                      : kernel_tets_choose_in_double(&several, rays, e, false);
 }
@@ -217,8 +217,8 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
     if (is_pencil) {
         for (int n = 0; n < 4; n++) weak[n] = kernel_tets_inaccurate(t, n, hit[n], sums[n].weight);
         if (__builtin_expect(vm_any(vm_or(vm_or(weak[0], weak[1]), vm_or(weak[2], weak[3]))), 0)) {
-            kernel_lane_rays own;
-            const kernel_tets copy = kernel_tets_copy(t, &own);
+            kernel_lane_rays lane_rays;
+            const kernel_tets copy = kernel_tets_copy(t, &lane_rays);
             ends = kernel_tets_recompute(&copy, rays, e, has_colour);
         }
     }
@@ -247,7 +247,7 @@ SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *
 SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
                                           kernel_interval *out)
 {
-    const kernel_tets tets = {.own = r, .transformed = transformed};
+    const kernel_tets tets = {.lane_rays = r, .transformed = transformed};
     kernel_tets_interval(&tets, r->active, true, false, out);
 }
 

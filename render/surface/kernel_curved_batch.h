@@ -44,7 +44,7 @@
 enum { KERNEL_CURVED_PIXELS = 64 };
 
 typedef struct kernel_curved_batch {
-    const kernel_surface_cells *own; /* the cells being traced */
+    const kernel_surface_cells *queued; /* the cells being traced */
     kernel_transformed_curved transformed;
     /* colour field by vertex and lane, as in kernel_cell.g; set only if the layer has one */
     float colours[8][SIMD_WIDTH];
@@ -67,7 +67,7 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
 
 SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h)
 {
-    return (kernel_curved){.type = h->own->type,
+    return (kernel_curved){.type = h->queued->type,
                            .at = (const float(*)[8][SIMD_WIDTH])h->transformed.at,
                            .colours = (const float(*)[SIMD_WIDTH])h->colours,
                            .bounds = &h->bounds};
@@ -80,10 +80,10 @@ SIMD_INLINE void kernel_curved_ready(const kernel_tile_trace *t, kernel_curved_b
 {
     if (h->ready >> n & 1) return;
     h->ready |= 1u << n;
-    kernel_transformed_curved_cell(&h->transformed, h->own->type, n, &h->cells[n]);
+    kernel_transformed_curved_cell(&h->transformed, h->queued->type, n, &h->cells[n]);
     kernel_cell_lines(&h->cells[n], t->frame, &t->tile);
-    h->cells[n].part = h->own->part;
-    h->cells[n].index = h->own->cell[n];
+    h->cells[n].part = h->queued->part;
+    h->cells[n].index = h->queued->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
     for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->transformed.vertex[i][n];
 }
@@ -117,7 +117,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
         p->is_nearer = false;
         kernel_curved_ready(t, h, n);
         curved.lane = n;
-        kernel_cell_surface(p, &state, &h->cells[n], &curved, h->own->value[n], vm_and(p->active, vm_from_bits(same)));
+        kernel_cell_surface(p, &state, &h->cells[n], &curved, h->queued->value[n], vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
     }
     return blocks;
@@ -177,7 +177,7 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         kernel_contracted at;
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_batch_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->own->near, p.lane), p.far));
+        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
         kernel_cell_ray_of(&cells, &p.rays, p.lane, &ray);
         p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &ray));
         if (!vm_any(p.active)) continue;
@@ -193,7 +193,7 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
 
 static __attribute__((noinline)) void kernel_curved_batch_contract(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_contract_of, t, h);
+    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_contract_of, t, h);
 }
 
 /* Lists the rays that cross two faces of their cells in `met`, with the numbers of these faces. Traces rays of other
@@ -208,7 +208,7 @@ SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t
         uint8_t faces[SIMD_WIDTH];
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_batch_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->own->near, p.lane), p.far));
+        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
         if (!vm_any(p.active)) continue;
         kernel_curved_faces(&h->transformed, &p, type, &crossed);
         const vi both = crossed.first | crossed.last << 3;
@@ -228,7 +228,7 @@ SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t
 
 static __attribute__((noinline)) unsigned kernel_curved_batch_find_faces(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_find_faces_of_type, t, h);
+    return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_find_faces_of_type, t, h);
 }
 
 /* Computes the points at which rays enter and leave their cells. Rays with exactly one root, by the values at the ends,
@@ -258,7 +258,7 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
 
 static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_cross_of, t, h);
+    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_cross_of, t, h);
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r in each ray's
@@ -278,12 +278,12 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const ke
                                                                         kernel_curved_batch *h)
 {
     const kernel_surface *s = t->surface;
-    const grid_field *field = &s->layer->colour_field.fields[h->own->part];
-    const int count = grid_type_vertices(h->own->type);
-    for (int n = 0; n < h->own->count; n++)
+    const grid_field *field = &s->layer->colour_field.fields[h->queued->part];
+    const int count = grid_type_vertices(h->queued->type);
+    for (int n = 0; n < h->queued->count; n++)
         for (int i = 0; i < count; i++) {
             const int64_t vertex = h->transformed.vertex[i][n];
-            const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->own->cell[n] : vertex);
+            const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->queued->cell[n] : vertex);
             h->colours[i][n] = (float)((v - s->colour.low) * s->colour.inverse_width);
         }
 }
@@ -298,9 +298,9 @@ typedef struct kernel_curved_batch_points {
 static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kernel_tile_trace *t,
                                                                       kernel_curved_batch *h)
 {
-    const grid_field *field = &t->surface->layer->lines->field.fields[h->own->part];
-    for (int n = 0; n < h->own->count; n++)
-        for (int i = 0; i < grid_type_vertices(h->own->type); i++)
+    const grid_field *field = &t->surface->layer->lines->field.fields[h->queued->part];
+    for (int n = 0; n < h->queued->count; n++)
+        for (int i = 0; i < grid_type_vertices(h->queued->type); i++)
             h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->transformed.vertex[i][n]);
 }
 
@@ -312,15 +312,15 @@ kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batc
     const render_surface_layer *layer = t->surface->layer;
     if (layer->colour_map) {
         const vf place =
-            kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, places->r, h->own->type);
+            kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, places->r, h->queued->type);
         kernel_base_colour(t->surface, 0, place, colours);
     } else {
         for (int i = 0; i < SIMD_WIDTH; i++)
-            for (int a = 0; a < 3; a++) colours[a][i] = layer->colours[3 * h->own->value[lanes[i]] + a];
+            for (int a = 0; a < 3; a++) colours[a][i] = layer->colours[3 * h->queued->value[lanes[i]] + a];
     }
     if (!layer->lines) return;
     kernel_line_field along;
-    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_line_field, t, h, p->lane, places->r, &along);
+    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_line_field, t, h, p->lane, places->r, &along);
     kernel_draw_lines(t->frame, &t->tile, t->surface, &p->rays, places->t, &along, colours);
 }
 
@@ -339,11 +339,11 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     if (has_own) kernel_curved_batch_colours(t, h, rays->lane + first, p, places, colours);
     memcpy(at, &p->at, sizeof at);
     for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit), value = h->own->value[rays->lane[first + i]];
+        const int i = __builtin_ctz(hit), value = h->queued->value[rays->lane[first + i]];
         const float *plain = layer->colours + 3 * value;
-        const kernel_ray_hit one = {.part = h->own->part,
+        const kernel_ray_hit one = {.part = h->queued->part,
                                     .value = value,
-                                    .cell = h->own->cell[rays->lane[first + i]],
+                                    .cell = h->queued->cell[rays->lane[first + i]],
                                     .depth = places->t[i],
                                     .normal = {places->normal[0][i], places->normal[1][i], places->normal[2][i]},
                                     .colour = {has_own ? colours[0][i] : plain[0], has_own ? colours[1][i] : plain[1],
@@ -414,13 +414,13 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
 
 static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h, false);
+    return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, false);
 }
 
 static __attribute__((noinline)) unsigned kernel_curved_batch_hit_contracted(kernel_tile_trace *t,
                                                                              kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h, true);
+    return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, true);
 }
 
 /* Searches the rays of `others` from index n on for their first visible root, and accepts it. Returns the mask of
@@ -495,41 +495,41 @@ SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved
 /* Transforms the queued cells, and lists their rays; cells whose rays are not traced in lanes go to packets one by one.
  */
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                                    kernel_surface_cells *own)
+                                                                    kernel_surface_cells *queued)
 {
     const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
     const bool by_ray = kernel_tile_layer_batches(t);
-    kernel_surface_cells_close(own);
-    h->own = own;
-    const vm collapsed = kernel_transform_curved(&h->transformed, &own->arrays, t->frame, &t->tile, own->vertex,
-                                                 own->isovalue, own->type);
-    kernel_bounds_of(own->type, (const float(*)[8][SIMD_WIDTH])h->transformed.at, &beam, &h->bounds);
+    kernel_surface_cells_close(queued);
+    h->queued = queued;
+    const vm collapsed = kernel_transform_curved(&h->transformed, &queued->arrays, t->frame, &t->tile, queued->vertex,
+                                                 queued->isovalue, queued->type);
+    kernel_bounds_of(queued->type, (const float(*)[8][SIMD_WIDTH])h->transformed.at, &beam, &h->bounds);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
     h->ready = 0;
     kernel_curved *const alone = t->curved;
     kernel_curved cells = kernel_curved_batch_cells(h);
     t->curved = &cells;
-    for (int n = 0; n < own->count; n++) {
-        const unsigned blocks = own->blocks[n] & t->wanted & kernel_blocks_beyond(t, own->near[n]);
+    for (int n = 0; n < queued->count; n++) {
+        const unsigned blocks = queued->blocks[n] & t->wanted & kernel_blocks_beyond(t, queued->near[n]);
         if (!blocks) continue;
         if (by_ray && !(vm_bits(collapsed) >> n & 1)) {
-            kernel_curved_batch_rays_of(t, h, n, own->box[n], own->blocks[n]);
+            kernel_curved_batch_rays_of(t, h, n, queued->box[n], queued->blocks[n]);
             continue;
         }
         kernel_curved_ready(t, h, n);
         cells.lane = n;
-        kernel_blocks_trace(t, blocks, h->own->part, own->cell[n], &h->cells[n], own->value[n]);
+        kernel_blocks_trace(t, blocks, h->queued->part, queued->cell[n], &h->cells[n], queued->value[n]);
     }
     t->curved = alone;
 }
 
 static __attribute__((noinline)) void kernel_curved_batch_run(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                              kernel_surface_cells *own)
+                                                              kernel_surface_cells *queued)
 {
-    kernel_curved_batch_transform(t, h, own);
+    kernel_curved_batch_transform(t, h, queued);
     if (h->rays.count) kernel_curved_batch_trace(t, h);
-    own->count = 0;
+    queued->count = 0;
 }
 
 #endif
