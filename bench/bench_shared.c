@@ -1,6 +1,6 @@
-/* Measures steps of new values beside a process that spins: what a simulation pays for a step where one of its cores has
- * other work. In turns, on one thread and on all, alone and beside the process; a turn is the mean of some steps. Prints
- * CSV. */
+/* Measures steps of new values beside a process that spins: what a simulation pays for a step where one of its cores
+ * has other work. In turns, on one thread and on all, alone and beside the process; a turn is the mean of some steps.
+ * Prints CSV. */
 #define _GNU_SOURCE 1
 #include <signal.h>
 #include <stdio.h>

@@ -160,7 +160,8 @@ static void array_range(const grid_array *a, int64_t count, int threads, double 
     enum { BLOCK = 65536 };
     float low = INFINITY, high = -INFINITY;
     if (a->axis) {
-        const grid_array places = {.data = (const char *)a->axis->axis_coordinates, .stride = sizeof(double), .is_wide = true};
+        const grid_array places = {
+            .data = (const char *)a->axis->axis_coordinates, .stride = sizeof(double), .is_wide = true};
         array_range_any(&places, a->axis->count, 1, least, most);
         return;
     }

@@ -18,8 +18,8 @@ typedef struct row_floats {
 
 bool rows_can_read(const grid *g, const grid_field *field)
 {
-    return g->lattice && !field->is_cell_centred && field->component >= 0 && !field->values.is_integer && !field->source_cells &&
-           grid_lattice_row_axis(g->lattice) >= 0;
+    return g->lattice && !field->is_cell_centred && field->component >= 0 && !field->values.is_integer &&
+           !field->source_cells && grid_lattice_row_axis(g->lattice) >= 0;
 }
 
 /* The smaller and the larger of two numbers. */
@@ -142,7 +142,8 @@ bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end
     const char *data = field->values.data + field->component * field->component_stride;
     const int64_t vertex = grid_lattice_first(l, out->first), stride = field->values.stride;
     /* Along an axis without cells the vertices' stride is 0, so the same row is read twice. */
-    const int64_t across[2] = {l->vertex_numbering.stride[(along + 1) % 3], l->vertex_numbering.stride[(along + 2) % 3]};
+    const int64_t across[2] = {l->vertex_numbering.stride[(along + 1) % 3],
+                               l->vertex_numbering.stride[(along + 2) % 3]};
     for (int side = 0; side < 4; side++)
         rows[side] = data + (vertex + (side & 1) * across[0] + (side >> 1) * across[1]) * stride;
     const int64_t step = stride * l->vertex_numbering.stride[along];

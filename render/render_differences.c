@@ -92,7 +92,7 @@ static hit_location place_of(const render_camera *camera, const render_pending_h
 }
 
 static void sort_hits(const render_camera *camera, render_pending_list *list, int64_t first, int64_t count,
-                         hit_location *places, render_pending_list *room)
+                      hit_location *places, render_pending_list *room)
 {
     for (int64_t i = 0; i < count; i++) places[i] = place_of(camera, &list->items[first + i], i);
     memcpy(room->items, list->items + first, (size_t)count * sizeof *room->items);
@@ -144,7 +144,7 @@ static void process_chunk(chunk_work *work, kernel_thread *thread, int64_t first
 }
 
 static insitu_status process_chunks(const render_job *job, chunk_work *work, int64_t first, int64_t count,
-                                 base_error *error)
+                                    base_error *error)
 {
     work->kernels = render_kernels();
     work->threads = job->threads > 0 ? job->threads : omp_get_max_threads();

@@ -35,7 +35,7 @@ static void random_direction(uint64_t *counter, double d[3])
 /* ---- cameras ---- */
 
 static void set_view(render_camera *camera, const double eye[3], const double focal[3], bool is_orthographic,
-                 uint64_t *counter)
+                     uint64_t *counter)
 {
     double up[3];
     do random_direction(counter, up);

@@ -286,7 +286,8 @@ static void add_place(places *list, double z)
 
 /* The last place on this side of where the value is x, and the first beyond it, so that neither part's end is of the
  * other's side. */
-static void add_crossing(const cell_interval *s, const reference_line *line, double low, double high, double x, places *out)
+static void add_crossing(const cell_interval *s, const reference_line *line, double low, double high, double x,
+                         places *out)
 {
     const bool rises = value_at(s, line, low) < x;
     for (int i = 0; i < 60; i++) {
@@ -366,8 +367,8 @@ static void add_points(const cell_interval *s, const reference_line *line, doubl
 }
 
 /* The sorted places where something begins, bends, reaches a point of the opacity or ends. */
-static double *find_cuts(const cell_interval *list, int64_t count, const reference_line *line, const reference_hit *hits,
-                         int hit_count, int64_t *cuts)
+static double *find_cuts(const cell_interval *list, int64_t count, const reference_line *line,
+                         const reference_hit *hits, int hit_count, int64_t *cuts)
 {
     places all = {0};
     for (int64_t i = 0; i < count; i++) {

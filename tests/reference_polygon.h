@@ -1,4 +1,5 @@
-/* A polygon's triangles by the letter of their definition (libinsitu/base/faces/polygon.h), by brute force in double. */
+/* A polygon's triangles by the letter of their definition (libinsitu/base/faces/polygon.h), by brute force in double.
+ */
 #ifndef REFERENCE_POLYGON_H
 #define REFERENCE_POLYGON_H
 

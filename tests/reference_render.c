@@ -312,7 +312,8 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
     reference_interpolate(&c->cell, point, values, &value, gradient);
     to_world(&t->scene->job->camera, gradient, e->hit.normal);
     normalize(e->hit.normal);
-    const double crossing_search = reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
+    const double crossing_search =
+        reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
     for (int axis = 0; axis < 3 && crossing_search > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
     /* A ray that enters and leaves a polyhedron through one quad's patch, beside its triangles, is outside of its tets:
      * the field there is defined along the ray, from patch to patch, but not across it. */

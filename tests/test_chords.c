@@ -135,7 +135,8 @@ static int clip_intervals(chord_interval *ray_intervals, int count, float near)
 {
     int left = 0;
     for (int i = 0; i < count; i++)
-        if (ray_intervals[i].t_out > near) ray_intervals[left++] = (chord_interval){fmaxf(ray_intervals[i].t_in, near), ray_intervals[i].t_out};
+        if (ray_intervals[i].t_out > near)
+            ray_intervals[left++] = (chord_interval){fmaxf(ray_intervals[i].t_in, near), ray_intervals[i].t_out};
     return left;
 }
 
@@ -159,7 +160,8 @@ static bool is_paired(const render_job *job, const chord_ray *r, const chord_int
 
 /* The longest overlap of intervals, which are sorted, and the longest gap; of rays that run within the hull's surface
  * only gaps in the shrunk hull count. */
-static void verify_neighbours(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count, tally *t)
+static void verify_neighbours(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count,
+                              tally *t)
 {
     double doubled = 0, gap = 0;
     for (int i = 1, last = 0; i < count; i++) {
@@ -191,7 +193,8 @@ static void verify_length(const chord_ray *r, double sum, tally *t)
                 r->length, r->least, r->most);
 }
 
-static void verify_ray(const render_job *job, const chord_rays *rays, int ray, chord_interval *ray_intervals, int count, tally *t)
+static void verify_ray(const render_job *job, const chord_rays *rays, int ray, chord_interval *ray_intervals, int count,
+                       tally *t)
 {
     const chord_ray r = chord_hull_ray(job, rays, ray);
     double sum = 0;
@@ -201,7 +204,8 @@ static void verify_ray(const render_job *job, const chord_rays *rays, int ray, c
     t->rays++;
     t->met += count > 0;
     t->ray_intervals += count;
-    for (int i = 0; i < count; i++) sum += ((double)ray_intervals[i].t_out - (double)ray_intervals[i].t_in) * r.line.length;
+    for (int i = 0; i < count; i++)
+        sum += ((double)ray_intervals[i].t_out - (double)ray_intervals[i].t_in) * r.line.length;
     verify_neighbours(job, &r, ray_intervals, count, t);
     verify_length(&r, sum, t);
     if (is_paired(job, &r, ray_intervals, count)) return;
@@ -270,10 +274,10 @@ static void print_tally(const char *what, const char *mesh, int by_tile, const t
     printf("%s%s%s, %s: %lld rays, %lld cells; off by %.2g of the side at most; %lld slanted, off by %.2g of the "
            "shift's share at most, %lld touching; %.2g beyond the shrunk and swollen hull's; overlaps by rounding on "
            "%lld, %.2g at most, gaps on %lld, %.2g at most; %lld wrong lengths, %lld with ends alone\n",
-           what, *mesh ? ", " : "", mesh, by_tile ? "by tile" : "alone", (long long)t->rays, (long long)t->ray_intervals,
-           t->worst_length, (long long)t->slanted, t->worst_slanted, (long long)t->touching, t->worst_bracketed,
-           (long long)t->doubled, t->worst_doubled, (long long)t->gaps, t->worst_gap, (long long)t->off,
-           (long long)t->unpaired);
+           what, *mesh ? ", " : "", mesh, by_tile ? "by tile" : "alone", (long long)t->rays,
+           (long long)t->ray_intervals, t->worst_length, (long long)t->slanted, t->worst_slanted,
+           (long long)t->touching, t->worst_bracketed, (long long)t->doubled, t->worst_doubled, (long long)t->gaps,
+           t->worst_gap, (long long)t->off, (long long)t->unpaired);
 }
 
 static void add_tally(tally *sum, const tally *t)

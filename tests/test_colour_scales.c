@@ -155,7 +155,8 @@ static void nan_has_its_colour(void **state)
         fixture_draw(&f, &drawn);
         assert_true(drawn.list.count > 100);
         for (int64_t n = 0; n < drawn.list.count; n++)
-            assert_memory_equal(drawn.list.items[n].colour, scale_cases[i].has_outside ? outside + 6 : grey, sizeof grey);
+            assert_memory_equal(drawn.list.items[n].colour, scale_cases[i].has_outside ? outside + 6 : grey,
+                                sizeof grey);
         drawn_free(&drawn);
     }
     test_view_free(&colours);

@@ -20,7 +20,13 @@
 #include "memory.h"
 #include "test_effort.h"
 
-typedef enum distribution { distribute_random, distribute_checkerboard, distribute_blocks, distribute_all_to_first, distribute_all_to_last } distribution;
+typedef enum distribution {
+    distribute_random,
+    distribute_checkerboard,
+    distribute_blocks,
+    distribute_all_to_first,
+    distribute_all_to_last
+} distribution;
 
 static MPI_Comm comm;
 static comp_group group;
@@ -131,7 +137,8 @@ typedef struct setting {
 /* Makes the i-th fragment of all. */
 typedef fragment fragment_maker(uint32_t i, uint32_t seed, uint32_t pixel_count);
 
-static setting make_setting_of(fragment_maker *make, int width, int height, uint32_t count, distribution how, uint32_t seed)
+static setting make_setting_of(fragment_maker *make, int width, int height, uint32_t count, distribution how,
+                               uint32_t seed)
 {
     setting s = {.count = count, .out = {.width = width, .height = height}};
     if (own_rank == 0) s.out = make_image(width, height);

@@ -158,7 +158,8 @@ static grid_errors errors_on(test_mesh_kind kind, int n, double jitter)
     double *q = calloc((size_t)mesh.vertex_count, sizeof *q),
            (*nodes)[6] = calloc((size_t)mesh.vertex_count, sizeof *nodes);
     assert_true(q && nodes);
-    test_vtk_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0], mesh.connectivity, velocity, 1, q);
+    test_vtk_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0], mesh.connectivity,
+                         velocity, 1, q);
     insitu_session *session =
         begin(&mesh, velocity,
               "fields: {q: {q_criterion: u}, w: {vorticity: u}, d: {divergence: u}, all: q + w.x + d}\nimages: [{name: "
@@ -228,7 +229,7 @@ static void q_criterion_takes_less_time_than_vtks(void **state)
         double *q = calloc((size_t)mesh.vertex_count, sizeof *q);
         assert_non_null(q);
         const double vtks = test_vtk_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0],
-                                       mesh.connectivity, velocity, 5, q);
+                                                 mesh.connectivity, velocity, 5, q);
         const double ours = seconds_for_q_criterion(&mesh, velocity);
         fprintf(stderr, "%s: Q of %lld vertices in %.1f ms, VTK in %.1f ms, ratio %.3f\n", test_mesh_kind_name(kind),
                 (long long)mesh.vertex_count, 1e3 * ours, 1e3 * vtks, ours / vtks);

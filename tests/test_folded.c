@@ -123,7 +123,8 @@ static void numbers_of_cells_and_ranks_do_not_show(void **state)
             fixture_draw(&f, &whole);
             draw_distributed(&mesh, scenes[s], &distributed);
             if (scenes[s] != SAMPLES) drawn_assert_same(&whole, &distributed);
-            if (!(drawn_difference(&whole, &distributed) <= 1e-6)) fail_msg("off by %g", drawn_difference(&whole, &distributed));
+            if (!(drawn_difference(&whole, &distributed) <= 1e-6))
+                fail_msg("off by %g", drawn_difference(&whole, &distributed));
             drawn_free(&whole);
             drawn_free(&distributed);
             fixture_free(&f);

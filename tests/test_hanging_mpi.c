@@ -125,9 +125,9 @@ typedef struct hanging_case {
 } hanging_case;
 
 static const hanging_case cases[] = {
-    {TEST_HEXES, 2, TEST_HANGING_DYADIC, false}, {TEST_HEXES, 4, TEST_HANGING_DYADIC, false},
+    {TEST_HEXES, 2, TEST_HANGING_DYADIC, false},  {TEST_HEXES, 4, TEST_HANGING_DYADIC, false},
     {TEST_HEXES, 2, TEST_HANGING_ROTATED, false}, {TEST_HEXES, 4, TEST_HANGING_ROTATED, false},
-    {TEST_HEXES, 2, TEST_HANGING_CURVED, false}, {TEST_HEXES, 4, TEST_HANGING_CURVED, false},
+    {TEST_HEXES, 2, TEST_HANGING_CURVED, false},  {TEST_HEXES, 4, TEST_HANGING_CURVED, false},
     {TEST_HEXES, 2, TEST_HANGING_ROTATED, true},  {TEST_WEDGES, 2, TEST_HANGING_ROTATED, false},
     {TEST_TETS, 2, TEST_HANGING_ROTATED, false},  {TEST_TETS, 4, TEST_HANGING_DYADIC, false},
 };

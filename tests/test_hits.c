@@ -61,7 +61,7 @@ static void verify_depth(const render_fixture *f, const reference_hit *truth, do
 }
 
 static void verify_hit(const render_fixture *f, const reference_scene *scene, int x, int y, const reference_hit *truth,
-                      const fragment *hit, tally *t)
+                       const fragment *hit, tally *t)
 {
     double slope;
     const double depth = fixture_depth(f, hit->t_in);
@@ -76,7 +76,7 @@ static void verify_hit(const render_fixture *f, const reference_scene *scene, in
 }
 
 static void verify_ray(const render_fixture *f, const drawn_frame *drawn, const reference_scene *scene, int x, int y,
-                      double margin, tally *t)
+                       double margin, tally *t)
 {
     const fragment *hits[REFERENCE_MAX_HITS];
     reference_ray ray;
@@ -176,12 +176,18 @@ static void robust_hits_are_on_the_surface(void **state)
 
 /* ---- ugly cells ---- */
 
-typedef enum ill_shaped { ILL_SHAPED_WARPED, ILL_SHAPED_CONCAVE, ILL_SHAPED_WEDGE, ILL_SHAPED_APEX, ILL_SHAPED_COUNT } ill_shaped;
+typedef enum ill_shaped {
+    ILL_SHAPED_WARPED,
+    ILL_SHAPED_CONCAVE,
+    ILL_SHAPED_WEDGE,
+    ILL_SHAPED_APEX,
+    ILL_SHAPED_COUNT
+} ill_shaped;
 
 static void make_ill_shaped(ill_shaped kind, uint64_t seed, test_mesh *out)
 {
     static const test_cell_shape shapes[ILL_SHAPED_COUNT] = {TEST_UNIT_HEX, TEST_UNIT_HEX, TEST_UNIT_WEDGE,
-                                                       TEST_UNIT_PYRAMID};
+                                                             TEST_UNIT_PYRAMID};
     test_mesh_single(shapes[kind], test_linear, out);
     for (uint64_t i = 0; i < (uint64_t)out->vertex_count; i++) {
         double *p = out->coordinates + 3 * i;
@@ -203,7 +209,8 @@ static void make_ill_shaped(ill_shaped kind, uint64_t seed, test_mesh *out)
 static void robust_hits_in_ill_shaped_cells_match_the_reference(void **state)
 {
     (void)state;
-    static const char *const names[ILL_SHAPED_COUNT] = {"warped hexes", "concave hexes", "twisted wedges", "pyramid apexes"};
+    static const char *const names[ILL_SHAPED_COUNT] = {"warped hexes", "concave hexes", "twisted wedges",
+                                                        "pyramid apexes"};
     for (ill_shaped kind = 0; kind < ILL_SHAPED_COUNT; kind++) {
         tally t = {.rays = 0};
         for (uint64_t seed = 0; seed < 24; seed++) {
@@ -277,7 +284,7 @@ static double normal_error(const render_fixture *f, const fragment *hit, const d
  * The place is off by 1e-6 cells, which second derivatives of a range or two turn into as much again. Seen edge-on,
  * either side may face the eye. */
 static void verify_normal(const render_fixture *f, const reference_scene *scene, const reference_hit *truth,
-                         const fragment *hit, int64_t *checked)
+                          const fragment *hit, int64_t *checked)
 {
     const int x = (int)hit->pixel % f->job.camera.width, y = (int)hit->pixel / f->job.camera.width;
     double slope, gradient[3];

@@ -373,8 +373,8 @@ static bool verify_mesh(insitu_session *session, int kind, int side, const test_
             char what[96];
             input part;
             if (!is_due(kind, how, layers)) continue;
-            snprintf(what, sizeof what, "%s, %s, %d ghost layers", test_mesh_kind_name(kinds[kind]), distribution_names[how],
-                     layers);
+            snprintf(what, sizeof what, "%s, %s, %d ghost layers", test_mesh_kind_name(kinds[kind]),
+                     distribution_names[how], layers);
             distribute(mesh, (distribution)how, side, owners);
             extract_rank_cells(mesh, owners, layers, &part);
             draw(session, &part, cycle++);

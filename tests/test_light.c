@@ -108,7 +108,8 @@ static double size_of(const test_mesh *mesh, int64_t cell)
 
 /* Tells by brute force whether the ray meets something in front: 1, 0, or -1 where rounding may decide. Roots of the
  * hit's own surface lie behind the start by the lift less what hits are off by. */
-static int is_blocked_by_brute_force(const render_fixture *f, const test_mesh *mesh, const double start[3], const double d[3], double reach)
+static int is_blocked_by_brute_force(const render_fixture *f, const test_mesh *mesh, const double start[3],
+                                     const double d[3], double reach)
 {
     static const float nothing[4] = {0, 0, 0, 0};
     const double *across = fabs(d[1]) < 0.9 ? (const double[]){0, 1, 0} : (const double[]){1, 0, 0};
@@ -148,7 +149,7 @@ static void verify(int said, bool is_open, const char *what, tally *t)
 }
 
 static void verify_hit(const render_fixture *f, const test_mesh *mesh, const hits *h, int64_t i, const char *what,
-                      tally *t)
+                       tally *t)
 {
     const render_hit *hit = &h->hits[i];
     double n[3], start[3], d[3];
@@ -160,7 +161,8 @@ static void verify_hit(const render_fixture *f, const test_mesh *mesh, const hit
     }
     for (int k = 0; k < LIGHTS; k++)
         if (h->rays[i].lights >> k & 1)
-            verify(is_blocked_by_brute_force(f, mesh, start, f->lights[k].direction, INFINITY), h->open[i].lights >> k & 1, what, t);
+            verify(is_blocked_by_brute_force(f, mesh, start, f->lights[k].direction, INFINITY),
+                   h->open[i].lights >> k & 1, what, t);
 }
 
 static void verify_mesh(const test_mesh *mesh, fixture_camera camera, float contact, const char *what)

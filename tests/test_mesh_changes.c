@@ -124,7 +124,7 @@ void test_mesh_reorder_vertices(test_mesh *mesh, uint64_t seed)
 {
     for (int64_t i = 0; i < mesh->face_count; i++)
         rotate_loop(mesh->face_connectivity + mesh->face_offsets[i], mesh->face_offsets[i + 1] - mesh->face_offsets[i],
-                  test_hash((uint64_t)i, seed));
+                    test_hash((uint64_t)i, seed));
     for (int64_t i = 0; i < mesh->cell_count; i++) {
         if (mesh->types[i] == GRID_POLYHEDRON) {
             int64_t *faces = mesh->connectivity + mesh->offsets[i];

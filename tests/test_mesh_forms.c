@@ -20,7 +20,7 @@ const char formed_scene[] =
                                "      - isosurface: {field: i, values: [0.3], normals: differences}\n");
 
 const char formed_corner_scene[] = "threads: 1\nimages:\n" IMAGE("a", "      - isosurface: {field: d, values: [0.1]}\n"
-                                                                    "      - surface: {colour_by: {field: d}}\n")
+                                                                      "      - surface: {colour_by: {field: d}}\n")
     IMAGE("b", "      - volume: {field: "
                "d}\n");
 

@@ -412,11 +412,11 @@ static void verify_frame(const render_fixture *f, const double iso, tally *t)
     drawn_frame drawn;
     make_subject(f, &s);
     const verify j = {.f = f,
-                     .s = &s,
-                     .iso = iso,
-                     .place = 3e-6 / f->job.space.scale,
-                     .is_opaque = f->surfaces[0].opacity >= 1,
-                     .t = t};
+                      .s = &s,
+                      .iso = iso,
+                      .place = 3e-6 / f->job.space.scale,
+                      .is_opaque = f->surfaces[0].opacity >= 1,
+                      .t = t};
     t->cells++;
     t->stars += s.is_star;
     fixture_draw(f, &drawn);

@@ -316,7 +316,7 @@ static int surface_fragments(const drawn_frame *drawn, int64_t pixel, const frag
 }
 
 static void print_hits(const comparison *c, int x, int y, const reference_ray *ray, int count,
-                      const fragment *const *hits)
+                       const fragment *const *hits)
 {
     fprintf(stderr, "%s, pixel %d, %d: edge margin %.3g, value margin %.3g%s%s\n", c->what, x, y, ray->edge_margin,
             ray->value_margin, ray->ambiguous ? ", ambiguous" : "", ray->map_failed ? ", map failed" : "");

@@ -314,7 +314,8 @@ static void layouts_do_not_change_a_bit(void **state)
 /* ---- parts and ranks ---- */
 
 /* Deals the mesh's cells out. With ghosts, every part holds all cells, with those of others as ghosts. */
-static void distribute(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts, test_mesh *out)
+static void distribute(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts,
+                       test_mesh *out)
 {
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
     test_partition(mesh, partition, n, parts, owners);
@@ -340,7 +341,8 @@ static void assert_same_to_rounding(const drawn_frame *whole, const drawn_frame 
     if (scene == OPAQUE || scene == TRANSPARENT) drawn_assert_same(whole, parts);
 }
 
-static void compare_distributed(test_mesh_kind kind, scene_kind scene, test_partition_kind partition, int parts, bool ghosts)
+static void compare_distributed(test_mesh_kind kind, scene_kind scene, test_partition_kind partition, int parts,
+                                bool ghosts)
 {
     const fixture_camera camera = (int)scene % 2 ? CAMERA_INSIDE : CAMERA_OUTSIDE;
     test_mesh mesh, distributed[5];

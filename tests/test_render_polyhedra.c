@@ -274,7 +274,8 @@ static void random_ownership_changes_nothing(void **state)
         draw_mesh(&mesh, CAMERA_OUTSIDE, pass < 3 ? set_surfaces : set_volume, &alone);
         draw_distributed(&mesh, pass % 3 < 2, pass < 3 ? set_surfaces : set_volume, &distributed);
         if (pass < 3) drawn_assert_same(&alone, &distributed);
-        if (!(drawn_difference(&alone, &distributed) <= 1e-6)) fail_msg("off by %g", drawn_difference(&alone, &distributed));
+        if (!(drawn_difference(&alone, &distributed) <= 1e-6))
+            fail_msg("off by %g", drawn_difference(&alone, &distributed));
         drawn_free(&alone);
         drawn_free(&distributed);
         test_mesh_free(&mesh);

@@ -413,7 +413,7 @@ static void verify_bundle(bundle *b, const reference_cell *cell, ray_profile *c,
             if (!(vm_bits(list[i].mask) >> lane & 1)) continue;
             *c = (ray_profile){.cell = cell, .values = b->values, .line = line_of(b, lane)};
             verify_ray(n, &map, c, (double)list[i].t_in[lane], (double)list[i].t_out[lane], hit >> lane & 1,
-                      (double)t[lane]);
+                       (double)t[lane]);
         }
     }
 }

@@ -354,7 +354,7 @@ static void wrong_keys_are_reported_with_place_and_expectation(void **state)
         scene_attachments files = {.read = read_stored};
         const insitu_status status = parse(bad_keys[i][0], &files, &s, &error);
         const bool is_reported = strncmp(error.message, place, strlen(place)) == 0 &&
-                             strstr(error.message, bad_keys[i][1]) && strstr(error.message, bad_keys[i][2]);
+                                 strstr(error.message, bad_keys[i][1]) && strstr(error.message, bad_keys[i][2]);
         scene_attachments_free(&files);
         if (status != INSITU_ERROR_SCENE || !is_reported) fail_msg("%s: %s", bad_keys[i][0], error.message);
         assert_int_equal(base_memory_held(), held);

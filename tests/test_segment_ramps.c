@@ -47,7 +47,7 @@ typedef enum ramp_scene { ALONE, CUT, POLYHEDRON } ramp_scene;
 
 /* first, every: of the seeds. */
 static void verify_ramp(test_cell_shape shape, ramp_scene scene, double width, uint64_t first, uint64_t every,
-                       double worst[3])
+                        double worst[3])
 {
     double raw = 0;
     static const float opacities[3][4] = {{0, 0, 0.9f, 0.9f}, {0.8f, 0.8f, 0, 0.3f}, {0.1f, 0.2f, 0.6f, 0.1f}};

@@ -299,7 +299,7 @@ static void steep_ramps_are_kept_as_steps_are(void **state)
         for (int dense = 0; dense < 2; dense++)
             if (test_is_whole() || dense == k % 2)
                 verify_hex((step_function){.opacities = {0, 0.02f, 0.9f, 0.5f}}, CAMERA_OUTSIDE, widths[k],
-                          dense ? 0.005 : 0.1);
+                           dense ? 0.005 : 0.1);
 }
 
 /* ---- the same rays everywhere ---- */

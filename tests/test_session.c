@@ -428,7 +428,7 @@ static void missing_field_leaves_the_other_picture(void **context)
     discard_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
     reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"; there are",
-                    "\"f\" (mesh \"m\")");
+                        "\"f\" (mesh \"m\")");
     everywhere(insitu_last_report(session)->images == 1);
     everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_0.exr")));
     insitu_destroy(&session);
@@ -442,7 +442,7 @@ static void component_that_is_not_there_is_named(void **context)
     everywhere(submit(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"",
-                    "it has components 0 to 0");
+                        "it has components 0 to 0");
     insitu_destroy(&session);
 }
 
@@ -599,7 +599,7 @@ static void scene_that_is_no_file_is_reported(void **context)
     everywhere(own_rank != 0 || (unlink(scene) == 0 && rename(kept, scene) == 0));
     const insitu_status of_folder = insitu_create(MPI_COMM_WORLD, "/", &other);
     reported_everywhere(NULL, of_folder, INSITU_ERROR_SCENE,
-                    "/: cannot be read: it is a directory, expected a regular file");
+                        "/: cannot be read: it is a directory, expected a regular file");
     insitu_destroy(&session);
 }
 

@@ -198,7 +198,8 @@ static void fill_block(block *b)
 
 static void make_block(int number, block *b)
 {
-    const int place[3] = {number % distribute[0], number / distribute[0] % distribute[1], number / distribute[0] / distribute[1]};
+    const int place[3] = {number % distribute[0], number / distribute[0] % distribute[1],
+                          number / distribute[0] / distribute[1]};
     *b = (block){.number = number};
     for (int axis = 0; axis < 3; axis++) {
         const int width = CELLS / distribute[axis], first = place[axis] * width, end = first + width;
@@ -432,7 +433,8 @@ static void faults_of_one_block_are_reported_on_all_ranks(void **state)
     insitu_mesh_defaults(&mesh);
     mesh.vertex_count = -1;
     if (is_mine) insitu_set_block(session, "m", corrupted, &mesh);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT, "mesh \"m[5]\": vertex_count is -1");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT,
+                        "mesh \"m[5]\": vertex_count is -1");
     blocks[corrupted].a.hexes[77] = -4; /* by its number it is a list of cells */
     if (is_mine) submit_block(session, &blocks[corrupted], INSITU_CHANGED_ALL);
     reported_everywhere(session, insitu_step(session, 1, 1), INSITU_ERROR_MESH, "mesh \"m[5]\": cell 9 ");
@@ -443,7 +445,7 @@ static void faults_of_one_block_are_reported_on_all_ranks(void **state)
     if (is_mine) set_block(session, &blocks[corrupted], INSITU_CHANGED_ALL); /* without its fields */
     if (rank_count > 1 || is_mine)
         reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
-                        "mesh \"m[5]\": field \"c\" is not set, other blocks have it");
+                            "mesh \"m[5]\": field \"c\" is not set, other blocks have it");
     discard_pictures();
     if (is_mine) submit_block(session, &blocks[corrupted], 0);
     step_ok(session, 3);

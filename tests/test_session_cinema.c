@@ -231,12 +231,13 @@ static void tables_that_cannot_be_written_are_reported_and_written_later(void **
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
     assert_int_equal(submit(session, &in), INSITU_OK);
     discard_pictures();
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv", "cannot be");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv",
+                        "cannot be");
     everywhere(caught_count == (own_rank == 0 ? 8 : 0));
     if (own_rank == 0) rmdir("out/a.cdb/data.csv");
     put_file("out/a.cdb/data.csv", "a,b\n1,2\n");
     reported_everywhere(session, insitu_step(session, 2, 1), INSITU_ERROR_IO, "out/a.cdb/data.csv", "other columns",
-                    "\"cycle,time,phi,theta,isovalue,FILE\"");
+                        "\"cycle,time,phi,theta,isovalue,FILE\"");
     remove_files();
     if (own_rank == 0) mkdir("out/a.cdb/data.js", 0777);
     discard_pictures();

@@ -189,8 +189,8 @@ static bool has_medium(const caught_picture *picture, const region *g, double me
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         const ray r = ray_of(pixel);
         const interval within = intersect_both(cube_range(&r), visible_interval(g, &r));
-        const double length =
-            (length_of(within) - length_of(intersect_both(within, hole_interval(g, &r)))) * sqrt(dot(r.direction, r.direction));
+        const double length = (length_of(within) - length_of(intersect_both(within, hole_interval(g, &r)))) *
+                              sqrt(dot(r.direction, r.direction));
         const double alpha = 1 - pow(0.5, media * length), own = (double)picture->rgba[4 * pixel + 3];
         hits += alpha > 0.1;
         if (fabs(own - alpha) < tolerance) continue;
@@ -293,7 +293,7 @@ static double difference(const caught_picture *a, const caught_picture *b)
 }
 
 static void verify(test_mesh_kind kind, const clip_case *c, const region *g, clip_place place,
-                  const session_input inputs[2])
+                   const session_input inputs[2])
 {
     const char *scene = scene_of(c, g, place);
     caught_picture ours = draw_scene(MPI_COMM_WORLD, scene, &inputs[1]), alone = {0};

@@ -232,7 +232,7 @@ static void broken_file_of_ranges_is_reported_on_all_ranks(void **state)
         everywhere(submit(session, &block) == INSITU_OK);
         const insitu_status status = insitu_step(session, 0, 0);
         reported_everywhere(session, status, INSITU_ERROR_SCENE, image_name, ".ranges:3: is no range",
-                        "delete the file to begin anew");
+                            "delete the file to begin anew");
         remove_ranges();
         step_is_good(session, 1);
         discard_pictures();

@@ -220,7 +220,8 @@ static bool is_clipped(const truth *t, const double at[2], const float *rgba, fl
     return is_value(&cut, at, rgba, depth);
 }
 
-static bool is_correct(const tile tiles[TILES], const caught_picture *picture, verify_function *verify, const char *what)
+static bool is_correct(const tile tiles[TILES], const caught_picture *picture, verify_function *verify,
+                       const char *what)
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
@@ -277,7 +278,8 @@ static void concave_shells_are_what_they_are(void **state)
         bool is_good = true;
         if (own_rank == 0) {
             alone = draw(MPI_COMM_SELF, scene, &whole);
-            is_good = is_correct(tiles, &alone, cases[i].verify, cases[i].what) && are_one(&ours, &alone, cases[i].what);
+            is_good =
+                is_correct(tiles, &alone, cases[i].verify, cases[i].what) && are_one(&ours, &alone, cases[i].what);
         }
         everywhere(is_good);
         free_caught(&ours);

@@ -44,8 +44,8 @@ typedef struct form {
 typedef struct values {
     int64_t corners;
     double *at_vertices, *at_corners, *at_cells, *gathered;
-    double *distributed;  /* corners' values as the form has them */
-    int64_t *index; /* NULL: none */
+    double *distributed; /* corners' values as the form has them */
+    int64_t *index;      /* NULL: none */
     int64_t distributed_count;
     double *coordinates; /* of the doubled mesh */
     int64_t *connectivity, *ids, *doubled_ids;
@@ -129,7 +129,8 @@ static values make_values(const form *of, const test_mesh *part)
 
 static void free_values(values *v)
 {
-    free(v->at_vertices), free(v->at_corners), free(v->at_cells), free(v->gathered), free(v->distributed), free(v->index);
+    free(v->at_vertices), free(v->at_corners), free(v->at_cells), free(v->gathered), free(v->distributed),
+        free(v->index);
     free(v->coordinates), free(v->connectivity), free(v->ids), free(v->doubled_ids);
 }
 
@@ -410,7 +411,7 @@ static void wrong_array_contents_are_reported_on_all_ranks(void **state)
     if (own_rank == rank_count - 1) v.index[9] = v.distributed_count;
     for (int step = 0; step < 2; step++)
         reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD, "the index of corner 9 is ",
-                        "outside 0..");
+                            "outside 0..");
     v.index[9] = good;
     step_is_good(session, 2);
     insitu_destroy(&session);
@@ -423,7 +424,8 @@ static void wrong_array_contents_are_reported_on_all_ranks(void **state)
     assert_non_null(zeros);
     everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
     set_field(session, "f", INSITU_CORNER, in.part.connectivity_count, zeros, NULL, NULL);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "is a polyhedron, whose corners", "cell ");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "is a polyhedron, whose corners",
+                        "cell ");
     insitu_destroy(&session);
     free(zeros);
     input_free(&in);

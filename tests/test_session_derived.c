@@ -621,7 +621,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
                 everywhere(status == INSITU_OK);
             else
                 reported_everywhere(session, status, INSITU_ERROR_FIELD, ":1: ", wrong[i].words[0], wrong[i].words[1],
-                                wrong[i].words[2]);
+                                    wrong[i].words[2]);
             everywhere(own_rank != 0 || caught_count == (is_right ? 2 : 1));
         }
         insitu_destroy(&session);
@@ -642,13 +642,13 @@ static void clashes_are_reported_on_all_ranks(void **state)
     make_vector(&in.part, swirl, INSITU_VERTEX, true, "u", &u);
     insitu_session *session = begin(MPI_COMM_WORLD, SCENE("f: u.x + 1", "f"), &in, &u);
     insitu_status status = insitu_step(session, 0, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD, ":1: fields.f: mesh \"m\" has a field of this name already",
-                    "expected another name");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD,
+                        ":1: fields.f: mesh \"m\" has a field of this name already", "expected another name");
     insitu_destroy(&session);
     session = begin(MPI_COMM_WORLD, SCENE("speed: mag(u)", "sped"), &in, &u);
     status = insitu_step(session, 0, 0);
     reported_everywhere(session, status, INSITU_ERROR_FIELD, "no mesh has the field \"sped\" (did you mean speed?)",
-                    "there are: ");
+                        "there are: ");
     insitu_destroy(&session);
     /* It may come later. */
     session = open_stepped(MPI_COMM_WORLD, SCENE("late: u.x + 1", "late"), &in, &u);
@@ -656,7 +656,8 @@ static void clashes_are_reported_on_all_ranks(void **state)
     late.name = "late";
     assert_int_equal(insitu_set_field(session, "m", &late), INSITU_OK);
     status = insitu_step(session, 1, 0);
-    reported_everywhere(session, status, INSITU_ERROR_FIELD, "fields.late: mesh \"m\" has a field of this name already");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD,
+                        "fields.late: mesh \"m\" has a field of this name already");
     insitu_destroy(&session);
     if (rank_count > 1) {
         session = begin(MPI_COMM_WORLD, SCENE("q: {q_criterion: u}", "q"), &in, NULL);
@@ -664,7 +665,7 @@ static void clashes_are_reported_on_all_ranks(void **state)
         assert_int_equal(insitu_set_field(session, "m", &u.field), INSITU_OK);
         status = insitu_step(session, 0, 0);
         reported_everywhere(session, status, INSITU_ERROR_FIELD, "fields.q.q_criterion: rank ", "field \"u\"",
-                        "another centring or number of components");
+                            "another centring or number of components");
         insitu_destroy(&session);
     }
     free(u.values);
@@ -674,11 +675,16 @@ static void clashes_are_reported_on_all_ranks(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(linear_velocities_are_exact),     cmocka_unit_test(expressions_are_those_of_c),
-        cmocka_unit_test(partitions_do_not_show),          cmocka_unit_test(blocks_show_no_seam),
-        cmocka_unit_test(gradients_of_shells_lie_in_them), cmocka_unit_test(velocities_of_cells_and_corners_are_taken),
-        cmocka_unit_test(what_stays_is_not_made_again),    cmocka_unit_test(an_edited_scene_has_its_own),
-        cmocka_unit_test(wrong_input_is_reported_on_all_ranks),    cmocka_unit_test(clashes_are_reported_on_all_ranks),
+        cmocka_unit_test(linear_velocities_are_exact),
+        cmocka_unit_test(expressions_are_those_of_c),
+        cmocka_unit_test(partitions_do_not_show),
+        cmocka_unit_test(blocks_show_no_seam),
+        cmocka_unit_test(gradients_of_shells_lie_in_them),
+        cmocka_unit_test(velocities_of_cells_and_corners_are_taken),
+        cmocka_unit_test(what_stays_is_not_made_again),
+        cmocka_unit_test(an_edited_scene_has_its_own),
+        cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
+        cmocka_unit_test(clashes_are_reported_on_all_ranks),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

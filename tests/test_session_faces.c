@@ -253,7 +253,8 @@ static const corrupted_case at_the_step[] = {
 static void corrupted_arrays_are_reported_at_once(void **context)
 {
     (void)context;
-    for (size_t i = 0; i < sizeof at_once / sizeof at_once[0]; i++) corrupted_is_reported_on_all_ranks(session, &input, &at_once[i]);
+    for (size_t i = 0; i < sizeof at_once / sizeof at_once[0]; i++)
+        corrupted_is_reported_on_all_ranks(session, &input, &at_once[i]);
 }
 
 static void corrupted_faces_are_reported_at_the_step(void **context)

@@ -315,7 +315,7 @@ static void folders_that_cannot_be_made_are_reported(void **state)
             insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(own_files[i].scene));
             for (int cycle = 0; cycle < 2; cycle++)
                 reported_everywhere(session, step(session, cycle), INSITU_ERROR_IO, folders[f].name,
-                                strrchr(own_files[i].path, '/'), folders[f].reason);
+                                    strrchr(own_files[i].path, '/'), folders[f].reason);
             insitu_destroy(&session);
         }
 }

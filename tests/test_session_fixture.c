@@ -27,8 +27,8 @@ void assert_everywhere(bool is_well, const char *what, const char *file, int lin
     assert_true(all);
 }
 
-void assert_reported(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
-                 const char *file, int line)
+void assert_reported(const insitu_session *session, insitu_status status, insitu_status expected,
+                     const char *const *words, const char *file, int line)
 {
     char first[1024] = "";
     const char *message = insitu_error(session);
@@ -127,7 +127,8 @@ void input_describe(session_input *in)
     in->field.values = (insitu_array){in->part.values, INSITU_FLOAT64, 0};
 }
 
-void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind distributed, int rank, int count)
+void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind distributed, int rank,
+                  int count)
 {
     test_mesh whole;
     in->kind = kind;
@@ -185,7 +186,7 @@ void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *
         discard_pictures();
         const insitu_status status = insitu_step(session, 1, 0);
         reported_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
-                        c->words[1] ? c->words[1] : "");
+                            c->words[1] ? c->words[1] : "");
         everywhere(insitu_last_report(session)->images == 0 && caught_count == 0);
     }
     input_renew(in);
@@ -193,7 +194,8 @@ void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *
     step_is_good(session, 2);
 }
 
-void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts, test_mesh *out)
+void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts,
+                       test_mesh *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
     int *all = test_calloc((size_t)whole->cell_count, sizeof *all);

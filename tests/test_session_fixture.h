@@ -23,10 +23,10 @@ extern int own_rank, rank_count;
 void assert_everywhere(bool is_well, const char *what, const char *file, int line);
 
 /* Every rank was told the same, and it holds all of the count words (NULL ones are passed over). */
-#define reported_everywhere(session, status, expected, ...)                                                                \
+#define reported_everywhere(session, status, expected, ...)                                                            \
     assert_reported((session), (status), (expected), (const char *const[]){__VA_ARGS__, NULL}, __FILE__, __LINE__)
-void assert_reported(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
-                 const char *file, int line);
+void assert_reported(const insitu_session *session, insitu_status status, insitu_status expected,
+                     const char *const *words, const char *file, int line);
 
 /* Returns the values' sum, rounded once, divided by their number; NAN if there are none. Recentring leaves out less
  * than 2^-85 of the largest of 100 values, so that it has the same bits unless a sum is that near to a tie. */
@@ -68,7 +68,8 @@ typedef struct session_input {
 void describe_part(const test_mesh *part, insitu_mesh *mesh);
 
 /* Hexes or any kind, side^3 cubes, dealt to count ranks; the part of rank. */
-void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind distributed, int rank, int count);
+void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind distributed, int rank,
+                  int count);
 /* Describe the part again, after it was spoilt. */
 void input_describe(session_input *in);
 /* Restores the input as it was created. */
@@ -76,7 +77,8 @@ void input_renew(session_input *in);
 void input_free(session_input *in);
 
 /* This rank's cells of the whole; with ghosts: all cells, of which the others' are ghosts. */
-void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts, test_mesh *out);
+void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts,
+                       test_mesh *out);
 
 /* Set the mesh "m" and its field; the first status that is not OK. */
 insitu_status submit(insitu_session *session, const session_input *in);

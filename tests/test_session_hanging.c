@@ -390,8 +390,8 @@ static void means_follow_the_other_mesh(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cell_values_continue_across_hanging_nodes), cmocka_unit_test(cell_values_continue_across_triangles),
-        cmocka_unit_test(a_layer_makes_meshes_one), cmocka_unit_test(vertices_on_a_common_wall_do_not_hang),
-        cmocka_unit_test(means_follow_the_other_mesh)};
+        cmocka_unit_test(cell_values_continue_across_hanging_nodes),
+        cmocka_unit_test(cell_values_continue_across_triangles), cmocka_unit_test(a_layer_makes_meshes_one),
+        cmocka_unit_test(vertices_on_a_common_wall_do_not_hang), cmocka_unit_test(means_follow_the_other_mesh)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

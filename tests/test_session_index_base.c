@@ -125,7 +125,7 @@ static void errors_count_from_one_too(void **state)
     if (is_last) in.part.connectivity[3] = 0;
     submit(session, &in);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "vertex index 0 is outside 1..",
-                    "index_base is 1");
+                        "index_base is 1");
     if (is_last) in.part.connectivity[3] = in.part.vertex_count + 1;
     submit(session, &in);
     reported_everywhere(session, insitu_step(session, 1, 0), INSITU_ERROR_MESH, "is outside 1..");
@@ -152,7 +152,7 @@ static void wrong_indices_are_reported(insitu_session *session, const session_in
         if (own_rank == rank_count - 1) *place = wrong[i];
         submit(session, in);
         reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH, word, "vertex index ",
-                        " is outside 1..");
+                            " is outside 1..");
     }
     *place = good;
     submit(session, in);

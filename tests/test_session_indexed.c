@@ -332,7 +332,7 @@ static void cells_are_reported_too(void **state)
     everywhere(submit(session, &in) == INSITU_OK);
     for (int step = 0; step < 2; step++)
         reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
-                        "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
+                            "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
     corrupted[in.part.cell_count - 1] = 0;
     step_is_good(session, 2); /* mended in place, for nothing was taken of it */
     insitu_destroy(&session);

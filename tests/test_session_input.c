@@ -219,7 +219,8 @@ static const corrupted_case cases[] = {
 static void corrupted_input_is_reported_on_all_ranks(void **context)
 {
     (void)context;
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) corrupted_is_reported_on_all_ranks(session, &input, &cases[i]);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+        corrupted_is_reported_on_all_ranks(session, &input, &cases[i]);
 }
 
 static void call_without_a_mesh_is_reported_once(void **context)
@@ -465,7 +466,7 @@ static void message_stays_until_the_next_step(void **context)
     everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
     everywhere(strstr(insitu_error(session), "its mesh \"none\" is not set") != NULL);
     reported_everywhere(session, insitu_step(session, 71, 0), INSITU_ERROR_FIELD,
-                    "rank 0: ", "its mesh \"none\" is not set");
+                        "rank 0: ", "its mesh \"none\" is not set");
     step_is_good(session, 72);
     everywhere(*insitu_error(session) == '\0');
 }

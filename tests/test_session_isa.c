@@ -37,8 +37,7 @@ static caught_picture draw_alone(const char *scene, test_mesh_kind kind)
         input_create(&whole, kind, 5, TEST_BLOCK, 0, 1);
         insitu_session *session = open_session(MPI_COMM_SELF, scene);
         discard_pictures();
-        is_drawn =
-            submit(session, &whole) == INSITU_OK && insitu_step(session, 0, 0) == INSITU_OK && caught_count == 1;
+        is_drawn = submit(session, &whole) == INSITU_OK && insitu_step(session, 0, 0) == INSITU_OK && caught_count == 1;
         picture = caught[0];
         caught_count = 0;
         insitu_destroy(&session);

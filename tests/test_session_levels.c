@@ -602,7 +602,7 @@ static void blocks_that_do_not_fit_are_reported(void **state)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]++;
     everywhere(submit_levels(session, &l, blocks));
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[", "refinement along j is 4",
-                    "begin and end at borders of coarser cells");
+                        "begin and end at borders of coarser cells");
     for (int i = 0; i < l.count; i++)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]--;
     everywhere(submit_levels(session, &l, blocks));
@@ -616,7 +616,7 @@ static void blocks_that_do_not_fit_are_reported(void **state)
         everywhere(true);
     }
     reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_MESH,
-                    "mesh \"m[0]\": lattice: refinement along k is 0, expected 1..1048576");
+                        "mesh \"m[0]\": lattice: refinement along k is 0, expected 1..1048576");
     insitu_destroy(&session);
     free_blocks(&l, blocks);
 }
@@ -630,8 +630,8 @@ static int begin_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sphere_continues_across_levels), cmocka_unit_test(outer_surfaces_have_no_wall_between_levels),
-        cmocka_unit_test(levels_come_and_go), cmocka_unit_test(blocks_beside_a_change_stay),
-        cmocka_unit_test(blocks_that_do_not_fit_are_reported)};
+        cmocka_unit_test(a_sphere_continues_across_levels),
+        cmocka_unit_test(outer_surfaces_have_no_wall_between_levels), cmocka_unit_test(levels_come_and_go),
+        cmocka_unit_test(blocks_beside_a_change_stay), cmocka_unit_test(blocks_that_do_not_fit_are_reported)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

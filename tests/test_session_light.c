@@ -66,8 +66,8 @@ static void make_jittered(session_input *in, test_mesh_kind kind, double jitter,
     input_describe(in);
 }
 
-static void make_part(session_input *in, test_mesh_kind kind, test_function *f, test_partition_kind distributed, int rank,
-                      int count)
+static void make_part(session_input *in, test_mesh_kind kind, test_function *f, test_partition_kind distributed,
+                      int rank, int count)
 {
     make_jittered(in, kind, 0.2, f, distributed, rank, count);
 }
@@ -253,7 +253,8 @@ static sky verify_sky(const corner *c, const caught_picture *drawn, const caught
         out.sum += share;
         if (fabs(counted - round(counted)) < 1e-4 && round(counted) >= open && round(counted) <= open + undecided_rays)
             continue;
-        if (!out.wrong++) fprintf(stderr, "pixel %d: %.6g open, expected %d to %d\n", p, counted, open, open + undecided_rays);
+        if (!out.wrong++)
+            fprintf(stderr, "pixel %d: %.6g open, expected %d to %d\n", p, counted, open, open + undecided_rays);
     }
     return out;
 }
@@ -289,8 +290,8 @@ static void corners_are_as_dark_as_disk_segments(void **context)
              * by a root of their number less, five times that at most. At the cube's ends the planes end, in a tenth of
              * the pixels at most. */
             const double off = fabs(s.sum - expected) / count;
-            is_right =
-                s.wrong == 0 && s.pixels > 200 && s.undecided_rays < s.pixels / 10 && off < 5 * 0.125 / sqrt(count) + 0.02;
+            is_right = s.wrong == 0 && s.pixels > 200 && s.undecided_rays < s.pixels / 10 &&
+                       off < 5 * 0.125 / sqrt(count) + 0.02;
             if (!is_right)
                 fprintf(stderr, "%s: %d pixels, %d wrong, %d unsure, mean off by %g\n", test_mesh_kind_name(kind),
                         s.pixels, s.wrong, s.undecided_rays, off);
@@ -374,7 +375,7 @@ static double difference(const caught_picture *a, const caught_picture *b)
 
 /* most: 0 where there are surfaces alone, which are one picture to the bit. */
 static void verify_partition(const char *scene, const session_input *whole, const session_input *part, double most,
-                            const char *what)
+                             const char *what)
 {
     double off = 0;
     caught_picture distributed = draw(MPI_COMM_WORLD, scene, part);

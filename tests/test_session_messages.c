@@ -543,9 +543,9 @@ static void faults_of_words_are_reported_at_once(void **context)
             step_is_good(session, cycle);
             const char *warnings = insitu_last_report(session)->warnings;
             everywhere(is_reported && cycle == 0 ? strstr(warnings, "image \"a\": no font was found") &&
-                                                   strstr(warnings, "image \"a\": no glyphs for U+6E29") &&
-                                                   strstr(warnings, "image \"a\": no room for the axes")
-                                             : !*warnings);
+                                                       strstr(warnings, "image \"a\": no glyphs for U+6E29") &&
+                                                       strstr(warnings, "image \"a\": no room for the axes")
+                                                 : !*warnings);
         }
         insitu_destroy(&session);
     }
@@ -581,7 +581,7 @@ static void pictures_that_would_take_hours_are_refused(void **context)
         everywhere(submit(session, &in) == INSITU_OK);
         const insitu_status status = insitu_step(session, 0, 0);
         reported_everywhere(session, status, INSITU_ERROR_SCENE, refused[i].words[0], refused[i].words[1],
-                        refused[i].words[2] ? refused[i].words[2] : "");
+                            refused[i].words[2] ? refused[i].words[2] : "");
         insitu_destroy(&session);
     }
     input_free(&in);

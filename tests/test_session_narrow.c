@@ -387,9 +387,11 @@ static int begin_tests(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(narrow_ranges_are_closed_forms), cmocka_unit_test(percentiles_are_those_of_doubles),
-        cmocka_unit_test(percentiles_are_right_among_many_equal_values), cmocka_unit_test(constant_fields_have_one_tick),
-        cmocka_unit_test(values_too_near_are_reported), cmocka_unit_test(statistics_distinguish_narrow_fields)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(narrow_ranges_are_closed_forms),
+                                       cmocka_unit_test(percentiles_are_those_of_doubles),
+                                       cmocka_unit_test(percentiles_are_right_among_many_equal_values),
+                                       cmocka_unit_test(constant_fields_have_one_tick),
+                                       cmocka_unit_test(values_too_near_are_reported),
+                                       cmocka_unit_test(statistics_distinguish_narrow_fields)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

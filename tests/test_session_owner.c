@@ -312,7 +312,7 @@ static void hexes_with_a_crossed_face_are_reported(void **state)
         v[1] = second, v[2] = first;
         submit(session, &in);
         reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH,
-                        "mesh \"m\": cell 0 (polyhedron): ", "the surface is not closed");
+                            "mesh \"m\": cell 0 (polyhedron): ", "the surface is not closed");
         v[1] = first, v[2] = second;
     }
     insitu_destroy(&session);

@@ -296,8 +296,8 @@ static void hexes_want_vertices(void **state)
     input.field.patches = patches;
     input.field.patch_count = 1;
     everywhere(submit(session, &input) == INSITU_ERROR_FIELD);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "patch 0: names faces by their numbers",
-                    "the mesh has none");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD,
+                        "patch 0: names faces by their numbers", "the mesh has none");
     insitu_destroy(&session);
     input_free(&input);
 }

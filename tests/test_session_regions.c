@@ -240,7 +240,7 @@ static void fields_that_no_rank_has_are_refused(void **context)
         insitu_session *session = open_regions(cases[i].scene);
         const insitu_status status = insitu_step(session, 0, 0);
         reported_everywhere(session, status, cases[i].status, cases[i].words[0],
-                        cases[i].words[1] ? cases[i].words[1] : "");
+                            cases[i].words[1] ? cases[i].words[1] : "");
         insitu_destroy(&session);
     }
 }

@@ -112,7 +112,8 @@ static void make_whole(test_mesh_kind kind, double jitter, session_input *out)
 }
 
 /* The rank's cells; with ghosts: all cells, of which the others' are ghosts. */
-static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts, session_input *out)
+static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts,
+                               session_input *out)
 {
     extract_own_cells(&whole->part, distributed, SIDE, with_ghosts, &out->part);
     test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);

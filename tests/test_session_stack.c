@@ -124,7 +124,7 @@ static void small_stacks_are_reported(void **context)
     for (int cycle = 0; cycle < 2; cycle++) {
         const insitu_status status = insitu_step(session, cycle, 0);
         reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: OpenMP's threads have ",
-                        "of stack left, a step needs 256 kB: expected stacks of ", "(OMP_STACKSIZE=");
+                            "of stack left, a step needs 256 kB: expected stacks of ", "(OMP_STACKSIZE=");
         const char *figure = strstr(insitu_error(session), "OMP_STACKSIZE=");
         const long reported = figure ? strtol(figure + strlen("OMP_STACKSIZE="), NULL, 10) : 0;
         everywhere(reported > SESSION_WORKER_STACK >> 10 && reported <= MOST_TOLD);

@@ -218,7 +218,8 @@ static void files_that_cannot_be_written_are_reported(void **state)
         open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: f, path: other.csv}]\n"));
     discard_pictures();
     assert_int_equal(submit(session, &in), INSITU_OK);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns", "cycle,time");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns",
+                        "cycle,time");
     everywhere(caught_count == (own_rank == 0));
     read_file("other.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(text, "a,b\n1,2\n") == 0);

@@ -127,7 +127,8 @@ static void strides_beyond_memory_are_refused(void **state)
         formed_mesh m;
         formed_create(form, SIDE, own_rank, rank_count, &m);
         const bool is_torn = formed_has_corners(form);
-        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_corner_scene : formed_scene));
+        insitu_session *session =
+            open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_corner_scene : formed_scene));
         refuse_all(session, &m, list, list_of_mesh(&m.mesh, list));
         refuse_all(session, &m, list, list_of_fields(&m, list, 0));
         refuse_all(session, &m, list, list_of_patch(&m, list));

@@ -25,7 +25,8 @@ static void make_whole(test_mesh_kind kind, session_input *out)
 }
 
 /* The rank's cells, listed its own way; with ghosts: all cells, of which the others' are ghosts. */
-static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts, session_input *out)
+static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts,
+                               session_input *out)
 {
     extract_own_cells(&whole->part, distributed, SIDE, with_ghosts, &out->part);
     if (!with_ghosts) test_mesh_reorder_vertices(&out->part, 3 + (uint64_t)own_rank);

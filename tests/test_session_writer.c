@@ -116,7 +116,7 @@ static void simulation_goes_on_while_pictures_wait(void **state)
     unwritable = "b";
     set_gate(false);
     reported_everywhere(NULL, insitu_destroy(&session), INSITU_ERROR_IO, "cycle 0: image \"b\": b0.exr",
-                    "(and 3 more like it)");
+                        "(and 3 more like it)");
     everywhere(caught_count == (own_rank ? 0 : 4));
     input_free(&in);
 }

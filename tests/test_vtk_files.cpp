@@ -384,8 +384,9 @@ void cgns_cells_are_read_wherever_the_boundary_is_numbered(void **)
 void cgns_zones_with_wrong_numbers_are_refused(void **)
 {
     write_cgns_elements(folder + "/wrong.cgns", hexes(lattice::curved), cgns_order::gap);
-    expect_reported(why_refused("wrong.cgns"), "wrong.cgns: cannot be read: zone Base/Zone: its section \"Fluid\" has the "
-                                           "elements 22 to 81, expected them to begin with 21");
+    expect_reported(why_refused("wrong.cgns"),
+                    "wrong.cgns: cannot be read: zone Base/Zone: its section \"Fluid\" has the "
+                    "elements 22 to 81, expected them to begin with 21");
     write_cgns_elements(folder + "/wrong.cgns", hexes(lattice::curved), cgns_order::wall_first, 50);
     const std::string many = "zone Base/Zone: its sections of dimension 3 have 60 elements, expected its 50 cells";
     expect_reported(why_refused("wrong.cgns"), many);

@@ -47,7 +47,7 @@ static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64
 /* Coordinates along one axis of a uniform or rectilinear lattice. */
 typedef struct grid_axis {
     const double *axis_coordinates; /* coordinates, by index along the axis */
-    int64_t count;        /* number of coordinates */
+    int64_t count;                  /* number of coordinates */
     const grid_numbering *vertices;
     int axis;
 } grid_axis;
@@ -81,11 +81,11 @@ typedef struct grid_array {
     const char *data;
     int64_t stride; /* distance between elements in bytes; 0: all elements are the same one */
     bool is_wide;
-    bool is_integer;    /* elements must not be read as float or double: they are integers or odd */
-    unsigned char unusual_type;  /* one of the values of grid_unusual_type */
-    int64_t base;       /* for indices and offsets: the entry that means 0 */
-    int64_t implied_end_count; /* for offsets without the last entry: their number; else 0 */
-    int64_t implied_end;   /* the omitted last offset, counted from 0 */
+    bool is_integer;            /* elements must not be read as float or double: they are integers or odd */
+    unsigned char unusual_type; /* one of the values of grid_unusual_type */
+    int64_t base;               /* for indices and offsets: the entry that means 0 */
+    int64_t implied_end_count;  /* for offsets without the last entry: their number; else 0 */
+    int64_t implied_end;        /* the omitted last offset, counted from 0 */
     /* if not NULL, coordinates are computed from this axis by vertex number, and there is no data */
     const grid_axis *axis;
 } grid_array;
@@ -140,7 +140,7 @@ typedef struct grid_field {
     const struct grid_field *source_cells;
 } grid_field;
 
-#define GRID_READ_UNUSUAL(type)                                                                                            \
+#define GRID_READ_UNUSUAL(type)                                                                                        \
     {                                                                                                                  \
         type value;                                                                                                    \
         memcpy(&value, p, sizeof value);                                                                               \
@@ -241,7 +241,8 @@ static inline int grid_lattice_row_axis(const grid_lattice *l)
 static inline int64_t grid_lattice_first(const grid_lattice *l, int64_t cell)
 {
     int64_t first = 0;
-    for (int axis = 0; axis < 3; axis++) first += grid_index_along(&l->cell_numbering, axis, cell) * l->vertex_numbering.stride[axis];
+    for (int axis = 0; axis < 3; axis++)
+        first += grid_index_along(&l->cell_numbering, axis, cell) * l->vertex_numbering.stride[axis];
     return first;
 }
 
@@ -339,7 +340,8 @@ static inline bool grid_walk_next(grid_walk *w, int64_t *vertex)
 {
     if (!w->is_polyhedron) {
         if (w->next == w->end) return false;
-        *vertex = w->corner_offsets ? w->base + w->corner_offsets[w->next] : grid_array_index(&w->cells->connectivity, w->next);
+        *vertex = w->corner_offsets ? w->base + w->corner_offsets[w->next]
+                                    : grid_array_index(&w->cells->connectivity, w->next);
         w->next++;
         return true;
     }

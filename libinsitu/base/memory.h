@@ -14,8 +14,8 @@ void *base_alloc(size_t bytes);
 void *base_calloc(size_t count, size_t size);
 
 /* base_reserve() reserves address space for bytes that are not counted yet, because memory that has not been written to
- * is not used. base_set_used_bytes() sets the number of bytes in use and counts them. base_realloc() before base_set_used_bytes() does not
- * keep the contents. */
+ * is not used. base_set_used_bytes() sets the number of bytes in use and counts them. base_realloc() before
+ * base_set_used_bytes() does not keep the contents. */
 void *base_reserve(size_t bytes);
 void base_set_used_bytes(void *block, size_t bytes);
 

@@ -116,7 +116,8 @@ SIMD_INLINE kernel_doubles kernel_doubles_slope(int type, const kernel_doubles c
 
 /* Returns the difference between the derivative along axis a at the reference coordinates r and that at the domain's
  * centre, for a polynomial whose coefficients 4 to 7 are `bent`. */
-SIMD_INLINE kernel_doubles kernel_doubles_bend(int type, const kernel_doubles nonlinear_part[4], int a, const double r[3])
+SIMD_INLINE kernel_doubles kernel_doubles_bend(int type, const kernel_doubles nonlinear_part[4], int a,
+                                               const double r[3])
 {
     const double *centre = kernel_domain_of(type)->centre;
     const int next = (a + 1) % 3, last = (a + 2) % 3;
@@ -373,7 +374,8 @@ SIMD_INLINE void kernel_doubles_rate(const kernel_bounds_lanes *b, int type, con
     const kernel_doubles error_bound = kernel_doubles_sqrt(own) + speed * value * 5e-7 + 1e-6;
     const kernel_doubles domain_margin = 2 * ((face + error_bound) / rest) + 4e-6;
     const kernel_doubles_mask contracts = r->is_regular & (kernel_doubles_mask)(r->rise > 0) &
-                                          (kernel_doubles_mask)(rate < 0.9) & (kernel_doubles_mask)(domain_margin < 0.015625);
+                                          (kernel_doubles_mask)(rate < 0.9) &
+                                          (kernel_doubles_mask)(domain_margin < 0.015625);
     kernel_doubles_store(out->grow, half,
                          kernel_doubles_select(contracts, 1.0001 * rate / rest, kernel_doubles_set((double)INFINITY)));
     kernel_doubles_store(out->error_bound, half, error_bound);
@@ -398,7 +400,8 @@ SIMD_INLINE void kernel_doubles_contraction_of(const kernel_bounds_lanes *b, con
             -(b->inverse[i][0] * middle[0] + b->inverse[i][1] * middle[1] + b->inverse[i][2] * middle[2]);
         kernel_doubles_store(out->offset[i], half, offset);
         kernel_doubles_terms(type, b->nonlinear_part[i], terms);
-        for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_doubles_store(out->nonlinear_part[j][i], half, terms[j]);
+        for (int j = 0; j < kernel_nonlinear_count(type); j++)
+            kernel_doubles_store(out->nonlinear_part[j][i], half, terms[j]);
     }
     kernel_doubles_store(out->middle, half, middle[3]);
     kernel_doubles_terms(type, r->e + 4, terms);
@@ -487,8 +490,8 @@ SIMD_INLINE void kernel_doubles_bounds(const float at[4][8][SIMD_WIDTH], int hal
     length = kernel_doubles_sqrt(length), off = kernel_doubles_sqrt(off);
     const kernel_doubles whole = slant * stretch * (length + off);
     const kernel_doubles apart =
-        kernel_doubles_sqrt(most.along) +
-        slant * (kernel_doubles_sqrt(most.nonlinear_part) + theta * theta * stretch * (length + off) + (one + theta) * off);
+        kernel_doubles_sqrt(most.along) + slant * (kernel_doubles_sqrt(most.nonlinear_part) +
+                                                   theta * theta * stretch * (length + off) + (one + theta) * off);
     const kernel_doubles rise =
         kernel_doubles_abs(g[2]) - spread * (kernel_doubles_abs(g[0]) + kernel_doubles_abs(g[1]));
     const kernel_doubles least = kernel_doubles_select((kernel_doubles_mask)(whole < apart), whole, apart);
@@ -531,7 +534,7 @@ typedef struct kernel_curved {
     const float (*at)[8][SIMD_WIDTH];
     const float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
     const kernel_bounds *bounds;        /* NULL if the bounds of a single cell have not been computed yet */
-    struct kernel_curved_storage *room;    /* memory for the data and bounds of a single cell */
+    struct kernel_curved_storage *room; /* memory for the data and bounds of a single cell */
 } kernel_curved;
 
 /* Memory for a single cell, whose data are copied to all lanes. */

@@ -190,7 +190,7 @@ SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, 
 /* Computes the weights of the triangle i, j, k again on rays for which they are not accurate enough. least: an upper
  * bound of kernel_triangle_least() for the triangle, tested first. */
 SIMD_INLINE void kernel_weights_recompute(const kernel_packet *p, float least, vm hit, kernel_tile_position i,
-                                     kernel_tile_position j, kernel_tile_position k, kernel_weights *w)
+                                          kernel_tile_position j, kernel_tile_position k, kernel_weights *w)
 {
     if (!p->is_pencil) return;
     const vf weight = kernel_weight(w->ij, w->jk, w->ik);
@@ -297,7 +297,7 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
     kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]],
                                          edges->e[ijk[0]][ijk[2]]);
     kernel_weights_recompute(s->packet, c->least[0], hit, kernel_cell_position(c, w.i), kernel_cell_position(c, w.j),
-                        kernel_cell_position(c, w.k), &w);
+                             kernel_cell_position(c, w.k), &w);
     out->mask = hit;
     out->t = kernel_weighted_depth(&w, c->z);
     kernel_triangle_values(s, &w, out);

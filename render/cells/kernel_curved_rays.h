@@ -78,7 +78,7 @@ SIMD_INLINE vi kernel_curved_around(const kernel_curved_sides *sides, int type)
 /* Returns the rays that cross just one half of a quad, even if it does not look convex; the result does not depend on
  * which diagonal halves it. Adds the rays that may cross its patch twice to *alone. */
 SIMD_INLINE vm kernel_curved_cross_one_triangle(const kernel_projected *s, const kernel_curved_sides *sides,
-                                  const kernel_shape *shape, int face, vm rays, vm *alone)
+                                                const kernel_shape *shape, int face, vm rays, vm *alone)
 {
     vm side[4];
     kernel_quad_around(shape, face, sides, side);
@@ -136,8 +136,10 @@ SIMD_INLINE void kernel_curved_quad_gather(const kernel_transformed_curved *h, c
         const vi corner = word >> (4 * i) & 7;
         out->corner[i] = corner;
         q->z[i] = kernel_curved_gather_vertex(h->at[2], count, p->lane, corner);
-        q->x[i] = (kernel_curved_gather_vertex(h->at[0], count, p->lane, corner) - p->rays.origin_x) - p->rays.slope_x * q->z[i];
-        q->y[i] = (kernel_curved_gather_vertex(h->at[1], count, p->lane, corner) - p->rays.origin_y) - p->rays.slope_y * q->z[i];
+        q->x[i] = (kernel_curved_gather_vertex(h->at[0], count, p->lane, corner) - p->rays.origin_x) -
+                  p->rays.slope_x * q->z[i];
+        q->y[i] = (kernel_curved_gather_vertex(h->at[1], count, p->lane, corner) - p->rays.origin_y) -
+                  p->rays.slope_y * q->z[i];
         out->f[i] = kernel_curved_gather_vertex(h->at[3], count, p->lane, corner);
     }
 }
@@ -150,7 +152,8 @@ SIMD_INLINE void kernel_curved_quad_reference(int type, const kernel_curved_quad
     for (int a = 0; a < 3; a++) {
         vf at[4];
         for (int i = 0; i < 4; i++)
-            at[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, own->corner[i]);
+            at[i] =
+                kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, own->corner[i]);
         out->r[a] = (at[0] + place->s * (at[1] - at[0])) + place->r * (at[3] - at[0]);
     }
 }
@@ -163,7 +166,7 @@ typedef struct kernel_curved_triangle {
 
 /* Returns the rays on which the triangle's weights are not good enough. number: the triangle's, per ray. */
 SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
-                                           const kernel_curved_triangle *own)
+                                                 const kernel_curved_triangle *own)
 {
     const vf weight = kernel_weight(own->e[0], own->e[1], own->e[2]);
     return vm_and(rays, vf_lt(vf_abs(weight), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
@@ -171,8 +174,9 @@ SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved
 
 /* Computes edge functions in doubt, and those of weak weights, again from projected vertices. */
 static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(const kernel_transformed_curved *h,
-                                                                        const kernel_lane_rays *p, vm rays, vi number,
-                                                                        const vm doubt[3], kernel_curved_triangle *own)
+                                                                             const kernel_lane_rays *p, vm rays,
+                                                                             vi number, const vm doubt[3],
+                                                                             kernel_curved_triangle *own)
 {
     vf x[3], y[3], e[3];
     for (int i = 0; i < 3; i++) {
@@ -227,7 +231,8 @@ SIMD_INLINE void kernel_curved_triangle_reference(const kernel_transformed_curve
     for (int i = 0; i < 3; i++) v[i] = kernel_curved_gather_vertex(h->at[3], count, lane, own->corner[i]);
     out->value = kernel_curved_weighted_mean(own, v, inverse);
     for (int a = 0; a < 3; a++) {
-        for (int i = 0; i < 3; i++) v[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), count, a, own->corner[i]);
+        for (int i = 0; i < 3; i++)
+            v[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), count, a, own->corner[i]);
         out->r[a] = kernel_curved_weighted_mean(own, v, inverse);
     }
 }

@@ -398,7 +398,8 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
 /* Points, one per lane, each in the cell of its lane. */
 typedef struct kernel_local_points {
     vf y[3], r[3], nonlinear_part[KERNEL_BENT_TERMS][3];
-    kernel_nonlinear_terms bend;     /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
+    kernel_nonlinear_terms
+        bend;             /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
     vf column[3][3], det; /* columns of the adjugate of the derivatives' matrix, and 1 / its determinant in det */
 } kernel_local_points;
 
@@ -408,7 +409,8 @@ SIMD_INLINE void kernel_local_left(int type, const kernel_local_points *p, vf ou
 {
     for (int a = 0; a < 3; a++) {
         out[a] = p->y[a] - p->r[a];
-        for (int k = 0; k < kernel_nonlinear_count(type); k++) out[a] = vf_muladd(-p->nonlinear_part[k][a], p->bend.term[k], out[a]);
+        for (int k = 0; k < kernel_nonlinear_count(type); k++)
+            out[a] = vf_muladd(-p->nonlinear_part[k][a], p->bend.term[k], out[a]);
     }
 }
 

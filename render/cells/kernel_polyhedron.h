@@ -182,7 +182,7 @@ SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, k
 {
     const polyhedron *c = r->cell;
     kernel_weights_recompute(r->packet, c->least, hit, kernel_polyhedron_position(c, w->i),
-                        kernel_polyhedron_position(c, w->j), kernel_polyhedron_position(c, w->k), w);
+                             kernel_polyhedron_position(c, w->j), kernel_polyhedron_position(c, w->k), w);
 }
 
 /* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the unmended weights, which
@@ -275,7 +275,8 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
     kernel_quad_corners(&ranks, loop, corner);
     for (int i = 0; i < 4; i++) corner[i] = around[corner[i]];
     const bool has_corner = kernel_facet_has(&c->facets[first], corner[1]);
-    const int other_half = c->facets[first].other_half, half_of[2] = {has_corner ? first : other_half, has_corner ? other_half : first};
+    const int other_half = c->facets[first].other_half,
+              half_of[2] = {has_corner ? first : other_half, has_corner ? other_half : first};
     const polyhedron_facet *t[2] = {&c->facets[half_of[0]], &c->facets[half_of[1]]};
     kernel_triangle_crossings *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
     for (int half = 0; half < 2; half++) kernel_poly_facet(r, t[half], &w, m[half]);
@@ -461,7 +462,8 @@ static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool 
 SIMD_INLINE vm kernel_polyhedron_interval_contains(const kernel_polyhedron_interval *polyhedron_interval,
                                                    const kernel_triangle_crossings *sheet)
 {
-    const vm inside = vm_and(vf_lt(polyhedron_interval->interval.t_in, sheet->t), vf_lt(sheet->t, polyhedron_interval->interval.t_out));
+    const vm inside = vm_and(vf_lt(polyhedron_interval->interval.t_in, sheet->t),
+                             vf_lt(sheet->t, polyhedron_interval->interval.t_out));
     const vm within = vm_and(vf_lt(polyhedron_interval->in.t, sheet->t), vf_lt(sheet->t, polyhedron_interval->out.t));
     return vm_and(vm_and(polyhedron_interval->interval.mask, sheet->mask), vm_and(inside, within));
 }
@@ -508,7 +510,8 @@ SIMD_INLINE kernel_profile_piece kernel_profile_begin(const kernel_polyhedron_in
 
 /* Replaces *piece by the next linear piece of the field along each ray. v_out is the value at the end of the ray's
  * interval. */
-SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r, const kernel_polyhedron_interval *polyhedron_interval, vf v_out,
+SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r,
+                                     const kernel_polyhedron_interval *polyhedron_interval, vf v_out,
                                      kernel_profile_piece *piece)
 {
     vf t = polyhedron_interval->interval.t_out, v = v_out, w = polyhedron_interval->interval.w_out;
@@ -524,7 +527,8 @@ SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r, const kerne
 }
 
 /* Returns those of the given rays on which the field has further linear pieces behind the given one. */
-SIMD_INLINE vm kernel_profile_open(const kernel_polyhedron_interval *polyhedron_interval, const kernel_profile_piece *piece, vm mask)
+SIMD_INLINE vm kernel_profile_open(const kernel_polyhedron_interval *polyhedron_interval,
+                                   const kernel_profile_piece *piece, vm mask)
 {
     return vm_and(mask, vf_lt(piece->t1, polyhedron_interval->interval.t_out));
 }

@@ -236,7 +236,7 @@ SIMD_INLINE kernel_doubles kernel_doubles_root(const kernel_doubles_quadratic *c
 /* Computes the patch's point for the wanted rays in one half of the lanes. Each of these rays crosses one triangle.
  * Returns the rays for which one of the quadratics A and B vanishes, whose points must be computed one by one. */
 SIMD_INLINE kernel_doubles_mask kernel_doubles_single_point(const kernel_quad *quad, vm wanted, int half,
-                                                    kernel_quad_point *out)
+                                                            kernel_quad_point *out)
 {
     const kernel_doubles zero = {0}, one = zero + 1;
     kernel_doubles_quad q;
@@ -301,7 +301,8 @@ static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad
 
 /* Computes the points of the wanted rays that meet the patch twice: one in out[0], the other in out[1]. Returns these
  * rays. */
-static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_quad *q, vm wanted, kernel_quad_point out[2])
+static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_quad *q, vm wanted,
+                                                                 kernel_quad_point out[2])
 {
     unsigned found = 0;
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
@@ -389,7 +390,8 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
 }
 
 /* Computes the points of rays that meet no edge. The edge functions are computed from the projected corners. */
-static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const kernel_quad *q, vm wanted, kernel_quad_point *out)
+static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const kernel_quad *q, vm wanted,
+                                                                         kernel_quad_point *out)
 {
     kernel_quad own = *q;
     own.e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
@@ -542,7 +544,8 @@ typedef struct kernel_projected_edges {
     vf margin; /* upper bound of the rounding error of a cross product of two edges */
 } kernel_projected_edges;
 
-SIMD_INLINE void kernel_projected_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type, kernel_projected_edges *out)
+SIMD_INLINE void kernel_projected_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type,
+                                           kernel_projected_edges *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf middle[2], steep[2], reach[2], longest = vf_set(0);

@@ -164,7 +164,7 @@ SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf we
 
 /* Chooses as kernel_tets_choose() does, with edges projected again for rays whose weights are not good enough. */
 SIMD_INLINE kernel_ends kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
-                                                   bool has_colour)
+                                                     bool has_colour)
 {
     vf x[4], y[4];
     kernel_sums sums[4];
@@ -188,7 +188,7 @@ SIMD_INLINE kernel_ends kernel_tets_choose_in_double(const kernel_tets *t, vm ra
 
 /* As above. is_one is made a constant, because one packet in some has such weights. */
 static __attribute__((noinline, cold)) kernel_ends kernel_tets_recompute(const kernel_tets *t, vm rays,
-                                                                    const vf e[KERNEL_TET_EDGES], bool has_colour)
+                                                                         const vf e[KERNEL_TET_EDGES], bool has_colour)
 {
     const kernel_tets one = {.is_one = true, .packet = t->packet, .one = t->one};
     const kernel_tets several = {.lane_rays = t->lane_rays, .transformed = t->transformed};

@@ -11,8 +11,8 @@
 typedef struct polyhedron_facet {
     int vertex[3];
     int edge[3];
-    int quad;   /* number of the quad of which it is one half, or -1 */
-    int other_half;   /* number of the quad's other triangle, or -1 */
+    int quad;       /* number of the quad of which it is one half, or -1 */
+    int other_half; /* number of the quad's other triangle, or -1 */
     float sign; /* sign of the volume of the tet with the centre: 1; -1 if the tet is inverted; 0 if it has no volume */
 } polyhedron_facet;
 

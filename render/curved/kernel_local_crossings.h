@@ -189,16 +189,18 @@ SIMD_INLINE void kernel_local_corners_gather(const kernel_local_faces *f, const 
 {
     enum { WORDS = 2, HALF = KERNEL_LOCAL_ROW / 2 };
     const float *const first = pair ? pair->rows[0][0] : NULL, *const last = pair ? pair->rows[1][0] : NULL;
-    const vi word = pair ? vi_from_bits(vf_permute_pair(vf_load(first + WORDS * KERNEL_LOCAL_ROW),
-                                                        vf_load(last + WORDS * KERNEL_LOCAL_ROW), face | pair->second))
-                         : vi_from_bits(kernel_curved_gather_vertex(f->words, kernel_cell_shape(type)->face_count, lane, face));
+    const vi word =
+        pair ? vi_from_bits(vf_permute_pair(vf_load(first + WORDS * KERNEL_LOCAL_ROW),
+                                            vf_load(last + WORDS * KERNEL_LOCAL_ROW), face | pair->second))
+             : vi_from_bits(kernel_curved_gather_vertex(f->words, kernel_cell_shape(type)->face_count, lane, face));
     for (int i = 0; i < 4; i++) {
         out->vertex[i] = word >> (4 * i) & 7;
         for (int n = 0; n < 4; n++) {
             const int row = n / 2 * KERNEL_LOCAL_ROW;
-            out->at[i][n] = pair ? vf_permute_pair(vf_load(first + row), vf_load(last + row),
-                                                   (out->vertex[i] | pair->second) + n % 2 * HALF)
-                                 : kernel_curved_gather_vertex(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
+            out->at[i][n] = pair
+                                ? vf_permute_pair(vf_load(first + row), vf_load(last + row),
+                                                  (out->vertex[i] | pair->second) + n % 2 * HALF)
+                                : kernel_curved_gather_vertex(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
         }
     }
 }
@@ -275,9 +277,9 @@ SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int ty
     out->t = kernel_local_weighted_mean(e, inverse, i[2], j[2], k[2]);
     out->value = kernel_local_weighted_mean(e, inverse, i[3], j[3], k[3]);
     for (int a = 0; a < 3; a++)
-        out->r[a] =
-            kernel_local_weighted_mean(e, inverse, kernel_local_vertex_coordinate(type, a, c->vertex[0]),
-                               kernel_local_vertex_coordinate(type, a, c->vertex[1]), kernel_local_vertex_coordinate(type, a, c->vertex[2]));
+        out->r[a] = kernel_local_weighted_mean(e, inverse, kernel_local_vertex_coordinate(type, a, c->vertex[0]),
+                                               kernel_local_vertex_coordinate(type, a, c->vertex[1]),
+                                               kernel_local_vertex_coordinate(type, a, c->vertex[2]));
 }
 
 /* Computes the crossings of the rays in on_quad[n] with quads; the points of other rays are undefined. */

@@ -280,7 +280,8 @@ SIMD_INLINE void kernel_find_surface(kernel_finder *s, kernel_cell *c, int value
 /* Adds the fetched cell to the candidates if its values are visible in the volume. */
 SIMD_INLINE void kernel_find_volume(kernel_finder *s)
 {
-    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer)) kernel_add_whole_cell(s, &s->cell, s->source);
+    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer))
+        kernel_add_whole_cell(s, &s->cell, s->source);
 }
 
 /* ---- cells in lanes ---- */

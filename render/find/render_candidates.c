@@ -231,8 +231,8 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, pixel_rang
 /* The number of cells of some mesh parts, and the area of the picture that their bounding boxes cover. */
 typedef struct coverage {
     double cells;
-    double pixels; /* sum of the areas of the parts' boxes */
-    pixel_range all[2];   /* ranges of columns and rows that all boxes together cover */
+    double pixels;      /* sum of the areas of the parts' boxes */
+    pixel_range all[2]; /* ranges of columns and rows that all boxes together cover */
 } coverage;
 
 /* Measures the parts on which the field has ranges of values, or all parts if ranges is NULL. Returns false if a part

@@ -26,7 +26,7 @@ typedef struct kernel_hits {
     vf kind;
     int cut_count;           /* number of rows in `cut` */
     vf cut[KERNEL_MAX_CUTS]; /* row n holds the n-th crossing found of each ray, unsorted; +inf if a ray has fewer */
-    vm overflowed;              /* rays with more than KERNEL_MAX_CUTS crossings */
+    vm overflowed;           /* rays with more than KERNEL_MAX_CUTS crossings */
 } kernel_hits;
 
 static inline void kernel_hits_begin(kernel_hits *hits)

@@ -89,15 +89,15 @@ typedef struct kernel_steep {
 typedef struct kernel_preint_entry {
     int32_t before[4]; /* sums over all earlier bins */
     float own[4];
-    int32_t colour; /* colour at the bin's middle, 10 bits per channel */
-    float table_error;    /* variation of extinction and emission within the bin, as light */
+    int32_t colour;    /* colour at the bin's middle, 10 bits per channel */
+    float table_error; /* variation of extinction and emission within the bin, as light */
     float unused[2];
 } kernel_preint_entry;
 
 typedef struct kernel_preintegral {
-    int bin_count;             /* number of bins of equal width; one infinite entry before and one behind them */
+    int bin_count;                /* number of bins of equal width; one infinite entry before and one behind them */
     kernel_preint_entry *entries; /* bin_count + 2 */
-    float low, inverse;        /* value at which the first bin begins, and 1 / the width of a bin */
+    float low, inverse;           /* value at which the first bin begins, and 1 / the width of a bin */
     float depth_unit, light_unit;
     float colour_unit, colour_error;
     float bend_square, bend, bend_at_ends, contrast;

@@ -38,7 +38,7 @@ SIMD_INLINE vm kernel_visible_values_overlap_cells(const kernel_visible_values *
 }
 
 SIMD_INLINE bool kernel_node_is_visible(const kernel_visible_values *visible_values, const mmbvh_ranges *ranges,
-                                   int64_t node)
+                                        int64_t node)
 {
     float low, high;
     memcpy(&low, ranges->low + node * ranges->stride, sizeof low);

@@ -36,8 +36,8 @@ _Static_assert(SIMD_WIDTH *KERNEL_BATCH_PIXELS <= KERNEL_LIST_PIXELS, "a batch's
 
 typedef struct kernel_batch {
     const kernel_surface_cells *queued; /* the cells being traced */
-    kernel_transformed_tets tets;    /* transformed cells; f is the field minus the isovalue, scaled */
-    bool is_of_faces;                /* copy of the layer's is_of_faces */
+    kernel_transformed_tets tets;       /* transformed cells; f is the field minus the isovalue, scaled */
+    bool is_of_faces;                   /* copy of the layer's is_of_faces */
     bool has_normals;
     vf normal[3];
     kernel_pixel_list rays; /* list of rays to be traced */
@@ -151,7 +151,8 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
 
 /* ---- batches ---- */
 
-static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b, kernel_surface_cells *queued)
+static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b,
+                                                       kernel_surface_cells *queued)
 {
     const render_surface_layer *layer = t->surface->layer;
     /* Layers that need more of a hit than its depth and normal are traced cell by cell. */

@@ -162,8 +162,8 @@ SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, co
     return vf_lt(2.0f * most + error_bound, 0.999f * kernel_dot(s, s));
 }
 
-SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_ray *ray, vm rays, kernel_contracted *out,
-                                 int type)
+SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_ray *ray, vm rays,
+                                 kernel_contracted *out, int type)
 {
     const int terms = kernel_nonlinear_count(type);
     const vf over = 1.0f / ray->rise, t = (ray->level + c->middle) * over;

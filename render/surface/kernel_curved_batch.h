@@ -117,7 +117,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
         p->is_nearer = false;
         kernel_curved_ready(t, h, n);
         curved.lane = n;
-        kernel_cell_surface(p, &state, &h->cells[n], &curved, h->queued->value[n], vm_and(p->active, vm_from_bits(same)));
+        kernel_cell_surface(p, &state, &h->cells[n], &curved, h->queued->value[n],
+                            vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
     }
     return blocks;

@@ -133,8 +133,9 @@ typedef struct kernel_line_coverage {
 /* Computes which line is nearest to each hit, and the share of the pixel that it covers: 0 if the field is constant or
  * NaN. */
 static __attribute__((noinline)) kernel_line_coverage kernel_lines_cover(const kernel_frame *f, const kernel_tile *tile,
-                                                                 const kernel_surface *s, const kernel_rays *rays, vf t,
-                                                                 const kernel_line_field *at)
+                                                                         const kernel_surface *s,
+                                                                         const kernel_rays *rays, vf t,
+                                                                         const kernel_line_field *at)
 {
     const kernel_lines *l = &s->lines;
     const vf zero = vf_set(0), one = vf_set(1), *g = at->gradient, *n = at->normal;

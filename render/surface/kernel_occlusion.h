@@ -132,8 +132,8 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
     if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
     while (kernel_poly_next(&r, &polyhedron_interval)) {
         const vm changes = kernel_changes_sign(&polyhedron_interval.interval);
-        const vm wanted =
-            vm_and(kernel_is_near(p, &polyhedron_interval.interval), vm_or(changes, kernel_polyhedron_may_cross(p, c, &r, &polyhedron_interval)));
+        const vm wanted = vm_and(kernel_is_near(p, &polyhedron_interval.interval),
+                                 vm_or(changes, kernel_polyhedron_may_cross(p, c, &r, &polyhedron_interval)));
         if (vm_any(wanted)) kernel_occlusion_interval(p, o, wanted, &r, &polyhedron_interval);
     }
 }

@@ -519,7 +519,8 @@ typedef struct kernel_profile_walk {
     vf t, w;                    /* depth of the crossing that was found, and the colour field there */
 } kernel_profile_walk;
 
-static void kernel_profile_walk_begin(const kernel_polyhedron_interval *polyhedron_interval, vm rays, kernel_profile_walk *walk)
+static void kernel_profile_walk_begin(const kernel_polyhedron_interval *polyhedron_interval, vm rays,
+                                      kernel_profile_walk *walk)
 {
     const kernel_interval *i = &polyhedron_interval->interval;
     const vf zero = vf_set(0);
@@ -545,15 +546,17 @@ SIMD_INLINE void kernel_piece_select(vm rays, const kernel_profile_piece *from, 
  * face counts as a piece. A value inside the cell that equals the isovalue up to rounding is treated as if it were on
  * the side from which the ray comes: a ray may meet several sheets at one point, each with its own rounding, and their
  * signs would alternate. The values at the faces are not changed. */
-SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r, const kernel_polyhedron_interval *polyhedron_interval,
-                                           vm left, kernel_profile_walk *walk)
+SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r,
+                                           const kernel_polyhedron_interval *polyhedron_interval, vm left,
+                                           kernel_profile_walk *walk)
 {
     kernel_profile_piece next = walk->piece;
     const vf zero = vf_set(0);
     const vm inside = kernel_profile_open(polyhedron_interval, &next, left);
-    kernel_profile_next(r, polyhedron_interval, vf_select(inside, polyhedron_interval->u_out, polyhedron_interval->interval.v_out), &next);
-    const vm rounding =
-        vm_and(kernel_profile_open(polyhedron_interval, &next, inside), vf_le(vf_abs(next.v1), vf_set(KERNEL_ROOT_BAND)));
+    kernel_profile_next(r, polyhedron_interval,
+                        vf_select(inside, polyhedron_interval->u_out, polyhedron_interval->interval.v_out), &next);
+    const vm rounding = vm_and(kernel_profile_open(polyhedron_interval, &next, inside),
+                               vf_le(vf_abs(next.v1), vf_set(KERNEL_ROOT_BAND)));
     next.v1 = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v1);
     kernel_piece_select(left, &next, &walk->piece);
     return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(polyhedron_interval, &next, inside)));
@@ -566,8 +569,8 @@ SIMD_INLINE vf kernel_next_float(vf t)
 }
 
 /* Finds the next crossing of each open ray; returns the rays that have one. */
-static vm kernel_profile_walk_next(const kernel_poly_crossings *r, const kernel_polyhedron_interval *polyhedron_interval,
-                                   kernel_profile_walk *walk)
+static vm kernel_profile_walk_next(const kernel_poly_crossings *r,
+                                   const kernel_polyhedron_interval *polyhedron_interval, kernel_profile_walk *walk)
 {
     const vm jump = walk->jump_in;
     vm found = jump, left = vm_andnot(walk->open, jump);
@@ -669,8 +672,8 @@ static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *st
     while (kernel_poly_next(&r, &polyhedron_interval)) {
         const vm near = kernel_is_near(p, &polyhedron_interval.interval);
         if (!vm_any(near)) continue;
-        const vm wanted =
-            vm_and(near, vm_or(kernel_changes_sign(&polyhedron_interval.interval), kernel_polyhedron_may_cross(p, c, &r, &polyhedron_interval)));
+        const vm wanted = vm_and(near, vm_or(kernel_changes_sign(&polyhedron_interval.interval),
+                                             kernel_polyhedron_may_cross(p, c, &r, &polyhedron_interval)));
         if (vm_any(wanted)) kernel_polyhedron_cross(p, state, value, wanted, &r, &polyhedron_interval);
     }
 }

@@ -105,7 +105,8 @@ static void divide(const widening *w, const piece_range *whole, piece_range out[
         for (int n = 0; n < 2; n++) out[n] = node_range(w, mmbvh_node_ref(w->binary, whole->node) + n);
         return;
     }
-    const piece_range both[2] = {leaf_part(w, whole->first, half), leaf_part(w, whole->first + half, whole->count - half)};
+    const piece_range both[2] = {leaf_part(w, whole->first, half),
+                                 leaf_part(w, whole->first + half, whole->count - half)};
     memcpy(out, both, sizeof both);
 }
 

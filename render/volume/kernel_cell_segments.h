@@ -71,7 +71,7 @@ typedef struct kernel_bisection {
     const kernel_cell_interval *cell_interval;
     const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
     double u, v, slope, shift;   /* constants of the ray: at depth t it is at (u, v) * (slope * t + shift) */
-    kernel_exact_point in, out;         /* ends of the interval, at the crossings of the faces */
+    kernel_exact_point in, out;  /* ends of the interval, at the crossings of the faces */
     /* unit distances per t; length of the interval; share of the light that reaches the current subinterval */
     double per_t, length, light;
     int64_t *map_failures;
@@ -105,8 +105,8 @@ static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, doubl
     return out;
 }
 
-static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, const kernel_exact_point *a, const kernel_exact_point *b,
-                                       double share)
+static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, const kernel_exact_point *a,
+                                                     const kernel_exact_point *b, double share)
 {
     double guess[3];
     for (int n = 0; n < 3; n++) guess[n] = kernel_between(a->r[n], b->r[n], share);
@@ -115,7 +115,8 @@ static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, 
 
 /* Returns the point between a and b, whose values lie on either side of x, at which the field is x. It uses regula
  * falsi that halves the value at an end that stays (the Illinois method). */
-static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, const kernel_exact_point *a, const kernel_exact_point *b, double x)
+static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, const kernel_exact_point *a,
+                                                   const kernel_exact_point *b, double x)
 {
     kernel_exact_point low = *a, high = *b, at = *a;
     double low_v = low.v - x, high_v = high.v - x;
@@ -308,8 +309,9 @@ static kernel_medium_range kernel_subinterval_range(const kernel_bisection *h, c
 /* ---- segments ---- */
 
 /* Emits the subinterval as `subdivisions` equal segments. */
-static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_exact_point *from,
-                                    const kernel_exact_point *to, const double values[2], double subdivisions)
+static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane,
+                                    const kernel_exact_point *from, const kernel_exact_point *to,
+                                    const double values[2], double subdivisions)
 {
     float begin = (float)from->t;
     for (int n = 1; n <= (int)subdivisions; n++) {
@@ -418,8 +420,8 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
 /* Adds the segments of the rays' intervals from t0 to t1 by bisection; only those that begin in the window are kept. */
 static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_packet *p,
                                                                         const kernel_segment_state *state,
-                                                                        const kernel_cell_interval *cell_interval, vm rays,
-                                                                        vf t0, vf t1)
+                                                                        const kernel_cell_interval *cell_interval,
+                                                                        vm rays, vf t0, vf t1)
 {
     const kernel_interval *i = cell_interval->interval;
     const kernel_frame *f = p->frame;
@@ -448,7 +450,8 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
             h.in.r[a] = (double)i->r_in[a][n];
             h.out.r[a] = (double)i->r_out[a][n];
         }
-        if (!cell_interval->map && cell_interval->cell) h.in.v = h.out.v = kernel_double_domain(transfer, cell_interval->cell->values[0]);
+        if (!cell_interval->map && cell_interval->cell)
+            h.in.v = h.out.v = kernel_double_domain(transfer, cell_interval->cell->values[0]);
         const double whole = h.out.t - h.in.t;
         if (!(whole > 0)) continue;
         const double a = ((double)t0[n] - h.in.t) / whole, b = ((double)t1[n] - h.in.t) / whole;
@@ -476,8 +479,8 @@ typedef struct kernel_parts {
 } kernel_parts;
 
 /* Returns t at the n-th boundary between subintervals, and stores the field there in *value. */
-SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_cell_interval *cell_interval, const kernel_parts *s, vm rays,
-                                int n, vf *value)
+SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_cell_interval *cell_interval, const kernel_parts *s,
+                                vm rays, int n, vf *value)
 {
     const vm inner = vm_and(rays, vf_lt(vf_set((float)n), s->count));
     const vf t = vf_select(inner, s->t0 + s->cell_interval * (float)n, s->t1);
@@ -497,13 +500,14 @@ SIMD_INLINE vf kernel_parts_chord_offset(const kernel_parts *s, vm is_first, vm 
 }
 
 /* Adds a tet's interval from t0 to t1 as one segment, computed in double, if it begins in the window. */
-SIMD_INLINE void kernel_cell_interval_double(kernel_segment_state *state, const kernel_cell_interval *cell_interval, vm rays,
-                                             vf t0, vf t1)
+SIMD_INLINE void kernel_cell_interval_double(kernel_segment_state *state, const kernel_cell_interval *cell_interval,
+                                             vm rays, vf t0, vf t1)
 {
     const kernel_interval *i = cell_interval->interval;
     const kernel_precise_interval *precise = cell_interval->precise;
     const kernel_unit_segment whole = {precise->length, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
-    const kernel_unit_segment run = kernel_unit_segment_part(&whole, kernel_interval_fraction(i, t0), kernel_interval_fraction(i, t1));
+    const kernel_unit_segment run =
+        kernel_unit_segment_part(&whole, kernel_interval_fraction(i, t0), kernel_interval_fraction(i, t1));
     const kernel_interval sub = {.t_in = t0, .t_out = t1, .v_in = run.v_in, .v_out = run.v_out};
     const kernel_precise_interval own = {run.length, run.rest_in, run.rest_out};
     const vm mine = vm_and(vf_le(state->list->t_begin, t0), vf_lt(t0, state->list->t_end));
@@ -635,7 +639,8 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, k
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_cell_interval cell_interval = {.map = map, .cell = c};
     const int intervals = kernel_curved_intervals(p, c, p->active, list);
-    if (intervals && (map || state->pieces->has_rests)) kernel_cell_interval_bound(state, c->f, c->count, &cell_interval);
+    if (intervals && (map || state->pieces->has_rests))
+        kernel_cell_interval_bound(state, c->f, c->count, &cell_interval);
     for (int k = 0; k < intervals; k++) {
         cell_interval.interval = &list[k];
         kernel_cell_interval_integrate(p, state, &cell_interval);
@@ -651,7 +656,8 @@ SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *
 
 /* Sets the window's samples begin .. end - 1 that lie in the piece of the profile and in the interval. A sample that
  * another cell has already set keeps its value, as in kernel_fill(). */
-static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state, const kernel_polyhedron_interval *polyhedron_interval,
+static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state,
+                                   const kernel_polyhedron_interval *polyhedron_interval,
                                    const kernel_profile_piece *piece, int begin, int end)
 {
     kernel_samples *s = state->samples;
@@ -713,7 +719,8 @@ static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *stat
     kernel_poly_crossings r;
     kernel_polyhedron_interval polyhedron_interval;
     if (!c || !kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r, &polyhedron_interval)) kernel_polyhedron_interval_integrate(p, state, &r, &polyhedron_interval);
+    while (kernel_poly_next(&r, &polyhedron_interval))
+        kernel_polyhedron_interval_integrate(p, state, &r, &polyhedron_interval);
 }
 
 /* Adds the segments of a polyhedron: the pieces of the ray's profile, on which the field is exactly linear. */

@@ -172,7 +172,7 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
 /* A ray's position in a piece of the transfer function. */
 typedef struct kernel_piece_state {
     vf below, above; /* distances of the value to the piece's low and high end */
-    vf remaining;         /* remaining change of the value within this piece */
+    vf remaining;    /* remaining change of the value within this piece */
     vf left;         /* length of the ray over which this change takes place, in unit distances */
     vf shortest;     /* lower limit of a step's length, in unit distances */
     /* value at the end of the piece that the ray is approaching, and its rounding error; initially the value at the
@@ -200,8 +200,8 @@ SIMD_INLINE kernel_segment_constants kernel_segment_constants_of(const kernel_un
 }
 
 /* Sets the positions of the rays in `fresh`, which enter the piece with the given ends. */
-SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *piece_state, const kernel_segment_constants *constants, vm fresh,
-                                          const kernel_piece_ends *ends)
+SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *piece_state, const kernel_segment_constants *constants,
+                                          vm fresh, const kernel_piece_ends *ends)
 {
     const vf v = piece_state->edge, zero = vf_set(0);
     const vf below = vf_max((v - ends->low) + (piece_state->rest - ends->low_rest), zero);
@@ -215,7 +215,8 @@ SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *piece_state, const
     piece_state->left = vf_select(fresh, left, piece_state->left);
     piece_state->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, piece_state->shortest);
     piece_state->edge = vf_select(fresh, vf_select(constants->falling, ends->low, ends->high), piece_state->edge);
-    piece_state->rest = vf_select(fresh, vf_select(constants->falling, ends->low_rest, ends->high_rest), piece_state->rest);
+    piece_state->rest =
+        vf_select(fresh, vf_select(constants->falling, ends->low_rest, ends->high_rest), piece_state->rest);
     piece_state->is_last = vm_or(vm_andnot(piece_state->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
@@ -256,7 +257,8 @@ SIMD_INLINE void kernel_integration_step_limit(kernel_integration_step *st, vf l
     const vf zero = vf_set(0), one = vf_set(1), rise = vf_abs(st->rise), ratio = st->clear * KERNEL_STEP_RATIO;
     const vm nonlinear_part = vf_lt(ratio, rise);
     st->share = one;
-    if (vm_any(nonlinear_part)) st->share = vf_select(nonlinear_part, vf_min(vf_max(ratio / rise, shortest / left), one), one);
+    if (vm_any(nonlinear_part))
+        st->share = vf_select(nonlinear_part, vf_min(vf_max(ratio / rise, shortest / left), one), one);
     st->is_opaque = vm_and(vf_eq(st->clear, zero), vf_eq(rise, zero));
     const vf up = vf_max(st->share * st->rise, zero), clear = vf_max(st->clear - up, vf_set(KERNEL_TINY));
     const vf most = kernel_extinction(vf_min(st->opacity + up, one), clear), length = left * st->share;
@@ -333,7 +335,8 @@ SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_
         piece_state.remaining -= size;
         piece_state.left -= st.length;
         const vm through = vf_le(vf_set(1), st.share);
-        open = vm_and(vm_andnot(open, vm_and(through, piece_state.is_last)), vf_lt(vf_set(KERNEL_BLACK), light->transmittance));
+        open = vm_and(vm_andnot(open, vm_and(through, piece_state.is_last)),
+                      vf_lt(vf_set(KERNEL_BLACK), light->transmittance));
         fresh = vm_and(open, through);
         piece = vf_select(fresh, piece + constants.turn, piece);
     }

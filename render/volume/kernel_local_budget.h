@@ -80,8 +80,8 @@ typedef struct kernel_local_budget {
 /* ---- cells ---- */
 
 /* Sets the lanes' bounds from the values at their vertices. The ends of chords may lie outside the cell's values: those
- * of one chord by at most three sixteenths of the values' range (kernel_local_leaves_range()), those of several by a sixth of
- * the parabola's maximum, which is less than that range. */
+ * of one chord by at most three sixteenths of the values' range (kernel_local_leaves_range()), those of several by a
+ * sixth of the parabola's maximum, which is less than that range. */
 SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values)[SIMD_WIDTH], int type)
 {
     const kernel_pieces *t = b->pieces;

@@ -43,8 +43,8 @@
 typedef struct kernel_preint_end {
     /* place: position within the bin, 0 .. 1; it may be outside this range in the first and the last bin */
     vf value, bin, place;
-    vf own[4], table_error;     /* own: the bin's sums of extinction and emission; rough: the error bound of the bin */
-    vi before[4], colour; /* before: the sums of all earlier bins */
+    vf own[4], table_error; /* own: the bin's sums of extinction and emission; rough: the error bound of the bin */
+    vi before[4], colour;   /* before: the sums of all earlier bins */
 } kernel_preint_end;
 
 /* The light of a segment or of a subinterval of it, and bounds of its error. */
@@ -106,8 +106,8 @@ SIMD_INLINE vf kernel_preint_bend(const kernel_preintegral *t, vf v0, vf v1)
     return bend + vf_select(outside, vf_min(width * t->bend_at_ends, vf_set(t->contrast)), vf_set(0));
 }
 
-SIMD_INLINE void kernel_preint_between(const kernel_preintegral *t, const kernel_preint_end *a, const kernel_preint_end *b,
-                                    vf length, kernel_preint_subinterval *out)
+SIMD_INLINE void kernel_preint_between(const kernel_preintegral *t, const kernel_preint_end *a,
+                                       const kernel_preint_end *b, vf length, kernel_preint_subinterval *out)
 {
     const vf one = vf_set(1), bins = vf_abs(b->bin - a->bin);
     const vm same = vf_eq(a->bin, b->bin), rising = vf_lt(a->bin, b->bin);
@@ -139,9 +139,9 @@ SIMD_INLINE void kernel_preint_between(const kernel_preintegral *t, const kernel
 
 /* Integrates the segment in `count` subintervals of equal value ranges. Each ray has its own count, and so its result
  * does not depend on other lanes. */
-static __attribute__((noinline)) void kernel_preint_subdivide(const kernel_preintegral *t, const kernel_preint_end *from,
-                                                           vf v_out, vf length, vf count, int most,
-                                                           kernel_preint_subinterval *all)
+static __attribute__((noinline)) void kernel_preint_subdivide(const kernel_preintegral *t,
+                                                              const kernel_preint_end *from, vf v_out, vf length,
+                                                              vf count, int most, kernel_preint_subinterval *all)
 {
     const vf zero = vf_set(0), share = 1.0f / count, rise = (v_out - from->value) * share;
     kernel_preint_end ends[2] = {*from};
@@ -180,8 +180,9 @@ SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_preint_subinterv
 
 /* Integrates the rays for which one subinterval is not accurate enough. */
 static __attribute__((noinline)) void kernel_preint_finely(const kernel_pieces *pieces, vm rays,
-                                                        const kernel_preint_end *from, const kernel_unit_segment *run,
-                                                        const kernel_preint_subinterval *whole, kernel_light *light)
+                                                           const kernel_preint_end *from,
+                                                           const kernel_unit_segment *run,
+                                                           const kernel_preint_subinterval *whole, kernel_light *light)
 {
     const vf room = vf_max(whole->allowed - whole->table_error, vf_set(1e-30f));
     const vf wanted = vf_sqrt(vf_min(whole->error / room, vf_set(1e6f))) * 1.1f;
@@ -191,8 +192,9 @@ static __attribute__((noinline)) void kernel_preint_finely(const kernel_pieces *
         kernel_preint_subinterval subdivisions;
         const vf count = vf_select(few, 1.0f + vf_floor(wanted), vf_set(1));
         kernel_preint_subdivide(pieces->preintegral, from, run->v_out, run->length, count, (int)vf_reduce_max(count),
-                             &subdivisions);
-        const vm good = vm_and(few, vf_le(subdivisions.error + subdivisions.table_error, whole->allowed - whole->table_error));
+                                &subdivisions);
+        const vm good =
+            vm_and(few, vf_le(subdivisions.error + subdivisions.table_error, whole->allowed - whole->table_error));
         *light = kernel_light_select(good, &subdivisions, light);
         left = vm_andnot(rays, good);
     }
@@ -200,7 +202,7 @@ static __attribute__((noinline)) void kernel_preint_finely(const kernel_pieces *
     kernel_light exact = kernel_clear();
     kernel_integrate_apart(pieces, left, run, &exact);
     const kernel_preint_subinterval sub = {.colour = {exact.colour[0], exact.colour[1], exact.colour[2]},
-                                        .depth = exact.depth};
+                                           .depth = exact.depth};
     *light = kernel_light_select(left, &sub, light);
     light->transmittance = vf_select(left, exact.transmittance, light->transmittance);
 }

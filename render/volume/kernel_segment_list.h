@@ -400,8 +400,8 @@ SIMD_INLINE vm kernel_cell_interval_is_steep(const kernel_segment_state *state, 
 }
 
 /* Returns the rays whose values from low to high contain a step of the opacity. */
-SIMD_INLINE vm kernel_cell_interval_steps(const kernel_segment_state *state, const kernel_cell_interval *cell_interval, vf low,
-                                          vf high)
+SIMD_INLINE vm kernel_cell_interval_steps(const kernel_segment_state *state, const kernel_cell_interval *cell_interval,
+                                          vf low, vf high)
 {
     vm any = vm_none();
     for (int i = 0; i < cell_interval->step_count; i++) {
@@ -443,8 +443,8 @@ SIMD_INLINE vf kernel_cell_interval_curvature(const vf off[KERNEL_DEVIATION_SAMP
 }
 
 SIMD_INLINE void kernel_cell_interval_deviate(kernel_packet *p, const kernel_segment_state *state,
-                                              const kernel_cell_interval *cell_interval, vm rays, const kernel_interval *stretch,
-                                              kernel_cell_interval_deviation *out)
+                                              const kernel_cell_interval *cell_interval, vm rays,
+                                              const kernel_interval *stretch, kernel_cell_interval_deviation *out)
 {
     const vf t0 = stretch->t_in, length = stretch->t_out - t0, v0 = stretch->v_in, v1 = stretch->v_out;
     const kernel_transfer *transfer = &p->frame->volumes[state->volume];
@@ -540,8 +540,8 @@ SIMD_INLINE vf kernel_cell_interval_subdivisions(kernel_packet *p, const kernel_
         *halved = rays;
     }
     if (state->mixing > 0)
-        subdivisions = vf_max(
-            subdivisions, kernel_cell_interval_subdivisions_mixed(state, cell_interval, length, vf_abs(v1 - v0) + 2.0f * off));
+        subdivisions = vf_max(subdivisions, kernel_cell_interval_subdivisions_mixed(state, cell_interval, length,
+                                                                                    vf_abs(v1 - v0) + 2.0f * off));
     return vf_clamp(-vf_floor(-subdivisions), vf_set(1), most);
 }
 
@@ -586,7 +586,8 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *st
         const vm put = vm_andnot(open, cut);
         const kernel_fragments segment = {
             begin, end, {light.colour[0], light.colour[1], light.colour[2]}, light.transmittance, vf_set(0)};
-        kernel_emit(p, vm_and(put, kernel_fragment_is_visible(light.colour, light.transmittance)), FRAGMENT_VOLUME, &segment);
+        kernel_emit(p, vm_and(put, kernel_fragment_is_visible(light.colour, light.transmittance)), FRAGMENT_VOLUME,
+                    &segment);
         depth += vf_select(put, light.depth, vf_set(0));
         open = vm_andnot(open, vm_and(put, vm_or(vf_eq(to, one), vf_lt(vf_set(KERNEL_DARK_DEPTH), depth))));
         from = vf_select(put, to, from);

@@ -204,8 +204,8 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
         /* a bin without extinction has no rounding */
         const double rounding = 2 * (units[0] * contrast + units[1]) / width;
         e->table_error = (float)fmin((bin->high - bin->low) * 2 * contrast + bin->high * colour_change(bin) +
-                                   (bin->high > 0 ? rounding : 0),
-                               1e30);
+                                         (bin->high > 0 ? rounding : 0),
+                                     1e30);
         change = fmax(change, colour_change(bin));
     }
     out->depth_unit = (float)(units[0] / width);

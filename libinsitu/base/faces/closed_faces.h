@@ -33,8 +33,8 @@ typedef struct closed_faces {
     int *entry_vertices; /* vertex number of each entry */
     int *face_of;        /* face of each entry */
     int64_t *vertices;   /* index in the grid of each numbered vertex */
-    /* 1 or -1 per face: whether it is reversed; after closed_faces_orient_outward(), 1 if the face's vertices run around
-     * the outward normal */
+    /* 1 or -1 per face: whether it is reversed; after closed_faces_orient_outward(), 1 if the face's vertices run
+     * around the outward normal */
     int *orientation;
     int *piece; /* number of the connected piece to which each face belongs */
     closed_triangle *triangles;

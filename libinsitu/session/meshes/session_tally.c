@@ -415,7 +415,8 @@ static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int6
         tally_point(&t, box.lower);
         tally_point(&t, box.upper);
         for (int axis = 0; axis < 3; axis++) {
-            const double *at = g->lattice->axes[axis].axis_coordinates + grid_index_along(&g->lattice->cell_numbering, axis, cell);
+            const double *at =
+                g->lattice->axes[axis].axis_coordinates + grid_index_along(&g->lattice->cell_numbering, axis, cell);
             volume *= g->lattice->cells[axis] ? at[1] - at[0] : 0;
         }
         t.flat_count += volume == 0;

@@ -299,7 +299,8 @@ static void set_value_arrays(const session_mesh *mesh, session_field *field, con
 {
     const bool has_index = is_by_index(mesh, given), was_apart = field->given.components != NULL;
     if (is_other || field->has_index != has_index || field->given.corner_row != given->corner_row ||
-        field->given.values.type != given->values.type || field->values.unusual_type || field->component_arrays || was_apart)
+        field->given.values.type != given->values.type || field->values.unusual_type || field->component_arrays ||
+        was_apart)
         session_drop_copy(field);
     field->has_index = has_index;
     field->is_copy_stale = field->is_copy_stale || is_stale;
