@@ -236,8 +236,8 @@ static void verify_robust(count *c, const cubic *g, const truth *t, bool hit, lo
 
 typedef struct rates {
     count robust;
-    int64_t monotone; /* packets in whose cells the field is known to be monotone along all rays */
-    int64_t later;    /* further crossings that the robust search did not find, or found too many of */
+    int64_t monotone;          /* packets in whose cells the field is known to be monotone along all rays */
+    int64_t further_crossings; /* further crossings that the robust search did not find, or found too many of */
 } rates;
 
 static void verify_bundle(bundle *b, rates *r)
@@ -257,7 +257,7 @@ static void verify_bundle(bundle *b, rates *r)
             const truth truth = find_truth(&g, (long double)list[n].t_in[lane], (long double)list[n].t_out[lane]);
             verify_robust(&r->robust, &g, &truth, hit >> lane & 1, (long double)t[lane]);
             /* Crossings alternate, so their number is odd where the faces differ. */
-            if (((int)hits[lane] & 1) != (int)(vm_bits(change) >> lane & 1)) r->later++;
+            if (((int)hits[lane] & 1) != (int)(vm_bits(change) >> lane & 1)) r->further_crossings++;
         }
     }
 }
@@ -265,7 +265,7 @@ static void verify_bundle(bundle *b, rates *r)
 static void robust_misses_no_first_root(void **state)
 {
     (void)state;
-    rates r = {.later = 0};
+    rates r = {.further_crossings = 0};
     bundle b;
     for (int64_t n = 0; r.robust.rays < cubics; n++) {
         make_bundle(&b, n);
@@ -278,7 +278,7 @@ static void robust_misses_no_first_root(void **state)
     assert_true(r.monotone > cubics / 2000);
     assert_int_equal(r.robust.missed, 0);
     assert_int_equal(r.robust.off, 0);
-    assert_int_equal(r.later, 0);
+    assert_int_equal(r.further_crossings, 0);
     assert_int_equal(b.thread.map_failures, 0);
 }
 

@@ -28,7 +28,7 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
+enum { KERNEL_NONLINEAR_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
 
 /* Squares of the largest norm of the derivative of the map's nonlinear part: 0.78, and 0.89 for callers that bound the
  * error of the reference coordinates themselves. */
@@ -40,8 +40,8 @@ enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
 typedef struct kernel_local_cells {
     /* affine approximation y of the reference coordinates of a position X: y = inverse (X - origin) + offset */
     float origin[3][SIMD_WIDTH], inverse[3][3][SIMD_WIDTH], offset[3][SIMD_WIDTH];
-    float nonlinear_part[KERNEL_BENT_TERMS][3][SIMD_WIDTH];
-    float field[4 + KERNEL_BENT_TERMS][SIMD_WIDTH];
+    float nonlinear_part[KERNEL_NONLINEAR_TERMS][3][SIMD_WIDTH];
+    float field[4 + KERNEL_NONLINEAR_TERMS][SIMD_WIDTH];
     /* bounds, over all points inside the cell, of the affine approximation y of the reference coordinates */
     float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
     /* square of an upper bound of the Frobenius norm of n's derivative */
@@ -115,7 +115,7 @@ SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
 
 /* The nonlinear terms of a cell's map at given reference coordinates, and their derivatives along each of these. */
 typedef struct kernel_nonlinear_terms {
-    vf term[KERNEL_BENT_TERMS], along[KERNEL_BENT_TERMS][3];
+    vf term[KERNEL_NONLINEAR_TERMS], along[KERNEL_NONLINEAR_TERMS][3];
 } kernel_nonlinear_terms;
 
 SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], kernel_nonlinear_terms *b)
@@ -268,7 +268,7 @@ SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
 /* ---- cells ---- */
 
 /* Returns the square of the largest Frobenius norm of n's derivative over the cell's corners. */
-SIMD_INLINE vf kernel_local_bent(int type, const vf nonlinear_part[KERNEL_BENT_TERMS][3])
+SIMD_INLINE vf kernel_local_bent(int type, const vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3])
 {
     static const float corners[2][8][3] = {{{-0.5f, -0.5f, -0.5f},
                                             {0.5f, -0.5f, -0.5f},
@@ -365,7 +365,7 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
                                   kernel_local_cells *out)
 {
     const int count = grid_type_vertices(type), bends = kernel_nonlinear_count(type);
-    vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], nonlinear_part[KERNEL_BENT_TERMS][3];
+    vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
     for (int a = 0; a < 3; a++) {
         for (int n = 0; n < count; n++) at[a][n] = places[a][n] - places[a][0];
         kernel_local_terms(type, at[a], terms[a]);
@@ -397,7 +397,7 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
 
 /* Points, one per lane, each in the cell of its lane. */
 typedef struct kernel_local_points {
-    vf y[3], r[3], nonlinear_part[KERNEL_BENT_TERMS][3];
+    vf y[3], r[3], nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
     kernel_nonlinear_terms
         bend;             /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
     vf column[3][3], det; /* columns of the adjugate of the derivatives' matrix, and 1 / its determinant in det */

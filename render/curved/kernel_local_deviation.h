@@ -39,7 +39,7 @@ enum { KERNEL_DEVIATION_STEPS = 8 };
 /* Coefficients and error bounds of the nonlinear terms of each lane's cell. */
 typedef struct kernel_local_nonlinear {
     /* h: coefficients of the field's deviation from linear (the file's opening comment) */
-    float terms[KERNEL_BENT_TERMS][SIMD_WIDTH];
+    float terms[KERNEL_NONLINEAR_TERMS][SIMD_WIDTH];
     /* square of the upper bound of the derivative of the map's nonlinear part */
     float bend[SIMD_WIDTH];
     /* lower bound of the part of the field's deviation that is not visible at the three sampled places (the error E of
@@ -98,8 +98,8 @@ typedef struct kernel_local_chord {
     /* reference coordinates at the line's middle, and their difference between the line's ends */
     vf middle[3], span[3];
     /* the nonlinear terms' chords: value at the middle, and difference between the ends */
-    vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS];
-    vf nonlinear_part[KERNEL_BENT_TERMS][3], own[KERNEL_BENT_TERMS];
+    vf mean[KERNEL_NONLINEAR_TERMS], rise[KERNEL_NONLINEAR_TERMS];
+    vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3], own[KERNEL_NONLINEAR_TERMS];
     vf tolerance, residual_limit;
 } kernel_local_chord;
 
@@ -107,7 +107,7 @@ typedef struct kernel_local_iterate {
     vf r[3], residual[3], deviation;
 } kernel_local_iterate;
 
-SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_BENT_TERMS])
+SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_NONLINEAR_TERMS])
 {
     kernel_nonlinear_terms b;
     kernel_nonlinear_terms_at(type, r, &b);
@@ -126,7 +126,7 @@ SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
 SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const kernel_local_nonlinear *nonlinear,
                                        vi lane, const kernel_point ends[2], int type, kernel_local_chord *out)
 {
-    vf first[KERNEL_BENT_TERMS], last[KERNEL_BENT_TERMS];
+    vf first[KERNEL_NONLINEAR_TERMS], last[KERNEL_NONLINEAR_TERMS];
     kernel_local_bent_at(type, ends[0].r, first);
     kernel_local_bent_at(type, ends[1].r, last);
     for (int a = 0; a < 3; a++) {
@@ -147,7 +147,7 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
  * chord there. */
 SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, int type, kernel_local_iterate *p)
 {
-    vf term[KERNEL_BENT_TERMS];
+    vf term[KERNEL_NONLINEAR_TERMS];
     kernel_local_bent_at(type, p->r, term);
     for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(c->span[a], vf_set(u), c->middle[a]) - p->r[a];
     for (int k = 0; k < kernel_nonlinear_count(type); k++) {

@@ -261,7 +261,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
 }
 
 /* Adds the fetched cell to the candidates, with the pixels of its vertices' bounding box. */
-static __attribute__((noinline)) void kernel_add_whole_cell(kernel_finder *s, kernel_cell *c, uint32_t source)
+static __attribute__((noinline)) void kernel_add_cell_box(kernel_finder *s, kernel_cell *c, uint32_t source)
 {
     kernel_outline o;
     kernel_candidate candidate = {.cell = c->index, .source = source};
@@ -274,14 +274,13 @@ static __attribute__((noinline)) void kernel_add_whole_cell(kernel_finder *s, ke
 SIMD_INLINE void kernel_find_surface(kernel_finder *s, kernel_cell *c, int value)
 {
     if (c->is_finite && kernel_values_straddle(c->values, c->count, s->surface->layer->values[value]))
-        kernel_add_whole_cell(s, c, s->source + (uint32_t)value);
+        kernel_add_cell_box(s, c, s->source + (uint32_t)value);
 }
 
 /* Adds the fetched cell to the candidates if its values are visible in the volume. */
 SIMD_INLINE void kernel_find_volume(kernel_finder *s)
 {
-    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer))
-        kernel_add_whole_cell(s, &s->cell, s->source);
+    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer)) kernel_add_cell_box(s, &s->cell, s->source);
 }
 
 /* ---- cells in lanes ---- */

@@ -79,7 +79,7 @@ SIMD_INLINE void kernel_local_put(const kernel_local_segment_batch *b, int at, c
     if (__builtin_expect(kernel_segments_put(list, lane, s, &precise), 1)) return;
     const kernel_unit_segment run =
         kernel_unit_segment_of((vf_set(s->t_out) - s->t_in) * list->per_t, vf_set(s->v_in), vf_set(s->v_out));
-    kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->heap);
+    kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->unsorted_light);
 }
 
 /* Coefficients of a polynomial that is zero at u = -1/2 and 1/2. kernel_local_deviation() returns its value at u,

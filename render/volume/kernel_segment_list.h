@@ -49,7 +49,7 @@ typedef struct kernel_segments {
     kernel_double_rays rays;
     /* Light of the segments that do not fit into a list because too many begin at the same t, as in meshes that overlap
      * many times. Such segments have no order; they are integrated here at once, and blended behind the window. */
-    kernel_light heap;
+    kernel_light unsorted_light;
     vf t_begin, t_end; /* depth interval of each ray's window */
     bool is_shortened; /* set when t_end has been lowered since the flag was last cleared */
     vf per_t;          /* number of unit distances (of the transfer function) per unit of t on each ray */
@@ -161,11 +161,11 @@ static void kernel_items_sort(kernel_segments *list, int lane)
     }
 }
 
-SIMD_INLINE void kernel_heap_clear(kernel_light *heap, int lane)
+SIMD_INLINE void kernel_heap_clear(kernel_light *unsorted_light, int lane)
 {
-    for (int a = 0; a < 3; a++) heap->colour[a][lane] = 0;
-    heap->depth[lane] = 0;
-    heap->transmittance[lane] = 1;
+    for (int a = 0; a < 3; a++) unsorted_light->colour[a][lane] = 0;
+    unsorted_light->depth[lane] = 0;
+    unsorted_light->transmittance[lane] = 1;
 }
 
 /* Makes space in a full list: the window ends at the begin of one of its farther segments, and all segments from there
@@ -182,7 +182,7 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
         list->t_end[lane] = simd_max(s->t_in, first);
         if (s->t_in < first) {
             list->count[lane] = 0;
-            kernel_heap_clear(&list->heap, lane);
+            kernel_heap_clear(&list->unsorted_light, lane);
         }
     } else {
         while (items[count].t_in == first) count++;
@@ -237,7 +237,7 @@ SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segment
         if (precise)
             run = (kernel_unit_segment){precise->length * list->per_t, i->v_in, i->v_out, precise->rest_in,
                                         precise->rest_out};
-        kernel_integrate(pieces, vm_from_bits(left), &run, &list->heap);
+        kernel_integrate(pieces, vm_from_bits(left), &run, &list->unsorted_light);
     }
 }
 

@@ -120,19 +120,20 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         else
             kernel_blend_light(b, has, t_in, t_out, &light);
     }
-    const vm heaped = kernel_fragment_is_visible(list->heap.colour, list->heap.transmittance);
+    const vm heaped = kernel_fragment_is_visible(list->unsorted_light.colour, list->unsorted_light.transmittance);
     if (!vm_any(heaped)) return;
     if (p->frame->job->reproducible)
-        kernel_blend_separate(p, b, heaped, b->t_last, b->t_last, list->heap.colour, list->heap.transmittance);
+        kernel_blend_separate(p, b, heaped, b->t_last, b->t_last, list->unsorted_light.colour,
+                              list->unsorted_light.transmittance);
     else
-        kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
+        kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->unsorted_light);
 }
 
 /* Begins a window at list->t_begin with empty lists. t_end: depth at which each ray's window ends. */
 SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 {
     memset(list->count, 0, sizeof list->count);
-    list->heap = kernel_clear();
+    list->unsorted_light = kernel_clear();
     list->t_end = t_end;
     list->is_shortened = false;
 }
