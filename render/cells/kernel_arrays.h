@@ -333,7 +333,7 @@ SIMD_INLINE vf kernel_raw_minus(const kernel_numbers *c, const kernel_raw_number
 {
     vf out;
     if (kernel_numbers_are_narrow(c)) return (v->narrow - level->middle) - level->rest;
-    for (int half = 0; half < 2; half++) kernel_doubles_store_lanes(&out, half, v->wide.half[half] - level->value);
+    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v->wide.half[half] - level->value);
     return out;
 }
 

@@ -52,7 +52,7 @@ typedef struct kernel_double_cell {
 
 /* The (u, v) of a packet's rays in double, relative to the tile's centre. */
 typedef struct kernel_double_rays {
-    kernel_doubles u[2], v[2];
+    kernel_f64 u[2], v[2];
 } kernel_double_rays;
 
 SIMD_INLINE kernel_precise_interval kernel_precise_interval_of(const kernel_interval *i)

@@ -63,28 +63,27 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
 
 /* Points at which rays meet a face's plane. is_sound: the face is not seen edge on. */
 typedef struct kernel_double_end {
-    kernel_doubles t, v;
-    kernel_doubles_mask is_sound;
+    kernel_f64 t, v;
+    kernel_f64_mask is_sound;
 } kernel_double_end;
 
-SIMD_INLINE kernel_doubles kernel_affine_at(const kernel_affine *a, kernel_doubles u, kernel_doubles v)
+SIMD_INLINE kernel_f64 kernel_affine_at(const kernel_affine *a, kernel_f64 u, kernel_f64 v)
 {
     return (a->c[0] + a->c[1] * u) + a->c[2] * v;
 }
 
-SIMD_INLINE kernel_double_end kernel_double_intersect(const kernel_double_face *face, kernel_doubles u,
-                                                      kernel_doubles v)
+SIMD_INLINE kernel_double_end kernel_double_intersect(const kernel_double_face *face, kernel_f64 u, kernel_f64 v)
 {
-    const kernel_doubles weight = kernel_affine_at(&face->weight, u, v), inverse = 1.0 / weight;
+    const kernel_f64 weight = kernel_affine_at(&face->weight, u, v), inverse = 1.0 / weight;
     return (kernel_double_end){kernel_affine_at(&face->depth, u, v) * inverse,
                                kernel_affine_at(&face->value, u, v) * inverse,
-                               (kernel_doubles_mask)(weight * weight > face->least * face->least)};
+                               (kernel_f64_mask)(weight * weight > face->least * face->least)};
 }
 
-SIMD_INLINE void kernel_double_select(kernel_doubles_mask m, const kernel_double_end *from, kernel_double_end *to)
+SIMD_INLINE void kernel_double_select(kernel_f64_mask m, const kernel_double_end *from, kernel_double_end *to)
 {
-    to->t = kernel_doubles_select(m, from->t, to->t);
-    to->v = kernel_doubles_select(m, from->v, to->v);
+    to->t = kernel_f64_select(m, from->t, to->t);
+    to->v = kernel_f64_select(m, from->v, to->v);
     to->is_sound = (from->is_sound & m) | (to->is_sound & ~m);
 }
 
@@ -94,10 +93,10 @@ typedef struct kernel_double_lanes {
         rest_out[SIMD_WIDTH];
 } kernel_double_lanes;
 
-SIMD_INLINE void kernel_double_value(kernel_doubles value, float *v, float *rest)
+SIMD_INLINE void kernel_double_value(kernel_f64 value, float *v, float *rest)
 {
-    const kernel_doubles_floats rounded = kernel_doubles_narrow(value);
-    const kernel_doubles_floats lost = kernel_doubles_narrow(value - kernel_doubles_widen(rounded));
+    const kernel_f64_floats rounded = kernel_f64_narrow(value);
+    const kernel_f64_floats lost = kernel_f64_narrow(value - kernel_f64_widen(rounded));
     memcpy(v, &rounded, sizeof rounded);
     memcpy(rest, &lost, sizeof lost);
 }
@@ -106,21 +105,21 @@ SIMD_INLINE void kernel_double_half(const kernel_double_cell *cell, const kernel
                                     int half, kernel_double_lanes *out)
 {
     kernel_double_end first = {0}, last = {0};
-    kernel_doubles_mask met = {0};
+    kernel_f64_mask met = {0};
     const int lane = half * KERNEL_HALF;
     for (int n = 0; n < 4; n++) {
-        const kernel_doubles_mask m = kernel_doubles_of_mask(hit[n], half);
+        const kernel_f64_mask m = kernel_f64_of_mask(hit[n], half);
         const kernel_double_end end = kernel_double_intersect(&cell->faces[n], rays->u[half], rays->v[half]);
         kernel_double_select(m & ~met, &end, &first);
         kernel_double_select(m & met, &end, &last);
         met |= m;
     }
-    const kernel_doubles_mask swap = (kernel_doubles_mask)(last.t < first.t);
+    const kernel_f64_mask swap = (kernel_f64_mask)(last.t < first.t);
     const kernel_double_end nearer = first;
     kernel_double_select(swap, &last, &first);
     kernel_double_select(swap, &nearer, &last);
-    const kernel_doubles_floats length = kernel_doubles_narrow(last.t - first.t);
-    const kernel_doubles_floats sound = __builtin_convertvector(first.is_sound & last.is_sound, kernel_doubles_floats);
+    const kernel_f64_floats length = kernel_f64_narrow(last.t - first.t);
+    const kernel_f64_floats sound = __builtin_convertvector(first.is_sound & last.is_sound, kernel_f64_floats);
     memcpy(out->length + lane, &length, sizeof length);
     memcpy(out->is_sound + lane, &sound, sizeof sound);
     kernel_double_value(first.v, out->v_in + lane, out->rest_in + lane);

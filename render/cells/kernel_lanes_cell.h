@@ -18,14 +18,14 @@ SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile
 {
     const double *eye = f->job->camera.eye;
     for (int half = 0; half < 2; half++) {
-        kernel_doubles d[3], at[3];
+        kernel_f64 d[3], at[3];
         for (int a = 0; a < 3; a++) d[a] = world[a]->half[half] - eye[a];
         for (int a = 0; a < 3; a++)
             at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
-        const kernel_doubles depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
-        kernel_doubles_store_lanes(&out[0], half, at[0] - tile->centre_x * depth);
-        kernel_doubles_store_lanes(&out[1], half, at[1] - tile->centre_y * depth);
-        kernel_doubles_store_lanes(&out[2], half, at[2] - tile->depth_shift);
+        const kernel_f64 depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
+        kernel_f64_store_lanes(&out[0], half, at[0] - tile->centre_x * depth);
+        kernel_f64_store_lanes(&out[1], half, at[1] - tile->centre_y * depth);
+        kernel_f64_store_lanes(&out[2], half, at[2] - tile->depth_shift);
     }
 }
 
@@ -35,19 +35,19 @@ SIMD_INLINE void kernel_lanes_relative(const kernel_wide_doubles *values, int co
                                        vf *out)
 {
     for (int half = 0; half < 2; half++) {
-        kernel_doubles isovalue, v[8], largest = {0};
+        kernel_f64 isovalue, v[8], largest = {0};
         memcpy(&isovalue, isovalues + half * KERNEL_HALF, sizeof isovalue);
         for (int i = 0; i < count; i++) {
             v[i] = values[i].half[half] - isovalue;
-            largest = kernel_doubles_max(kernel_doubles_abs(v[i]), largest);
+            largest = kernel_f64_max(kernel_f64_abs(v[i]), largest);
         }
         /* The exponent of the largest value, limited so that its negation gives a normal number. */
-        kernel_doubles_mask exponent = (kernel_doubles_mask)largest >> 52;
-        const kernel_doubles_mask low = exponent < 23;
-        const kernel_doubles_mask high = exponent > 2023;
+        kernel_f64_mask exponent = (kernel_f64_mask)largest >> 52;
+        const kernel_f64_mask low = exponent < 23;
+        const kernel_f64_mask high = exponent > 2023;
         exponent = (low & 23) | (high & 2023) | (exponent & ~(low | high));
-        const kernel_doubles scale = (kernel_doubles)((2046 - exponent) << 52);
-        for (int i = 0; i < count; i++) kernel_doubles_store_lanes(&out[i], half, v[i] * scale);
+        const kernel_f64 scale = (kernel_f64)((2046 - exponent) << 52);
+        for (int i = 0; i < count; i++) kernel_f64_store_lanes(&out[i], half, v[i] * scale);
     }
 }
 
@@ -71,14 +71,14 @@ SIMD_INLINE void kernel_lanes_line(const kernel_frame *f, const vf a[3], const v
 {
     const bool flat = f->job->camera.is_orthographic;
     for (int half = 0; half < 2; half++) {
-        const kernel_doubles ax = kernel_doubles_of(&a[0], half), ay = kernel_doubles_of(&a[1], half);
-        const kernel_doubles bx = kernel_doubles_of(&b[0], half), by = kernel_doubles_of(&b[1], half);
-        kernel_doubles da = kernel_doubles_of(&a[2], half) + f->depth_shift;
-        kernel_doubles db = kernel_doubles_of(&b[2], half) + f->depth_shift;
-        if (flat) da = db = (kernel_doubles){0} + 1;
-        kernel_doubles_store_lanes(&line[0], half, ax * by - bx * ay);
-        kernel_doubles_store_lanes(&line[1], half, db * ay - da * by);
-        kernel_doubles_store_lanes(&line[2], half, da * bx - db * ax);
+        const kernel_f64 ax = kernel_f64_of(&a[0], half), ay = kernel_f64_of(&a[1], half);
+        const kernel_f64 bx = kernel_f64_of(&b[0], half), by = kernel_f64_of(&b[1], half);
+        kernel_f64 da = kernel_f64_of(&a[2], half) + f->depth_shift;
+        kernel_f64 db = kernel_f64_of(&b[2], half) + f->depth_shift;
+        if (flat) da = db = (kernel_f64){0} + 1;
+        kernel_f64_store_lanes(&line[0], half, ax * by - bx * ay);
+        kernel_f64_store_lanes(&line[1], half, db * ay - da * by);
+        kernel_f64_store_lanes(&line[2], half, da * bx - db * ax);
     }
 }
 

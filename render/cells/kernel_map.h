@@ -76,7 +76,7 @@ SIMD_INLINE void kernel_polynomial_fit(double out[8], int type, const double v[G
 }
 
 /* Computes the polynomials of SIMD_WIDTH / 2 cells from the numbers v at their vertices. */
-SIMD_INLINE void kernel_doubles_fit(int type, kernel_doubles c[8], const kernel_doubles v[8])
+SIMD_INLINE void kernel_f64_fit(int type, kernel_f64 c[8], const kernel_f64 v[8])
 {
     KERNEL_FIT(type, c, v);
 }
@@ -156,7 +156,7 @@ typedef struct kernel_map {
     float tolerance; /* a Newton step smaller than it is the last */
     vf origin[3];    /* vertex 0 in tile space */
     vf position[3][8], field[8];
-    kernel_doubles exact[2][4][8]; /* the coefficients of positions and field in double, by halves of the lanes */
+    kernel_f64 exact[2][4][8]; /* the coefficients of positions and field in double, by halves of the lanes */
 } kernel_map;
 
 /* Computes the map of each ray's own cell. at: x, y, z and the field by vertex, in vectors whose lanes are cells; lane:
@@ -171,12 +171,12 @@ SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kerne
         for (int i = 0; i < count; i++) v[i] = kernel_gather_lane(at[n][i], lane);
         if (n < 3) out->origin[n] = v[0];
         for (int half = 0; half < 2; half++) {
-            kernel_doubles d[8], *const e = out->exact[half][n];
-            for (int i = 0; i < count; i++) d[i] = kernel_doubles_of(&v[i], half);
+            kernel_f64 d[8], *const e = out->exact[half][n];
+            for (int i = 0; i < count; i++) d[i] = kernel_f64_of(&v[i], half);
             if (n < 3)
                 for (int i = count - 1; i >= 0; i--) d[i] -= d[0];
-            kernel_doubles_fit(type, e, d);
-            for (int i = 0; i < 8; i++) kernel_doubles_store_lanes(&c[i], half, e[i]);
+            kernel_f64_fit(type, e, d);
+            for (int i = 0; i < 8; i++) kernel_f64_store_lanes(&c[i], half, e[i]);
         }
     }
 }
@@ -209,10 +209,10 @@ SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi la
     vf v[8];
     for (int i = 0; i < count; i++) v[i] = kernel_gather_lane(values[i], lane);
     for (int half = 0; half < 2; half++) {
-        kernel_doubles d[8], e[8];
-        for (int i = 0; i < count; i++) d[i] = kernel_doubles_of(&v[i], half);
-        kernel_doubles_fit(type, e, d);
-        for (int i = 0; i < 8; i++) kernel_doubles_store_lanes(&c[i], half, e[i]);
+        kernel_f64 d[8], e[8];
+        for (int i = 0; i < count; i++) d[i] = kernel_f64_of(&v[i], half);
+        kernel_f64_fit(type, e, d);
+        for (int i = 0; i < 8; i++) kernel_f64_store_lanes(&c[i], half, e[i]);
     }
 }
 

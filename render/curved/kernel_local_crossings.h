@@ -39,24 +39,23 @@ typedef struct kernel_local_faces {
  * their order. Coordinates are compared in double. */
 SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int count, vf rank[8])
 {
-    kernel_doubles sum[2][8] = {0};
+    kernel_f64 sum[2][8] = {0};
     for (int half = 0; half < 2; half++) {
-        kernel_doubles at[3][8];
+        kernel_f64 at[3][8];
         for (int a = 0; a < 3; a++)
             for (int i = 0; i < count; i++) memcpy(&at[a][i], world[a][i] + half * KERNEL_HALF, sizeof at[a][i]);
         for (int i = 0; i < count; i++)
             for (int j = i + 1; j < count; j++) {
-                kernel_doubles_mask after = (kernel_doubles_mask)(at[2][j] < at[2][i]);
+                kernel_f64_mask after = (kernel_f64_mask)(at[2][j] < at[2][i]);
                 for (int a = 1; a >= 0; a--)
-                    after = (kernel_doubles_mask)(at[a][j] < at[a][i]) |
-                            ((kernel_doubles_mask)(at[a][j] == at[a][i]) & after);
-                const kernel_doubles one = kernel_doubles_select(after, (kernel_doubles){0} + 1, (kernel_doubles){0});
+                    after = (kernel_f64_mask)(at[a][j] < at[a][i]) | ((kernel_f64_mask)(at[a][j] == at[a][i]) & after);
+                const kernel_f64 one = kernel_f64_select(after, (kernel_f64){0} + 1, (kernel_f64){0});
                 sum[half][i] += one;
                 sum[half][j] += 1 - one;
             }
     }
     for (int i = 0; i < count; i++)
-        for (int half = 0; half < 2; half++) kernel_doubles_store_lanes(&rank[i], half, sum[half][i]);
+        for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&rank[i], half, sum[half][i]);
 }
 
 /* Does one step of a transposition of 16 × 16 floats, after vf_transpose() has transposed the 4 × 4 blocks: exchanges

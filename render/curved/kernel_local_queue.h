@@ -118,11 +118,11 @@ SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scal
     vm finite = vm_all_lanes();
     for (int i = 0; i < count; i++) {
         for (int half = 0; half < 2; half++) {
-            kernel_doubles v;
+            kernel_f64 v;
             memcpy(&v, scalars[i] + half * KERNEL_HALF, sizeof v);
-            kernel_doubles_store_lanes(&odd, half, v - v);
-            kernel_doubles_store_lanes(&plain[i], half, kernel_doubles_clamp(v, 3e38));
-            kernel_doubles_store_lanes(&values[i], half, kernel_doubles_clamp((v - t->low) * t->inverse_width, 1e18));
+            kernel_f64_store_lanes(&odd, half, v - v);
+            kernel_f64_store_lanes(&plain[i], half, kernel_f64_clamp(v, 3e38));
+            kernel_f64_store_lanes(&values[i], half, kernel_f64_clamp((v - t->low) * t->inverse_width, 1e18));
         }
         finite = vm_and(finite, vf_eq(odd, odd));
     }

@@ -1,4 +1,4 @@
-/* Vectors of doubles, and permutations that give each ray the numbers of its own cell. A kernel_doubles has SIMD_WIDTH
+/* Vectors of doubles, and permutations that give each ray the numbers of its own cell. A kernel_f64 has SIMD_WIDTH
  * / 2 doubles and fills one register; compilers split larger vectors and compare their lanes one by one. */
 #ifndef RENDER_KERNEL_WIDE_H
 #define RENDER_KERNEL_WIDE_H
@@ -9,9 +9,9 @@
 #include "simd.h"
 
 enum { KERNEL_HALF = SIMD_WIDTH / 2 };
-typedef vd kernel_doubles;
-typedef int64_t kernel_doubles_mask __attribute__((vector_size(8 * KERNEL_HALF)));
-typedef float kernel_doubles_floats __attribute__((vector_size(4 * KERNEL_HALF)));
+typedef vd kernel_f64;
+typedef int64_t kernel_f64_mask __attribute__((vector_size(8 * KERNEL_HALF)));
+typedef float kernel_f64_floats __attribute__((vector_size(4 * KERNEL_HALF)));
 
 /* Returns of[lane] for each ray, where `lane` is the lane that holds the ray's cell. */
 SIMD_INLINE vf kernel_gather_lane(const float *of, vi lane)
@@ -19,53 +19,53 @@ SIMD_INLINE vf kernel_gather_lane(const float *of, vi lane)
     return vf_permute(vf_load(of), lane);
 }
 
-SIMD_INLINE kernel_doubles kernel_doubles_widen(kernel_doubles_floats v)
+SIMD_INLINE kernel_f64 kernel_f64_widen(kernel_f64_floats v)
 {
-    return __builtin_convertvector(v, kernel_doubles);
+    return __builtin_convertvector(v, kernel_f64);
 }
 
-SIMD_INLINE kernel_doubles_floats kernel_doubles_narrow(kernel_doubles v)
+SIMD_INLINE kernel_f64_floats kernel_f64_narrow(kernel_f64 v)
 {
-    return __builtin_convertvector(v, kernel_doubles_floats);
+    return __builtin_convertvector(v, kernel_f64_floats);
 }
 
 /* Returns the first half (0) or the second half (1) of a mask's lanes. */
-SIMD_INLINE kernel_doubles_mask kernel_doubles_of_mask(vm m, int half)
+SIMD_INLINE kernel_f64_mask kernel_f64_of_mask(vm m, int half)
 {
-    typedef int32_t kernel_doubles_ints __attribute__((vector_size(4 * KERNEL_HALF)));
+    typedef int32_t kernel_f64_ints __attribute__((vector_size(4 * KERNEL_HALF)));
     int32_t lanes[SIMD_WIDTH];
-    kernel_doubles_ints ints;
+    kernel_f64_ints ints;
     const vi all = (vi)vf_select(m, (vf)vi_set(-1), (vf)vi_set(0));
     memcpy(lanes, &all, sizeof all);
     memcpy(&ints, lanes + half * KERNEL_HALF, sizeof ints);
-    return __builtin_convertvector(ints, kernel_doubles_mask);
+    return __builtin_convertvector(ints, kernel_f64_mask);
 }
 
-SIMD_INLINE kernel_doubles kernel_doubles_select(kernel_doubles_mask m, kernel_doubles a, kernel_doubles b)
+SIMD_INLINE kernel_f64 kernel_f64_select(kernel_f64_mask m, kernel_f64 a, kernel_f64 b)
 {
-    return (kernel_doubles)(((kernel_doubles_mask)a & m) | ((kernel_doubles_mask)b & ~m));
+    return (kernel_f64)(((kernel_f64_mask)a & m) | ((kernel_f64_mask)b & ~m));
 }
 
 /* Returns the first half (0) or the second half (1) of v's lanes, converted to double. */
-SIMD_INLINE kernel_doubles kernel_doubles_of(const vf *v, int half)
+SIMD_INLINE kernel_f64 kernel_f64_of(const vf *v, int half)
 {
-    kernel_doubles_floats f;
+    kernel_f64_floats f;
     memcpy(&f, (const char *)v + half * (int)sizeof f, sizeof f);
-    return kernel_doubles_widen(f);
+    return kernel_f64_widen(f);
 }
 
-SIMD_INLINE void kernel_doubles_store_lanes(vf *v, int half, kernel_doubles d)
+SIMD_INLINE void kernel_f64_store_lanes(vf *v, int half, kernel_f64 d)
 {
-    const kernel_doubles_floats f = kernel_doubles_narrow(d);
+    const kernel_f64_floats f = kernel_f64_narrow(d);
     memcpy((char *)v + half * (int)sizeof f, &f, sizeof f);
 }
 
-SIMD_INLINE kernel_doubles kernel_doubles_abs(kernel_doubles a)
+SIMD_INLINE kernel_f64 kernel_f64_abs(kernel_f64 a)
 {
-    return (kernel_doubles)((kernel_doubles_mask)a & INT64_MAX);
+    return (kernel_f64)((kernel_f64_mask)a & INT64_MAX);
 }
 
-SIMD_INLINE kernel_doubles kernel_doubles_sqrt(kernel_doubles v)
+SIMD_INLINE kernel_f64 kernel_f64_sqrt(kernel_f64 v)
 {
     double d[KERNEL_HALF];
     memcpy(d, &v, sizeof d);
@@ -74,22 +74,22 @@ SIMD_INLINE kernel_doubles kernel_doubles_sqrt(kernel_doubles v)
     return v;
 }
 
-SIMD_INLINE kernel_doubles kernel_doubles_max(kernel_doubles a, kernel_doubles b)
+SIMD_INLINE kernel_f64 kernel_f64_max(kernel_f64 a, kernel_f64 b)
 {
-    return kernel_doubles_select((kernel_doubles_mask)(b < a), a, b);
+    return kernel_f64_select((kernel_f64_mask)(b < a), a, b);
 }
 
 /* Returns v with each lane clamped to the interval [-limit, limit]. */
-SIMD_INLINE kernel_doubles kernel_doubles_clamp(kernel_doubles v, double limit)
+SIMD_INLINE kernel_f64 kernel_f64_clamp(kernel_f64 v, double limit)
 {
-    const kernel_doubles most = (kernel_doubles){0} + limit;
-    v = kernel_doubles_select((kernel_doubles_mask)(v < -most), -most, v);
-    return kernel_doubles_select((kernel_doubles_mask)(most < v), most, v);
+    const kernel_f64 most = (kernel_f64){0} + limit;
+    v = kernel_f64_select((kernel_f64_mask)(v < -most), -most, v);
+    return kernel_f64_select((kernel_f64_mask)(most < v), most, v);
 }
 
 /* A vector of SIMD_WIDTH doubles, one per lane, stored as two halves. */
 typedef struct kernel_wide_doubles {
-    kernel_doubles half[2];
+    kernel_f64 half[2];
 } kernel_wide_doubles;
 
 SIMD_INLINE vm kernel_wide_doubles_lt(const kernel_wide_doubles *a, const kernel_wide_doubles *b)
@@ -112,19 +112,19 @@ SIMD_INLINE kernel_wide_doubles kernel_wide_doubles_select(vm m, const kernel_wi
 
 SIMD_INLINE kernel_wide_doubles kernel_wide_doubles_set(double x)
 {
-    const kernel_doubles all = (kernel_doubles){0} + x;
+    const kernel_f64 all = (kernel_f64){0} + x;
     return (kernel_wide_doubles){{all, all}};
 }
 
 SIMD_INLINE kernel_wide_doubles kernel_wide_doubles_widen(vf v)
 {
-    return (kernel_wide_doubles){{kernel_doubles_of(&v, 0), kernel_doubles_of(&v, 1)}};
+    return (kernel_wide_doubles){{kernel_f64_of(&v, 0), kernel_f64_of(&v, 1)}};
 }
 
 SIMD_INLINE vf kernel_wide_doubles_narrow(const kernel_wide_doubles *v)
 {
     vf out;
-    for (int half = 0; half < 2; half++) kernel_doubles_store_lanes(&out, half, v->half[half]);
+    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v->half[half]);
     return out;
 }
 

@@ -51,9 +51,9 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
 {
     const double scale = f->job->space.scale;
     for (int half = 0; half < 2; half++) {
-        kernel_doubles d[3][3], df[3], g[3], largest = {0};
+        kernel_f64 d[3][3], df[3], g[3], largest = {0};
         for (int i = 0; i < 3; i++) {
-            df[i] = kernel_doubles_of(&b->tets.f[i + 1], half) - kernel_doubles_of(&b->tets.f[0], half);
+            df[i] = kernel_f64_of(&b->tets.f[i + 1], half) - kernel_f64_of(&b->tets.f[0], half);
             for (int a = 0; a < 3; a++)
                 d[i][a] = (b->tets.world[a][i + 1].half[half] - b->tets.world[a][0].half[half]) * scale;
         }
@@ -61,14 +61,13 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
             const int p = (a + 1) % 3, q = (a + 2) % 3;
             g[a] = df[0] * (d[1][p] * d[2][q] - d[1][q] * d[2][p]) + df[1] * (d[2][p] * d[0][q] - d[2][q] * d[0][p]) +
                    df[2] * (d[0][p] * d[1][q] - d[0][q] * d[1][p]);
-            largest = kernel_doubles_max(kernel_doubles_abs(g[a]), largest);
+            largest = kernel_f64_max(kernel_f64_abs(g[a]), largest);
         }
-        const kernel_doubles inverse =
-            kernel_doubles_select((kernel_doubles_mask)(largest > 0), 1 / (largest * scale), (kernel_doubles){0});
+        const kernel_f64 inverse =
+            kernel_f64_select((kernel_f64_mask)(largest > 0), 1 / (largest * scale), (kernel_f64){0});
         for (int a = 0; a < 3; a++) {
             const double *axis = f->scaled_axes[a];
-            kernel_doubles_store_lanes(&b->normal[a], half,
-                                       (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) * inverse);
+            kernel_f64_store_lanes(&b->normal[a], half, (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) * inverse);
         }
     }
     b->has_normals = true;

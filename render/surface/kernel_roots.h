@@ -390,7 +390,7 @@ SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *o
 
 /* ---- the last step of a refinement ---- */
 
-SIMD_INLINE kernel_doubles kernel_doubles_value(const kernel_doubles c[8], const kernel_doubles r[3], kernel_doubles m)
+SIMD_INLINE kernel_f64 kernel_f64_value(const kernel_f64 c[8], const kernel_f64 r[3], kernel_f64 m)
 {
     return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
@@ -402,22 +402,22 @@ SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map *map
                                   vf *value)
 {
     for (int half = 0; half < 2; half++) {
-        kernel_doubles r[3], target[3];
-        const kernel_doubles t = kernel_doubles_of(&at->t, half);
-        for (int a = 0; a < 3; a++) r[a] = kernel_doubles_of(&at->r[a], half);
-        kernel_doubles m = r[0] * r[1];
+        kernel_f64 r[3], target[3];
+        const kernel_f64 t = kernel_f64_of(&at->t, half);
+        for (int a = 0; a < 3; a++) r[a] = kernel_f64_of(&at->r[a], half);
+        kernel_f64 m = r[0] * r[1];
         if (map->is_pyramid) {
             const vf k = vf_max(at->r[2], vf_set(1e-6f));
-            m /= kernel_doubles_of(&k, half);
+            m /= kernel_f64_of(&k, half);
         }
-        target[0] = kernel_doubles_of(&rays->origin_x, half) + kernel_doubles_of(&rays->slope_x, half) * t;
-        target[1] = kernel_doubles_of(&rays->origin_y, half) + kernel_doubles_of(&rays->slope_y, half) * t;
+        target[0] = kernel_f64_of(&rays->origin_x, half) + kernel_f64_of(&rays->slope_x, half) * t;
+        target[1] = kernel_f64_of(&rays->origin_y, half) + kernel_f64_of(&rays->slope_y, half) * t;
         target[2] = t;
         for (int a = 0; a < 3; a++)
-            kernel_doubles_store_lanes(&off[a], half,
-                                       target[a] - kernel_doubles_of(&map->origin[a], half) -
-                                           kernel_doubles_value(map->exact[half][a], r, m));
-        kernel_doubles_store_lanes(value, half, kernel_doubles_value(map->exact[half][3], r, m));
+            kernel_f64_store_lanes(&off[a], half,
+                                   target[a] - kernel_f64_of(&map->origin[a], half) -
+                                       kernel_f64_value(map->exact[half][a], r, m));
+        kernel_f64_store_lanes(value, half, kernel_f64_value(map->exact[half][3], r, m));
     }
 }
 
