@@ -104,7 +104,7 @@ static void choose(studio *s)
                        s->depths);
 }
 
-static bool is_worth_another(const accuracy_effort *effort, int runs, double total)
+static bool needs_another_run(const accuracy_effort *effort, int runs, double total)
 {
     if (runs >= effort->runs) return false;
     return runs == 0 || total < effort->seconds || (runs < FEW_RUNS && total < 4 * effort->seconds);
@@ -117,7 +117,7 @@ static void measure(studio *s, accuracy_row *row)
     row->status = "ok";
     row->frames = frames;
     row->first = s->context->build + draw(s);
-    while (is_worth_another(s->context->effort, row->runs, total)) total += frames[row->runs++] = draw(s);
+    while (needs_another_run(s->context->effort, row->runs, total)) total += frames[row->runs++] = draw(s);
     choose(s);
     row->error = s->scene.job.surface_count ? accuracy_surface_error(s->context->truth, s->depths)
                                             : accuracy_volume_error(s->context->truth, ACCURACY_OPACITY, s->chosen);

@@ -74,7 +74,7 @@ static void peer_row(const accuracy_context *context, const peer *p, const int *
         snprintf(row.setting, sizeof row.setting, "%s", p->setting);
     else
         snprintf(row.setting, sizeof row.setting, "%d^3", request.resolution);
-    row.status = bench_apart_draw(&request, context->effort->peer_seconds, &result, rgba);
+    row.status = bench_unindexed_draw(&request, context->effort->peer_seconds, &result, rgba);
     if (row.status[0] == 'o') {
         row.first = result.first;
         row.runs = result.runs;

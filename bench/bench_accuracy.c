@@ -76,7 +76,7 @@ int main(int argc, char **argv)
                                          {"no-peers", no_argument, NULL, NO_PEERS},
                                          {0}};
     const accuracy_effort *effort = &whole;
-    bool with_peers = bench_vtk_is_there(), with_head = true;
+    bool with_peers = bench_vtk_is_available(), with_head = true;
     for (int found; (found = getopt_long(argc, argv, "", list, NULL)) != -1;) {
         if (found == HELP) return usage(0);
         if (found == LARGE)

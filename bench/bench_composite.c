@@ -180,8 +180,8 @@ static stopwatch begin(void)
 static void end(const stopwatch *watch, int number, measure *m)
 {
     const double seconds = bench_seconds() - watch->began, cpu = cpu_seconds() - watch->cpu_began;
-    bench_keep(reduce(seconds, MPI_MAX), number, &m->series);
-    bench_keep(reduce(cpu, MPI_SUM), number, &m->cpu);
+    bench_add_sample(reduce(seconds, MPI_MAX), number, &m->series);
+    bench_add_sample(reduce(cpu, MPI_SUM), number, &m->cpu);
 }
 
 static void run_own(bench *b, comp_schedule schedule, int number, measure *m)

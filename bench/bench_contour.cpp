@@ -76,7 +76,7 @@ void set_view(bench_contour &c, const bench_contour_view &view)
 
 } // namespace
 
-bool bench_contour_is_there(void)
+bool bench_contour_is_available(void)
 {
     return true;
 }

@@ -31,7 +31,7 @@ typedef struct bench_triangles {
 } bench_triangles;
 
 /* Tells whether VTK is in this program; otherwise nothing else here may be called. */
-bool bench_contour_is_there(void);
+bool bench_contour_is_available(void);
 
 typedef struct bench_contour bench_contour;
 

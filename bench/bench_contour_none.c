@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-bool bench_contour_is_there(void)
+bool bench_contour_is_available(void)
 {
     return false;
 }

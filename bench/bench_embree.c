@@ -54,14 +54,14 @@ static void *must(void *p)
     return p;
 }
 
-static void complain(void *user, enum RTCError code, const char *text)
+static void print_embree_error(void *user, enum RTCError code, const char *text)
 {
     (void)user;
     fprintf(stderr, "embree: error %d: %s\n", (int)code, text);
     exit(1);
 }
 
-bool bench_embree_is_there(void)
+bool bench_embree_is_available(void)
 {
     return true;
 }
@@ -73,7 +73,7 @@ bench_embree *bench_embree_create(int threads)
     snprintf(options, sizeof options, "threads=%d", threads);
     e->device = must(rtcNewDevice(options));
     e->threads = threads;
-    rtcSetDeviceErrorFunction(e->device, complain, NULL);
+    rtcSetDeviceErrorFunction(e->device, print_embree_error, NULL);
     return e;
 }
 

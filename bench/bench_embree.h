@@ -5,7 +5,7 @@
 #include "render.h"
 
 /* Tells whether Embree is in this program; otherwise nothing else here may be called. */
-bool bench_embree_is_there(void);
+bool bench_embree_is_available(void);
 
 typedef struct bench_embree bench_embree;
 

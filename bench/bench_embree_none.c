@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-bool bench_embree_is_there(void)
+bool bench_embree_is_available(void)
 {
     return false;
 }

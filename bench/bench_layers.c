@@ -70,7 +70,7 @@ static void measure(const bench_command *command, test_mesh_kind kind, int n)
     bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
     float *xyz = malloc(3 * (size_t)scene.view.cells.vertex_count * sizeof *xyz);
     if (!xyz) abort();
-    bench_layers_vtk *vtk = bench_layers_vtk_is_there() ? create_vtk(&scene, xyz) : NULL;
+    bench_layers_vtk *vtk = bench_layers_vtk_is_available() ? create_vtk(&scene, xyz) : NULL;
     if (!vtk) fprintf(stderr, "bench_layers: no VTK, or no X server: ours alone\n");
     measure_pictures(&scene, vtk, command->runs);
     bench_layers_vtk_destroy(vtk);

@@ -94,7 +94,7 @@ void set_view(bench_layers_vtk &l, const bench_contour_view &view)
 
 } // namespace
 
-bool bench_layers_vtk_is_there(void)
+bool bench_layers_vtk_is_available(void)
 {
     return std::getenv("DISPLAY") != nullptr; /* without a server VTK aborts the process */
 }

@@ -13,7 +13,7 @@ typedef enum bench_layer { BENCH_LAYER_SLICE, BENCH_LAYER_SURFACE, BENCH_LAYER_C
 
 /* Tells whether VTK is in this program, and an X server's window to draw in; otherwise nothing else here may be called.
  */
-bool bench_layers_vtk_is_there(void);
+bool bench_layers_vtk_is_available(void);
 
 typedef struct bench_layers_vtk bench_layers_vtk;
 

@@ -2,7 +2,7 @@
 
 #include <stddef.h>
 
-bool bench_layers_vtk_is_there(void)
+bool bench_layers_vtk_is_available(void)
 {
     return false;
 }

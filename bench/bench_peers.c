@@ -36,7 +36,7 @@ static void run(bench_scene *scene, bench_routes *routes, peers_series *series, 
     bench_routes_run(routes, bench_isovalues, 1, number);
     for (int i = 0; routes->embree && i < 3; i++) {
         bench_begin();
-        bench_keep(bench_embree_build_cells(routes->embree, (bench_embree_builder)i), number, &series->embree[i]);
+        bench_add_sample(bench_embree_build_cells(routes->embree, (bench_embree_builder)i), number, &series->embree[i]);
     }
 }
 

@@ -51,13 +51,13 @@ void bench_routes_create(bench_routes *r, const bench_scene *scene)
     memset(r, 0, sizeof *r);
     r->subject = &scene->subject;
     r->camera = &scene->job.camera;
-    if (!bench_contour_is_there()) return;
+    if (!bench_contour_is_available()) return;
     r->interleaved = must(malloc(3 * (size_t)g->vertex_count * sizeof(float)));
     const float *coordinates[3];
     for (int axis = 0; axis < 3; axis++) coordinates[axis] = floats(&g->coordinates[axis]);
     interleave(r, coordinates, g->vertex_count);
     create_contour(r, scene);
-    if (!bench_embree_is_there()) return;
+    if (!bench_embree_is_available()) return;
     r->embree = bench_embree_create(scene->subject.threads);
     r->depths = must(malloc(pixels * sizeof *r->depths));
     r->normals = must(malloc(3 * pixels * sizeof *r->normals));
@@ -87,7 +87,7 @@ static void run_embree(bench_routes *r, bench_triangles triangles, double extrac
     began = bench_begin();
     bench_embree_trace(r->embree, r->camera, r->depths, r->normals);
     const double trace = bench_end(began, number, is_fast ? &r->trace_low : &r->trace_medium);
-    bench_keep(extract + build + trace, number, is_fast ? &r->embree_low : &r->embree_medium);
+    bench_add_sample(extract + build + trace, number, is_fast ? &r->embree_low : &r->embree_medium);
 }
 
 static void run_window(bench_routes *r, double extract, int number)
@@ -95,7 +95,7 @@ static void run_window(bench_routes *r, double extract, int number)
     double began = bench_begin();
     bench_contour_draw(r->contour);
     const double first = bench_end(began, number, &r->first);
-    bench_keep(extract + first, number, &r->vtk);
+    bench_add_sample(extract + first, number, &r->vtk);
     began = bench_begin();
     bench_contour_draw(r->contour);
     bench_end(began, number, &r->later);

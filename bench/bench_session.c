@@ -248,7 +248,7 @@ void bench_session_step(bench_session *s, int number)
     const insitu_report *r = insitu_last_report(s->session);
     const double parts[BENCH_PARTS] = {r->prepare_ms, r->build_ms, r->refit_ms, r->surface_ms + r->volume_ms,
                                        r->composite_ms};
-    for (int i = 0; i < BENCH_PARTS; i++) bench_keep(1e-3 * parts[i], number, &s->parts[i]);
+    for (int i = 0; i < BENCH_PARTS; i++) bench_add_sample(1e-3 * parts[i], number, &s->parts[i]);
     s->bytes_trees = r->bytes_trees;
     s->bytes_peak = r->bytes_peak;
 }

@@ -1,6 +1,6 @@
-/* Measures steps of new values beside a process that spins: what a simulation pays for a step where one of its cores has
- * other work. In turns, on one thread and on all, alone and beside the process; a turn is the mean of some steps. Prints
- * CSV. */
+/* Measures steps of new values beside a process that spins: what a simulation pays for a step where one of its cores
+ * has other work. In turns, on one thread and on all, alone and beside the process; a turn is the mean of some steps.
+ * Prints CSV. */
 #define _GNU_SOURCE 1
 #include <signal.h>
 #include <stdio.h>
@@ -36,7 +36,7 @@ static void start_spinner(void)
 static const char *const places[2] = {"alone", "beside a spinning process"};
 
 /* The time of a turn goes into the series of its place. */
-static void take_turn(bench_session *session, int place, int number, bench_series series[2])
+static void measure_once(bench_session *session, int place, int number, bench_series series[2])
 {
     double sum = 0;
     if (place) kill(spinner, SIGCONT);
@@ -44,7 +44,7 @@ static void take_turn(bench_session *session, int place, int number, bench_serie
     for (int step = 0; step <= STEPS; step++) bench_session_step(session, step);
     if (place) kill(spinner, SIGSTOP);
     for (int i = 0; i < session->whole.count; i++) sum += session->whole.seconds[i];
-    bench_keep(sum / session->whole.count, number, &series[place]);
+    bench_add_sample(sum / session->whole.count, number, &series[place]);
 }
 
 static void print(const bench_subject *subject, bench_picture picture, bench_series series[2])
@@ -67,7 +67,7 @@ static void measure_picture(bench_scene *scene, bench_picture picture, int runs)
     }
     for (int number = 0; number <= runs; number++)
         for (int k = 0; k < 2; k++)
-            for (int place = 0; place < 2; place++) take_turn(&sessions[k], place, number, series[k]);
+            for (int place = 0; place < 2; place++) measure_once(&sessions[k], place, number, series[k]);
     for (int k = 0; k < 2; k++) {
         scene->subject.threads = k ? all : 1;
         print(&scene->subject, picture, series[k]);

@@ -53,11 +53,11 @@ double bench_begin(void)
 double bench_end(double began, int number, bench_series *series)
 {
     const double seconds = bench_seconds() - began;
-    bench_keep(seconds, number, series);
+    bench_add_sample(seconds, number, series);
     return seconds;
 }
 
-void bench_keep(double seconds, int number, bench_series *series)
+void bench_add_sample(double seconds, int number, bench_series *series)
 {
     if (number > 0 && series->count < BENCH_MAX_RUNS) series->seconds[series->count++] = seconds;
 }

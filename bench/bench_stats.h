@@ -41,7 +41,7 @@ typedef struct bench_series {
 double bench_begin(void);
 
 /* Keeps a time, unless number is 0, the warm-up. */
-void bench_keep(double seconds, int number, bench_series *series);
+void bench_add_sample(double seconds, int number, bench_series *series);
 
 /* Keeps the time since began, and returns it. */
 double bench_end(double began, int number, bench_series *series);

@@ -110,7 +110,7 @@ static void measure_peers(bench_scene *scene, test_mesh_kind kind, int runs)
     for (size_t i = 0; i < sizeof peers / sizeof *peers; i++) {
         bench_vtk_result result = {0};
         request.mapper = peers[i].mapper;
-        const char *status = bench_apart_draw(&request, PEER_SECONDS, &result, rgba);
+        const char *status = bench_unindexed_draw(&request, PEER_SECONDS, &result, rgba);
         if (!strcmp(status, "ok"))
             print_peer(scene, peers[i].name, &result, truth, rgba);
         else
@@ -160,7 +160,7 @@ static void measure(const bench_command *command, test_mesh_kind kind, int n)
     bench_scene_resize(&scene, SIZE / command->shrink, SIZE / command->shrink);
     bench_scene_build(&scene);
     bench_scene_show_volume(&scene);
-    if (bench_vtk_is_there() && kind == TEST_TETS) measure_peers(&scene, kind, runs);
+    if (bench_vtk_is_available() && kind == TEST_TETS) measure_peers(&scene, kind, runs);
     measure_steps(&scene, runs);
     measure_frames(&scene, "samples", RENDER_SAMPLES, 0, runs);
     measure_frames(&scene, "max_error 1e-1", RENDER_SEGMENTS, 1e-1, runs);

@@ -304,7 +304,7 @@ bool bench_vtk_draw(const bench_vtk_request *request, bench_vtk_result *result, 
     return true;
 }
 
-bool bench_vtk_is_there(void)
+bool bench_vtk_is_available(void)
 {
     return true;
 }

@@ -61,7 +61,7 @@ bool bench_vtk_draw(const bench_vtk_request *request, bench_vtk_result *result, 
 bool bench_vtk_read(const char *path, const char *field, test_mesh *out);
 
 /* Tells whether VTK is in this program. */
-bool bench_vtk_is_there(void);
+bool bench_vtk_is_available(void);
 
 #ifdef __cplusplus
 }

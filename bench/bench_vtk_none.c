@@ -13,7 +13,7 @@ bool bench_vtk_read(const char *path, const char *field, test_mesh *out)
     return false;
 }
 
-bool bench_vtk_is_there(void)
+bool bench_vtk_is_available(void)
 {
     return false;
 }

@@ -326,10 +326,10 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
 /* Counts the leading fragments that a fold combines into one: those of volumes in the same interval. */
 static int64_t count_folded(const fragment *sorted, int64_t count)
 {
-    const int32_t interval = fragment_stretch(sorted[0].t_in);
+    const int32_t interval = fragment_interval_number(sorted[0].t_in);
     int64_t n = 1;
     if (sorted[0].kind >= FRAGMENT_SURFACE) return n;
-    while (n < count && sorted[n].kind < FRAGMENT_SURFACE && fragment_stretch(sorted[n].t_in) == interval) n++;
+    while (n < count && sorted[n].kind < FRAGMENT_SURFACE && fragment_interval_number(sorted[n].t_in) == interval) n++;
     return n;
 }
 
@@ -337,8 +337,8 @@ static int64_t count_folded(const fragment *sorted, int64_t count)
  * light, because ranks may have omitted fragments there. */
 static bool is_dark(float transmittance, const fragment *before, const fragment *next)
 {
-    return transmittance == 0 ||
-           (transmittance <= FRAGMENT_DARK && fragment_stretch(before->t_in) != fragment_stretch(next->t_in));
+    return transmittance == 0 || (transmittance <= FRAGMENT_DARK &&
+                                  fragment_interval_number(before->t_in) != fragment_interval_number(next->t_in));
 }
 
 void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],

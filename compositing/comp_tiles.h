@@ -20,8 +20,8 @@ typedef struct comp_tiles {
 insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int threads, bool finds_overlaps,
                                image *out, base_error *error);
 
-/* A fragment_taker (fragment.h) with tiles as its state: the tile's pixels in out become bitwise equal to the result of
- * comp_composite() for these fragments. Tiles must lie within out and not overlap. */
+/* A fragment_callback (fragment.h) with tiles as its state: the tile's pixels in out become bitwise equal to the result
+ * of comp_composite() for these fragments. Tiles must lie within out and not overlap. */
 bool comp_tiles_take(void *tiles, int thread, const pixel_area *area, fragment *items, int64_t count);
 
 /* Ends the tiles. statistics receives the number of fragments taken and the time of the slowest thread; overlaps, which

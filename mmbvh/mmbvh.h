@@ -132,17 +132,17 @@ typedef struct mmbvh_interval {
 
 /* A query for the cells whose range, rounded to float, intersects one of the intervals. The other cells are
  * invisible. */
-typedef struct mmbvh_wish {
+typedef struct mmbvh_query {
     const grid_field *field;
     int interval_count;
     const mmbvh_interval *intervals;
-} mmbvh_wish;
+} mmbvh_query;
 
 /* Selects the cells that at least one of the queries (wishes) finds. Ghosts, flat cells and cells with non-finite
  * values are never selected; unusable[i] receives the number of cells whose values are not finite for query i.
  * Parallel; reads each cell's values once per query, about as fast as a refit of ranges. As long as cells, values and
  * queries do not change, a tree over the selection (mmbvh_options) gives the same picture as the full tree. */
-insitu_status mmbvh_select(const grid *g, const mmbvh_wish *wishes, int wish_count, const mmbvh_options *options,
+insitu_status mmbvh_select(const grid *g, const mmbvh_query *queries, int query_count, const mmbvh_options *options,
                            mmbvh_selection *out, int64_t *unusable, base_error *error);
 void mmbvh_selection_free(mmbvh_selection *selection);
 

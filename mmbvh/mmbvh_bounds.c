@@ -160,7 +160,8 @@ static void array_range(const grid_array *a, int64_t count, int threads, double 
     enum { BLOCK = 65536 };
     float low = INFINITY, high = -INFINITY;
     if (a->axis) {
-        const grid_array places = {.data = (const char *)a->axis->places, .stride = sizeof(double), .is_wide = true};
+        const grid_array places = {
+            .data = (const char *)a->axis->axis_coordinates, .stride = sizeof(double), .is_wide = true};
         array_range_any(&places, a->axis->count, 1, least, most);
         return;
     }
@@ -188,7 +189,7 @@ static void array_range(const grid_array *a, int64_t count, int threads, double 
     if (!(low > -INFINITY && high < INFINITY)) array_range_any(a, count, threads, least, most);
 }
 
-fetch_box bounds_guess(const bounds_source *source, int threads)
+fetch_box bounds_estimate(const bounds_source *source, int threads)
 {
     fetch_box box;
     const int64_t size = (int64_t)sizeof(float);

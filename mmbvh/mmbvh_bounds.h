@@ -46,7 +46,7 @@ static inline void bounds_transform(const bounds_source *source, fetch_box *box)
 
 /* Returns the box of all vertices with finite coordinates, in the tree's coordinates. It contains all such cells, but
  * is larger than necessary if some vertices belong to no cell. */
-fetch_box bounds_guess(const bounds_source *source, int threads);
+fetch_box bounds_estimate(const bounds_source *source, int threads);
 
 /* Computes the boxes of items that have only an index. Extends *set by the items, and *exact, unless NULL, by the boxes
  * in the source's coordinates. */

@@ -61,7 +61,7 @@ MMBVH_INLINE int64_t fetch_first(const grid *g, int64_t cell, int count, const f
 /* Returns vertex i of a cell, where `first` is fetch_first() of the cell. */
 MMBVH_INLINE int64_t fetch_corner(const grid *g, int64_t first, int i, const fetch_shape shape, const bool wide_index)
 {
-    return shape == FETCH_LATTICE ? first + g->lattice->corner[i]
+    return shape == FETCH_LATTICE ? first + g->lattice->corner_offsets[i]
                                   : fetch_index(&g->connectivity, first + i, wide_index);
 }
 
@@ -308,7 +308,7 @@ static inline bool fetch_is_plain(const grid *g)
 static inline void fetch_box_axes(fetch_box *box, const grid_lattice *l, int64_t cell)
 {
     for (int axis = 0; axis < 3; axis++) {
-        const double *at = l->axes[axis].places + grid_index_along(&l->by_cell, axis, cell);
+        const double *at = l->axes[axis].axis_coordinates + grid_index_along(&l->cell_numbering, axis, cell);
         const double a = at[0], b = l->cells[axis] ? at[1] : a;
         box->lower[axis] = fmin(fmin(a, b), box->lower[axis]);
         box->upper[axis] = fmax(fmax(a, b), box->upper[axis]);

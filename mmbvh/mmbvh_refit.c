@@ -29,10 +29,10 @@ bool sweep_visits(const sweep *s, int64_t node)
     return s->visible_count == 0;
 }
 
-static sweep_sum run_with_followers(const sweep *s, int64_t first, int64_t end)
+static sweep_sum sweep_range_with_followers(const sweep *s, int64_t first, int64_t end)
 {
     const sweep_sum sum = s->run(s, first, end);
-    return s->follower ? run_with_followers(s->follower, first, end) : sum;
+    return s->follower ? sweep_range_with_followers(s->follower, first, end) : sum;
 }
 
 /* Returns the index of the first descendant of the pair's right node; `end` if that node is a leaf. */
@@ -44,12 +44,12 @@ static int64_t find_right_subtree(const sweep *s, int64_t first, int64_t end)
 /* Sweeps a pair and its descendants, nodes[first .. end), in runs of at most s->run_max nodes. */
 static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
 {
-    if (!s->run_max || end - first <= s->run_max) return run_with_followers(s, first, end);
+    if (!s->range_max || end - first <= s->range_max) return sweep_range_with_followers(s, first, end);
     const int64_t right_first = find_right_subtree(s, first, end);
     sweep_sum left = {0}, right = {0};
     if (sweep_visits(s, first + 1)) right = sweep_runs(s, right_first, end);
     if (sweep_visits(s, first)) left = sweep_runs(s, first + 2, right_first);
-    return sweep_add(sweep_add(left, right), run_with_followers(s, first, first + 2));
+    return sweep_add(sweep_add(left, right), sweep_range_with_followers(s, first, first + 2));
 }
 
 /* Sweeps the descendants of the pair in parallel tasks of at most RUN_MAX nodes each, and then the pair itself. */
@@ -64,7 +64,7 @@ static sweep_sum sweep_below(const sweep *s, int64_t first, int64_t end)
     }
     if (sweep_visits(s, first + 1)) right = sweep_below(s, right_first, end);
 #pragma omp taskwait
-    return sweep_add(sweep_add(left, right), run_with_followers(s, first, first + 2));
+    return sweep_add(sweep_add(left, right), sweep_range_with_followers(s, first, first + 2));
 }
 
 sweep_sum sweep_tree(const sweep *s, int threads)
@@ -83,7 +83,7 @@ sweep_sum sweep_tree(const sweep *s, int threads)
             region_leave();
         }
     }
-    return sweep_add(sum, run_with_followers(s, 0, 1)); /* the root is processed after its children */
+    return sweep_add(sum, sweep_range_with_followers(s, 0, 1)); /* the root is processed after its children */
 }
 
 /* Prefetches the connectivity of a leaf that is visited later; the sweep processes the cells in descending order. If a
@@ -214,7 +214,7 @@ static sweep_sum run_box_ranges(const sweep *s, int64_t first, int64_t end)
 static bool is_plain(const grid *g, const grid_field *field)
 {
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
-    return is_float && !field->own && !grid_has_faces(g);
+    return is_float && !field->source_cells && !grid_has_faces(g);
 }
 
 bool sweep_reads_floats(const sweep *ranges)

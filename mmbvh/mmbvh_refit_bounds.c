@@ -121,7 +121,7 @@ static sweep sweep_of_visible_bounds(const mmbvh *tree, const bounds_source *sou
     s.measures_area = true;
     s.visible = visible;
     s.visible_count = visible_count;
-    if (visible_count) s.run_max = VISIBLE_NODES;
+    if (visible_count) s.range_max = VISIBLE_NODES;
     return s;
 }
 

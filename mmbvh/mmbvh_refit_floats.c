@@ -175,7 +175,7 @@ void sweep_bounds_as_floats(sweep *bounds)
     const grid *g = bounds->source->g;
     if (!bounds->source->read_float_boxes) return;
     bounds->run = run_bounds_table[fetch_grid_shape(g)][g->connectivity.is_wide];
-    bounds->run_max = PART_NODES;
+    bounds->range_max = PART_NODES;
 }
 
 bool sweep_both_as_floats(const sweep *ranges, const bounds_source *source, sweep *both)
@@ -184,6 +184,6 @@ bool sweep_both_as_floats(const sweep *ranges, const bounds_source *source, swee
     *both = *ranges;
     both->source = source;
     both->run = run_both_table[fetch_grid_shape(source->g)][source->g->connectivity.is_wide];
-    both->run_max = PART_NODES;
+    both->range_max = PART_NODES;
     return true;
 }

@@ -18,8 +18,8 @@ typedef struct row_floats {
 
 bool rows_can_read(const grid *g, const grid_field *field)
 {
-    return g->lattice && !field->is_cell_centred && field->component >= 0 && !field->values.is_integer && !field->own &&
-           grid_lattice_row_axis(g->lattice) >= 0;
+    return g->lattice && !field->is_cell_centred && field->component >= 0 && !field->values.is_integer &&
+           !field->source_cells && grid_lattice_row_axis(g->lattice) >= 0;
 }
 
 /* The smaller and the larger of two numbers. */
@@ -113,7 +113,7 @@ static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t e
         int64_t index[3], row = from;
         bool is_inside = true;
         for (int axis = 0; axis < 3; axis++) {
-            index[axis] = grid_index_along(&l->by_cell, axis, from);
+            index[axis] = grid_index_along(&l->cell_numbering, axis, from);
             if (axis == along) continue;
             is_inside = is_inside && index[axis] >= l->drawn_first[axis] && index[axis] < l->drawn_end[axis];
         }
@@ -126,7 +126,7 @@ static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t e
             if (out->count > 0) return true;
         }
         /* Continues with the next row, because the rest of this row contains no drawn cell. */
-        const double outer = l->by_cell.outer[along];
+        const double outer = l->cell_numbering.outer[along];
         if (outer == 0) return false;
         from = row + (int64_t)outer;
     }
@@ -142,10 +142,11 @@ bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end
     const char *data = field->values.data + field->component * field->component_stride;
     const int64_t vertex = grid_lattice_first(l, out->first), stride = field->values.stride;
     /* Along an axis without cells the vertices' stride is 0, so the same row is read twice. */
-    const int64_t across[2] = {l->by_vertex.stride[(along + 1) % 3], l->by_vertex.stride[(along + 2) % 3]};
+    const int64_t across[2] = {l->vertex_numbering.stride[(along + 1) % 3],
+                               l->vertex_numbering.stride[(along + 2) % 3]};
     for (int side = 0; side < 4; side++)
         rows[side] = data + (vertex + (side & 1) * across[0] + (side >> 1) * across[1]) * stride;
-    const int64_t step = stride * l->by_vertex.stride[along];
+    const int64_t step = stride * l->vertex_numbering.stride[along];
     if (field->values.is_wide)
         double_ranges(rows, step, out);
     else

@@ -24,7 +24,7 @@ typedef int64_t (*selector_run)(const selector *s, int64_t begin, int64_t end);
 struct selector {
     selector_run run;
     const grid *g;
-    const mmbvh_wish *wish;
+    const mmbvh_query *query;
     grid_array values; /* array of the field's component */
     uint64_t *bits;
 };
@@ -38,8 +38,8 @@ MMBVH_INLINE match_result match_range(const selector *s, const fetch_range e)
 {
     const float low = (float)e.low, high = (float)e.high;
     match_result out = {e.is_finite, false};
-    for (int i = 0; i < s->wish->interval_count; i++)
-        out.intersects |= (low <= s->wish->intervals[i].high) & (high >= s->wish->intervals[i].low);
+    for (int i = 0; i < s->query->interval_count; i++)
+        out.intersects |= (low <= s->query->intervals[i].high) & (high >= s->query->intervals[i].low);
     return out;
 }
 
@@ -50,8 +50,8 @@ MMBVH_INLINE match_result match_floats(const selector *s, int64_t cell, const fe
     vec4 v[2];
     match_result out = {fetch_cell_floats(s->g, &s->values, cell, shape, wide_index, is_packed, v), false};
     const vec4 low = vec4_min(v[0], v[1]), high = vec4_max(v[0], v[1]);
-    for (int i = 0; i < s->wish->interval_count; i++) {
-        const mmbvh_interval *interval = &s->wish->intervals[i];
+    for (int i = 0; i < s->query->interval_count; i++) {
+        const mmbvh_interval *interval = &s->query->intervals[i];
         const bool reaches = vec4_any((ivec4)(low <= vec4_set1(interval->high)));
         const bool rises = vec4_any((ivec4)(high >= vec4_set1(interval->low)));
         out.intersects |= reaches & rises;
@@ -144,9 +144,9 @@ MMBVH_INLINE four_ranges read_four_doubles(const selector *s, int64_t cell, cons
 MMBVH_INLINE void match_four(const selector *s, const four_ranges *r, uint64_t *unusable, uint64_t *intersecting)
 {
     ivec4 intersects = {0};
-    for (int i = 0; i < s->wish->interval_count; i++)
-        intersects |= (ivec4)(r->low <= vec4_set1(s->wish->intervals[i].high)) &
-                      (ivec4)(r->high >= vec4_set1(s->wish->intervals[i].low));
+    for (int i = 0; i < s->query->interval_count; i++)
+        intersects |= (ivec4)(r->low <= vec4_set1(s->query->intervals[i].high)) &
+                      (ivec4)(r->high >= vec4_set1(s->query->intervals[i].low));
     const int not_finite = sign_bits((ivec4)(r->nonfinite != vec4_set1(0)));
     *unusable = (uint64_t)not_finite;
     *intersecting = (uint64_t)(sign_bits(intersects) & ~not_finite);
@@ -232,7 +232,7 @@ FETCH_INSTANCES(DEFINE_RUN, mark_vertices)
 MMBVH_INLINE match_result match_any(const selector *s, int64_t cell, const bool is_packed)
 {
     (void)is_packed;
-    return match_range(s, fetch_any_cell_range(s->g, s->wish->field, cell));
+    return match_range(s, fetch_any_cell_range(s->g, s->query->field, cell));
 }
 
 static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
@@ -256,8 +256,8 @@ static uint64_t packed_bits(const unsigned char *bytes, int64_t count)
 static uint64_t row_bits(const selector *s, const rows_ranges *r)
 {
     unsigned char intersects[ROWS_CELLS] = {0};
-    for (int i = 0; i < s->wish->interval_count; i++) {
-        const mmbvh_interval of = s->wish->intervals[i];
+    for (int i = 0; i < s->query->interval_count; i++) {
+        const mmbvh_interval of = s->query->intervals[i];
         for (int64_t n = 0; n < r->count; n++)
             intersects[n] = (unsigned char)(intersects[n] | ((r->low[n] <= of.high) & (r->high[n] >= of.low)));
     }
@@ -271,7 +271,7 @@ static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
     const grid *g = s->g;
     rows_ranges r;
     int64_t unusable = 0;
-    for (int64_t from = begin; rows_read(g, s->wish->field, from, end, &r); from = r.first + r.count) {
+    for (int64_t from = begin; rows_read(g, s->query->field, from, end, &r); from = r.first + r.count) {
         uint64_t intersecting = row_bits(s, &r), finite = packed_bits(r.is_finite, r.count), drawn = 0;
         for (int64_t n = 0; n < r.count && (g->ghosts || g->flat); n++) {
             const int64_t cell = r.first + n;
@@ -288,13 +288,13 @@ static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
     return unusable;
 }
 
-static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *bits)
+static selector make_selector(const grid *g, const mmbvh_query *query, uint64_t *bits)
 {
     static const selector_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(mark_vertices);
-    const grid_field *field = wish->field;
-    selector s = {.run = mark_any, .g = g, .wish = wish, .values = field->values, .bits = bits};
+    const grid_field *field = query->field;
+    selector s = {.run = mark_any, .g = g, .query = query, .values = field->values, .bits = bits};
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
-    if (is_float && !field->own && !grid_has_faces(g))
+    if (is_float && !field->source_cells && !grid_has_faces(g))
         s.run = table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
     if (rows_can_read(g, field)) s.run = mark_rows;
     if (field->component > 0) s.values.data += field->component * field->component_stride;
@@ -309,7 +309,7 @@ enum { MOST_READ_TWICE = 1 << 16 };
 static bool has_no_visible_cell(const selector *s)
 {
     float low, high;
-    if (s->run != mark_rows || s->g->cell_count > MOST_READ_TWICE || !rows_extent(s->g, s->wish->field, &low, &high))
+    if (s->run != mark_rows || s->g->cell_count > MOST_READ_TWICE || !rows_extent(s->g, s->query->field, &low, &high))
         return false;
     return !match_range(s, (fetch_range){.low = (double)low, .high = (double)high, .is_finite = true}).intersects;
 }
@@ -375,7 +375,7 @@ static bool list_cells(const uint64_t *bits, int64_t words, int threads, mmbvh_s
     return out->cells != NULL;
 }
 
-insitu_status mmbvh_select(const grid *g, const mmbvh_wish *wishes, int wish_count, const mmbvh_options *options,
+insitu_status mmbvh_select(const grid *g, const mmbvh_query *queries, int query_count, const mmbvh_options *options,
                            mmbvh_selection *out, int64_t *unusable, base_error *error)
 {
     const int threads = sweep_threads(options);
@@ -383,8 +383,8 @@ insitu_status mmbvh_select(const grid *g, const mmbvh_wish *wishes, int wish_cou
     uint64_t *bits = base_calloc((size_t)(words ? words : 1), sizeof *bits);
     *out = (mmbvh_selection){0};
     bool is_listed = bits != NULL;
-    for (int i = 0; i < wish_count && is_listed; i++) {
-        const selector s = make_selector(g, &wishes[i], bits);
+    for (int i = 0; i < query_count && is_listed; i++) {
+        const selector s = make_selector(g, &queries[i], bits);
         unusable[i] = mark_query(&s, threads);
     }
     is_listed = is_listed && list_cells(bits, words, threads, out);

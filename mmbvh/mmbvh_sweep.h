@@ -30,7 +30,7 @@ struct sweep {
     const float *box_ranges;     /* ranges of the boxes of a parent tree: low and high for each box */
     const bounds_source *source; /* reads the cells' boxes in a sweep of bounds */
     mmbvh_ranges ranges;         /* receives the results of a sweep of ranges */
-    int64_t run_max;             /* maximum number of nodes per run; 0: no limit other than the size of a task */
+    int64_t range_max;           /* maximum number of nodes per run; 0: no limit other than the size of a task */
     bool measures_area; /* for a sweep of bounds of nodes that have bounds already: the change of area is measured */
     int visible_count;  /* 0: all nodes are swept; otherwise only the visible nodes and their children */
     const mmbvh_visible *visible;

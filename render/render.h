@@ -141,40 +141,40 @@ enum { RENDER_DIFFERENCE_SAMPLES = 6 };
 
 /* A hit with a normal from RENDER_DIFFERENCES that needs samples of other ranks (render_differences.h). It takes 16
  * bytes. */
-typedef struct render_waiting_hit {
+typedef struct render_pending_hit {
     uint32_t pixel, kind; /* pixel and kind of the fragment that will be made of the hit */
     /* reach: distance from the hit to its samples, which lie before and behind it along each axis; scaled units */
     float t, reach;
-} render_waiting_hit;
+} render_pending_hit;
 
 /* What is needed to light such a hit: the gradient in its own cell, in camera axes, and its unlit colour. */
-typedef struct render_waiting_look {
+typedef struct render_pending_shading {
     float normal[3], colour[3];
-} render_waiting_look;
+} render_pending_shading;
 
 /* Growing lists of hits and their looks, with the same count. Memory comes from memory.h. */
-typedef struct render_waiting_list {
-    render_waiting_hit *items;
-    render_waiting_look *looks;
+typedef struct render_pending_list {
+    render_pending_hit *items;
+    render_pending_shading *shadings;
     int64_t count, capacity;
-} render_waiting_list;
+} render_pending_list;
 
 /* The samples around a hit: before and behind it along the first axis, then along the second and the third. They take
  * 32 bytes. */
-typedef struct render_samples_about {
+typedef struct render_difference_samples {
     uint32_t found, unused; /* found: one bit per sample, set if some cell contains the sample's point */
     float values[RENDER_DIFFERENCE_SAMPLES];
-} render_samples_about;
+} render_difference_samples;
 
 /* Value of `transmittance` that marks the placeholder fragments of these hits while a frame is traced. */
 #define RENDER_WAITS 2.0f
 
 /* The value range of each surface's field over all ranks (low > high if no rank has the field), and the list of hits
  * that need samples of other ranks. */
-typedef struct render_waiting {
+typedef struct render_pending_hits {
     double ranges[RENDER_MAX_ISOVALUES][2];
-    render_waiting_list list;
-} render_waiting;
+    render_pending_list list;
+} render_pending_hits;
 
 /* Gradients at the vertices of a mesh part, of any length. All vertices of cells that the layer's isovalues cross have
  * one. */
@@ -316,7 +316,7 @@ typedef struct render_job {
     const render_occlusion *occlusion; /* shadows and ambient occlusion; used by RENDER_UNLIT */
     /* NULL: normals by RENDER_DIFFERENCES are computed at once from this rank's cells. Otherwise such hits, except
      * those of polyhedra, are added to its list instead of becoming fragments. Not allowed with RENDER_VALUES. */
-    render_waiting *waiting;
+    render_pending_hits *waiting;
     render_traversal traversal;
     const render_volume_layer *volumes;
     int volume_count;
@@ -373,7 +373,7 @@ insitu_status render_frame(const render_job *job, fragment_list *out, render_sta
 
 /* Draws as render_frame() does, but passes the fragments to take() tile by tile. Every pixel of the camera lies in one
  * of the tiles; tiles without fragments are passed too. take() is called by as many threads as the job has. */
-insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, void *state,
+insitu_status render_frame_tiles(const render_job *job, fragment_callback *take, void *state,
                                  render_statistics *statistics, base_error *error);
 
 /* Returns the instruction set in use: "avx512", "avx2", "sse4.2" or "plain". INSITU_ISA in the environment may select a

@@ -47,7 +47,7 @@ static const double box_margin = 1e-5;
 
 /* The six sample points are the ends of a cross around the hit, whose three bars are two reaches long. The test is
  * whether one of the bars meets the box. */
-bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_box *box)
+bool render_differences_meet(const render_job *job, const render_pending_hit *hit, const render_box *box)
 {
     const uint32_t width = (uint32_t)job->camera.width;
     const double z = (double)hit->t / job->space.scale + job->space.depth_origin;
@@ -68,56 +68,56 @@ bool render_differences_meet(const render_job *job, const render_waiting_hit *hi
 
 /* ---- order ----------------------------------------------------------------------------------------------------- */
 
-typedef struct place_of_hit {
+typedef struct hit_location {
     uint64_t tile; /* number of the tile, and of the block in the tile */
     uint32_t kind, within;
     int64_t index;
-} place_of_hit;
+} hit_location;
 
-static int by_place(const void *a, const void *b)
+static int compare_locations(const void *a, const void *b)
 {
-    const place_of_hit *x = a, *y = b;
+    const hit_location *x = a, *y = b;
     if (x->tile != y->tile) return x->tile < y->tile ? -1 : 1;
     if (x->kind != y->kind) return x->kind < y->kind ? -1 : 1;
     if (x->within != y->within) return x->within < y->within ? -1 : 1;
     return (x->index > y->index) - (x->index < y->index);
 }
 
-static place_of_hit place_of(const render_camera *camera, const render_waiting_hit *hit, int64_t index)
+static hit_location place_of(const render_camera *camera, const render_pending_hit *hit, int64_t index)
 {
     const uint32_t x = hit->pixel % (uint32_t)camera->width, y = hit->pixel / (uint32_t)camera->width;
     const uint64_t tile = (uint64_t)(y / KERNEL_TILE) << 16 | x / KERNEL_TILE;
     const uint32_t block = y % KERNEL_TILE / KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_TILE / KERNEL_BLOCK;
-    return (place_of_hit){tile << 8 | block, hit->kind, y % KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_BLOCK, index};
+    return (hit_location){tile << 8 | block, hit->kind, y % KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_BLOCK, index};
 }
 
-static void put_in_order(const render_camera *camera, render_waiting_list *list, int64_t first, int64_t count,
-                         place_of_hit *places, render_waiting_list *room)
+static void sort_hits(const render_camera *camera, render_pending_list *list, int64_t first, int64_t count,
+                      hit_location *places, render_pending_list *room)
 {
     for (int64_t i = 0; i < count; i++) places[i] = place_of(camera, &list->items[first + i], i);
     memcpy(room->items, list->items + first, (size_t)count * sizeof *room->items);
-    memcpy(room->looks, list->looks + first, (size_t)count * sizeof *room->looks);
-    qsort(places, (size_t)count, sizeof *places, by_place);
+    memcpy(room->shadings, list->shadings + first, (size_t)count * sizeof *room->shadings);
+    qsort(places, (size_t)count, sizeof *places, compare_locations);
     for (int64_t i = 0; i < count; i++) {
         list->items[first + i] = room->items[places[i].index];
-        list->looks[first + i] = room->looks[places[i].index];
+        list->shadings[first + i] = room->shadings[places[i].index];
     }
 }
 
-bool render_differences_sort(const render_job *job, render_waiting_list *list)
+bool render_differences_sort(const render_job *job, render_pending_list *list)
 {
     const int64_t most = list->count < SORTED_HITS ? list->count : SORTED_HITS;
-    place_of_hit *places = base_alloc((size_t)(most + 1) * sizeof *places);
-    render_waiting_list room = {.items = base_alloc((size_t)(most + 1) * sizeof *room.items),
-                                .looks = base_alloc((size_t)(most + 1) * sizeof *room.looks)};
-    const bool has_room = places && room.items && room.looks;
+    hit_location *places = base_alloc((size_t)(most + 1) * sizeof *places);
+    render_pending_list room = {.items = base_alloc((size_t)(most + 1) * sizeof *room.items),
+                                .shadings = base_alloc((size_t)(most + 1) * sizeof *room.shadings)};
+    const bool has_room = places && room.items && room.shadings;
     for (int64_t first = 0; first < list->count && has_room; first += most) {
         const int64_t left = list->count - first;
-        put_in_order(&job->camera, list, first, left < most ? left : most, places, &room);
+        sort_hits(&job->camera, list, first, left < most ? left : most, places, &room);
     }
     base_free(places);
     base_free(room.items);
-    base_free(room.looks);
+    base_free(room.shadings);
     return has_room;
 }
 
@@ -128,23 +128,23 @@ typedef struct chunk_work {
     kernel_frame frame;
     const kernel_table *kernels;
     int threads;
-    const render_waiting_hit *hits;
-    render_samples_about *samples;
-    const render_waiting_list *list; /* hits to be lit; NULL if samples are to be taken */
-    const render_samples_about *merged;
+    const render_pending_hit *hits;
+    render_difference_samples *samples;
+    const render_pending_list *list; /* hits to be lit; NULL if samples are to be taken */
+    const render_difference_samples *merged;
     fragment *out;
 } chunk_work;
 
-static void work_on(chunk_work *work, kernel_thread *thread, int64_t first, int64_t count)
+static void process_chunk(chunk_work *work, kernel_thread *thread, int64_t first, int64_t count)
 {
     if (work->list)
-        work->kernels->light_waiting(&work->frame, thread, work->list, work->merged, first, count, work->out);
+        work->kernels->light_pending(&work->frame, thread, work->list, work->merged, first, count, work->out);
     else
-        work->kernels->sample_waiting(&work->frame, thread, work->hits + first, work->samples + first, count);
+        work->kernels->sample_pending(&work->frame, thread, work->hits + first, work->samples + first, count);
 }
 
-static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_t first, int64_t count,
-                                 base_error *error)
+static insitu_status process_chunks(const render_job *job, chunk_work *work, int64_t first, int64_t count,
+                                    base_error *error)
 {
     work->kernels = render_kernels();
     work->threads = job->threads > 0 ? job->threads : omp_get_max_threads();
@@ -162,7 +162,7 @@ static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_
 #pragma omp for schedule(dynamic, 1) nowait
         for (int64_t at = first; at < first + count; at += CHUNK_HITS) {
             const int64_t left = first + count - at;
-            if (thread.memory) work_on(work, &thread, at, left < CHUNK_HITS ? left : CHUNK_HITS);
+            if (thread.memory) process_chunk(work, &thread, at, left < CHUNK_HITS ? left : CHUNK_HITS);
         }
         base_free(thread.memory);
         region_leave();
@@ -173,16 +173,16 @@ static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_
     return status;
 }
 
-insitu_status render_differences_sample(const render_job *job, const render_waiting_hit *hits,
-                                        render_samples_about *out, int64_t count, base_error *error)
+insitu_status render_differences_sample(const render_job *job, const render_pending_hit *hits,
+                                        render_difference_samples *out, int64_t count, base_error *error)
 {
     chunk_work work = {.hits = hits, .samples = out};
     if (count && !job->part_count) memset(out, 0, (size_t)count * sizeof *out);
     if (!count || !job->part_count) return INSITU_OK;
-    return work_on_all(job, &work, 0, count, error);
+    return process_chunks(job, &work, 0, count, error);
 }
 
-void render_differences_merge(render_samples_about *into, const render_samples_about *other)
+void render_differences_merge(render_difference_samples *into, const render_difference_samples *other)
 {
     for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
         const uint32_t bit = 1u << k;
@@ -192,12 +192,12 @@ void render_differences_merge(render_samples_about *into, const render_samples_a
     }
 }
 
-insitu_status render_differences_light(const render_job *job, const render_waiting_list *list,
-                                       const render_samples_about *samples, int64_t first, int64_t count, fragment *out,
-                                       base_error *error)
+insitu_status render_differences_light(const render_job *job, const render_pending_list *list,
+                                       const render_difference_samples *samples, int64_t first, int64_t count,
+                                       fragment *out, base_error *error)
 {
     /* With a list that begins at hit `first`, hits, samples and fragments have the same indices, from 0 on. */
-    const render_waiting_list some = {list->items + first, list->looks + first, count, count};
+    const render_pending_list some = {list->items + first, list->shadings + first, count, count};
     chunk_work work = {.list = &some, .merged = samples, .out = out};
-    return count ? work_on_all(job, &work, 0, count, error) : INSITU_OK;
+    return count ? process_chunks(job, &work, 0, count, error) : INSITU_OK;
 }

@@ -78,7 +78,7 @@ static void shorten(const render_folding *folding, fragment *items, int64_t coun
     for (int64_t i = 0; i < count && folding->has_segments; i++) items[i].t_out -= error_at(items[i].t_out);
 }
 
-/* Folds the fragments of one run, interval by interval (fragment_stretch()). Returns the end of its output. */
+/* Folds the fragments of one run, interval by interval (fragment_interval_number()). Returns the end of its output. */
 static fragment *fold_run(const render_folding *folding, fragment *run, int64_t count, fragment *out)
 {
     const bool is_alone = folding->job->is_alone;
@@ -91,8 +91,8 @@ static fragment *fold_run(const render_folding *folding, fragment *run, int64_t 
         end -= error_at(end);
     }
     for (int64_t i = 0, n; i < count; i += n) {
-        const int32_t stretch = fragment_stretch(run[i].t_in);
-        for (n = 1; i + n < count && fragment_stretch(run[i + n].t_in) == stretch;) n++;
+        const int32_t interval_number = fragment_interval_number(run[i].t_in);
+        for (n = 1; i + n < count && fragment_interval_number(run[i + n].t_in) == interval_number;) n++;
         const int64_t made = fragment_fold_between(run + i, n, begin, end, run + i);
         shorten(folding, run + i, made);
         for (int64_t k = i; k < i + made; k++)

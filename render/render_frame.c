@@ -35,7 +35,7 @@ enum { TILE_FRAGMENTS = KERNEL_TILE * KERNEL_TILE };
 /* The destination of fragments: each writer's piece of a list, or a callback that receives them tile by tile. */
 typedef struct frame_end {
     fragment_writer *writers; /* one writer per thread */
-    fragment_taker *take;     /* callback that receives fragments; NULL: fragments stay in the writers' lists */
+    fragment_callback *take;  /* callback that receives fragments; NULL: fragments stay in the writers' lists */
     void *state;
 } frame_end;
 
@@ -56,7 +56,7 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     fragment_list *own = &end->writers[number].list;
     const bool folds = frame->job->reproducible && frame->job->volume_count && !frame->job->separate_samples;
     render_folding fold = {.job = frame->job, .has_segments = frame->has_segments};
-#pragma omp for schedule(dynamic, KERNEL_TILE_RUN) nowait
+#pragma omp for schedule(dynamic, KERNEL_TILES_PER_TASK) nowait
     for (int tile = 0; tile < columns * rows; tile++) {
         if (!render_thread_begin(kernels, thread)) continue;
         if (thread->polyhedra) polyhedra_reset(thread->polyhedra);
@@ -75,35 +75,35 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
 
 /* ---- hits that need samples of other ranks ------------------------------------------------------------------- */
 
-static bool grow_list(render_waiting_list *list, int64_t capacity)
+static bool grow_list(render_pending_list *list, int64_t capacity)
 {
-    render_waiting_hit *items = base_realloc(list->items, (size_t)capacity * sizeof *items);
+    render_pending_hit *items = base_realloc(list->items, (size_t)capacity * sizeof *items);
     if (items) list->items = items;
-    render_waiting_look *looks = base_realloc(list->looks, (size_t)capacity * sizeof *looks);
-    if (looks) list->looks = looks;
-    if (!items || !looks) return false;
+    render_pending_shading *shadings = base_realloc(list->shadings, (size_t)capacity * sizeof *shadings);
+    if (shadings) list->shadings = shadings;
+    if (!items || !shadings) return false;
     list->capacity = capacity;
     return true;
 }
 
-static bool grow_waiting(render_waiting_list *list)
+static bool grow_pending(render_pending_list *list)
 {
     return grow_list(list, list->capacity + list->capacity / 2 + 1024);
 }
 
-static bool append_waiting(render_waiting_list *to, const render_waiting_list *from)
+static bool append_pending(render_pending_list *to, const render_pending_list *from)
 {
     const int64_t count = to->count + from->count;
     if (!from->count) return true;
     if (count > to->capacity && !grow_list(to, count)) return false;
     memcpy(to->items + to->count, from->items, (size_t)from->count * sizeof *to->items);
-    memcpy(to->looks + to->count, from->looks, (size_t)from->count * sizeof *to->looks);
+    memcpy(to->shadings + to->count, from->shadings, (size_t)from->count * sizeof *to->shadings);
     to->count = count;
     return true;
 }
 
 /* Removes the placeholder fragments of hits that still need samples of other ranks. */
-static void drop_places(fragment_list *list, int64_t first)
+static void drop_placeholders(fragment_list *list, int64_t first)
 {
     fragment *to = list->items + first;
     for (int64_t i = first; i < list->count; i++)
@@ -127,7 +127,7 @@ static void begin_threads(const kernel_frame *frame, const frame_end *end, kerne
                                     .out_of_memory = false,
                                     .find_polyhedron = polyhedra_find,
                                     .polyhedron_scratch = polyhedra_scratch,
-                                    .grow_waiting = grow_waiting,
+                                    .grow_pending = grow_pending,
                                     .now = now};
     for (int i = 0; i < threads && has_polyhedra; i++) states[i].out_of_memory = !states[i].polyhedra;
 }
@@ -142,9 +142,9 @@ static bool end_threads(const render_job *job, kernel_thread *states, int thread
         base_free(states[i].bin.room);
         base_free(states[i].volume_bin.room);
         has_memory = has_memory && !states[i].out_of_memory;
-        if (has_memory && job->waiting) has_memory = append_waiting(&job->waiting->list, &states[i].waiting);
+        if (has_memory && job->waiting) has_memory = append_pending(&job->waiting->list, &states[i].waiting);
         base_free(states[i].waiting.items);
-        base_free(states[i].waiting.looks);
+        base_free(states[i].waiting.shadings);
         surface = fmax(surface, states[i].surface_seconds);
         volume = fmax(volume, states[i].volume_seconds);
         statistics->map_failures += states[i].map_failures;
@@ -204,11 +204,11 @@ static bool trace_to_list(kernel_frame *frame, fragment_writer *writers, int thr
     const bool is_traced = trace_frame(frame, &(frame_end){.writers = writers}, threads, statistics);
     const int64_t first = out->count;
     const bool is_whole = fragment_pieces_end(&pieces, writers, threads);
-    if (frame->job->waiting) drop_places(out, first);
+    if (frame->job->waiting) drop_placeholders(out, first);
     return is_whole && is_traced;
 }
 
-static bool trace_to_taker(kernel_frame *frame, const frame_end *end, int threads, render_statistics *statistics)
+static bool trace_to_callback(kernel_frame *frame, const frame_end *end, int threads, render_statistics *statistics)
 {
     for (int i = 0; i < threads; i++) end->writers[i] = (fragment_writer){.piece = -1};
     const bool is_traced = trace_frame(frame, end, threads, statistics);
@@ -217,7 +217,7 @@ static bool trace_to_taker(kernel_frame *frame, const frame_end *end, int thread
 }
 
 /* Draws a frame. The fragments are appended to out, or, if out is NULL, passed to take() tile by tile. */
-static insitu_status draw(const render_job *job, fragment_list *out, fragment_taker *take, void *state,
+static insitu_status draw(const render_job *job, fragment_list *out, fragment_callback *take, void *state,
                           render_statistics *statistics, base_error *error)
 {
     kernel_frame frame;
@@ -229,7 +229,7 @@ static insitu_status draw(const render_job *job, fragment_list *out, fragment_ta
     fragment_writer *writers = base_calloc((size_t)threads, sizeof *writers);
     const bool has_memory =
         writers && (out ? trace_to_list(&frame, writers, threads, out, statistics)
-                        : trace_to_taker(&frame, &(frame_end){writers, take, state}, threads, statistics));
+                        : trace_to_callback(&frame, &(frame_end){writers, take, state}, threads, statistics));
     base_free(writers);
     if (!has_memory)
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for the fragments and cells of %d x %d pixels",
@@ -246,7 +246,7 @@ insitu_status render_frame(const render_job *job, fragment_list *out, render_sta
     return status;
 }
 
-insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, void *state,
+insitu_status render_frame_tiles(const render_job *job, fragment_callback *take, void *state,
                                  render_statistics *statistics, base_error *error)
 {
     return draw(job, NULL, take, state, statistics, error);

@@ -46,22 +46,22 @@ SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
         kernel_values_colours(t->surface, part, t->cell->index, t->cell->vertices, t->cell->count, t->cell->g);
 }
 
-static void kernel_tile_meet(kernel_tile_trace *t, const kernel_tile_candidate *candidate, int part, int value,
-                             unsigned blocks)
+static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_tile_candidate *candidate, int part,
+                                          int value, unsigned blocks)
 {
     const render_surface_layer *layer = t->surface->layer;
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell *c = t->cell;
     kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
     if (kernel_has_own_faces(c->type)) {
-        kernel_blocks_meet(t, blocks, part, candidate->cell, NULL, 0);
+        kernel_blocks_trace(t, blocks, part, candidate->cell, NULL, 0);
         return;
     }
     kernel_cell_move(c, t->frame, &t->tile, g);
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_ready(t, part);
     t->curved->bounds = NULL;
-    kernel_blocks_meet(t, blocks, part, c->index, c, value);
+    kernel_blocks_trace(t, blocks, part, c->index, c, value);
 }
 
 /* Makes the surface layer of a candidate's source current. Stores the source's mesh part, and returns the number of its
@@ -105,7 +105,7 @@ static void kernel_tile_queue_begin(kernel_tile_queue *m)
 }
 
 /* Makes the current layer and the part those of the cells queued next. */
-SIMD_INLINE void kernel_tile_queue_turn(const kernel_tile_trace *t, kernel_tile_queue *m, int part)
+SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_tile_queue *m, int part)
 {
     if (m->layer == t->layer && m->part == part) return;
     m->layer = t->layer;
@@ -151,7 +151,7 @@ SIMD_INLINE void kernel_tile_queue_put(kernel_tile_trace *t, kernel_tile_queue *
 
 /* Traces the cells that are queued in no vector. Traces the vectors first, because their cells were found earlier and
  * may hide these. */
-static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
+static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     if (!m->alone_count) return;
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_run(t, m, &m->pending[i]);
@@ -159,7 +159,7 @@ static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
         int part;
         const int value = kernel_tile_source(t, m->alone[n].source, &part);
         const unsigned blocks = kernel_candidate_blocks(t, &m->alone[n]);
-        if (blocks) kernel_tile_meet(t, &m->alone[n], part, value, blocks);
+        if (blocks) kernel_tile_process_candidate(t, &m->alone[n], part, value, blocks);
     }
     m->alone_count = 0;
 }
@@ -169,20 +169,20 @@ static void kernel_tile_queue_alone(kernel_tile_trace *t, kernel_tile_queue *m)
 SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *m,
                                        const kernel_tile_candidate *candidate, int part, int value)
 {
-    kernel_tile_queue_turn(t, m, part);
+    kernel_tile_queue_set_part(t, m, part);
     const int type = kernel_arrays_type(&m->arrays, candidate->cell);
     if (kernel_is_for_vectors(m, candidate, type)) {
-        kernel_tile_queue_put(t, m, &m->pending[kernel_found_number(type)], candidate, value);
+        kernel_tile_queue_put(t, m, &m->pending[kernel_lane_type_index(type)], candidate, value);
         return;
     }
-    if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_alone(t, m);
+    if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_trace_singly(t, m);
     m->alone[m->alone_count++] = *candidate;
 }
 
 /* Traces all cells that are still queued. */
 static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
 {
-    kernel_tile_queue_alone(t, m);
+    kernel_tile_queue_trace_singly(t, m);
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_run(t, m, &m->pending[i]);
 }
 
@@ -204,14 +204,14 @@ SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_t
 }
 
 /* Cells whose vertex indices are being prefetched. */
-typedef struct kernel_pending {
+typedef struct kernel_prefetch_queue {
     int count;
     const kernel_tile_candidate *items[SIMD_WIDTH];
-} kernel_pending;
+} kernel_prefetch_queue;
 
 /* Sorts pending cells by their part, and leaves them in order of depth within each: a batch holds cells of one part,
  * and those of blocks alternate in depth. */
-static void kernel_pending_sort(kernel_pending *w)
+static void kernel_pending_sort(kernel_prefetch_queue *w)
 {
     for (int n = 1; n < w->count; n++) {
         const kernel_tile_candidate *item = w->items[n];
@@ -223,14 +223,14 @@ static void kernel_pending_sort(kernel_pending *w)
 }
 
 /* Prefetches the vertices of all pending cells, then queues them for tracing. */
-static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_tile_queue *m,
-                                                               kernel_pending *w)
+static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_queue *m,
+                                                                   kernel_prefetch_queue *w)
 {
     kernel_pending_sort(w);
     for (int n = 0; n < w->count; n++) {
         int part;
         kernel_tile_source(t, w->items[n]->source, &part);
-        if (m->layer < 0) kernel_tile_queue_turn(t, m, part);
+        if (m->layer < 0) kernel_tile_queue_set_part(t, m, part);
         if (m->layer == t->layer && m->part == part &&
             kernel_is_for_vectors(m, w->items[n], kernel_arrays_type(&m->arrays, w->items[n]->cell)))
             continue; /* vectors prefetch their own cells */
@@ -250,7 +250,7 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
                                                                    bool transparent)
 {
     kernel_tile_queue *queue = &((kernel_tile_search *)t->search)->queue;
-    kernel_pending pending = {0};
+    kernel_prefetch_queue pending = {0};
     kernel_tile_queue_begin(queue);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
         for (int i = q->first[bin]; i >= 0; i = q->items[i].next) {
@@ -261,9 +261,9 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
             kernel_candidate_prefetch(t->frame, candidate);
             pending.items[pending.count++] = candidate;
-            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, queue, &pending);
+            if (pending.count == SIMD_WIDTH) kernel_tile_queue_prefetched(t, queue, &pending);
         }
-    kernel_tile_meet_pending(t, queue, &pending);
+    kernel_tile_queue_prefetched(t, queue, &pending);
     kernel_tile_queue_end(t, queue);
 }
 
@@ -281,7 +281,7 @@ SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
 /* ---- isosurfaces in cells that a tile finds by traversing the trees ---- */
 
 /* Queues the cells found so far for tracing, unless nearer hits hide them. */
-static bool kernel_tile_find_take(kernel_candidate_list *list)
+static bool kernel_tile_find_flush(kernel_candidate_list *list)
 {
     kernel_tile_search *s = (kernel_tile_search *)((char *)list - offsetof(kernel_tile_search, list));
     kernel_tile_trace *t = s->tile;
@@ -290,8 +290,8 @@ static bool kernel_tile_find_take(kernel_candidate_list *list)
         int part;
         const int value = kernel_tile_source(t, found->source, &part);
         const kernel_tile_candidate candidate =
-            kernel_candidate_in_tile(found, kernel_span_in_tile(found->x0, found->x1, t->tile.x0),
-                                     kernel_span_in_tile(found->y0, found->y1, t->tile.y0));
+            kernel_candidate_in_tile(found, kernel_range_in_tile(found->x0, found->x1, t->tile.x0),
+                                     kernel_range_in_tile(found->y0, found->y1, t->tile.y0));
         if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, candidate.box, found->near))
             kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
     }
@@ -300,14 +300,14 @@ static bool kernel_tile_find_take(kernel_candidate_list *list)
 }
 
 /* Makes another mesh part current for the search; the cells pending from the previous part are processed first. */
-static void kernel_tile_find_turn(kernel_tile_trace *t, kernel_tile_search *s, int part)
+static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *s, int part)
 {
     kernel_finder *finder = t->thread->finder;
     if (finder->frame == t->frame && finder->surface == t->surface && finder->part == part) return;
-    if (finder->frame) kernel_find_rest(finder);
+    if (finder->frame) kernel_find_flush(finder);
     kernel_finder_begin(finder, t->frame, &(kernel_subtree){.surface = t->layer, .part = part});
     finder->list = &s->list;
-    finder->grow = kernel_tile_find_take;
+    finder->grow = kernel_tile_find_flush;
     finder->first[0] = t->tile.x0;
     finder->first[1] = t->tile.y0;
     const render_camera *c = &t->frame->job->camera;
@@ -317,7 +317,7 @@ static void kernel_tile_find_turn(kernel_tile_trace *t, kernel_tile_search *s, i
 
 static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count)
 {
-    kernel_tile_find_turn(t, (kernel_tile_search *)t->search, part);
+    kernel_tile_find_set_part(t, (kernel_tile_search *)t->search, part);
     kernel_find_leaf(t->thread->finder, cells, count);
 }
 
@@ -333,8 +333,8 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
     for (int layer = 0; layer < t->frame->surface_count; layer++) {
         kernel_tile_set_layer(t, layer);
         kernel_tile_surface(t);
-        if (t->thread->finder->frame) kernel_find_rest(t->thread->finder);
-        kernel_tile_find_take(&s->list);
+        if (t->thread->finder->frame) kernel_find_flush(t->thread->finder);
+        kernel_tile_find_flush(&s->list);
         kernel_tile_queue_end(t, &s->queue);
     }
 }
@@ -346,7 +346,7 @@ typedef struct kernel_memory {
     kernel_cell_cache packet_cells;
     kernel_cell tile_cell;
     kernel_curved tile_curved;
-    kernel_curved_room tile_curved_room;
+    kernel_curved_storage tile_curved_room;
     kernel_tile_trace tile;
     kernel_tile_volume volume;
     kernel_tile_segments segments;
@@ -355,13 +355,13 @@ typedef struct kernel_memory {
     kernel_tile_search search;
 } kernel_memory;
 
-static int volume_turns(const kernel_frame *f)
+static int volume_intervals(const kernel_frame *f)
 {
-    return f->volume_turns ? f->volume_turns : 1;
+    return f->volume_intervals ? f->volume_intervals : 1;
 }
 
 /* Returns whether one of the rectangle's pixels must be traced. */
-static bool is_wanted(const render_job *job, int x0, int y0, int columns, int rows)
+static bool has_active_pixel(const render_job *job, int x0, int y0, int columns, int rows)
 {
     const int x1 = x0 + columns, y1 = y0 + rows;
     if (!job->pixels) return x0 < job->camera.width && y0 < job->camera.height;
@@ -371,12 +371,12 @@ static bool is_wanted(const render_job *job, int x0, int y0, int columns, int ro
     return false;
 }
 
-static unsigned wanted_blocks(const render_job *job, int x0, int y0)
+static unsigned active_blocks(const render_job *job, int x0, int y0)
 {
     unsigned blocks = 0;
     for (int i = 0; i < KERNEL_BLOCKS; i++)
-        if (is_wanted(job, x0 + i % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK, y0 + i / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK,
-                      KERNEL_BLOCK, KERNEL_BLOCK))
+        if (has_active_pixel(job, x0 + i % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK,
+                             y0 + i / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK, KERNEL_BLOCK, KERNEL_BLOCK))
             blocks |= 1u << i;
     return blocks;
 }
@@ -399,14 +399,14 @@ static void trace_tile_surfaces(kernel_tile_trace *t)
 static void trace_tile_segments(kernel_tile_trace *t)
 {
     const double start = t->thread->now();
-    for (t->turn = 0; t->turn < volume_turns(t->frame); t->turn++) kernel_tile_segments_trace(t);
+    for (t->turn = 0; t->turn < volume_intervals(t->frame); t->turn++) kernel_tile_segments_trace(t);
     t->thread->volume_seconds += t->thread->now() - start;
 }
 
 static void trace_tile_samples(kernel_tile_trace *t)
 {
     const double start = t->thread->now();
-    for (t->turn = 0; t->turn < volume_turns(t->frame); t->turn++) kernel_tile_volumes(t);
+    for (t->turn = 0; t->turn < volume_intervals(t->frame); t->turn++) kernel_tile_volumes(t);
     t->thread->volume_seconds += t->thread->now() - start;
 }
 
@@ -431,20 +431,20 @@ static bool has_surface(const kernel_frame *f, const kernel_thread *thread, int 
     return f->candidates ? thread->bin.count : is_covered(f, x0, y0);
 }
 
-static bool begins_run(const kernel_frame *f, int x0, int y0)
+static bool begins_task(const kernel_frame *f, int x0, int y0)
 {
     const int columns = (f->job->camera.width - 1) / KERNEL_TILE + 1;
-    return (y0 / KERNEL_TILE * columns + x0 / KERNEL_TILE) % KERNEL_TILE_RUN == 0;
+    return (y0 / KERNEL_TILE * columns + x0 / KERNEL_TILE) % KERNEL_TILES_PER_TASK == 0;
 }
 
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
 {
     thread->serial++;
-    if (begins_run(f, x0, y0)) kernel_depth_forget(&thread->tile_volume->depth);
+    if (begins_task(f, x0, y0)) kernel_depth_reset(&thread->tile_volume->depth);
     kernel_tile_trace *t = thread->tile;
     const bool fogs = has_volume(f, thread, x0, y0);
     if (!fogs && !has_surface(f, thread, x0, y0)) return;
-    const unsigned wanted = wanted_blocks(f->job, x0, y0);
+    const unsigned wanted = active_blocks(f->job, x0, y0);
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
     if (f->surface_count) trace_tile_surfaces(t);
@@ -491,5 +491,5 @@ const kernel_table KERNEL_TABLE = {SIMD_WIDTH,
                                    find_candidates,
                                    kernel_occlude,
                                    kernel_occlude_by_cell,
-                                   kernel_sample_waiting,
-                                   kernel_light_waiting};
+                                   kernel_sample_pending,
+                                   kernel_light_pending};

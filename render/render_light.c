@@ -20,9 +20,9 @@
 
 /* ---- one hit ------------------------------------------------------------------------------------------------- */
 
-static hit_place place_of(const render_job *job, const render_hit *hit)
+static hit_frame place_of(const render_job *job, const render_hit *hit)
 {
-    return hit_place_of(job, hit->pixel, hit->t, hit->normal, RENDER_LIFT);
+    return hit_frame_of(job, hit->pixel, hit->t, hit->normal, RENDER_LIFT);
 }
 
 /* Returns the surface layer to which the fragment belongs, by the number of its isovalue. */
@@ -55,7 +55,7 @@ bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, re
 void render_hit_samples(const render_job *job, const render_hit *hit, double start[3],
                         double directions[RENDER_MAX_SAMPLES][3])
 {
-    const hit_place p = place_of(job, hit);
+    const hit_frame p = place_of(job, hit);
     memcpy(start, p.start, sizeof p.start);
     hit_directions(job, hit->pixel, &p.a, directions);
 }
@@ -94,17 +94,17 @@ typedef struct tracer {
     kernel_frame frame;
     kernel_thread thread;
     kernel_bundle bundle;
-    kernel_straights straights;
-    kernel_straight rays[CHUNK_RAYS];
+    kernel_secondary_rays secondary_rays;
+    kernel_secondary_ray rays[CHUNK_RAYS];
     ray_name names[CHUNK_RAYS];
 } tracer;
 
-static bool grow_doubts(kernel_straights *s)
+static bool grow_undecided(kernel_secondary_rays *s)
 {
     const int64_t capacity = s->capacity + s->capacity / 2 + 1024;
-    kernel_doubt *doubts = base_realloc(s->doubts, (size_t)capacity * sizeof *doubts);
-    if (!doubts) return false;
-    s->doubts = doubts;
+    kernel_undecided_pair *undecided = base_realloc(s->undecided, (size_t)capacity * sizeof *undecided);
+    if (!undecided) return false;
+    s->undecided = undecided;
     s->capacity = capacity;
     return true;
 }
@@ -114,8 +114,8 @@ static bool grow_doubts(kernel_straights *s)
 static void add_ray(tracer *t, int hit, int number, const double start[3], const double direction[3], double far)
 {
     const render_space *space = &t->job->space;
-    const int i = t->straights.count++;
-    kernel_straight *ray = &t->rays[i];
+    const int i = t->secondary_rays.count++;
+    kernel_secondary_ray *ray = &t->rays[i];
     t->names[i] = (ray_name){(int16_t)hit, (int16_t)number};
     for (int a = 0; a < 3; a++) {
         ray->origin[a] = (float)((start[a] - space->origin[a]) * space->scale);
@@ -128,7 +128,7 @@ static void add_ray(tracer *t, int hit, int number, const double start[3], const
 static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_rays *rays)
 {
     const render_occlusion *o = t->job->occlusion;
-    const hit_place p = place_of(t->job, hit);
+    const hit_frame p = place_of(t->job, hit);
     double samples[RENDER_MAX_SAMPLES][3];
     if (rays->samples) hit_directions(t->job, hit->pixel, &p.a, samples);
     for (uint64_t left = rays->samples; left; left &= left - 1) {
@@ -143,7 +143,7 @@ static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_ra
 
 /* ---- rays that must be tested exactly in a cell */
 
-static void tracer_look(tracer *t, const double eye[3], const hit_axes *a, bool is_orthographic)
+static void tracer_set_camera(tracer *t, const double eye[3], const hit_axes *a, bool is_orthographic)
 {
     render_camera *c = &t->moved.camera;
     memcpy(c->eye, eye, sizeof c->eye);
@@ -159,15 +159,15 @@ static void tracer_look(tracer *t, const double eye[3], const hit_axes *a, bool 
 }
 
 /* Sets up the bundle with the rays of a hit's hemisphere. */
-static void look_at_hemisphere(tracer *t, const render_hit *hit)
+static void set_hemisphere_rays(tracer *t, const render_hit *hit)
 {
     const render_occlusion *o = t->job->occlusion;
     const render_space *space = &t->job->space;
-    const hit_place p = place_of(t->job, hit);
+    const hit_frame p = place_of(t->job, hit);
     kernel_bundle *b = &t->bundle;
     double directions[RENDER_MAX_SAMPLES][3];
     hit_hemisphere(t->job, hit->pixel, directions);
-    tracer_look(t, p.start, &p.a, false);
+    tracer_set_camera(t, p.start, &p.a, false);
     b->tile.centre_x = b->tile.centre_y = 0;
     b->tile.radius = 0;
     for (int k = 0; k < o->samples; k++) {
@@ -186,18 +186,18 @@ static void look_at_hemisphere(tracer *t, const render_hit *hit)
 }
 
 /* Sets up the bundle with a hit's ray to a light. */
-static void look_at_light(tracer *t, const render_hit *hit, int light)
+static void set_light_ray(tracer *t, const render_hit *hit, int light)
 {
     const hit_axes a = hit_axes_around(t->job->lights[light].direction);
     const render_space *space = &t->job->space;
-    const hit_place p = place_of(t->job, hit);
+    const hit_frame p = place_of(t->job, hit);
     kernel_bundle *b = &t->bundle;
     double from[3];
     for (int k = 0; k < 3; k++) from[k] = (p.start[k] - space->origin[k]) * space->scale;
     const double x = hit_dot(a.right, from), y = hit_dot(a.up, from);
     const double centre[2] = {(floor(x * LIGHT_TILES) + 0.5) / LIGHT_TILES,
                               (floor(y * LIGHT_TILES) + 0.5) / LIGHT_TILES};
-    tracer_look(t, space->origin, &a, true);
+    tracer_set_camera(t, space->origin, &a, true);
     b->tile.centre_x = centre[0] / space->scale;
     b->tile.centre_y = centre[1] / space->scale;
     b->tile.radius = 0.5F / LIGHT_TILES;
@@ -215,89 +215,89 @@ static void look_at_light(tracer *t, const render_hit *hit, int light)
 
 static int by_ray(const void *a, const void *b)
 {
-    const kernel_doubt *x = a, *y = b;
+    const kernel_undecided_pair *x = a, *y = b;
     if (x->ray != y->ray) return x->ray < y->ray ? -1 : 1;
     return (x->occluder > y->occluder) - (x->occluder < y->occluder);
 }
 
-static void ask_cell(tracer *t, int32_t occluder)
+static void test_cell(tracer *t, int32_t occluder)
 {
     t->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
 /* Marks a doubt (a ray that must be tested exactly in a cell) whose cell has already been tested with all its rays. */
-enum { ASKED = -1 };
+enum { TESTED = -1 };
 
 /* Tests a hit's rays into the hemisphere exactly in the cells of its `count` doubts, and closes the rays that are
  * blocked. */
-static void settle_hemisphere(tracer *t, const render_hit *hit, kernel_doubt *doubts, int64_t count)
+static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_pair *undecided, int64_t count)
 {
     uint64_t open = 0;
     int32_t ray_of[RENDER_MAX_SAMPLES];
-    look_at_hemisphere(t, hit);
+    set_hemisphere_rays(t, hit);
     for (int64_t i = 0; i < count; i++) {
-        const int k = t->names[doubts[i].ray].number;
-        ray_of[k] = doubts[i].ray;
-        if (t->rays[doubts[i].ray].is_open) open |= (uint64_t)1 << k;
+        const int k = t->names[undecided[i].ray].number;
+        ray_of[k] = undecided[i].ray;
+        if (t->rays[undecided[i].ray].is_open) open |= (uint64_t)1 << k;
     }
-    const uint64_t asked = open;
+    const uint64_t prefetched = open;
     for (int64_t i = 0; i < count && open; i++) {
-        const int32_t occluder = doubts[i].occluder;
-        if (occluder == ASKED) continue;
+        const int32_t occluder = undecided[i].occluder;
+        if (occluder == TESTED) continue;
         t->bundle.open = 0;
         for (int64_t j = i; j < count; j++) {
-            if (doubts[j].occluder != occluder) continue;
-            t->bundle.open |= (uint64_t)1 << t->names[doubts[j].ray].number;
-            doubts[j].occluder = ASKED;
+            if (undecided[j].occluder != occluder) continue;
+            t->bundle.open |= (uint64_t)1 << t->names[undecided[j].ray].number;
+            undecided[j].occluder = TESTED;
         }
         t->bundle.open &= open;
         if (!t->bundle.open) continue;
         const uint64_t before = t->bundle.open;
-        ask_cell(t, occluder);
+        test_cell(t, occluder);
         open &= ~(before & ~t->bundle.open);
     }
-    for (uint64_t closed = asked & ~open; closed; closed &= closed - 1)
+    for (uint64_t closed = prefetched & ~open; closed; closed &= closed - 1)
         t->rays[ray_of[__builtin_ctzll(closed)]].is_open = false;
 }
 
-static void settle_light(tracer *t, const render_hit *hit, const kernel_doubt *doubt)
+static void trace_light(tracer *t, const render_hit *hit, const kernel_undecided_pair *doubt)
 {
-    kernel_straight *ray = &t->rays[doubt->ray];
+    kernel_secondary_ray *ray = &t->rays[doubt->ray];
     if (!ray->is_open) return;
-    look_at_light(t, hit, t->names[doubt->ray].number - RENDER_MAX_SAMPLES);
+    set_light_ray(t, hit, t->names[doubt->ray].number - RENDER_MAX_SAMPLES);
     t->bundle.open = 1;
-    ask_cell(t, doubt->occluder);
+    test_cell(t, doubt->occluder);
     ray->is_open = t->bundle.open;
 }
 
-static void settle_doubts(tracer *t, const render_hit *hits)
+static void trace_undecided(tracer *t, const render_hit *hits)
 {
-    kernel_straights *s = &t->straights;
-    qsort(s->doubts, (size_t)s->doubt_count, sizeof *s->doubts, by_ray);
-    for (int64_t first = 0, end; first < s->doubt_count; first = end) {
-        kernel_doubt *from = &s->doubts[first];
+    kernel_secondary_rays *s = &t->secondary_rays;
+    qsort(s->undecided, (size_t)s->undecided_count, sizeof *s->undecided, by_ray);
+    for (int64_t first = 0, end; first < s->undecided_count; first = end) {
+        kernel_undecided_pair *from = &s->undecided[first];
         const ray_name name = t->names[from->ray];
-        for (end = first + 1; end < s->doubt_count && name.number < RENDER_MAX_SAMPLES; end++) {
-            const ray_name next = t->names[s->doubts[end].ray];
+        for (end = first + 1; end < s->undecided_count && name.number < RENDER_MAX_SAMPLES; end++) {
+            const ray_name next = t->names[s->undecided[end].ray];
             if (next.hit != name.hit || next.number >= RENDER_MAX_SAMPLES) break;
         }
         if (name.number < RENDER_MAX_SAMPLES)
-            settle_hemisphere(t, &hits[name.hit], from, end - first);
+            trace_hemisphere(t, &hits[name.hit], from, end - first);
         else
-            settle_light(t, &hits[name.hit], from);
+            trace_light(t, &hits[name.hit], from);
     }
 }
 
 static void trace_chunk(tracer *t, const render_hit *hits, render_hit_rays *rays, int count)
 {
-    kernel_straights *s = &t->straights;
+    kernel_secondary_rays *s = &t->secondary_rays;
     t->thread.serial++;
     if (t->thread.polyhedra) polyhedra_reset(t->thread.polyhedra);
     s->count = 0;
-    s->doubt_count = 0;
+    s->undecided_count = 0;
     for (int i = 0; i < count; i++) add_hit(t, i, &hits[i], &rays[i]);
     t->kernels->occlude(&t->frame, &t->thread, &t->of->trees, s);
-    if (s->doubt_count) settle_doubts(t, hits);
+    if (s->undecided_count) trace_undecided(t, hits);
     for (int i = 0; i < s->count; i++) {
         const ray_name name = t->names[i];
         if (t->rays[i].is_open) continue;
@@ -324,7 +324,7 @@ static tracer *tracer_create(const render_occluders *of)
     t->frame = of->frame;
     t->frame.job = &t->moved;
     t->frame.depth_shift = t->moved.space.depth_origin = 0;
-    t->straights = (kernel_straights){.rays = t->rays, .grow = grow_doubts};
+    t->secondary_rays = (kernel_secondary_rays){.rays = t->rays, .grow = grow_undecided};
     t->thread = (kernel_thread){.memory = base_alloc(t->kernels->memory_bytes),
                                 .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
                                 .find_polyhedron = polyhedra_find,
@@ -344,7 +344,7 @@ static bool tracer_free(tracer *t)
     const bool is_well = !t->thread.out_of_memory;
     polyhedra_free(t->thread.polyhedra);
     base_free(t->thread.memory);
-    base_free(t->straights.doubts);
+    base_free(t->secondary_rays.undecided);
     base_free(t);
     return is_well;
 }
@@ -454,10 +454,10 @@ static bool is_near_box(const double from[3], double reach, const render_box *bo
 }
 
 void render_rays_to_boxes(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
-                          const render_box *boxes, int count, render_box_taker *take, void *state)
+                          const render_box *boxes, int count, render_box_callback *take, void *state)
 {
     const render_occlusion *o = job->occlusion;
-    const hit_place p = place_of(job, hit);
+    const hit_frame p = place_of(job, hit);
     const double margin = box_margin / job->space.scale;
     double samples[RENDER_MAX_SAMPLES][3];
     if (rays->samples) hit_directions(job, hit->pixel, &p.a, samples);
@@ -480,7 +480,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 /* ---- colours ------------------------------------------------------------------------------------------------- */
 
 /* Computes the sums of diffuse and specular light of kernel_shade() over the lights in `lights` only, in double. */
-static void shade(const render_job *job, const render_material *m, const hit_place *p, uint32_t lights,
+static void shade(const render_job *job, const render_material *m, const hit_frame *p, uint32_t lights,
                   double diffuse[3], double specular[3])
 {
     const double *n = p->a.forward;
@@ -512,7 +512,7 @@ void render_light_fragment(const render_job *job, const render_hit_rays *open, f
     f->t_out = f->t_in;
     f->transmittance = layer->opacity >= 1 ? 0 : 1 - layer->opacity;
     const render_occlusion *o = job->occlusion;
-    const hit_place p = place_of(job, &hit);
+    const hit_frame p = place_of(job, &hit);
     const double sky = o->samples ? (double)__builtin_popcountll(open->samples) / o->samples : 1;
     shade(job, &layer->material, &p, open->lights | ~o->lights, diffuse, specular);
     const double opacity = layer->opacity >= 1 ? 1 : (double)layer->opacity;

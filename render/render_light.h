@@ -63,9 +63,9 @@ render_box render_occluder_box(const render_job *job);
 
 /* render_rays_to_boxes() calls take(state, box number, rays) for each of `count` boxes that rays of the hit may meet,
  * with these rays. */
-typedef void render_box_taker(void *state, int box, const render_hit_rays *rays);
+typedef void render_box_callback(void *state, int box, const render_hit_rays *rays);
 void render_rays_to_boxes(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
-                          const render_box *boxes, int count, render_box_taker *take, void *state);
+                          const render_box *boxes, int count, render_box_callback *take, void *state);
 
 /* Lights an unlit fragment by its open rays, giving the fragment that RENDER_LIGHT would have given if nothing were
  * blocked. Fragments of volumes are left unchanged. */

@@ -54,23 +54,23 @@ int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER
     return count;
 }
 
-static void prepare_isovalues(kernel_interest *interest, const render_surface_layer *layer)
+static void prepare_isovalues(kernel_visible_values *visible_values, const render_surface_layer *layer)
 {
-    interest->count = layer->value_count;
+    visible_values->count = layer->value_count;
     for (int i = 0; i < layer->value_count; i++) {
         const mmbvh_interval interval = render_isovalue_interval(layer->values[i]);
-        interest->low[i] = interval.low;
-        interest->high[i] = interval.high;
+        visible_values->low[i] = interval.low;
+        visible_values->high[i] = interval.high;
     }
 }
 
-static void prepare_visible(kernel_interest *interest, const render_transfer *t)
+static void prepare_visible(kernel_visible_values *visible_values, const render_transfer *t)
 {
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
-    interest->count = render_visible_intervals(t, intervals);
-    for (int i = 0; i < interest->count; i++) {
-        interest->low[i] = intervals[i].low;
-        interest->high[i] = intervals[i].high;
+    visible_values->count = render_visible_intervals(t, intervals);
+    for (int i = 0; i < visible_values->count; i++) {
+        visible_values->low[i] = intervals[i].low;
+        visible_values->high[i] = intervals[i].high;
     }
 }
 
@@ -90,9 +90,9 @@ static void prepare_scale(kernel_transfer *out, const render_transfer *t)
                                 .shift = (float)((begin - low) * slope)};
 }
 
-/* Returns the position in the colour table of a value at which an opacity is given, as kernel_colour_place() computes
- * it. */
-static double ramp_place(const kernel_transfer *out, const render_transfer *t, double value)
+/* Returns the position in the colour table of a value at which an opacity is given, as kernel_colour_position()
+ * computes it. */
+static double ramp_position(const kernel_transfer *out, const render_transfer *t, double value)
 {
     if (t->scale == RENDER_LINEAR) return (value - out->low) * out->inverse_width;
     const double low = render_scaled(t->scale, t->threshold, t->low);
@@ -112,14 +112,14 @@ static void prepare_transfer(kernel_transfer *out, const render_transfer *t, dou
     out->ramp_count = t->opacity_count - 1;
     out->base_opacity = t->opacities[0];
     for (int i = 0; i < out->ramp_count; i++) {
-        const double start = ramp_place(out, t, t->opacity_values[i]);
-        const double along = ramp_place(out, t, t->opacity_values[i + 1]) - start;
+        const double start = ramp_position(out, t, t->opacity_values[i]);
+        const double along = ramp_position(out, t, t->opacity_values[i + 1]) - start;
         out->ramp_start[i] = (float)start;
         out->ramp_inverse[i] = along > 1e-38 ? (float)(1 / along) : 3e38f;
         out->ramp_rise[i] = t->opacities[i + 1] - t->opacities[i];
     }
     out->exponent = (float)(step / t->unit_distance);
-    prepare_visible(&out->interest, t);
+    prepare_visible(&out->visible_values, t);
 }
 
 static void prepare_lines(kernel_lines *out, const render_lines *l)
@@ -197,7 +197,7 @@ static void prepare_clips(kernel_frame *f)
     if (job->volume_count) f->common_clips &= job->volume_clips;
     if (!job->clip_count) f->common_clips = 0;
     if (job->volume_count && job->volume_clips & ~f->common_clips)
-        f->volume_turns = 1 + __builtin_popcount(job->volume_clips & outside);
+        f->volume_intervals = 1 + __builtin_popcount(job->volume_clips & outside);
 }
 
 /* Opaque layers come first; kinds number the isovalues in the job's order. */
@@ -215,7 +215,7 @@ static void prepare_surfaces(kernel_frame *f)
                 s->layer = layer;
                 s->first_kind = kind;
                 s->own_clips = job->clip_count ? layer->clips & ~f->common_clips : 0;
-                prepare_isovalues(&s->interest, layer);
+                prepare_isovalues(&s->visible_values, layer);
                 if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, i);
                 f->needs_packets = f->needs_packets || layer->normal == RENDER_DIFFERENCES;
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
@@ -358,7 +358,7 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
             status = render_preintegral_build(&f->pieces[i], t, error_of_each, (double)f->reach[i], error);
     }
     if (status == INSITU_OK && f->allowance > 0 && has_curved_cells(job))
-        status = render_swings_build(&f->pieces[0], job->volumes[0].transfer, error);
+        status = render_variations_build(&f->pieces[0], job->volumes[0].transfer, error);
     return status;
 }
 
@@ -388,7 +388,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     const bool bins = job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
     /* A tile's list of cells can be used by one turn only, because tracing consumes it. */
-    frame->bins_volume =
-        bins && job->volume_count == 1 && frame->volume_turns <= 1 && !(frame->has_segments && job->separate_samples);
+    frame->bins_volume = bins && job->volume_count == 1 && frame->volume_intervals <= 1 &&
+                         !(frame->has_segments && job->separate_samples);
     return segments;
 }

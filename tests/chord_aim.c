@@ -34,8 +34,8 @@ static void random_direction(uint64_t *counter, double d[3])
 
 /* ---- cameras ---- */
 
-static void look(render_camera *camera, const double eye[3], const double focal[3], bool is_orthographic,
-                 uint64_t *counter)
+static void set_view(render_camera *camera, const double eye[3], const double focal[3], bool is_orthographic,
+                     uint64_t *counter)
 {
     double up[3];
     do random_direction(counter, up);
@@ -43,14 +43,14 @@ static void look(render_camera *camera, const double eye[3], const double focal[
     camera->is_orthographic = is_orthographic;
 }
 
-static void look_from_anywhere(render_camera *camera, uint64_t *counter)
+static void view_from_random_point(render_camera *camera, uint64_t *counter)
 {
     double eye[3], focal[3];
     const double distance = uniform(counter, 2, 8);
     random_direction(counter, eye);
     for (int a = 0; a < 3; a++) eye[a] *= distance;
     random_point(counter, 0.5, focal);
-    look(camera, eye, focal, uniform(counter, 0, 1) < 0.5, counter);
+    set_view(camera, eye, focal, uniform(counter, 0, 1) < 0.5, counter);
 }
 
 static void project(const render_camera *c, const double p[3], double *x, double *y)
@@ -132,7 +132,7 @@ static void step_back(const double *a, const double *b, double distance, double 
 
 /* The eye on the line of the face's first edge, or in the plane of its first three vertices; in every second camera the
  * view is along that line as well, so that orthographic rays are. */
-static void look_along(const face_loop *face, chord_aim aim, render_camera *camera, uint64_t *counter)
+static void view_along(const face_loop *face, chord_aim aim, render_camera *camera, uint64_t *counter)
 {
     double to[3], eye[3], focal[3];
     memcpy(to, face->at[1], sizeof to);
@@ -140,7 +140,7 @@ static void look_along(const face_loop *face, chord_aim aim, render_camera *came
     step_back(face->at[0], to, uniform(counter, 4, 8), eye);
     random_point(counter, 0.5, focal);
     const bool is_straight = uniform(counter, 0, 1) < 0.5;
-    look(camera, eye, is_straight ? to : focal, is_straight && uniform(counter, 0, 1) < 0.7, counter);
+    set_view(camera, eye, is_straight ? to : focal, is_straight && uniform(counter, 0, 1) < 0.7, counter);
 }
 
 /* ---- rays ---- */
@@ -203,7 +203,7 @@ static void aim_along(const test_mesh *mesh, int64_t cell, chord_aim aim, uint64
 {
     face_loop face;
     random_face(mesh, cell, counter, &face);
-    look_along(&face, aim, camera, counter);
+    view_along(&face, aim, camera, counter);
     aim_at(camera, face.at[0], counter, rays);
     while (rays->count < CHORD_MAX_RAYS / 2) {
         double p[3];
@@ -249,15 +249,15 @@ void chord_aim_rays(const test_mesh *mesh, int n, chord_aim aim, uint64_t *count
     case CHORD_FROM_INSIDE:
         random_point(counter, 0.9, eye);
         random_point(counter, 2, focal);
-        look(camera, eye, focal, uniform(counter, 0, 1) < 0.3, counter);
+        set_view(camera, eye, focal, uniform(counter, 0, 1) < 0.3, counter);
         aim_forward(counter, rays);
         break;
     case CHORD_RANDOM:
-        look_from_anywhere(camera, counter);
+        view_from_random_point(camera, counter);
         aim_anywhere(camera, counter, rays);
         break;
     default:
-        look_from_anywhere(camera, counter);
+        view_from_random_point(camera, counter);
         aim_at_cell(mesh, cell, aim, camera, counter, rays);
         break;
     }

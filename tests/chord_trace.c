@@ -24,8 +24,8 @@ static void chord_note(const chord_state *state, vm mask, vf t_in, vf t_out)
     vf_store(out, t_out);
     for (unsigned bits = vm_bits(mask); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits), ray = state->first + lane;
-        const int at = state->rays->span_count[ray]++;
-        if (at < CHORD_MAX_SPANS) state->rays->spans[ray][at] = (chord_span){in[lane], out[lane]};
+        const int at = state->rays->interval_count[ray]++;
+        if (at < CHORD_MAX_INTERVALS) state->rays->ray_intervals[ray][at] = (chord_interval){in[lane], out[lane]};
     }
 }
 
@@ -34,17 +34,16 @@ static void chord_polyhedron(kernel_packet *p, const chord_state *state, const g
 {
     polyhedron *c =
         p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part, 0, index);
-    kernel_passage r;
-    kernel_stay stay;
+    kernel_poly_crossings r;
+    kernel_polyhedron_interval stay;
     if (!c) p->thread->out_of_memory = true;
     if (!c) return;
-    if (!c->is_placed) {
-        kernel_polyhedron_place(c, p);
+    if (!c->is_transformed) {
+        kernel_polyhedron_transform(c, p);
         for (int i = 0; i <= c->vertex_count; i++) c->f[i] = 0;
     }
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
-    while (kernel_passage_next(&r, &stay))
-        chord_note(state, stay.interval.mask, stay.interval.t_in, stay.interval.t_out);
+    if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    while (kernel_poly_next(&r, &stay)) chord_note(state, stay.interval.mask, stay.interval.t_in, stay.interval.t_out);
 }
 
 static void chord_cell(kernel_packet *p, const chord_state *state, const grid_field *field, int part, uint32_t index,
@@ -57,8 +56,8 @@ static void chord_cell(kernel_packet *p, const chord_state *state, const grid_fi
         chord_polyhedron(p, state, field, part, index, rays);
         return;
     }
-    if (!c->is_placed) {
-        kernel_cell_place(c, p, p->frame->job->parts[part].cells);
+    if (!c->is_transformed) {
+        kernel_cell_transform(c, p, p->frame->job->parts[part].cells);
         for (int i = 0; i < c->count; i++) c->f[i] = 0;
     }
     if (c->type == GRID_TET)
@@ -77,7 +76,7 @@ static void chord_leaf(kernel_packet *p, void *opaque_state, int part, const uin
 static void chord_tile_rays(kernel_packet *p, const kernel_lanes *l)
 {
     const bool flat = p->frame->job->camera.is_orthographic;
-    const double reach = kernel_reach(p->frame);
+    const double reach = kernel_slope_to_origin(p->frame);
     float lanes[4][SIMD_WIDTH];
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const double dx = l->px[i] - p->tile->centre_x, dy = l->py[i] - p->tile->centre_y;
@@ -137,7 +136,7 @@ static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays
                               .shear_y = flat ? 0 : (float)rays->centre_y,
                               .radius = (float)chord_radius(f, rays)};
     thread->serial++;
-    for (int i = 0; i < rays->count; i++) rays->span_count[i] = 0;
+    for (int i = 0; i < rays->count; i++) rays->interval_count[i] = 0;
     for (int first = 0; first < rays->count; first += SIMD_WIDTH) {
         kernel_packet p;
         chord_state state = {rays, first};

@@ -6,11 +6,11 @@
 
 #include "kernel_types.h"
 
-enum { CHORD_MAX_RAYS = 64, CHORD_MAX_SPANS = 160 };
+enum { CHORD_MAX_RAYS = 64, CHORD_MAX_INTERVALS = 160 };
 
-typedef struct chord_span {
+typedef struct chord_interval {
     float t_in, t_out;
-} chord_span;
+} chord_interval;
 
 /* Rays of one tile. Where there are more spans than fit, span_count says so all the same. */
 typedef struct chord_rays {
@@ -18,8 +18,8 @@ typedef struct chord_rays {
     bool is_pencil;                              /* edges by their lines (kernel_cell.h), as tiles have them? */
     double centre_x, centre_y;                   /* the tile's middle in the image plane: slopes, or offsets */
     double x[CHORD_MAX_RAYS], y[CHORD_MAX_RAYS]; /* the rays */
-    int span_count[CHORD_MAX_RAYS];
-    chord_span spans[CHORD_MAX_RAYS][CHORD_MAX_SPANS]; /* in the order of the tree */
+    int interval_count[CHORD_MAX_RAYS];
+    chord_interval ray_intervals[CHORD_MAX_RAYS][CHORD_MAX_INTERVALS]; /* in the order of the tree */
 } chord_rays;
 
 typedef struct chord_table {

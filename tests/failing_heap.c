@@ -9,11 +9,11 @@
 
 #if defined(__SANITIZE_ADDRESS__) || !defined(__GLIBC__)
 
-void heap_arm(int64_t n, bool is_for_good)
+void heap_start_failing(int64_t n, bool is_for_good)
 {
     (void)n, (void)is_for_good;
 }
-int64_t heap_disarm(void)
+int64_t heap_stop_failing(void)
 {
     return 0;
 }
@@ -76,7 +76,7 @@ static bool must_fail(const void *caller)
     return true;
 }
 
-void heap_arm(int64_t n, bool is_for_good)
+void heap_start_failing(int64_t n, bool is_for_good)
 {
     if (!spared_count) dl_iterate_phdr(note_library, NULL);
     heap.is_for_good = is_for_good;
@@ -85,7 +85,7 @@ void heap_arm(int64_t n, bool is_for_good)
     heap.is_armed = true;
 }
 
-int64_t heap_disarm(void)
+int64_t heap_stop_failing(void)
 {
     heap.is_armed = false;
     return heap.count;

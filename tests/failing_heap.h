@@ -14,10 +14,10 @@ extern "C" {
 #endif
 
 /* Makes the n-th allocation of this thread from now on fail (1: the next one), and all after it if is_for_good. */
-void heap_arm(int64_t n, bool is_for_good);
+void heap_start_failing(int64_t n, bool is_for_good);
 
-/* Allocations work again. Returns how many were asked for since heap_arm(). */
-int64_t heap_disarm(void);
+/* Allocations work again. Returns how many were asked for since heap_start_failing(). */
+int64_t heap_stop_failing(void);
 
 /* Between these the thread's allocations are neither counted nor failed. They may stand in each other. */
 void heap_pause(void);

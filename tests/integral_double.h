@@ -9,7 +9,7 @@ void integral_on_doubles(const render_transfer *t, double length, double v_in, d
 void integral_on_floats(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
 
 /* By range of values what a field that is off does to the light: by how much that varies, its most, and the most of the
- * extinction and of its slope (kernel_swing). */
+ * extinction and of its slope (kernel_light_variation). */
 void integral_swings(const render_transfer *t, int count, const double (*ranges)[2], double (*out)[4]);
 
 #endif

@@ -3,7 +3,7 @@
 #define KERNEL_REAL_IS_DOUBLE
 #define BASE_SIMD_H
 #define render_pieces_build pieces_build_of_doubles
-#define render_swings_build swings_build_of_doubles
+#define render_variations_build swings_build_of_doubles
 #define render_pieces_free pieces_free_of_doubles
 
 #include <math.h>
@@ -163,7 +163,7 @@ void integral_on_doubles(const render_transfer *t, double length, double v_in, d
     prepare_gauss();
     if (render_pieces_build(&pieces, t, 0, &error) != INSITU_OK) abort();
     kernel_light light = kernel_clear();
-    const kernel_run run = kernel_run_of(vf_set(length), vf_set(v_in), vf_set(v_out));
+    const kernel_unit_segment run = kernel_unit_segment_of(vf_set(length), vf_set(v_in), vf_set(v_out));
     kernel_integrate(&pieces, (vm){-1, -1}, &run, &light);
     for (int c = 0; c < 3; c++) out[c] = light.colour[c][0];
     out[3] = light.transmittance[0];

@@ -12,7 +12,8 @@ void integral_on_floats(const render_transfer *t, double length, double v_in, do
     base_error error = {0};
     if (render_pieces_build(&pieces, t, 0, &error) != INSITU_OK) abort();
     kernel_light light = kernel_clear();
-    const kernel_run run = kernel_run_of(vf_set((float)length), vf_set((float)v_in), vf_set((float)v_out));
+    const kernel_unit_segment run =
+        kernel_unit_segment_of(vf_set((float)length), vf_set((float)v_in), vf_set((float)v_out));
     kernel_integrate(&pieces, vm_all_lanes(), &run, &light);
     for (int c = 0; c < 3; c++) out[c] = (double)light.colour[c][0];
     out[3] = (double)light.transmittance[0];
@@ -24,10 +25,10 @@ void integral_swings(const render_transfer *t, int count, const double (*ranges)
     kernel_pieces pieces;
     base_error error = {0};
     if (render_pieces_build(&pieces, t, 0, &error) != INSITU_OK) abort();
-    if (render_swings_build(&pieces, t, &error) != INSITU_OK) abort();
+    if (render_variations_build(&pieces, t, &error) != INSITU_OK) abort();
     for (int i = 0; i < count; i++) {
         const vf low = vf_set((float)ranges[i][0]), high = vf_set((float)ranges[i][1]);
-        const float *found = &pieces.swings->swing + kernel_swing_entry(&pieces, low, high)[0];
+        const float *found = &pieces.variations->variation + kernel_light_variation_entry(&pieces, low, high)[0];
         for (int n = 0; n < 4; n++) out[i][n] = (double)found[n];
     }
     render_pieces_free(&pieces);

@@ -13,26 +13,26 @@
 #include <math.h>
 #include <stdlib.h>
 
-typedef struct placed_cell {
+typedef struct camera_cell {
     reference_cell cell;
     reference_box box;
     double values[REFERENCE_MAX_VERTICES];
     const render_transfer *transfer;
-} placed_cell;
+} camera_cell;
 
 struct reference_integral {
     const render_job *job;
     double tolerance;
     int64_t count;
-    placed_cell *cells;
+    camera_cell *cells;
 };
 
 /* The stretch of the ray in a cell of a layer. */
-typedef struct stretch {
-    const placed_cell *cell;
+typedef struct cell_interval {
+    const camera_cell *cell;
     double z_in, z_out;
     reference_crossing ends[2];
-} stretch;
+} cell_interval;
 
 /* The effect of a stretch on light: C and T. */
 typedef struct light {
@@ -44,13 +44,13 @@ typedef struct sample {
     double extinction, emission[3]; /* per z */
 } sample;
 
-typedef struct course {
+typedef struct active_intervals {
     const reference_integral *scene;
     int64_t count;
-    const stretch **active; /* the stretches that go on at the place, count */
+    const cell_interval **active; /* the stretches that go on at the place, count */
     reference_line line;
     double length; /* per z */
-} course;
+} active_intervals;
 
 static void add_cell(reference_integral *scene, int volume, int part, int64_t index)
 {
@@ -59,7 +59,7 @@ static void add_cell(reference_integral *scene, int volume, int part, int64_t in
     const render_field *field = &job->volumes[volume].field;
     const double *axes[3] = {job->camera.right, job->camera.up, job->camera.forward};
     int64_t vertices[REFERENCE_MAX_VERTICES];
-    placed_cell *c = &scene->cells[scene->count];
+    camera_cell *c = &scene->cells[scene->count];
     if (grid_is_ghost(g, index) || !field->ranges[part].low) return;
     c->box = reference_empty_box;
     c->transfer = job->volumes[volume].transfer;
@@ -93,7 +93,7 @@ reference_integral *reference_integral_create(const render_job *job, double tole
 {
     reference_integral *scene = reference_reserve(NULL, sizeof *scene);
     const size_t most = (size_t)count_drawn(job) * (size_t)job->volume_count;
-    *scene = (reference_integral){job, tolerance, 0, reference_reserve(NULL, most * sizeof(placed_cell))};
+    *scene = (reference_integral){job, tolerance, 0, reference_reserve(NULL, most * sizeof(camera_cell))};
     for (int volume = 0; volume < job->volume_count; volume++)
         for (int part = 0; part < job->part_count; part++)
             for (int64_t cell = 0; cell < job->parts[part].cells->cell_count; cell++)
@@ -107,9 +107,9 @@ void reference_integral_free(reference_integral *scene)
     free(scene);
 }
 
-static double value_at(const stretch *s, const reference_line *line, double z)
+static double value_at(const cell_interval *s, const reference_line *line, double z)
 {
-    const placed_cell *placed = s->cell;
+    const camera_cell *placed = s->cell;
     const double point[3] = {line->base[0] + line->slope[0] * z, line->base[1] + line->slope[1] * z, z};
     double value;
     if (placed->cell.type == GRID_POLYHEDRON)
@@ -119,9 +119,9 @@ static double value_at(const stretch *s, const reference_line *line, double z)
     return value;
 }
 
-static void add_sample(const course *c, const stretch *s, double z, sample *sum)
+static void add_sample(const active_intervals *c, const cell_interval *s, double z, sample *sum)
 {
-    const placed_cell *placed = s->cell;
+    const camera_cell *placed = s->cell;
     const double value = value_at(s, &c->line, z);
     double colour[3];
     const double clear = -log1p(-fmin(reference_opacity(placed->transfer, value), 1 - 1e-15));
@@ -131,7 +131,7 @@ static void add_sample(const course *c, const stretch *s, double z, sample *sum)
     for (int k = 0; k < 3; k++) sum->emission[k] += extinction * colour[k];
 }
 
-static sample sample_at(const course *c, double z)
+static sample sample_at(const active_intervals *c, double z)
 {
     sample sum = {0};
     for (int64_t i = 0; i < c->count; i++) add_sample(c, c->active[i], z, &sum);
@@ -171,7 +171,7 @@ static double difference(const light *a, const light *b)
 }
 
 /* s: at the ends, the quarters and the middle. */
-static light adapt(const course *c, double from, double to, const sample s[5], double tolerance, int depth)
+static light adapt(const active_intervals *c, double from, double to, const sample s[5], double tolerance, int depth)
 {
     const double middle = 0.5 * (from + to), width = to - from;
     sample left[5] = {s[0], sample_at(c, from + width / 8), s[1], sample_at(c, from + 3 * width / 8), s[2]};
@@ -184,7 +184,7 @@ static light adapt(const course *c, double from, double to, const sample s[5], d
     return over(&a, &b);
 }
 
-static light integrate(const course *c, double from, double to)
+static light integrate(const active_intervals *c, double from, double to)
 {
     sample s[5];
     for (int i = 0; i < 5; i++) s[i] = sample_at(c, from + (to - from) * i / 4);
@@ -207,9 +207,9 @@ static bool is_near(const reference_cell *cell, const reference_line *line)
 }
 
 /* The cells on the ray in front of the eye. */
-static stretch *collect(const reference_integral *scene, const reference_line *line, int64_t *count)
+static cell_interval *collect(const reference_integral *scene, const reference_line *line, int64_t *count)
 {
-    stretch *list = NULL;
+    cell_interval *list = NULL;
     int64_t capacity = 0;
     *count = 0;
     for (int64_t i = 0; i < scene->count; i++) {
@@ -221,18 +221,18 @@ static stretch *collect(const reference_integral *scene, const reference_line *l
             if (!(crossings[k + 1].z > fmax(crossings[k].z, 0))) continue;
             if (*count == capacity)
                 list = reference_reserve(list, (size_t)(capacity = 2 * capacity + 64) * sizeof *list);
-            list[(*count)++] = (stretch){
+            list[(*count)++] = (cell_interval){
                 &scene->cells[i], fmax(crossings[k].z, 0), crossings[k + 1].z, {crossings[k], crossings[k + 1]}};
         }
     }
     return list;
 }
 
-static course begin_ray(const reference_integral *scene, int x, int y)
+static active_intervals begin_ray(const reference_integral *scene, int x, int y)
 {
     const render_camera *camera = &scene->job->camera;
     const double *axes[2] = {camera->right, camera->up};
-    course c = {.scene = scene};
+    active_intervals c = {.scene = scene};
     double base[3], direction[3], from_eye[3];
     render_camera_ray(camera, x, y, base, direction);
     for (int axis = 0; axis < 3; axis++) from_eye[axis] = base[axis] - camera->eye[axis];
@@ -258,7 +258,7 @@ static int compare_numbers(const void *left, const void *right)
 }
 
 /* Finds where the stretch begins, bends and ends; returns how many places. */
-static int stretch_cuts(const stretch *s, const reference_line *line, double z[REFERENCE_MAX_BREAKS])
+static int stretch_cuts(const cell_interval *s, const reference_line *line, double z[REFERENCE_MAX_BREAKS])
 {
     z[0] = s->z_in;
     z[1] = s->z_out;
@@ -286,7 +286,8 @@ static void add_place(places *list, double z)
 
 /* The last place on this side of where the value is x, and the first beyond it, so that neither part's end is of the
  * other's side. */
-static void add_crossing(const stretch *s, const reference_line *line, double low, double high, double x, places *out)
+static void add_crossing(const cell_interval *s, const reference_line *line, double low, double high, double x,
+                         places *out)
 {
     const bool rises = value_at(s, line, low) < x;
     for (int i = 0; i < 60; i++) {
@@ -301,7 +302,7 @@ static void add_crossing(const stretch *s, const reference_line *line, double lo
 }
 
 /* The greatest (sign 1) or least (-1) value between the places, by the golden section. */
-static double extreme(const stretch *s, const reference_line *line, double low, double high, double sign)
+static double extreme(const cell_interval *s, const reference_line *line, double low, double high, double sign)
 {
     const double golden = 0.6180339887498949;
     double a = high - golden * (high - low), b = low + golden * (high - low);
@@ -320,7 +321,7 @@ static double extreme(const stretch *s, const reference_line *line, double low, 
     return 0.5 * (low + high);
 }
 
-static void add_crossings(const stretch *s, const reference_line *line, double from, double to, places *out)
+static void add_crossings(const cell_interval *s, const reference_line *line, double from, double to, places *out)
 {
     const render_transfer *t = s->cell->transfer;
     const double a = value_at(s, line, from), b = value_at(s, line, to);
@@ -332,7 +333,7 @@ static void add_crossings(const stretch *s, const reference_line *line, double f
 }
 
 /* Adds the places at which the stretch, which does not bend between from and to, reaches a point of the opacity. */
-static void add_points(const stretch *s, const reference_line *line, double from, double to, places *out)
+static void add_points(const cell_interval *s, const reference_line *line, double from, double to, places *out)
 {
     enum { SAMPLES = 48 };
     const render_transfer *t = s->cell->transfer;
@@ -366,8 +367,8 @@ static void add_points(const stretch *s, const reference_line *line, double from
 }
 
 /* The sorted places where something begins, bends, reaches a point of the opacity or ends. */
-static double *find_cuts(const stretch *list, int64_t count, const reference_line *line, const reference_hit *hits,
-                         int hit_count, int64_t *cuts)
+static double *find_cuts(const cell_interval *list, int64_t count, const reference_line *line,
+                         const reference_hit *hits, int hit_count, int64_t *cuts)
 {
     places all = {0};
     for (int64_t i = 0; i < count; i++) {
@@ -384,7 +385,7 @@ static double *find_cuts(const stretch *list, int64_t count, const reference_lin
     return all.z;
 }
 
-static void find_active(course *c, const stretch *list, int64_t count, double from, double to)
+static void find_active(active_intervals *c, const cell_interval *list, int64_t count, double from, double to)
 {
     c->count = 0;
     for (int64_t i = 0; i < count; i++)
@@ -392,7 +393,7 @@ static void find_active(course *c, const stretch *list, int64_t count, double fr
 }
 
 /* Is the ray's place within what the job's clips of volumes leave? */
-static bool is_kept(const course *c, double z)
+static bool is_kept(const active_intervals *c, double z)
 {
     const render_job *job = c->scene->job;
     const render_camera *camera = &job->camera;
@@ -418,11 +419,11 @@ static bool is_kept(const course *c, double z)
 void reference_integral_trace(const reference_integral *scene, int x, int y, const float background[4],
                               const reference_hit *hits, int hit_count, double rgba[4])
 {
-    course c = begin_ray(scene, x, y);
+    active_intervals c = begin_ray(scene, x, y);
     light sum = {{0, 0, 0}, 1};
     int64_t count, cuts;
     int next = 0;
-    stretch *list = collect(scene, &c.line, &count);
+    cell_interval *list = collect(scene, &c.line, &count);
     double *z = find_cuts(list, count, &c.line, hits, hit_count, &cuts);
     c.active = reference_reserve(NULL, (size_t)count * sizeof *c.active);
     for (int64_t i = 0; i < cuts && sum.transmittance > 0; i++) {

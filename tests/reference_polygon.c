@@ -111,7 +111,7 @@ static int first_ear(const loop *l)
     return -1;
 }
 
-int reference_polygon_cut(const double (*corners)[3], int count, int (*triangles)[3])
+int reference_polygon_triangulate(const double (*corners)[3], int count, int (*triangles)[3])
 {
     loop l;
     int found = 0;

@@ -38,7 +38,7 @@ static int agreement(const reference_polyhedron *p, int one, int other)
 }
 
 /* turn: 1 or -1 for each face; piece: the first face of its connected piece. */
-static void turn_faces(const reference_polyhedron *p, int *turn, int *piece)
+static void orient_faces(const reference_polyhedron *p, int *turn, int *piece)
 {
     for (int face = 0; face < p->face_count; face++) turn[face] = 0;
     for (int first = 0; first < p->face_count; first++) {
@@ -75,7 +75,7 @@ static void add_triangles(reference_cell *cell)
         }
         p->is_patch[face] =
             p->face_size[face] == 4 && !(size == 4 && reference_is_concave_quad((const double(*)[3])corners));
-        const int count = size < 3 ? 0 : reference_polygon_cut((const double(*)[3])corners, size, cut);
+        const int count = size < 3 ? 0 : reference_polygon_triangulate((const double(*)[3])corners, size, cut);
         for (int i = 0; i < count; i++) {
             for (int k = 0; k < 3; k++) p->triangles[p->triangle_count][k] = loop[cut[i][k]];
             p->face_of[p->triangle_count++] = face;
@@ -155,7 +155,7 @@ void reference_polyhedron_setup(reference_cell *cell)
         for (int i = 0; i < cell->count; i++) centre[axis] += cell->position[i][axis] / cell->count;
     }
     add_triangles(cell);
-    turn_faces(p, turn, piece);
+    orient_faces(p, turn, piece);
     for (int i = 0; i < p->triangle_count; i++)
         volume[piece[p->face_of[i]]] += turn[p->face_of[i]] * signed_volume(cell, i, centre);
     for (int i = 0; i < p->triangle_count; i++) {

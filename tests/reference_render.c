@@ -19,8 +19,8 @@ typedef struct event {
     bool is_sample;
     int order; /* surface id or volume layer */
     double transmittance;
-    double blur;       /* of a hit: cell size × conditioning, by which rounding moves it */
-    reference_hit hit; /* of a sample: colour alone */
+    double error_bound; /* of a hit: cell size × conditioning, by which rounding moves it */
+    reference_hit hit;  /* of a sample: colour alone */
 } event;
 
 struct reference_scene {
@@ -42,7 +42,7 @@ typedef struct trace {
 } trace;
 
 /* A cell on a ray with its part. */
-typedef struct placed_cell {
+typedef struct camera_cell {
     const render_part *part;
     int part_index;
     int64_t index;
@@ -50,7 +50,7 @@ typedef struct placed_cell {
     reference_cell cell;
     reference_crossing ends[2]; /* of the interval at hand */
     double size;
-} placed_cell;
+} camera_cell;
 
 static bool normalize(double *v)
 {
@@ -153,7 +153,7 @@ static void line_at(const trace *t, double z, double point[3])
     point[2] = z;
 }
 
-static double value_along(trace *t, const placed_cell *c, const double *values, double z)
+static double value_along(trace *t, const camera_cell *c, const double *values, double z)
 {
     double point[3], value;
     line_at(t, z, point);
@@ -165,7 +165,7 @@ static double value_along(trace *t, const placed_cell *c, const double *values, 
 }
 
 /* The root between the interval's ends, whose sides of iso are given. */
-static double bisect(trace *t, const placed_cell *c, const double *values, double iso, double z_in, double z_out,
+static double bisect(trace *t, const camera_cell *c, const double *values, double iso, double z_in, double z_out,
                      bool side_in)
 {
     double low = z_in, high = z_out;
@@ -182,20 +182,20 @@ static double bisect(trace *t, const placed_cell *c, const double *values, doubl
 
 /* ---- every crossing ---- */
 
-typedef struct along {
+typedef struct crossing_search {
     trace *t;
-    const placed_cell *c;
+    const camera_cell *c;
     const double *values;
     double iso, range;
-} along;
+} crossing_search;
 
-static double relative_along(const along *a, double z)
+static double relative_along(const crossing_search *a, double z)
 {
     return value_along(a->t, a->c, a->values, z) - a->iso;
 }
 
 /* Finds where side times the field is least in [low, high], by golden section. */
-static double dip(const along *a, double low, double high, double side)
+static double dip(const crossing_search *a, double low, double high, double side)
 {
     const double golden = 0.6180339887498949;
     double x = high - golden * (high - low), y = low + golden * (high - low);
@@ -222,7 +222,7 @@ enum { CROSSING_PIECES = 24 };
 
 /* Points between which the field passes the isovalue at most once: even ones, and the bottom of every dip towards it
  * between two of one side. */
-static int crossing_fence(const along *a, double z_in, double z_out, double *z, double *v)
+static int crossing_fence(const crossing_search *a, double z_in, double z_out, double *z, double *v)
 {
     double at[CROSSING_PIECES + 1], f[CROSSING_PIECES + 1];
     int n = 0;
@@ -250,7 +250,7 @@ static int crossing_fence(const along *a, double z_in, double z_out, double *z, 
 
 /* Finds where a polyhedron's profile bends; between two such places it is linear. A bend near the isovalue may count on
  * either side of it. */
-static int profile_fence(const along *a, double z[REFERENCE_MAX_BREAKS], double v[REFERENCE_MAX_BREAKS])
+static int profile_fence(const crossing_search *a, double z[REFERENCE_MAX_BREAKS], double v[REFERENCE_MAX_BREAKS])
 {
     const int count = reference_profile_breaks(&a->c->cell, &a->t->line, a->c->ends, z);
     for (int i = 0; i < count; i++) {
@@ -260,7 +260,7 @@ static int profile_fence(const along *a, double z[REFERENCE_MAX_BREAKS], double 
     return count;
 }
 
-static void keep_off_sheets(trace *t, const placed_cell *c, double z)
+static void keep_off_sheets(trace *t, const camera_cell *c, double z)
 {
     double point[3];
     line_at(t, z, point);
@@ -282,7 +282,7 @@ static void to_world(const render_camera *camera, const double v[3], double worl
         world[axis] = camera->right[axis] * v[0] + camera->up[axis] * v[1] + camera->forward[axis] * v[2];
 }
 
-static void surface_colour(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index, double z,
+static void surface_colour(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index, double z,
                            double colour[3])
 {
     for (int k = 0; k < 3; k++) colour[k] = layer->colour_map ? 0 : (double)layer->colours[3 * value_index + k];
@@ -292,7 +292,7 @@ static void surface_colour(trace *t, const placed_cell *c, const render_surface_
     reference_colour(layer->colour_map, value_along(t, c, values, z), colour);
 }
 
-static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index,
+static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index,
                               int surface, const double *values, double depth)
 {
     double point[3], value, gradient[3], colour[3];
@@ -312,14 +312,15 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     reference_interpolate(&c->cell, point, values, &value, gradient);
     to_world(&t->scene->job->camera, gradient, e->hit.normal);
     normalize(e->hit.normal);
-    const double along = reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
-    for (int axis = 0; axis < 3 && along > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
+    const double crossing_search =
+        reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
+    for (int axis = 0; axis < 3 && crossing_search > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
     /* A ray that enters and leaves a polyhedron through one quad's patch, beside its triangles, is outside of its tets:
      * the field there is defined along the ray, from patch to patch, but not across it. */
-    const bool has_gradient = along != 0;
+    const bool has_gradient = crossing_search != 0;
     if (!has_gradient) t->out->ambiguous = true;
-    e->hit.conditioning = has_gradient ? 1 / fabs(along) : 1;
-    e->blur = c->size * e->hit.conditioning;
+    e->hit.conditioning = has_gradient ? 1 / fabs(crossing_search) : 1;
+    e->error_bound = c->size * e->hit.conditioning;
     surface_colour(t, c, layer, value_index, depth, colour);
     shade(t, &layer->material, colour, e->hit.normal, e->hit.colour);
     return &e->hit;
@@ -327,11 +328,11 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
 
 /* All crossings. Where the interpolant at a face has another side than the face's value, the crossing is at the face.
  */
-static void cross_every(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index, int surface,
+static void cross_every(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index, int surface,
                         const double *values, const reference_crossing ends[2], const double face[2])
 {
     double z[REFERENCE_MAX_BREAKS], v[REFERENCE_MAX_BREAKS], low, high; /* more than the fence's */
-    along a = {t, c, values, layer->values[value_index], 0};
+    crossing_search a = {t, c, values, layer->values[value_index], 0};
     range_of(values, c->cell.count, &low, &high);
     if (a.iso > high || a.iso < low || ends[1].z < 0) return;
     a.range = high - low;
@@ -356,7 +357,7 @@ static void cross_every(trace *t, const placed_cell *c, const render_surface_lay
     }
 }
 
-static void cross_surface(trace *t, const placed_cell *c, const render_surface_layer *layer, int first_surface,
+static void cross_surface(trace *t, const camera_cell *c, const render_surface_layer *layer, int first_surface,
                           const double *values, const reference_crossing ends[2])
 {
     double face[2], low, high;
@@ -382,7 +383,7 @@ static void cross_surface(trace *t, const placed_cell *c, const render_surface_l
     }
 }
 
-static void cross_surfaces(trace *t, const placed_cell *c, const reference_crossing ends[2])
+static void cross_surfaces(trace *t, const camera_cell *c, const reference_crossing ends[2])
 {
     const render_job *job = t->scene->job;
     for (int layer = 0, first = 0; layer < job->surface_count; first += job->surfaces[layer++].value_count) {
@@ -411,7 +412,7 @@ static void add_sample(trace *t, const render_transfer *transfer, int layer, dou
     for (int c = 0; c < 3; c++) e->hit.colour[c] = colour[c];
 }
 
-static void cross_volume(trace *t, const placed_cell *c, int layer, const double *values,
+static void cross_volume(trace *t, const camera_cell *c, int layer, const double *values,
                          const reference_crossing ends[2])
 {
     const double spacing = t->scene->job->step / t->length;
@@ -427,7 +428,7 @@ static void cross_volume(trace *t, const placed_cell *c, int layer, const double
     }
 }
 
-static void cross_volumes(trace *t, const placed_cell *c, const reference_crossing ends[2])
+static void cross_volumes(trace *t, const camera_cell *c, const reference_crossing ends[2])
 {
     const render_job *job = t->scene->job;
     for (int layer = 0; layer < job->volume_count; layer++) {
@@ -441,7 +442,7 @@ static void cross_volumes(trace *t, const placed_cell *c, const reference_crossi
 
 /* ---- the ray ---- */
 
-static void place_cell(const reference_scene *scene, int part, int64_t index, placed_cell *c)
+static void place_cell(const reference_scene *scene, int part, int64_t index, camera_cell *c)
 {
     double low[3], high[3], volume = 1, longest = 0;
     c->part = &scene->job->parts[part];
@@ -492,7 +493,7 @@ static bool is_near(const trace *t, int part, int64_t index)
 
 static void cross_cell(trace *t, int part, int64_t index)
 {
-    placed_cell c;
+    camera_cell c;
     reference_crossing crossings[REFERENCE_MAX_CROSSINGS];
     if (grid_is_ghost(t->scene->job->parts[part].cells, index) || !is_near(t, part, index)) return;
     place_cell(t->scene, part, index, &c);
@@ -543,7 +544,8 @@ static void margins_between(const event *events, int64_t count, double *margin)
 {
     for (int64_t i = 0; i + 1 < count; i++)
         if (events[i].is_sample != events[i + 1].is_sample)
-            lessen(margin, (events[i + 1].depth - events[i].depth) / fmax(events[i].blur, events[i + 1].blur));
+            lessen(margin,
+                   (events[i + 1].depth - events[i].depth) / fmax(events[i].error_bound, events[i + 1].error_bound));
 }
 
 static void blend_events(trace *t, const float background[4])
@@ -601,7 +603,7 @@ double reference_residual(const reference_scene *scene, int x, int y, const refe
 {
     reference_ray unused = {.hit_count = 0};
     trace t = {.scene = scene, .out = &unused};
-    placed_cell c;
+    camera_cell c;
     double values[8], point[3], value, low, high, g[3], iso = 0;
     int surface = hit->surface;
     const render_surface_layer *layer = scene->job->surfaces;

@@ -62,7 +62,7 @@ static inline kernel_beam bundle_beam(const kernel_packet *p)
 static inline int bundle_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CELL_INTERVALS], kernel_curved *curved)
 {
     const kernel_beam beam = bundle_beam(&b->packet);
-    kernel_curved_alone(&b->cell, &beam, curved);
+    kernel_curved_single_bounds(&b->cell, &beam, curved);
     return kernel_curved_intervals(&b->packet, &b->cell, b->packet.active, list);
 }
 

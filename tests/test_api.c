@@ -52,7 +52,7 @@ static void write_scene(const char *output)
 static float corners[8][3], values[8];
 static const int32_t indices[8] = {0, 1, 2, 3, 4, 5, 6, 7};
 
-static void hand_over(insitu_session *session)
+static void submit(insitu_session *session)
 {
     for (int i = 0; i < 8; i++) {
         corners[i][0] = i % 4 == 1 || i % 4 == 2;
@@ -94,7 +94,7 @@ static void picture_is_written_where_the_scene_says(void **context)
     insitu_session *session = NULL;
     everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
     everywhere(insitu_last_report(session)->images == 0 && !strcmp(insitu_last_report(session)->warnings, ""));
-    hand_over(session);
+    submit(session);
     everywhere(insitu_step(session, 7, 0.5) == INSITU_OK && !strcmp(insitu_error(session), ""));
     everywhere(insitu_last_report(session)->images == 1);
     snprintf(output, sizeof output, "api_np%d/deep/a_007.png", rank_count);
@@ -112,7 +112,7 @@ static void folder_that_cannot_be_written_is_named(void **context)
     write_scene(output);
     insitu_session *session = NULL;
     everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
-    hand_over(session);
+    submit(session);
     for (int cycle = 0; cycle < 2; cycle++) {
         everywhere(insitu_step(session, cycle, 0) == INSITU_ERROR_IO);
         everywhere(strstr(insitu_error(session), "rank 0: image \"a\": ") && strstr(insitu_error(session), scene_name));
@@ -122,7 +122,7 @@ static void folder_that_cannot_be_written_is_named(void **context)
 
 /* Written in the background: the steps go on, and one of them tells which cycle's pictures are not there. What none of
  * them has told is told at the end. */
-static void picture_that_is_not_written_is_told_later(void **context)
+static void picture_that_is_not_written_is_reported_later(void **context)
 {
     (void)context;
     char output[2048];
@@ -130,7 +130,7 @@ static void picture_that_is_not_written_is_told_later(void **context)
     write_scene_of("", output);
     insitu_session *session = NULL;
     everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
-    hand_over(session);
+    submit(session);
     insitu_status status = insitu_step(session, 20, 0);
     everywhere(status == INSITU_OK && insitu_last_report(session)->images == 1);
     for (int cycle = 21; cycle < 600 && status == INSITU_OK; cycle++) {
@@ -188,7 +188,7 @@ static void sessions_of_split_ranks_live_side_by_side(void **context)
     const insitu_status status = insitu_create(half, scene_name, &session);
     MPI_Comm_free(&half); /* the session has its own */
     everywhere(status == INSITU_OK);
-    hand_over(session);
+    submit(session);
     everywhere(insitu_step(session, own_rank % 2, 0) == INSITU_OK);
     for (int cycle = 0; cycle < 2 && cycle < rank_count; cycle++) {
         snprintf(name, sizeof name, "api_np%d_%d.exr", rank_count, cycle);
@@ -218,7 +218,7 @@ static const char scene_words[] =
 
 static void draw_once(insitu_session *session)
 {
-    hand_over(session);
+    submit(session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     insitu_destroy(&session);
 }
@@ -274,7 +274,7 @@ static void pictures_are_kept_in_memory_where_asked_for(void **context)
     insitu_session *session = NULL;
     int count = -1;
     everywhere(insitu_create_from_text(MPI_COMM_WORLD, text, &session) == INSITU_OK);
-    hand_over(session);
+    submit(session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK && !insitu_last_pictures(session, &count) && count == 0);
     everywhere(insitu_keep_pictures(session, own_rank == 0) == INSITU_OK); /* rank 0's counts */
     everywhere(insitu_step(session, 2, 0) == INSITU_OK);
@@ -290,7 +290,7 @@ static void pictures_are_kept_in_memory_where_asked_for(void **context)
     insitu_destroy(&session);
 }
 
-static void wrong_scene_text_is_told_with_its_line(void **context)
+static void wrong_scene_text_is_reported_with_its_line(void **context)
 {
     (void)context;
     insitu_session *session = NULL;
@@ -337,12 +337,12 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(picture_is_written_where_the_scene_says),
         cmocka_unit_test(folder_that_cannot_be_written_is_named),
-        cmocka_unit_test(picture_that_is_not_written_is_told_later),
+        cmocka_unit_test(picture_that_is_not_written_is_reported_later),
         cmocka_unit_test(callers_error_handler_stays),
         cmocka_unit_test(sessions_of_split_ranks_live_side_by_side),
         cmocka_unit_test(scene_given_as_text_draws_what_its_file_draws),
         cmocka_unit_test(pictures_are_kept_in_memory_where_asked_for),
-        cmocka_unit_test(wrong_scene_text_is_told_with_its_line),
+        cmocka_unit_test(wrong_scene_text_is_reported_with_its_line),
         cmocka_unit_test(calls_on_no_session_are_errors),
     };
     insitu_session *early = NULL, *late = NULL;

@@ -54,16 +54,16 @@ static void close_door(doorway *d)
     everywhere(insitu_destroy(&d->session) == INSITU_OK);
 }
 
-static void step_well(doorway *d)
+static void step_ok(doorway *d)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_blueprint_step(d->adaptor, NULL, NULL);
     if (status) fprintf(stderr, "%s\n", insitu_blueprint_error(d->adaptor));
     everywhere(status == INSITU_OK);
     everywhere(insitu_last_report(d->session)->images == 1 && caught_count == (own_rank == 0));
 }
 
-static void set_well(doorway *d, const char *name, const conduit_node *node)
+static void set_ok(doorway *d, const char *name, const conduit_node *node)
 {
     const insitu_status status = insitu_blueprint_set(d->adaptor, name, node);
     if (status) fprintf(stderr, "%s\n", insitu_blueprint_error(d->adaptor));
@@ -74,11 +74,11 @@ static void set_well(doorway *d, const char *name, const conduit_node *node)
 static caught_picture draw_plain(const char *path, const layout_case *layout, int64_t *copied)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, path);
-    everywhere(layout_hand_over(session, "mesh", layout) == INSITU_OK);
+    everywhere(layout_submit(session, "mesh", layout) == INSITU_OK);
     step_is_good(session, 100);
     *copied = insitu_last_report(session)->bytes_copied;
     insitu_destroy(&session);
-    return take_caught();
+    return pop_caught_picture();
 }
 
 static bool has_colour(const caught_picture *picture)
@@ -101,10 +101,10 @@ static void each_layout_is_the_plain_header_s(void **state)
         for (int packed = 0; packed < 2; packed++) {
             doorway d = open_door(path);
             if (packed) stand_in_pack(layout.node);
-            set_well(&d, "", layout.node);
-            step_well(&d);
+            set_ok(&d, "", layout.node);
+            step_ok(&d);
             const insitu_blueprint_report *report = insitu_blueprint_last_report(d.adaptor);
-            caught_picture picture = take_caught();
+            caught_picture picture = pop_caught_picture();
             const bool is_same = own_rank || same_pictures(&picture, &truth);
             if (!is_same) fprintf(stderr, "%s%s: another picture\n", layout_kinds[i].name, packed ? ", packed" : "");
             everywhere(is_same);
@@ -137,13 +137,13 @@ static void what_the_header_says_is_not_copied(void **state)
             int64_t copied;
             caught_picture truth = draw_plain(path, &layout, &copied);
             doorway d = open_door(path);
-            set_well(&d, "", layout.node);
-            step_well(&d);
+            set_ok(&d, "", layout.node);
+            step_ok(&d);
             everywhere(insitu_blueprint_last_report(d.adaptor)->bytes_copied == 0);
             if (insitu_last_report(d.session)->bytes_copied > copied)
                 fprintf(stderr, "%s: %s\n", names[n], insitu_last_report(d.session)->copied_why);
             everywhere(insitu_last_report(d.session)->bytes_copied <= copied);
-            forget_pictures();
+            discard_pictures();
             free_caught(&truth);
             close_door(&d);
             layout_free(&layout);
@@ -169,18 +169,18 @@ static void domains_are_meshes_of_their_own(void **state)
     layout_make(&layout_kinds[16], &b);
     const char *path = write_scene(scene);
     insitu_session *session = open_session(MPI_COMM_WORLD, path);
-    everywhere(layout_hand_over(session, "grid/mesh/0", &a) == INSITU_OK);
-    everywhere(layout_hand_over(session, "grid/mesh/1", &b) == INSITU_OK);
+    everywhere(layout_submit(session, "grid/mesh/0", &a) == INSITU_OK);
+    everywhere(layout_submit(session, "grid/mesh/1", &b) == INSITU_OK);
     step_is_good(session, 100);
-    caught_picture truth = take_caught();
+    caught_picture truth = pop_caught_picture();
     insitu_destroy(&session);
     conduit_node *both = conduit_node_create();
     adopt(both, "domain_000000", a.node);
     adopt(both, "domain_000001", b.node);
     doorway d = open_door(path);
-    set_well(&d, "grid", both);
-    step_well(&d);
-    caught_picture picture = take_caught();
+    set_ok(&d, "grid", both);
+    step_ok(&d);
+    caught_picture picture = pop_caught_picture();
     const bool is_same = own_rank || same_pictures(&picture, &truth);
     everywhere(is_same);
     everywhere(insitu_blueprint_last_report(d.adaptor)->meshes == 2);
@@ -208,17 +208,17 @@ static void meshes_come_and_go(void **state)
         const bool has_a = step % 3 != 2, has_b = step % 3 != 1, is_here = step < 3 || own_rank == 0;
         insitu_session *session = open_session(MPI_COMM_WORLD, path);
         if (has_a && is_here)
-            everywhere(layout_hand_over(session, "a/mesh", &a) == INSITU_OK || true);
+            everywhere(layout_submit(session, "a/mesh", &a) == INSITU_OK || true);
         else
             everywhere(true);
-        if (has_b) layout_hand_over(session, "b/mesh", &b);
+        if (has_b) layout_submit(session, "b/mesh", &b);
         step_is_good(session, 100);
-        caught_picture truth = take_caught();
+        caught_picture truth = pop_caught_picture();
         insitu_destroy(&session);
-        if (has_a) set_well(&d, "a", is_here ? a.node : empty);
-        if (has_b) set_well(&d, "b", b.node);
-        step_well(&d);
-        caught_picture picture = take_caught();
+        if (has_a) set_ok(&d, "a", is_here ? a.node : empty);
+        if (has_b) set_ok(&d, "b", b.node);
+        step_ok(&d);
+        caught_picture picture = pop_caught_picture();
         const bool is_same = own_rank || same_pictures(&picture, &truth);
         everywhere(is_same);
         free_caught(&picture);
@@ -247,9 +247,9 @@ static void changes_are_found(void **state)
                 for (int64_t v = 0; step == 3 && v < l.mesh.vertex_count; v++) values[v] *= -0.5;
                 int64_t copied;
                 caught_picture truth = draw_plain(path, &l, &copied);
-                set_well(&d, "", l.node);
-                step_well(&d);
-                caught_picture picture = take_caught();
+                set_ok(&d, "", l.node);
+                step_ok(&d);
+                caught_picture picture = pop_caught_picture();
                 const bool is_same = own_rank || same_pictures(&picture, &truth);
                 everywhere(is_same);
                 const double built = insitu_last_report(d.session)->build_ms;
@@ -273,24 +273,24 @@ static void cycles_are_counted(void **state)
     for (int step = 0; step < 4; step++) {
         if (step == 0) stand_in_remove(l.node, "state");
         if (said[step] >= 0) conduit_node_set_path_int64(l.node, "state/cycle", said[step]);
-        set_well(&d, "", l.node);
-        step_well(&d);
+        set_ok(&d, "", l.node);
+        step_ok(&d);
         everywhere(insitu_last_report(d.session)->cycle == expected[step]);
         everywhere(insitu_last_report(d.session)->time == (double)expected[step]);
         if (said[step] >= 0) stand_in_remove(l.node, "state");
     }
-    forget_pictures();
+    discard_pictures();
     close_door(&d);
     layout_free(&l);
 }
 
 /* ---- what is left out ------------------------------------------------------------------------------------------- */
 
-typedef void spoil_node(conduit_node *node);
+typedef void corrupt_node(conduit_node *node);
 
 typedef struct left_out_case {
     const char *layout;
-    spoil_node *spoil;
+    corrupt_node *corrupt;
     const char *words;
     int meshes, fields;
 } left_out_case;
@@ -374,7 +374,7 @@ static void what_is_left_out_is_named(void **state)
         const left_out_case *c = &left_out_cases[i];
         layout_case layout;
         layout_make(find_layout(c->layout), &layout);
-        c->spoil(layout.node);
+        c->corrupt(layout.node);
         doorway d = open_door(path);
         const insitu_status status = insitu_blueprint_set(d.adaptor, "grid", layout.node);
         insitu_blueprint_step(d.adaptor, NULL, NULL);
@@ -385,7 +385,7 @@ static void what_is_left_out_is_named(void **state)
             fprintf(stderr, "%s: \"%s\", %d meshes, %d fields: %s\n", c->words, r->left_out, r->meshes, r->fields,
                     insitu_blueprint_error(d.adaptor));
         everywhere(is_well);
-        forget_pictures();
+        discard_pictures();
         close_door(&d);
         layout_free(&layout);
     }

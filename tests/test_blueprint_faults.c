@@ -35,7 +35,7 @@ typedef struct node_fault {
     const char *word;
     int64_t number, place;
     insitu_status status;
-    const char *told; /* of the message, beside the path; it may have that of another entry itself, before ": " */
+    const char *reported; /* of the message, beside the path; it may have that of another entry itself, before ": " */
 } node_fault;
 
 #define MESH INSITU_ERROR_MESH
@@ -148,7 +148,7 @@ static void replace(conduit_node *node, const node_fault *f, int id)
     stand_in_put(node, f->path, id, copy, count, 0);
 }
 
-static void spoil(conduit_node *node, const node_fault *f)
+static void corrupt(conduit_node *node, const node_fault *f)
 {
     static const char nothing[8];
     conduit_node *at = f->kind >= SHORT && f->kind != AN_OBJECT ? conduit_node_fetch_existing(node, f->path) : NULL;
@@ -188,8 +188,8 @@ static bool check_message(const char *message, const node_fault *f, const char *
 {
     char path[256];
     snprintf(path, sizeof path, "grid/%s", f->path);
-    const bool has_path = strstr(message, path) || (strstr(message, "grid/") && strstr(f->told, ": "));
-    const bool is_well = has_path && strstr(message, f->told) && strstr(message, rank);
+    const bool has_path = strstr(message, path) || (strstr(message, "grid/") && strstr(f->reported, ": "));
+    const bool is_well = has_path && strstr(message, f->reported) && strstr(message, rank);
     if (!is_well) fprintf(stderr, "%s, %s: \"%s\"\n", f->layout, f->path, message);
     return is_well;
 }
@@ -197,13 +197,13 @@ static bool check_message(const char *message, const node_fault *f, const char *
 /* The adaptor keeps no trace of the wrong node. */
 static void draw_mended(insitu_session *session, insitu_blueprint *adaptor, const conduit_node *node)
 {
-    forget_pictures();
+    discard_pictures();
     everywhere(insitu_blueprint_set(adaptor, "grid", node) == INSITU_OK);
     everywhere(insitu_blueprint_step(adaptor, NULL, NULL) == INSITU_OK);
     everywhere(insitu_last_report(session)->images == 1 && caught_count == (own_rank == 0));
 }
 
-static void wrong_nodes_are_told_to_all(void **state)
+static void wrong_nodes_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     const int bad = rank_count - 1;
@@ -218,12 +218,12 @@ static void wrong_nodes_are_told_to_all(void **state)
         everywhere(insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor) == INSITU_OK);
         layout_make(find_layout(f->layout), &right);
         layout_make(find_layout(f->layout), &wrong);
-        if (own_rank == bad) spoil(wrong.node, f);
-        forget_pictures();
+        if (own_rank == bad) corrupt(wrong.node, f);
+        discard_pictures();
         const insitu_status at_once = insitu_blueprint_set(adaptor, "grid", wrong.node);
-        const bool is_told =
+        const bool is_reported =
             own_rank != bad ? !at_once : at_once && check_message(insitu_blueprint_error(adaptor), f, "");
-        everywhere(is_told);
+        everywhere(is_reported);
         const insitu_status status = insitu_blueprint_step(adaptor, NULL, NULL);
         if (status != f->status) fprintf(stderr, "%s, %s: status %d\n", f->layout, f->path, (int)status);
         everywhere(status == f->status && check_message(insitu_blueprint_error(adaptor), f, rank));
@@ -240,7 +240,7 @@ static void wrong_nodes_are_told_to_all(void **state)
 }
 
 /* What the arrays hold is checked by the session, which names the mesh and the cell. */
-static void wrong_indices_are_told_to_all(void **state)
+static void wrong_indices_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     static const node_fault f = {"tets", "topologies/mesh/elements/connectivity", ENTRY, "", 4000, 5, MESH, ""};
@@ -249,7 +249,7 @@ static void wrong_indices_are_told_to_all(void **state)
     insitu_blueprint *adaptor = NULL;
     insitu_blueprint_create(session, &insitu_conduit_functions, MPI_COMM_WORLD, &adaptor);
     layout_make(find_layout("tets"), &layout);
-    spoil(layout.node, &f);
+    corrupt(layout.node, &f);
     everywhere(insitu_blueprint_set(adaptor, "grid", layout.node) == INSITU_OK);
     const insitu_status status = insitu_blueprint_step(adaptor, NULL, NULL);
     const char *message = insitu_blueprint_error(adaptor);
@@ -288,8 +288,8 @@ static void doors_need_what_they_stand_on(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(wrong_nodes_are_told_to_all),
-        cmocka_unit_test(wrong_indices_are_told_to_all),
+        cmocka_unit_test(wrong_nodes_are_reported_on_all_ranks),
+        cmocka_unit_test(wrong_indices_are_reported_on_all_ranks),
         cmocka_unit_test(doors_need_what_they_stand_on),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);

@@ -612,7 +612,7 @@ void layout_free(layout_case *layout)
     while (layout->array_count) free(layout->arrays[--layout->array_count]);
 }
 
-insitu_status layout_hand_over(insitu_session *session, const char *name, const layout_case *layout)
+insitu_status layout_submit(insitu_session *session, const char *name, const layout_case *layout)
 {
     insitu_mesh mesh = layout->mesh;
     if (mesh.lattice) mesh.lattice = &layout->lattice;

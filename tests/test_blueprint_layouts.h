@@ -35,6 +35,6 @@ void layout_make(const layout_kind *kind, layout_case *out);
 void layout_free(layout_case *layout);
 
 /* Sets the mesh and its fields as the header has them. */
-insitu_status layout_hand_over(insitu_session *session, const char *name, const layout_case *layout);
+insitu_status layout_submit(insitu_session *session, const char *name, const layout_case *layout);
 
 #endif

@@ -95,7 +95,7 @@ static conduit_node *at_step(int64_t step)
 static bool has_drawn(int count)
 {
     const bool is_well = caught_count == (own_rank == 0 ? count : 0);
-    forget_pictures();
+    discard_pictures();
     return is_well;
 }
 
@@ -141,7 +141,7 @@ static void channels_are_drawn(void **state)
     if (own_rank == 0) put_channel(node, "grid", "mesh", "data", &a);
     put_channel(node, "parts", "multimesh", "data/walls", &b);
     put_channel(node, "levels", "amrmesh", "data/domain_000000", &c);
-    forget_pictures();
+    discard_pictures();
     everywhere(catalyst_adaptor_execute(node) == INSITU_OK && has_drawn(1));
     conduit_node *out = results();
     everywhere(number_of(out, "insitu/cycle") == 7 && number_of(out, "insitu/images") == 1);
@@ -163,7 +163,7 @@ static void errors_are_the_same_everywhere(void **state)
     everywhere(initialize(with_scene()) == INSITU_OK);
     conduit_node *node = at_step(0);
     put_channel(node, "grid", "mesh", "data", &l);
-    forget_pictures();
+    discard_pictures();
     for (int wrong = 0; wrong < 3; wrong++) {
         const bool is_last = own_rank == rank_count - 1;
         if (is_last && wrong == 0) conduit_node_set_path_char8_str(node, "catalyst/channels/grid/type", "table");
@@ -196,7 +196,7 @@ static void parameters_are_results(void **state)
     conduit_node_set_path_float64(node, "catalyst/insitu/parameters/outflow", 3);
     everywhere(initialize(node) == INSITU_OK);
     node = at_step(0);
-    forget_pictures();
+    discard_pictures();
     catalyst_adaptor_execute(node); /* nothing is there to be drawn */
     conduit_node *out = results();
     everywhere(number_of(out, "insitu/parameters/inflow") == 2.5 && number_of(out, "insitu/parameters/outflow") == 3);

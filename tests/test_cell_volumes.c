@@ -107,7 +107,7 @@ static void bent_cells_are_the_quadrature(void **state)
         const double before = volume_of(&mesh);
         test_mesh_to_polyhedra(&mesh, 1);
         assert_near(volume_of(&mesh), before);
-        test_mesh_turn(&mesh, (uint64_t)trial);
+        test_mesh_reorder_vertices(&mesh, (uint64_t)trial);
         assert_near(volume_of(&mesh), before);
         test_mesh_free(&mesh);
     }
@@ -135,7 +135,7 @@ static void concave_polyhedra_are_closed_forms(void **state)
             test_mesh mesh;
             test_mesh_polyhedron(shapes[i], test_linear, &mesh);
             const double expected = shape_volume(&mesh, shapes[i]);
-            if (turn) test_mesh_turn(&mesh, turn);
+            if (turn) test_mesh_reorder_vertices(&mesh, turn);
             assert_near(volume_of(&mesh), expected);
             test_mesh_free(&mesh);
         }
@@ -169,7 +169,7 @@ static void rings_are_closed_forms(void **state)
         }
     test_mesh_add_polyhedron(&mesh, faces, count);
     for (uint64_t turn = 0; turn < 20; turn++) {
-        if (turn) test_mesh_turn(&mesh, turn);
+        if (turn) test_mesh_reorder_vertices(&mesh, turn);
         assert_near(volume_of(&mesh), (1 - 0.36) * 0.5);
     }
     test_mesh_free(&mesh);

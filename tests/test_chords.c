@@ -87,7 +87,7 @@ static const double jitter_wanted = 0.2;
 
 /* Counts of a test's rays. Lengths are in sides of the hull. */
 typedef struct tally {
-    int64_t rays, met, spans;
+    int64_t rays, met, ray_intervals;
     int64_t slanted, touching; /* of both kinds each ray counts once */
     int64_t unpaired;          /* with an end alone where there may be none */
     int64_t off;
@@ -99,9 +99,9 @@ typedef struct tally {
     double worst_gap;
 } tally;
 
-static int compare_spans(const void *left, const void *right)
+static int compare_intervals(const void *left, const void *right)
 {
-    const chord_span *a = left, *b = right;
+    const chord_interval *a = left, *b = right;
     if (a->t_in != b->t_in) return a->t_in < b->t_in ? -1 : 1;
     return (a->t_out > b->t_out) - (a->t_out < b->t_out);
 }
@@ -113,13 +113,13 @@ static int compare_floats(const void *left, const void *right)
 }
 
 /* The ends that are not two intervals', sorted; returns how many. */
-static int lone_ends(const chord_span *spans, int count, float lone[2 * CHORD_MAX_SPANS])
+static int lone_ends(const chord_interval *ray_intervals, int count, float lone[2 * CHORD_MAX_INTERVALS])
 {
-    float ends[2 * CHORD_MAX_SPANS];
+    float ends[2 * CHORD_MAX_INTERVALS];
     int alone = 0;
     for (int i = 0; i < count; i++) {
-        ends[2 * i] = spans[i].t_in;
-        ends[2 * i + 1] = spans[i].t_out;
+        ends[2 * i] = ray_intervals[i].t_in;
+        ends[2 * i + 1] = ray_intervals[i].t_out;
     }
     qsort(ends, 2 * (size_t)count, sizeof *ends, compare_floats);
     for (int i = 0; i < 2 * count;)
@@ -131,11 +131,12 @@ static int lone_ends(const chord_span *spans, int count, float lone[2 * CHORD_MA
 }
 
 /* Clips spans at near: parts behind the eye's plane do not count. Returns how many are left. */
-static int clip_spans(chord_span *spans, int count, float near)
+static int clip_intervals(chord_interval *ray_intervals, int count, float near)
 {
     int left = 0;
     for (int i = 0; i < count; i++)
-        if (spans[i].t_out > near) spans[left++] = (chord_span){fmaxf(spans[i].t_in, near), spans[i].t_out};
+        if (ray_intervals[i].t_out > near)
+            ray_intervals[left++] = (chord_interval){fmaxf(ray_intervals[i].t_in, near), ray_intervals[i].t_out};
     return left;
 }
 
@@ -145,10 +146,10 @@ static double depth_of(const render_job *job, float t)
 }
 
 /* Tells whether ends are alone only where they may be. */
-static bool is_paired(const render_job *job, const chord_ray *r, const chord_span *spans, int count)
+static bool is_paired(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count)
 {
-    float lone[2 * CHORD_MAX_SPANS];
-    const int alone = lone_ends(spans, count, lone);
+    float lone[2 * CHORD_MAX_INTERVALS];
+    const int alone = lone_ends(ray_intervals, count, lone);
     if (!chord_is_touching(r) && alone != 0 && alone != 2) return false;
     for (int i = 0; i < alone; i++) {
         const double depth = depth_of(job, lone[i]);
@@ -159,11 +160,12 @@ static bool is_paired(const render_job *job, const chord_ray *r, const chord_spa
 
 /* The longest overlap of intervals, which are sorted, and the longest gap; of rays that run within the hull's surface
  * only gaps in the shrunk hull count. */
-static void judge_neighbours(const render_job *job, const chord_ray *r, const chord_span *spans, int count, tally *t)
+static void verify_neighbours(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count,
+                              tally *t)
 {
     double doubled = 0, gap = 0;
     for (int i = 1, last = 0; i < count; i++) {
-        const chord_span *before = &spans[last], *now = &spans[i];
+        const chord_interval *before = &ray_intervals[last], *now = &ray_intervals[i];
         doubled = fmax(doubled, fmin((double)before->t_out, (double)now->t_out) - (double)now->t_in);
         if (!chord_is_touching(r) || chord_is_within(r, depth_of(job, before->t_out), depth_of(job, now->t_in)))
             gap = fmax(gap, (double)now->t_in - (double)before->t_out);
@@ -175,7 +177,7 @@ static void judge_neighbours(const render_job *job, const chord_ray *r, const ch
     t->worst_gap = fmax(t->worst_gap, gap * r->line.length);
 }
 
-static void judge_length(const chord_ray *r, double sum, tally *t)
+static void verify_length(const chord_ray *r, double sum, tally *t)
 {
     const double spread = r->most - r->least, off = fabs(sum - r->length);
     const double bracketed = fmax(r->least - sum, sum - r->most);
@@ -191,20 +193,22 @@ static void judge_length(const chord_ray *r, double sum, tally *t)
                 r->length, r->least, r->most);
 }
 
-static void judge_ray(const render_job *job, const chord_rays *rays, int ray, chord_span *spans, int count, tally *t)
+static void verify_ray(const render_job *job, const chord_rays *rays, int ray, chord_interval *ray_intervals, int count,
+                       tally *t)
 {
     const chord_ray r = chord_hull_ray(job, rays, ray);
     double sum = 0;
-    assert_true(count <= CHORD_MAX_SPANS);
-    count = clip_spans(spans, count, (float)(-job->space.depth_origin * job->space.scale));
-    qsort(spans, (size_t)count, sizeof *spans, compare_spans);
+    assert_true(count <= CHORD_MAX_INTERVALS);
+    count = clip_intervals(ray_intervals, count, (float)(-job->space.depth_origin * job->space.scale));
+    qsort(ray_intervals, (size_t)count, sizeof *ray_intervals, compare_intervals);
     t->rays++;
     t->met += count > 0;
-    t->spans += count;
-    for (int i = 0; i < count; i++) sum += ((double)spans[i].t_out - (double)spans[i].t_in) * r.line.length;
-    judge_neighbours(job, &r, spans, count, t);
-    judge_length(&r, sum, t);
-    if (is_paired(job, &r, spans, count)) return;
+    t->ray_intervals += count;
+    for (int i = 0; i < count; i++)
+        sum += ((double)ray_intervals[i].t_out - (double)ray_intervals[i].t_in) * r.line.length;
+    verify_neighbours(job, &r, ray_intervals, count, t);
+    verify_length(&r, sum, t);
+    if (is_paired(job, &r, ray_intervals, count)) return;
     if (t->unpaired++ < 3)
         fprintf(stderr, "ray %.17g %.17g: ends of one interval alone; chord %.9g, %.9g to %.9g\n", rays->x[ray],
                 rays->y[ray], r.length, r.least, r.most);
@@ -235,7 +239,7 @@ static void trace(const render_job *job, kernel_thread *thread, chord_rays *rays
 }
 
 /* The first tally is of rays that are set up alone, the second of the same rays as those of one tile. */
-static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t count, tally tallies[2])
+static void verify_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t count, tally tallies[2])
 {
     static const double value[1] = {0};
     static chord_rays rays;
@@ -256,7 +260,7 @@ static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t co
             rays.is_pencil = by_tile;
             trace(&f.job, &thread, &rays);
             for (int i = 0; i < rays.count; i++)
-                judge_ray(&f.job, &rays, i, rays.spans[i], rays.span_count[i], &tallies[by_tile]);
+                verify_ray(&f.job, &rays, i, rays.ray_intervals[i], rays.interval_count[i], &tallies[by_tile]);
         }
     }
     fixture_free(&f);
@@ -265,22 +269,22 @@ static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t co
     base_free(thread.cells);
 }
 
-static void tell(const char *what, const char *mesh, int by_tile, const tally *t)
+static void print_tally(const char *what, const char *mesh, int by_tile, const tally *t)
 {
     printf("%s%s%s, %s: %lld rays, %lld cells; off by %.2g of the side at most; %lld slanted, off by %.2g of the "
            "shift's share at most, %lld touching; %.2g beyond the shrunk and swollen hull's; overlaps by rounding on "
            "%lld, %.2g at most, gaps on %lld, %.2g at most; %lld wrong lengths, %lld with ends alone\n",
-           what, *mesh ? ", " : "", mesh, by_tile ? "by tile" : "alone", (long long)t->rays, (long long)t->spans,
-           t->worst_length, (long long)t->slanted, t->worst_slanted, (long long)t->touching, t->worst_bracketed,
-           (long long)t->doubled, t->worst_doubled, (long long)t->gaps, t->worst_gap, (long long)t->off,
-           (long long)t->unpaired);
+           what, *mesh ? ", " : "", mesh, by_tile ? "by tile" : "alone", (long long)t->rays,
+           (long long)t->ray_intervals, t->worst_length, (long long)t->slanted, t->worst_slanted,
+           (long long)t->touching, t->worst_bracketed, (long long)t->doubled, t->worst_doubled, (long long)t->gaps,
+           t->worst_gap, (long long)t->off, (long long)t->unpaired);
 }
 
 static void add_tally(tally *sum, const tally *t)
 {
     sum->rays += t->rays;
     sum->met += t->met;
-    sum->spans += t->spans;
+    sum->ray_intervals += t->ray_intervals;
     sum->slanted += t->slanted;
     sum->touching += t->touching;
     sum->unpaired += t->unpaired;
@@ -312,22 +316,22 @@ static void assert_few_at_the_surface(chord_aim aim, const tally *t)
         fail_msg("%d slanted and %d touching of %d rays", (int)t->slanted, (int)t->touching, (int)t->rays);
 }
 
-static void judge(chord_aim aim, const char *what)
+static void verify(chord_aim aim, const char *what)
 {
     const int64_t share = rays_wanted / (CHORD_AIM_COUNT * MESH_COUNT * 2) + 1;
     tally all[2] = {{.rays = 0}};
     for (chord_mesh mesh = 0; mesh < MESH_COUNT; mesh++)
         for (int jittered = 0; jittered < 2; jittered++) {
             tally t[2] = {{.rays = 0}};
-            judge_mesh(mesh, jittered ? jitter_wanted : 0, aim, share, t);
+            verify_mesh(mesh, jittered ? jitter_wanted : 0, aim, share, t);
             for (int by_tile = 0; by_tile < 2; by_tile++) {
                 if (t[by_tile].off || t[by_tile].unpaired || getenv("INSITU_TEST_VERBOSE"))
-                    tell(what, mesh_name(mesh), by_tile, &t[by_tile]);
+                    print_tally(what, mesh_name(mesh), by_tile, &t[by_tile]);
                 assert_true(3 * t[by_tile].met > t[by_tile].rays);
                 add_tally(&all[by_tile], &t[by_tile]);
             }
         }
-    for (int by_tile = 0; by_tile < 2; by_tile++) tell(what, "", by_tile, &all[by_tile]);
+    for (int by_tile = 0; by_tile < 2; by_tile++) print_tally(what, "", by_tile, &all[by_tile]);
     for (int by_tile = 0; by_tile < 2; by_tile++) {
         assert_int_equal(all[by_tile].off, 0);
         assert_int_equal(all[by_tile].unpaired, 0);
@@ -340,55 +344,55 @@ static void judge(chord_aim aim, const char *what)
 static void random_rays_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_RANDOM, "random");
+    verify(CHORD_RANDOM, "random");
 }
 
 static void rays_through_vertices_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_TO_VERTICES, "through vertices");
+    verify(CHORD_TO_VERTICES, "through vertices");
 }
 
 static void rays_through_edges_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_TO_EDGES, "through edges");
+    verify(CHORD_TO_EDGES, "through edges");
 }
 
 static void rays_through_faces_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_TO_FACES, "through faces");
+    verify(CHORD_TO_FACES, "through faces");
 }
 
 static void rays_along_edges_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_ALONG_EDGES, "along edges");
+    verify(CHORD_ALONG_EDGES, "along edges");
 }
 
 static void rays_along_faces_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_ALONG_FACES, "along faces");
+    verify(CHORD_ALONG_FACES, "along faces");
 }
 
 static void axis_aligned_rays_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_AXIS_ALIGNED, "axis-aligned");
+    verify(CHORD_AXIS_ALIGNED, "axis-aligned");
 }
 
 static void rays_from_inside_add_up_to_their_chords(void **state)
 {
     (void)state;
-    judge(CHORD_FROM_INSIDE, "from inside");
+    verify(CHORD_FROM_INSIDE, "from inside");
 }
 
 /* The argument is the number of rays. */
 int main(int argc, char **argv)
 {
-    if (fixture_lacks_set()) return 77;
+    if (fixture_set_is_unavailable()) return 77;
     if (argc > 1) rays_wanted = atoll(argv[1]);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_rays_add_up_to_their_chords),

@@ -183,7 +183,7 @@ def two_runs_stand_side_by_side(page):
     wait("both by the page's address", lambda: page.is_shown(0) and page.is_shown(1))
 
 
-def what_is_missing_is_told(page):
+def what_is_missing_is_reported(page):
     page.open("?with=../none.cdb")
     wait("the message", lambda: "no table at" in page.message() and "none.cdb/data.js" in page.message())
     assert page.is_shown(0) and not page.at("picture1").is_displayed()
@@ -200,7 +200,7 @@ def what_is_missing_is_told(page):
     (folder / "victim.png").rename(victim)
 
 
-def runs_of_one_name_are_told_apart(page):
+def runs_of_one_name_are_distinguished(page):
     (folder / "later").mkdir()
     shutil.copytree(folder / "other.cdb", folder / "later" / "run.cdb")
     page.open("?with=../later/run.cdb")
@@ -297,7 +297,7 @@ def main():
     try:
         page = Page(driver)
         for test in (sliders_show_every_picture, keys_move_sliders, space_plays_over_time, two_runs_stand_side_by_side,
-                     what_is_missing_is_told, runs_of_one_name_are_told_apart, light_and_dark_are_readable,
+                     what_is_missing_is_reported, runs_of_one_name_are_distinguished, light_and_dark_are_readable,
                      new_pictures_are_found, the_newest_is_followed,
                      nothing_comes_from_a_network, no_script_failed):
             test(page)

@@ -46,7 +46,7 @@ static double error_of(test_mesh_kind kind, uint64_t seed, double max_error)
     drawn_frame drawn;
     const int pixel = (int)(test_uniform(1, seed) * SIDE * SIDE);
     fixture_create_lattice(&f, kind, 2 + (int)(seed % 3), 0.2, test_wave);
-    fixture_look(&f, (fixture_camera)(seed / 2 % 3), SIDE, SIDE);
+    fixture_set_camera(&f, (fixture_camera)(seed / 2 % 3), SIDE, SIDE);
     fixture_set_volume(&f, 1);
     fixture_set_function(&f, &function, seed, seed % 5 == 0, 0.9, pow(10, test_uniform_in(2, seed, -2.5, 0.5)));
     f.transfer.low = -1;
@@ -99,7 +99,7 @@ static double error_in_fog(test_mesh_kind kind, uint64_t seed)
     drawn_frame drawn;
     const int pixel = SIDE / 2 * SIDE + SIDE / 2;
     fixture_create_lattice(&f, kind, 3, 0.2, test_linear);
-    fixture_look(&f, (fixture_camera)(seed / 2 % 2), SIDE, SIDE);
+    fixture_set_camera(&f, (fixture_camera)(seed / 2 % 2), SIDE, SIDE);
     fixture_set_volume(&f, 1);
     graze(&f.job.camera, pixel, 2 * seed, &clip, depths); /* what is within is kept */
     render_camera_ray(&f.job.camera, pixel % SIDE, pixel / SIDE, base, d);

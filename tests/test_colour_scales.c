@@ -20,16 +20,16 @@
 static const float outside[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 static const float bands[] = {0.1F, 0.2F, 0.3F, 0.9F, 0.1F, 0.5F, 0.3F, 0.8F, 0.2F, 0.6F, 0.6F, 0.1F, 0.2F, 0.4F, 0.9F};
 
-typedef struct look {
+typedef struct scale_case {
     const char *name;
     double low, high;
     render_scale scale;
     double threshold;
     bool is_banded, has_outside;
-} look;
+} scale_case;
 
 /* The colours' field goes from -1.4 to 1.6. */
-static const look looks[] = {
+static const scale_case scale_cases[] = {
     {"linear", -0.4, 0.7, RENDER_LINEAR, 0, false, false},
     {"outside", -0.4, 0.7, RENDER_LINEAR, 0, false, true},
     {"bands", -0.4, 0.7, RENDER_LINEAR, 0, true, false},
@@ -42,9 +42,9 @@ static const look looks[] = {
     {"symlog, outside", -1, 0.5, RENDER_SYMLOG, 1e-3, false, true},
     {"symlog, positive", 0.1, 1, RENDER_SYMLOG, 0.3, true, true},
 };
-enum { LOOKS = sizeof looks / sizeof *looks };
+enum { LOOKS = sizeof scale_cases / sizeof *scale_cases };
 
-static void set_look(render_transfer *t, const look *l)
+static void set_scale_case(render_transfer *t, const scale_case *l)
 {
     *t = (render_transfer){.low = l->low,
                            .high = l->high,
@@ -79,7 +79,7 @@ static bool check_pixel(const render_transfer *t, double value, const float draw
     return true;
 }
 
-static void check_picture(const render_fixture *f, const render_transfer *t, const look *l)
+static void check_picture(const render_fixture *f, const render_transfer *t, const scale_case *l)
 {
     drawn_frame drawn;
     const render_camera *camera = &f->job.camera;
@@ -110,16 +110,16 @@ static void surfaces_without_light_have_the_maps_colours(void **state)
         test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
         test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
         fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, values, 2, 1);
         f.surfaces[0].colour_field = (render_field){&colours.field, f.ranges};
         f.surfaces[0].colour_map = &f.transfer;
         f.surfaces[0].material = (render_material){.ambient = 1};
         for (int i = 0; i < LOOKS; i++) {
-            set_look(&f.transfer, &looks[i]);
+            set_scale_case(&f.transfer, &scale_cases[i]);
             for (int set = 0; set < fixture_set_count(); set++) {
                 fixture_use_set(set);
-                check_picture(&f, &f.transfer, &looks[i]);
+                check_picture(&f, &f.transfer, &scale_cases[i]);
             }
         }
         test_view_free(&colours);
@@ -134,7 +134,7 @@ static double nothing(const double p[3])
     return (double)NAN;
 }
 
-static void what_is_not_a_number_has_its_colour(void **state)
+static void nan_has_its_colour(void **state)
 {
     (void)state;
     static const double values[] = {0.3};
@@ -151,11 +151,12 @@ static void what_is_not_a_number_has_its_colour(void **state)
     for (int i = 0; i < LOOKS; i++) {
         drawn_frame drawn;
         const float grey[3] = {RENDER_NO_COLOUR, RENDER_NO_COLOUR, RENDER_NO_COLOUR};
-        set_look(&f.transfer, &looks[i]);
+        set_scale_case(&f.transfer, &scale_cases[i]);
         fixture_draw(&f, &drawn);
         assert_true(drawn.list.count > 100);
         for (int64_t n = 0; n < drawn.list.count; n++)
-            assert_memory_equal(drawn.list.items[n].colour, looks[i].has_outside ? outside + 6 : grey, sizeof grey);
+            assert_memory_equal(drawn.list.items[n].colour, scale_cases[i].has_outside ? outside + 6 : grey,
+                                sizeof grey);
         drawn_free(&drawn);
     }
     test_view_free(&colours);
@@ -184,12 +185,12 @@ static double growing(const double p[3])
     return pow(10, 2 * test_linear(p)); /* 1.6e-3 to 1600 */
 }
 
-static void set_volume(render_fixture *f, const look *l, double values[3], render_transfer *t)
+static void set_volume(render_fixture *f, const scale_case *l, double values[3], render_transfer *t)
 {
     static const float opacities[3] = {0, 0.7F, 0.2F};
     fixture_set_volume(f, 0.4);
     const double unit = f->transfer.unit_distance;
-    set_look(t, l);
+    set_scale_case(t, l);
     t->opacity_count = 3;
     t->opacity_values = values;
     t->opacities = opacities;
@@ -197,7 +198,7 @@ static void set_volume(render_fixture *f, const look *l, double values[3], rende
     f->volume.transfer = t;
 }
 
-static const look volume_looks[] = {
+static const scale_case volume_looks[] = {
     {"log", 1e-2, 1e2, RENDER_LOG, 0, false, false},
     {"log, more than the data", 1e-3, 1e4, RENDER_LOG, 0, false, false},
     {"symlog", -10, 1e3, RENDER_SYMLOG, 0.1, false, false},
@@ -205,7 +206,7 @@ static const look volume_looks[] = {
 
 /* Samples have the bound of other transfer functions, and one for the rounding of a place, 3e-7 of the scale's value,
  * which moves the colour by less than 1e-5. */
-static void sampled_volumes_are_the_reference(void **state)
+static void sampled_volumes_match_the_reference(void **state)
 {
     (void)state;
     for (int i = 0; i < 3; i++) {
@@ -215,7 +216,7 @@ static void sampled_volumes_are_the_reference(void **state)
         fixture_bounds bounds = fixture_usual_bounds;
         bounds.colour += 1e-5;
         fixture_create_lattice(&f, TEST_TETS, 4, 0.2, growing);
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         set_volume(&f, &volume_looks[i], values, &t);
         fixture_compare(&f, &bounds, volume_looks[i].name);
         fixture_free(&f);
@@ -236,7 +237,7 @@ static void integrated_volumes_keep_their_error(void **state)
             double values[3] = {0.05, 3, 90}, worst = 0;
             const double allowed = 4e-4 + (hexes ? 0.01 : 1.01e-4);
             fixture_create_lattice(&f, hexes ? TEST_HEXES : TEST_TETS, 4, 0.2, growing);
-            fixture_look(&f, CAMERA_OUTSIDE, 17, 15);
+            fixture_set_camera(&f, CAMERA_OUTSIDE, 17, 15);
             set_volume(&f, &volume_looks[i], values, &t);
             f.job.integration = RENDER_SEGMENTS;
             f.job.max_error = hexes ? 0.01 : 0;
@@ -318,7 +319,7 @@ static double ramp_is_off(test_mesh_kind kind, test_function *field, uint64_t se
     make_ramp(&ramp, seed, 0.1);
     constant = pow(10, -decades * test_uniform(6, seed));
     fixture_create_lattice(&f, kind, 1 + (field == over_decades), 0.2, field);
-    fixture_look(&f, CAMERA_OUTSIDE, RAMP_SIDE, RAMP_SIDE);
+    fixture_set_camera(&f, CAMERA_OUTSIDE, RAMP_SIDE, RAMP_SIDE);
     fixture_set_volume(&f, 0.4);
     f.volume.transfer = &ramp.transfer;
     f.job.integration = RENDER_SEGMENTS;
@@ -366,8 +367,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scales_and_their_inverses_agree),
         cmocka_unit_test(surfaces_without_light_have_the_maps_colours),
-        cmocka_unit_test(what_is_not_a_number_has_its_colour),
-        cmocka_unit_test(sampled_volumes_are_the_reference),
+        cmocka_unit_test(nan_has_its_colour),
+        cmocka_unit_test(sampled_volumes_match_the_reference),
         cmocka_unit_test(integrated_volumes_keep_their_error),
         cmocka_unit_test(ramps_along_scales_keep_max_error),
     };

@@ -337,34 +337,34 @@ static void owners_are_drawn_by_what_they_have(void **context)
 }
 
 /* Shapes in pictures 1 high and centred at 0: the covered part of a row at height y is lower <= |x| < upper. */
-typedef struct span {
+typedef struct interval {
     double lower, upper;
-} span;
+} interval;
 
 static double circle(double radius, double y)
 {
     return fabs(y) < radius ? sqrt(radius * radius - y * y) : 0;
 }
 
-static span span_of_disc(double y)
+static interval interval_of_disc(double y)
 {
-    return (span){0, circle(0.3, y)};
+    return (interval){0, circle(0.3, y)};
 }
-static span span_of_ring(double y)
+static interval interval_of_ring(double y)
 {
-    return (span){circle(0.35, y), circle(0.45, y)};
+    return (interval){circle(0.35, y), circle(0.45, y)};
 }
-static span span_of_column(double y)
+static interval interval_of_column(double y)
 {
     (void)y;
-    return (span){0, 0.15};
+    return (interval){0, 0.15};
 }
-static span span_of_band(double y)
+static interval interval_of_band(double y)
 {
-    return (span){0, fabs(y) < 0.15 ? 100 : 0};
+    return (interval){0, fabs(y) < 0.15 ? 100 : 0};
 }
 
-typedef span span_function(double y);
+typedef interval span_function(double y);
 
 enum { MOST_RANKS = 1000 };
 
@@ -386,7 +386,7 @@ static int64_t claim_shape(const comp_grid *grid, span_function *span_of)
     int64_t covered = 0;
     memset(claims, 0, grid->blocks * sizeof *claims);
     for (uint32_t y = 0; y < grid->height; y++) {
-        const span s = span_of((y + 0.5) / grid->height - 0.5);
+        const interval s = span_of((y + 0.5) / grid->height - 0.5);
         const double middle = 0.5 * grid->width - 0.5, lower = s.lower * grid->height, upper = s.upper * grid->height;
         if (lower > 0) {
             cover(grid, y, middle - upper, middle - lower);
@@ -436,7 +436,7 @@ static double check_levels(uint32_t blocks, int ranks)
 static void owners_share_what_all_have(void **context)
 {
     (void)context;
-    static span_function *const shapes[] = {span_of_disc, span_of_ring, span_of_column, span_of_band};
+    static span_function *const shapes[] = {interval_of_disc, interval_of_ring, interval_of_column, interval_of_band};
     static const uint32_t widths[] = {1000, 1023, 1024, 1025, 1280, 1531, 1920, 2048, 2560, 3000, 3840, 4093, 4096};
     static const int ranks[] = {1,  2,   3,   5,   7,   8,   13,  16,  31,  32,  33,  61,  64,
                                 97, 100, 127, 128, 199, 256, 257, 401, 512, 600, 729, 997, MOST_RANKS};
@@ -476,7 +476,7 @@ static void owners_share_what_they_have(void **context)
     static const int ranks[] = {2, 3, 16, 64, 100, 509};
     for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++) {
         const comp_grid grid = comp_grid_of(1280, 720, ranks[n]);
-        claim_shape(&grid, span_of_disc);
+        claim_shape(&grid, interval_of_disc);
         for (uint32_t b = 0; b < grid.blocks; b++) {
             int64_t have[MOST_RANKS];
             spread(b, claims[b].fragments, ranks[n], have);
@@ -495,7 +495,7 @@ static void owners_share_what_they_have(void **context)
 static void check_folded(const comp_route *route)
 {
     const comp_grid grid = comp_grid_of(1920, 1080, route->ranks);
-    claim_shape(&grid, span_of_disc);
+    claim_shape(&grid, interval_of_disc);
     for (uint32_t b = 0; b < grid.blocks; b++)
         claims[b].priority = comp_claim_priority(b, (int)(next_random() % (uint32_t)route->ranks), claims[b].fragments);
     comp_route_fold(route, claims, grid.blocks);
@@ -584,15 +584,15 @@ static void claims_add_up(void **context)
 /* ---- strips -------------------------------------------------------------------------------------------------- */
 
 /* The fragments that sheets have handed over. */
-typedef struct handed {
+typedef struct received_sheets {
     const comp_grid *grid;
     fragment *items;
     int64_t count, sheets;
-} handed;
+} received_sheets;
 
 static bool take_sheet(void *state_of, const comp_sheet *sheet, int count)
 {
-    handed *h = state_of;
+    received_sheets *h = state_of;
     assert_int_equal(comp_sheet_count(sheet), count);
     for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
         if (comp_sheet_has(sheet, k))
@@ -608,7 +608,7 @@ static int by_all_bits(const void *a, const void *b)
 
 /* All fragments of a list come in sheets of their strips, for any number of threads: those of most are as many as the
  * fullest pixel has. */
-static void strips_hand_over_all(void **context)
+static void strips_send_all(void **context)
 {
     (void)context;
     enum { COUNT = 40000 };
@@ -620,7 +620,7 @@ static void strips_hand_over_all(void **context)
         for (int spread = 1; spread <= 1000; spread *= 10) {
             comp_grid grid = comp_grid_of(101, 67, threads); /* for four in shorter strips */
             comp_strips strips;
-            handed h = {&grid, back, 0, 0};
+            received_sheets h = {&grid, back, 0, 0};
             grid.threads = threads;
             for (int i = 0; i < COUNT; i++) {
                 items[i] = random_fragment();
@@ -1031,7 +1031,7 @@ int main(void)
         cmocka_unit_test(owners_share_what_they_have),
         cmocka_unit_test(fewer_owners_than_ranks_share_all),
         cmocka_unit_test(unfair_lots_are_levelled),
-        cmocka_unit_test(strips_hand_over_all),
+        cmocka_unit_test(strips_send_all),
         cmocka_unit_test(pixels_beyond_the_image_are_seen),
         cmocka_unit_test(tiles_are_merged_to_the_bit),
         cmocka_unit_test(tiles_without_memory_are_refused),

@@ -20,7 +20,13 @@
 #include "memory.h"
 #include "test_effort.h"
 
-typedef enum dealing { deal_random, deal_checkerboard, deal_blocks, deal_all_to_first, deal_all_to_last } dealing;
+typedef enum distribution {
+    distribute_random,
+    distribute_checkerboard,
+    distribute_blocks,
+    distribute_all_to_first,
+    distribute_all_to_last
+} distribution;
 
 static MPI_Comm comm;
 static comp_group group;
@@ -69,15 +75,15 @@ static fragment make_some_fragment(uint32_t i, uint32_t seed, uint32_t pixel_cou
     return f;
 }
 
-static int dealt_to(dealing how, uint32_t i, const fragment *f, int width, uint32_t count)
+static int distributed_to(distribution how, uint32_t i, const fragment *f, int width, uint32_t count)
 {
     const uint32_t x = f->pixel % (uint32_t)width, y = f->pixel / (uint32_t)width, ranks = (uint32_t)rank_count;
     switch (how) {
-    case deal_checkerboard: return (int)((x / 4 + y / 4 + (uint32_t)f->t_in) % ranks);
-    case deal_blocks: return (int)((uint64_t)i * ranks / count);
-    case deal_all_to_first: return 0;
-    case deal_all_to_last: return rank_count - 1;
-    case deal_random: break;
+    case distribute_checkerboard: return (int)((x / 4 + y / 4 + (uint32_t)f->t_in) % ranks);
+    case distribute_blocks: return (int)((uint64_t)i * ranks / count);
+    case distribute_all_to_first: return 0;
+    case distribute_all_to_last: return rank_count - 1;
+    case distribute_random: break;
     }
     return (int)(hash(i + 77) % ranks);
 }
@@ -131,7 +137,8 @@ typedef struct setting {
 /* Makes the i-th fragment of all. */
 typedef fragment fragment_maker(uint32_t i, uint32_t seed, uint32_t pixel_count);
 
-static setting make_setting_of(fragment_maker *make, int width, int height, uint32_t count, dealing how, uint32_t seed)
+static setting make_setting_of(fragment_maker *make, int width, int height, uint32_t count, distribution how,
+                               uint32_t seed)
 {
     setting s = {.count = count, .out = {.width = width, .height = height}};
     if (own_rank == 0) s.out = make_image(width, height);
@@ -141,7 +148,7 @@ static setting make_setting_of(fragment_maker *make, int width, int height, uint
     assert_true(!count || (all && s.own.items));
     for (uint32_t i = 0; i < count; i++) {
         all[i] = make(i, seed, (uint32_t)width * (uint32_t)height);
-        if (dealt_to(how, i, &all[i], width, count) == own_rank) s.own.items[s.own.count++] = all[i];
+        if (distributed_to(how, i, &all[i], width, count) == own_rank) s.own.items[s.own.count++] = all[i];
     }
     s.own.capacity = count;
     if (own_rank == 0) serial_merge(all, count, &s.expected);
@@ -149,7 +156,7 @@ static setting make_setting_of(fragment_maker *make, int width, int height, uint
     return s;
 }
 
-static setting make_setting(int width, int height, uint32_t count, dealing how, uint32_t seed)
+static setting make_setting(int width, int height, uint32_t count, distribution how, uint32_t seed)
 {
     return make_setting_of(make_fragment, width, height, count, how, seed);
 }
@@ -178,7 +185,7 @@ static int64_t held_by(const fragment_list *list)
     return list->items ? list->capacity * (int64_t)sizeof *list->items : 0;
 }
 
-static void check_composite(int width, int height, uint32_t count, dealing how, uint32_t seed)
+static void check_composite(int width, int height, uint32_t count, distribution how, uint32_t seed)
 {
     setting s = make_setting_of(make_some_fragment, width, height, count, how, seed);
     comp_statistics statistics;
@@ -203,13 +210,13 @@ static void composite_equals_serial_merge(void **context)
     uint32_t seed = 1;
     for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
         for (size_t c = 0; c < count_end; c++)
-            for (dealing how = deal_random; how <= deal_all_to_last; how++) {
+            for (distribution how = distribute_random; how <= distribute_all_to_last; how++) {
                 set_schedule(seed);
                 check_composite(sizes[s][0], sizes[s][1], counts[c], how, seed++);
             }
     for (uint32_t turn = 0; turn < 32; turn++) {
         set_schedule(turn);
-        check_composite(101, 67, 20000, deal_random, seed++);
+        check_composite(101, 67, 20000, distribute_random, seed++);
     }
 }
 
@@ -229,7 +236,7 @@ static void find_overlaps(fragment *all, uint32_t count, unsigned char *pixels)
     }
 }
 
-static void check_overlaps(int width, int height, uint32_t count, dealing how, uint32_t seed)
+static void check_overlaps(int width, int height, uint32_t count, distribution how, uint32_t seed)
 {
     const int64_t pixel_count = (int64_t)width * height, held = base_memory_held();
     fragment *all = base_alloc(count * sizeof *all);
@@ -257,7 +264,7 @@ static void check_overlaps(int width, int height, uint32_t count, dealing how, u
     assert_everywhere(base_memory_held() == held, "nothing is left allocated");
 }
 
-static void overlaps_are_told_to_all(void **context)
+static void overlaps_are_reported_on_all_ranks(void **context)
 {
     (void)context;
     const int sizes[][2] = {{1, 1}, {1, 7}, {65, 3}, {101, 67}};
@@ -265,7 +272,7 @@ static void overlaps_are_told_to_all(void **context)
     uint32_t seed = 5001;
     for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
         for (size_t c = 0; c < sizeof counts / sizeof *counts; c++)
-            for (dealing how = deal_random; how <= deal_all_to_last; how++)
+            for (distribution how = distribute_random; how <= distribute_all_to_last; how++)
                 check_overlaps(sizes[s][0], sizes[s][1], counts[c], how, seed++);
 }
 
@@ -273,9 +280,9 @@ static void overlaps_are_told_to_all(void **context)
 static void large_image_equals_serial_merge(void **context)
 {
     (void)context;
-    check_composite(601, 401 * rank_count, 40000, deal_random, 1001);
-    check_composite(1921, 1081, 1500, deal_random, 1002);
-    check_composite(5003, 3, 700, deal_blocks, 1003);
+    check_composite(601, 401 * rank_count, 40000, distribute_random, 1001);
+    check_composite(1921, 1081, 1500, distribute_random, 1002);
+    check_composite(5003, 3, 700, distribute_blocks, 1003);
 }
 
 /* Fragments of a curved surface, each in the pixels of one row, as in a tile of a picture. */
@@ -322,7 +329,7 @@ static void messages_are_as_counted(void **context)
         comp_statistics statistics;
         set_schedule(turn);
         if (group.longest_dense) continue;
-        setting s = make_setting(16, 16, 0, deal_random, 1);
+        setting s = make_setting(16, 16, 0, distribute_random, 1);
         assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK,
                           "all is well");
         const comp_route route = comp_route_of(group.schedule, rank_count, group.nodes, 8);
@@ -366,7 +373,7 @@ static void failed_allocation_is_an_error_on_all(void **context)
         const bool is_end = victim == 0 || victim == rank_count - 1;
         const int stride = test_is_whole() || (is_end && !is_many) ? 1 : is_many ? 4 : rank_count - 2;
         set_schedule((uint32_t)victim + 8 + 4 * (uint32_t)(victim / 4 % 2));
-        setting s = make_setting(65, 33, 3000, deal_random, 21);
+        setting s = make_setting(65, 33, 3000, distribute_random, 21);
         int64_t n = 1 + turn % stride;
         while (!draws_without_allocation(&s, victim, n)) n += stride;
         assert_everywhere(n > 1 + turn % stride, "some allocation could fail");
@@ -379,7 +386,7 @@ static void failed_allocation_is_an_error_on_all(void **context)
 static void pixel_beyond_the_image_is_an_error_on_all(void **context)
 {
     (void)context;
-    setting s = make_setting(8, 8, 100, deal_random, 33);
+    setting s = make_setting(8, 8, 100, distribute_random, 33);
     if (own_rank == rank_count - 1) {
         s.own.count = 1;
         s.own.items[0].pixel = 64;
@@ -415,7 +422,7 @@ int main(int argc, char **argv)
     if (!group.claims) MPI_Abort(comm, 1);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(composite_equals_serial_merge),
-        cmocka_unit_test(overlaps_are_told_to_all),
+        cmocka_unit_test(overlaps_are_reported_on_all_ranks),
         cmocka_unit_test(large_image_equals_serial_merge),
         cmocka_unit_test(smooth_surfaces_travel_in_a_third),
         cmocka_unit_test(messages_are_as_counted),

@@ -62,7 +62,7 @@ static void check_kind(test_mesh_kind kind, int type, fixture_camera camera)
     test_mesh_lattice(kind, SIDE, 0.1, wave, &values);
     test_view_create(&values, (test_layout){.wide_coordinates = true, .wide_values = true}, &view);
     fixture_create_lattice(&f, kind, SIDE, 0.1, distance);
-    fixture_look(&f, camera, WIDTH, HEIGHT);
+    fixture_set_camera(&f, camera, WIDTH, HEIGHT);
     fixture_add_surface(&f, &through, 1, 1);
     const render_lines lines = {
         .field = {&view.field, f.ranges}, .count = LEVELS, .values = levels, .width = 1.5F, .colours = white};

@@ -11,9 +11,9 @@
  * middle), so with K < 0.9 the step leaves 2 K / (1 - K) (1e-4)^2 = 1.8e-7 of r, which is as much of the cell's extent
  * along the ray; t is rounded to half a unit, twice.
  *
- * And quads that are taken to look convex along all rays of a box (kernel_curved_dents()), of the same cells: as each
- * of many rays sees its vertices, in float32, all of its corners turn one way in double; and where the edges of the
- * quad have known signs, the quad's two triangles and its patch say of the ray what the edges alone do. */
+ * And quads that are taken to look convex along all rays of a box (kernel_curved_nonconvex_quads()), of the same cells:
+ * as each of many rays sees its vertices, in float32, all of its corners turn one way in double; and where the edges of
+ * the quad have known signs, the quad's two triangles and its patch say of the ray what the edges alone do. */
 #include "kernel_bounds.h"
 #include "kernel_contraction.h"
 #include "kernel_quad.h"
@@ -162,13 +162,13 @@ static void contract(const batch *b, kernel_contracted *out, kernel_bounds *boun
     int32_t own[SIMD_WIDTH];
     vi lanes;
     kernel_contraction c;
-    kernel_sight ray;
+    kernel_cell_ray ray;
     kernel_map map;
     kernel_point at;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) own[lane] = lane;
     memcpy(&lanes, own, sizeof lanes);
     kernel_bounds_of(b->type, b->at, &b->beam, bounds);
-    kernel_sight_of(&cells, &b->rays, lanes, &ray);
+    kernel_cell_ray_of(&cells, &b->rays, lanes, &ray);
     kernel_contraction_of(bounds, lanes, b->type, &c);
     KERNEL_OF_TYPE(b->type, kernel_contract, &c, &ray, vm_all_lanes(), out);
     kernel_maps_of_type(b->at, lanes, b->type, &map);
@@ -257,7 +257,7 @@ static double depth_bound(const batch *b, int lane, double t)
     return 6e-8 * fabs(t) + 1.8e-7 * (high - low);
 }
 
-static void judge(const batch *b, int lane, const kernel_contracted *at, count *n)
+static void verify(const batch *b, int lane, const kernel_contracted *at, count *n)
 {
     reference_cell cell;
     reference_line line;
@@ -298,7 +298,7 @@ static void decided_crossings_are_right(void **state)
                 contract(&b, &at, &bounds);
                 for (int lane = 0; lane < SIMD_WIDTH; lane++) {
                     n.contracting += bounds.contractions.grow[lane] < INFINITY;
-                    judge(&b, lane, &at, &n);
+                    verify(&b, lane, &at, &n);
                 }
             }
             printf("%s %s: %lld rays, %lld in cells that contract, %lld with one crossing, %lld with none, %lld wrong, "
@@ -319,9 +319,9 @@ static void decided_crossings_are_right(void **state)
 
 enum { BOX_RAYS = 12 };
 
-typedef struct looks {
+typedef struct quad_counts {
     int64_t quads, convex, turned, wrong; /* rays too */
-} looks;
+} quad_counts;
 
 /* Slopes along which three neighbouring vertices of a quad are seen nearly in line; false where none are small. */
 static bool graze(const batch *b, int lane, double slope[2])
@@ -375,7 +375,7 @@ static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
     }
 }
 
-static bool turns_one_way(const vf x[8], const vf y[8], const signed char *loop, int lane)
+static bool is_convex_loop(const vf x[8], const vf y[8], const signed char *loop, int lane)
 {
     int left = 0, right = 0;
     for (int i = 0; i < 4; i++) {
@@ -405,13 +405,13 @@ static vm edges_are_wrong(const vf x[8], const vf y[8], const signed char *loop)
         around[i] = edge_of(x, y, loop[i], loop[(i + 1) & 3], &least);
         side[i] = vm_sign(around[i]);
     }
-    const vm once = kernel_halves_once(side, vm_sign(edge_of(x, y, loop[0], loop[2], &least)));
+    const vm once = kernel_cross_one_triangle(side, vm_sign(edge_of(x, y, loop[0], loop[2], &least)));
     const vm known = vf_lt(vf_set(KERNEL_EDGE_LEAST), least);
-    const vm bends = kernel_curved_bends(x, y, loop, vm_all_lanes(), side);
+    const vm bends = kernel_curved_may_cross_twice(x, y, loop, vm_all_lanes(), side);
     return vm_and(known, vm_or(vm_xor(once, vm_sign(kernel_sides_agree(around, 4))), bends));
 }
 
-static void judge_quads(const batch *b, const kernel_rays *rays, vi dents, looks *n)
+static void verify_quads(const batch *b, const kernel_rays *rays, vi dents, quad_counts *n)
 {
     const kernel_shape *shape = kernel_cell_shape(b->type);
     vf x[8], y[8];
@@ -428,7 +428,7 @@ static void judge_quads(const batch *b, const kernel_rays *rays, vi dents, looks
             n->quads++;
             if (dents[lane] >> face & 1) continue;
             n->convex++;
-            n->turned += !turns_one_way(x, y, loop, lane);
+            n->turned += !is_convex_loop(x, y, loop, lane);
             n->wrong += wrong >> lane & 1;
         }
     }
@@ -440,7 +440,7 @@ static void quads_that_look_convex_are(void **state)
     static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
     for (int k = 0; k < 3; k++)
         for (shape s = 0; s < SHAPE_COUNT; s++) {
-            looks n = {.quads = 0};
+            quad_counts n = {.quads = 0};
             while (n.quads < 4 * rays_wanted) {
                 batch b;
                 kernel_rays rays[BOX_RAYS];
@@ -450,8 +450,8 @@ static void quads_that_look_convex_are(void **state)
                 aim_box(&b, rays, &box);
                 for (int a = 0; a < 3; a++)
                     for (int i = 0; i < 8; i++) at[a][i] = vf_load(b.at[a][i]);
-                const vi dents = kernel_curved_dents(at, &box, types[k]);
-                for (int i = 0; i < BOX_RAYS; i++) judge_quads(&b, &rays[i], dents, &n);
+                const vi dents = kernel_curved_nonconvex_quads(at, &box, types[k]);
+                for (int i = 0; i < BOX_RAYS; i++) verify_quads(&b, &rays[i], dents, &n);
             }
             printf("%s: of %lld quads seen %lld look convex, %lld do not, %lld are wrong\n", shape_names[s],
                    (long long)n.quads, (long long)n.convex, (long long)n.turned, (long long)n.wrong);

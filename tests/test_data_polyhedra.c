@@ -23,10 +23,10 @@ static void cells_fixture(render_fixture *f)
 {
     fixture_create(f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.1, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(f, CAMERA_OUTSIDE, width, height);
+    fixture_set_camera(f, CAMERA_OUTSIDE, width, height);
 }
 
-static void surfaces_and_samples_are_the_reference(void **state)
+static void surfaces_and_samples_match_the_reference(void **state)
 {
     static const double opaque[1] = {0.2}, clear[2] = {-0.6, 0.9};
     (void)state;
@@ -85,7 +85,7 @@ static void moved_cells_are_their_own_tets(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(surfaces_and_samples_are_the_reference),
+        cmocka_unit_test(surfaces_and_samples_match_the_reference),
         cmocka_unit_test(segments_are_the_integral),
         cmocka_unit_test(moved_cells_are_their_own_tets),
     };

@@ -104,7 +104,7 @@ static void bands_of_ids_have_them_in_their_middle(void **state)
 }
 
 /* Returns how far a point is from the renderer's ray through a place of the picture (continuous pixels). */
-static double off_ray(const render_camera *c, const double pixel[2], const double point[3])
+static double distance_from_ray(const render_camera *c, const double pixel[2], const double point[3])
 {
     double base[3], direction[3], right[3], down[3], unused[3], along = 0, length = 0, square = 0;
     render_camera_ray(c, 0, 0, base, direction);
@@ -131,8 +131,8 @@ static void check_corners(const render_camera *c, const double lower[3], const d
         for (int corner = 0; corner < 8; corner++) {
             const double p[3] = {corner & 1 ? upper[0] : lower[0], corner & 2 ? upper[1] : lower[1],
                                  corner & 4 ? upper[2] : lower[2]};
-            best[0] = fmin(best[0], off_ray(c, strokes[edge].from, p));
-            best[1] = fmin(best[1], off_ray(c, strokes[edge].to, p));
+            best[0] = fmin(best[0], distance_from_ray(c, strokes[edge].from, p));
+            best[1] = fmin(best[1], distance_from_ray(c, strokes[edge].to, p));
         }
         assert_true(best[0] < 1e-9 && best[1] < 1e-9);
     }
@@ -164,7 +164,7 @@ static void edges_are_where_rays_see_them(void **state)
 
 /* A box seen over a corner has three edges behind it, over an edge five, and face on eight: the far face's four and
  * those that run away from the eye. From within, all twelve are behind. */
-static void edges_that_data_hides_are_told(void **state)
+static void edges_that_data_hides_are_reported(void **state)
 {
     (void)state;
     const double lower[3] = {0, 0, 0}, upper[3] = {1, 1, 1}, focal[3] = {0.5, 0.5, 0.5}, up[3] = {0, 1, 0.01};
@@ -225,7 +225,7 @@ static void check_rulers(const render_camera *c, const double lower[3], const do
             p[axis] = strtod(words->text, NULL);
             p[(axis + 1) % 3] = corner & 1 ? upper[(axis + 1) % 3] : lower[(axis + 1) % 3];
             p[(axis + 2) % 3] = corner & 2 ? upper[(axis + 2) % 3] : lower[(axis + 2) % 3];
-            best = fmin(best, off_ray(c, tick->from, p));
+            best = fmin(best, distance_from_ray(c, tick->from, p));
         }
         assert_true(best < 1e-9);
         for (int a = 0; a < 2; a++) outward += (tick->to[a] - tick->from[a]) * words->away[a];
@@ -276,7 +276,7 @@ int main(void)
                                        cmocka_unit_test(ticks_stand_where_their_numbers_are),
                                        cmocka_unit_test(bands_of_ids_have_them_in_their_middle),
                                        cmocka_unit_test(edges_are_where_rays_see_them),
-                                       cmocka_unit_test(edges_that_data_hides_are_told),
+                                       cmocka_unit_test(edges_that_data_hides_are_reported),
                                        cmocka_unit_test(rulers_stand_where_their_numbers_are),
                                        cmocka_unit_test(scale_bars_are_as_long_as_they_say)};
     return cmocka_run_group_tests(tests, NULL, NULL);

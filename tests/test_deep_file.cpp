@@ -51,11 +51,12 @@ slab make_slab()
             }
     for (int c = 0; c < NX * NY * NZ; c++)
         for (int n = 0; n < 8; n++)
-            s.hexes.push_back(vertex(c % NX + (n % 4 == 1 || n % 4 == 2), c / NX % NY + n % 4 / 2, c / NX / NY + n / 4));
+            s.hexes.push_back(
+                vertex(c % NX + (n % 4 == 1 || n % 4 == 2), c / NX % NY + n % 4 / 2, c / NX / NY + n / 4));
     return s;
 }
 
-void hand_over(insitu_session *session, const slab &s)
+void submit(insitu_session *session, const slab &s)
 {
     insitu_mesh mesh;
     insitu_field field;
@@ -80,12 +81,12 @@ void draw(const std::string &name, const std::string &layers)
     const std::string scene = folder + "/scene.yaml";
     if (own_rank == 0)
         std::ofstream(scene) << "images:\n  - name: a\n    size: [97, 61]\n    background: [0, 0, 0, 0]\n    layers:\n"
-                             << layers << "    outputs: [{path: " << folder << "/" << name << ".exr}, {path: "
-                             << folder << "/" << name << "_deep.exr, deep: true}]\n";
+                             << layers << "    outputs: [{path: " << folder << "/" << name << ".exr}, {path: " << folder
+                             << "/" << name << "_deep.exr, deep: true}]\n";
     const slab s = make_slab();
     insitu_session *session = nullptr;
     assert_int_equal(insitu_create(MPI_COMM_WORLD, scene.c_str(), &session), INSITU_OK);
-    hand_over(session, s);
+    submit(session, s);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     assert_int_equal(insitu_destroy(&session), INSITU_OK);
 }
@@ -124,8 +125,7 @@ void flattened_surfaces_are_the_picture(void **)
 
 void flattened_volume_is_the_picture(void **)
 {
-    draw("volume",
-         "      - volume: {field: f}\n      - isosurface: {field: f, values: [-0.5, 0.5], opacity: 0.3}\n");
+    draw("volume", "      - volume: {field: f}\n      - isosurface: {field: f, values: [-0.5, 0.5], opacity: 0.3}\n");
     compare("volume");
 }
 

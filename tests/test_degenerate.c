@@ -25,7 +25,7 @@ static void open_scene(render_fixture *f, const test_mesh *mesh, scene_kind scen
 {
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.5, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(f, camera, width, height);
+    fixture_set_camera(f, camera, width, height);
     if (scene != SEGMENTS) fixture_add_surface(f, values, 2, scene == OPAQUE ? 1 : 0.4f);
     if (scene != OPAQUE) fixture_set_volume(f, 0.3);
     if (scene == SEGMENTS) f->job.integration = RENDER_SEGMENTS;
@@ -137,7 +137,7 @@ static void add_point_faces(test_mesh *mesh)
 }
 
 /* All faces, or every second, the other way round. */
-static void turn_inside_out(test_mesh *mesh)
+static void reverse_faces(test_mesh *mesh)
 {
     for (int64_t face = 0; face < mesh->face_count; face++)
         for (int64_t i = mesh->face_offsets[face], k = mesh->face_offsets[face + 1] - 1; i < k; i++, k--) {
@@ -147,11 +147,11 @@ static void turn_inside_out(test_mesh *mesh)
         }
 }
 
-static void turn_every_second(test_mesh *mesh)
+static void reorder_every_second(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh), turned = begin_copy(mesh);
     copy_faces(mesh, &turned);
-    turn_inside_out(&turned);
+    reverse_faces(&turned);
     for (int64_t face = 0; face < mesh->face_count; face++) {
         const test_mesh *from = face % 2 ? mesh : &turned;
         test_mesh_add_face(&copy, from->face_connectivity + from->face_offsets[face], face_size(from, face));
@@ -280,8 +280,8 @@ static void faces_in_one_place_change_no_pixel(void **state)
 static void faces_turned_over_change_no_pixel(void **state)
 {
     (void)state;
-    assert_same_bits(turn_inside_out);
-    assert_same_bits(turn_every_second);
+    assert_same_bits(reverse_faces);
+    assert_same_bits(reorder_every_second);
 }
 
 static void polyhedra_of_no_volume_change_no_pixel(void **state)
@@ -293,7 +293,7 @@ static void polyhedra_of_no_volume_change_no_pixel(void **state)
 /* ---- the reference --------------------------------------------------------------------------------------------- */
 
 /* Compares pictures of surfaces and samples, and for segments every ray's integral: float32's values err by some 1e-6,
- * and so does the length in a steep stretch of the function (see sums_through_spokes_are_the_reference). */
+ * and so does the length in a steep stretch of the function (see sums_through_spokes_match_the_reference). */
 static void assert_reference(const test_mesh *mesh, fixture_camera camera, const char *what)
 {
     render_fixture f;
@@ -420,7 +420,7 @@ static int hang_middles(test_mesh *mesh)
 /* Vertices amid edges that some faces do not have, with the value of the edge there; in jittered lattices they are off
  * the edges by rounding. With other values the field's definition has a jump at the face without area, and a ray's
  * profile may take either side up to the next sheet: the picture must still be finite numbers. */
-static void faces_of_no_area_are_the_reference(void **state)
+static void faces_of_no_area_match_the_reference(void **state)
 {
     (void)state;
     for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++)
@@ -442,7 +442,7 @@ static void faces_of_no_area_are_the_reference(void **state)
 }
 
 /* Two tets on one face that passes a vertex twice, where they meet. */
-static void face_through_a_vertex_twice_is_the_reference(void **state)
+static void face_through_a_vertex_twice_matches_the_reference(void **state)
 {
     (void)state;
     static const double places[7][3] = {{0, 0, -0.3},     {-0.7, -0.5, -0.3}, {-0.6, 0.6, -0.3}, {0.7, -0.6, -0.3},
@@ -494,8 +494,8 @@ int main(void)
         cmocka_unit_test(faces_in_one_place_change_no_pixel),
         cmocka_unit_test(faces_turned_over_change_no_pixel),
         cmocka_unit_test(polyhedra_of_no_volume_change_no_pixel),
-        cmocka_unit_test(faces_of_no_area_are_the_reference),
-        cmocka_unit_test(face_through_a_vertex_twice_is_the_reference),
+        cmocka_unit_test(faces_of_no_area_match_the_reference),
+        cmocka_unit_test(face_through_a_vertex_twice_matches_the_reference),
         cmocka_unit_test(flat_polyhedra_are_finite),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

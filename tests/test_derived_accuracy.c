@@ -28,7 +28,7 @@ static void flow(const double p[3], double u[3])
     u[2] = c * sin(k * p[1]) + b * cos(k * p[0]);
 }
 
-static double true_q(const double p[3])
+static double true_q_criterion(const double p[3])
 {
     const double xy = -k * c * sin(k * p[1]), xz = k * a * cos(k * p[2]), yx = k * b * cos(k * p[0]);
     const double yz = -k * a * sin(k * p[2]), zx = -k * b * sin(k * p[0]), zy = k * c * cos(k * p[1]);
@@ -44,7 +44,7 @@ typedef struct sample_sums {
 static void add_sample(const double p[3], const double values[6], sample_sums *sums)
 {
     double u[3];
-    const double q = true_q(p);
+    const double q = true_q_criterion(p);
     flow(p, u);
     sums->ours += (values[0] - q) * (values[0] - q);
     sums->vtks += (values[1] - q) * (values[1] - q);
@@ -158,7 +158,8 @@ static grid_errors errors_on(test_mesh_kind kind, int n, double jitter)
     double *q = calloc((size_t)mesh.vertex_count, sizeof *q),
            (*nodes)[6] = calloc((size_t)mesh.vertex_count, sizeof *nodes);
     assert_true(q && nodes);
-    test_vtk_q(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0], mesh.connectivity, velocity, 1, q);
+    test_vtk_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0], mesh.connectivity,
+                         velocity, 1, q);
     insitu_session *session =
         begin(&mesh, velocity,
               "fields: {q: {q_criterion: u}, w: {vorticity: u}, d: {divergence: u}, all: q + w.x + d}\nimages: [{name: "
@@ -180,7 +181,7 @@ static grid_errors errors_on(test_mesh_kind kind, int n, double jitter)
                          sqrt(sums.divergence / sums.of_curl)};
 }
 
-static void q_is_as_near_as_vtks(void **state)
+static void q_criterion_is_as_accurate_as_vtks(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = TEST_TETS; kind <= TEST_HEXES; kind++)
@@ -200,7 +201,7 @@ static void q_is_as_near_as_vtks(void **state)
 }
 
 /* What a step with new velocities takes to prepare a slice of Q, at all vertices: the least of some steps. */
-static double seconds_for_q(const test_mesh *mesh, const float *velocity)
+static double seconds_for_q_criterion(const test_mesh *mesh, const float *velocity)
 {
     static const char scene[] = "threads: 1\nfields: {q: {q_criterion: u}}\nimages: [{name: a, size: [8, 8], layers: "
                                 "[{slice: {field: q, range: [0, 1]}}], outputs: [{path: /dev/null/a.png}]}]\n";
@@ -217,7 +218,7 @@ static double seconds_for_q(const test_mesh *mesh, const float *velocity)
 }
 
 /* The bars are those that the library has set itself; both run on one thread, one after the other. */
-static void q_takes_less_time_than_vtks(void **state)
+static void q_criterion_takes_less_time_than_vtks(void **state)
 {
     (void)state;
     if (!test_is_whole()) skip();
@@ -227,9 +228,9 @@ static void q_takes_less_time_than_vtks(void **state)
         float *velocity = make_velocity(&mesh);
         double *q = calloc((size_t)mesh.vertex_count, sizeof *q);
         assert_non_null(q);
-        const double vtks = test_vtk_q(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0],
-                                       mesh.connectivity, velocity, 5, q);
-        const double ours = seconds_for_q(&mesh, velocity);
+        const double vtks = test_vtk_q_criterion(mesh.vertex_count, mesh.coordinates, mesh.cell_count, mesh.types[0],
+                                                 mesh.connectivity, velocity, 5, q);
+        const double ours = seconds_for_q_criterion(&mesh, velocity);
         fprintf(stderr, "%s: Q of %lld vertices in %.1f ms, VTK in %.1f ms, ratio %.3f\n", test_mesh_kind_name(kind),
                 (long long)mesh.vertex_count, 1e3 * ours, 1e3 * vtks, ours / vtks);
         assert_true(ours <= (kind == TEST_TETS ? 0.5 : 0.4) * vtks);
@@ -243,8 +244,8 @@ int main(int argc, char **argv)
 {
     MPI_Init(&argc, &argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(q_is_as_near_as_vtks),
-        cmocka_unit_test(q_takes_less_time_than_vtks),
+        cmocka_unit_test(q_criterion_is_as_accurate_as_vtks),
+        cmocka_unit_test(q_criterion_takes_less_time_than_vtks),
     };
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
     MPI_Finalize();

@@ -10,8 +10,8 @@ extern "C" {
 
 /* Finds Q at the vertices, on one thread. type: 10 or 12; velocity: vertex_count × 3; q: vertex_count. Returns the
  * seconds that the filter took, the least of so many runs. */
-double test_vtk_q(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
-                  const int64_t *connectivity, const float *velocity, int runs, double *q);
+double test_vtk_q_criterion(int64_t vertex_count, const double *coordinates, int64_t cell_count, int type,
+                            const int64_t *connectivity, const float *velocity, int runs, double *q);
 
 #ifdef __cplusplus
 }

@@ -42,7 +42,7 @@ static void duals_are_their_own_tets(void **state)
     }
 }
 
-static void duals_are_the_reference(void **state)
+static void duals_match_the_reference(void **state)
 {
     static const double values[2] = {-0.2, 0.3};
     (void)state;
@@ -52,7 +52,7 @@ static void duals_are_the_reference(void **state)
         make_dual(4, 0.4, &mesh);
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.5, 1,
                        (const double[]){0, 0, 0});
-        fixture_look(&f, camera, 33, 29);
+        fixture_set_camera(&f, camera, 33, 29);
         fixture_add_surface(&f, values, 2, 0.5f);
         const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, fixture_camera_name(camera));
         assert_true(o.hits > 100);
@@ -65,7 +65,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(duals_are_their_own_tets),
-        cmocka_unit_test(duals_are_the_reference),
+        cmocka_unit_test(duals_match_the_reference),
     };
     if (argc > 1) cubes = atoi(argv[1]), width = 1280, height = 960;
     return cmocka_run_group_tests(tests, NULL, NULL);

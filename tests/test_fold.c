@@ -16,7 +16,7 @@ enum { MOST = 400, RANKS = 7 };
 
 static uint32_t state_of_chance;
 
-static double chance(void)
+static double random_number(void)
 {
     state_of_chance = state_of_chance * 1664525u + 1013904223u;
     return (double)(state_of_chance >> 8) / 16777216.0;
@@ -31,28 +31,28 @@ typedef struct ray {
 
 static void make_ray(ray *r, double density, double gap, double surface)
 {
-    float t = (float)(-1.5 + chance());
+    float t = (float)(-1.5 + random_number());
     r->count = 0;
     while (t < 1.5f && r->count < MOST) {
-        const float end = t + (float)pow(10, -6 + 5 * chance());
-        const bool is_surface = chance() < surface;
-        const float clear = (float)exp(-density * chance() * (is_surface ? 1 : (double)(end - t)));
-        if (chance() >= gap) {
+        const float end = t + (float)pow(10, -6 + 5 * random_number());
+        const bool is_surface = random_number() < surface;
+        const float clear = (float)exp(-density * random_number() * (is_surface ? 1 : (double)(end - t)));
+        if (random_number() >= gap) {
             fragment *f = &r->items[r->count++];
             *f = (fragment){.t_in = t, .t_out = is_surface ? t : end, .transmittance = clear};
             f->kind = is_surface ? FRAGMENT_SURFACE : FRAGMENT_VOLUME;
-            for (int c = 0; c < 3; c++) f->colour[c] = (1 - clear) * (float)chance();
+            for (int c = 0; c < 3; c++) f->colour[c] = (1 - clear) * (float)random_number();
         }
         t = is_surface ? nextafterf(t, 2) : end; /* two surfaces at one depth have an order of their own */
     }
 }
 
 /* Runs of some pieces a rank. */
-static void deal(ray *r, double change)
+static void distribute(ray *r, double change)
 {
     int owner = 0;
     for (int64_t i = 0; i < r->count; i++) {
-        if (chance() < change) owner = (int)(chance() * RANKS);
+        if (random_number() < change) owner = (int)(random_number() * RANKS);
         r->owners[i] = owner;
     }
 }
@@ -72,8 +72,8 @@ static int64_t send(const ray *r, int rank, fragment *out)
                r->items[i + n].t_in == r->items[i + n - 1].t_out)
             n++;
         for (int64_t k = i, m; k < i + n; k += m) {
-            const int32_t stretch = fragment_stretch(r->items[k].t_in);
-            for (m = 1; k + m < i + n && fragment_stretch(r->items[k + m].t_in) == stretch;) m++;
+            const int32_t interval_number = fragment_interval_number(r->items[k].t_in);
+            for (m = 1; k + m < i + n && fragment_interval_number(r->items[k + m].t_in) == interval_number;) m++;
             count += fragment_fold_between(r->items + k, m, r->items[i].t_in, r->items[i + n - 1].t_out, out + count);
         }
     }
@@ -105,7 +105,7 @@ static void blend_in_double(const ray *r, double rgba[4])
 
 /* A fragment adds a product and a sum of colours and a product of transmittances, which affects all behind it: three
  * roundings of 2^-24 of at most 1. Dark stretches may be left out. */
-static void judge(const ray *r, const float rgba[4])
+static void verify(const ray *r, const float rgba[4])
 {
     double expected[4];
     blend_in_double(r, expected);
@@ -128,9 +128,9 @@ static void fold_is_the_same_on_any_ranks(void **state)
         memset(r.owners, 0, sizeof r.owners);
         merge(&r, alone, &sent);
         whole += sent;
-        judge(&r, alone);
-        for (int dealt = 0; dealt < 4; dealt++) {
-            deal(&r, dealt == 0 ? 1 : 0.3 / (1 + 3 * dealt));
+        verify(&r, alone);
+        for (int distributed = 0; distributed < 4; distributed++) {
+            distribute(&r, distributed == 0 ? 1 : 0.3 / (1 + 3 * distributed));
             merge(&r, shared, &sent);
             parts += sent;
             assert_memory_equal(alone, shared, sizeof alone);

@@ -44,7 +44,7 @@ static void stage(render_fixture *f, const test_mesh *mesh, fixture_camera camer
 {
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(f, camera, WIDTH, HEIGHT);
+    fixture_set_camera(f, camera, WIDTH, HEIGHT);
     set_scene(f, scene);
 }
 
@@ -88,7 +88,7 @@ static void folded_cells_make_numbers(void **state)
 
 /* Draws on seven ranks, each with its own numbering of cells and vertices and order within cells: surfaces agree to the
  * bit, separate samples to the rounding of "over". */
-static void draw_dealt(const test_mesh *mesh, scene_kind scene, drawn_frame *out)
+static void draw_distributed(const test_mesh *mesh, scene_kind scene, drawn_frame *out)
 {
     render_fixture parts[RANKS];
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
@@ -97,7 +97,7 @@ static void draw_dealt(const test_mesh *mesh, scene_kind scene, drawn_frame *out
         test_mesh part;
         test_mesh_part(mesh, owners, rank, &part);
         test_mesh_shuffle(&part, (uint64_t)rank + 20);
-        test_mesh_turn(&part, (uint64_t)rank + 40);
+        test_mesh_reorder_vertices(&part, (uint64_t)rank + 40);
         stage(&parts[rank], &part, CAMERA_OUTSIDE, scene);
         parts[rank].job.is_alone = false;
         parts[rank].job.separate_samples = scene == SAMPLES;
@@ -116,16 +116,17 @@ static void numbers_of_cells_and_ranks_do_not_show(void **state)
         for (int s = 0; s < 2; s++) {
             test_mesh mesh;
             render_fixture f;
-            drawn_frame whole, dealt;
+            drawn_frame whole, distributed;
             tangle(kinds[k], &mesh);
             stage(&f, &mesh, CAMERA_OUTSIDE, scenes[s]);
             f.job.separate_samples = scenes[s] == SAMPLES;
             fixture_draw(&f, &whole);
-            draw_dealt(&mesh, scenes[s], &dealt);
-            if (scenes[s] != SAMPLES) drawn_assert_same(&whole, &dealt);
-            if (!(drawn_difference(&whole, &dealt) <= 1e-6)) fail_msg("off by %g", drawn_difference(&whole, &dealt));
+            draw_distributed(&mesh, scenes[s], &distributed);
+            if (scenes[s] != SAMPLES) drawn_assert_same(&whole, &distributed);
+            if (!(drawn_difference(&whole, &distributed) <= 1e-6))
+                fail_msg("off by %g", drawn_difference(&whole, &distributed));
             drawn_free(&whole);
-            drawn_free(&dealt);
+            drawn_free(&distributed);
             fixture_free(&f);
             test_mesh_free(&mesh);
         }
@@ -158,7 +159,7 @@ static void maps_of_sound_cells_converge(void **state)
 
 int main(void)
 {
-    if (fixture_lacks_set()) return 77;
+    if (fixture_set_is_unavailable()) return 77;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(folded_cells_make_numbers),
         cmocka_unit_test(numbers_of_cells_and_ranks_do_not_show),

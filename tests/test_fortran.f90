@@ -128,7 +128,7 @@ program test_fortran
     call patches_have_values()
     call parameters_are_read()
     call procedures_make_values()
-    call errors_are_told()
+    call errors_are_reported()
     call test_blocks(prefix)
     call MPI_Finalize()
 
@@ -572,7 +572,7 @@ contains
         call expect(status /= INSITU_OK .and. index(session%error(), words) > 0, words//', not: '//session%error())
     end subroutine refused
 
-    subroutine errors_are_told()
+    subroutine errors_are_reported()
         type(insitu_session) :: session
         call session%create(MPI_COMM_WORLD, prefix//'no.yaml', status)
         call refused(session, 'no.yaml')
@@ -653,5 +653,5 @@ contains
         call refused(session, 'the session is not open')
         call session%destroy(status)
         call expect(status == INSITU_OK .and. session%error() == '', 'a closed session may be closed again')
-    end subroutine errors_are_told
+    end subroutine errors_are_reported
 end program test_fortran

@@ -20,7 +20,7 @@ static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera,
     render_fixture f;
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.5, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(&f, camera, 61, 47);
+    fixture_set_camera(&f, camera, 61, 47);
     if (scene != SEGMENTS) fixture_add_surface(&f, values, 2, scene == OPAQUE ? 1 : 0.4f);
     if (scene != OPAQUE) fixture_set_volume(&f, 0.3);
     if (scene == SEGMENTS) f.job.integration = RENDER_SEGMENTS;

@@ -50,7 +50,7 @@ static double depth_moved(const render_fixture *f, const reference_hit *truth, d
 
 /* A hit must be within 1e-5 cells of the reference, unless the ray is so nearly tangent to the surface that rounding
  * alone may move the hit farther. That is at slopes of the field below some 0.03 ranges a cell. */
-static void judge_depth(const render_fixture *f, const reference_hit *truth, double depth, double slope, tally *t)
+static void verify_depth(const render_fixture *f, const reference_hit *truth, double depth, double slope, tally *t)
 {
     const double off = fabs(depth - truth->depth) / f->cell_size, moved = depth_moved(f, truth, slope);
     t->moved = fmax(t->moved, off / moved);
@@ -60,8 +60,8 @@ static void judge_depth(const render_fixture *f, const reference_hit *truth, dou
         t->raw = fmax(t->raw, off);
 }
 
-static void judge_hit(const render_fixture *f, const reference_scene *scene, int x, int y, const reference_hit *truth,
-                      const fragment *hit, tally *t)
+static void verify_hit(const render_fixture *f, const reference_scene *scene, int x, int y, const reference_hit *truth,
+                       const fragment *hit, tally *t)
 {
     double slope;
     const double depth = fixture_depth(f, hit->t_in);
@@ -72,11 +72,11 @@ static void judge_hit(const render_fixture *f, const reference_scene *scene, int
     /* An error of the field of 1e-6 ranges is one of depth by the slope. */
     const double grazing = 1e-6 / fabs(slope) / f->cell_size;
     t->depth = fmax(t->depth, fabs(depth - truth->depth) / f->cell_size - grazing);
-    judge_depth(f, truth, depth, slope, t);
+    verify_depth(f, truth, depth, slope, t);
 }
 
-static void judge_ray(const render_fixture *f, const drawn_frame *drawn, const reference_scene *scene, int x, int y,
-                      double margin, tally *t)
+static void verify_ray(const render_fixture *f, const drawn_frame *drawn, const reference_scene *scene, int x, int y,
+                       double margin, tally *t)
 {
     const fragment *hits[REFERENCE_MAX_HITS];
     reference_ray ray;
@@ -98,21 +98,21 @@ static void judge_ray(const render_fixture *f, const drawn_frame *drawn, const r
         fprintf(stderr, "pixel %d, %d: %d hits, reference %d\n", x, y, count, ray.hit_count);
         return;
     }
-    for (int i = 0; i < count; i++) judge_hit(f, scene, x, y, &ray.hits[i], hits[i], t);
+    for (int i = 0; i < count; i++) verify_hit(f, scene, x, y, &ray.hits[i], hits[i], t);
 }
 
-static void judge_frame(const render_fixture *f, double margin, tally *t)
+static void verify_frame(const render_fixture *f, double margin, tally *t)
 {
     drawn_frame drawn;
     reference_scene *scene = reference_create(&f->job);
     fixture_draw(f, &drawn);
     for (int y = 0; y < f->job.camera.height; y++)
-        for (int x = 0; x < f->job.camera.width; x++) judge_ray(f, &drawn, scene, x, y, margin, t);
+        for (int x = 0; x < f->job.camera.width; x++) verify_ray(f, &drawn, scene, x, y, margin, t);
     reference_free(scene);
     drawn_free(&drawn);
 }
 
-static void tell(const char *what, const tally *t)
+static void print_tally(const char *what, const tally *t)
 {
     printf("%s: %d rays, %d hits, %d excluded, %d folded, %d different; residual %.2g (%d beyond 1e-6), depth off by "
            "%.2g cells, %.2g of what rounding may, %d tangent\n",
@@ -161,10 +161,10 @@ static void robust_hits_are_on_the_surface(void **state)
             tally t = {.rays = 0};
             if (!test_is_whole() && (k + (int)camera) % 2) continue; /* a kind has one or two cameras */
             fixture_create_lattice(&f, kinds[k], kinds[k] == TEST_PYRAMIDS ? 3 : 4, 0.2, test_wave);
-            fixture_look(&f, camera, 53, 45);
+            fixture_set_camera(&f, camera, 53, 45);
             add_robust(&f, 0.4f); /* all crossings, not the first alone */
-            judge_frame(&f, 1e-6, &t);
-            tell(test_mesh_kind_name(kinds[k]), &t);
+            verify_frame(&f, 1e-6, &t);
+            print_tally(test_mesh_kind_name(kinds[k]), &t);
             assert_true(t.hits > 600);
             assert_int_equal(t.different, 0);
             assert_depths(&t, 250);
@@ -176,23 +176,29 @@ static void robust_hits_are_on_the_surface(void **state)
 
 /* ---- ugly cells ---- */
 
-typedef enum ugly { UGLY_WARPED, UGLY_CONCAVE, UGLY_WEDGE, UGLY_APEX, UGLY_COUNT } ugly;
+typedef enum ill_shaped {
+    ILL_SHAPED_WARPED,
+    ILL_SHAPED_CONCAVE,
+    ILL_SHAPED_WEDGE,
+    ILL_SHAPED_APEX,
+    ILL_SHAPED_COUNT
+} ill_shaped;
 
-static void make_ugly(ugly kind, uint64_t seed, test_mesh *out)
+static void make_ill_shaped(ill_shaped kind, uint64_t seed, test_mesh *out)
 {
-    static const test_cell_shape shapes[UGLY_COUNT] = {TEST_UNIT_HEX, TEST_UNIT_HEX, TEST_UNIT_WEDGE,
-                                                       TEST_UNIT_PYRAMID};
+    static const test_cell_shape shapes[ILL_SHAPED_COUNT] = {TEST_UNIT_HEX, TEST_UNIT_HEX, TEST_UNIT_WEDGE,
+                                                             TEST_UNIT_PYRAMID};
     test_mesh_single(shapes[kind], test_linear, out);
     for (uint64_t i = 0; i < (uint64_t)out->vertex_count; i++) {
         double *p = out->coordinates + 3 * i;
-        const double amount = kind == UGLY_WARPED || kind == UGLY_APEX ? 0.2 : 0.1;
+        const double amount = kind == ILL_SHAPED_WARPED || kind == ILL_SHAPED_APEX ? 0.2 : 0.1;
         for (uint64_t a = 0; a < 3; a++) p[a] += test_uniform_in(3 * i + a, seed, -amount, amount);
         out->values[i] = test_uniform_in(i, seed + 1000, -1, 1.5);
         /* A corner pulled in almost to the plane of its neighbours: dents on both sides of its edges. Beyond that plane
          * the hex's map folds, and a point has several values. */
-        if (kind == UGLY_CONCAVE && i == 6)
+        if (kind == ILL_SHAPED_CONCAVE && i == 6)
             for (uint64_t a = 0; a < 3; a++) p[a] = test_uniform_in(a, seed + 2000, 0.24, 0.3);
-        if (kind == UGLY_WEDGE && i >= 3) {
+        if (kind == ILL_SHAPED_WEDGE && i >= 3) {
             const double angle = test_uniform_in(0, seed + 3000, -0.8, 0.8), x = p[0], y = p[1];
             p[0] = cos(angle) * x - sin(angle) * y;
             p[1] = sin(angle) * x + cos(angle) * y;
@@ -200,29 +206,30 @@ static void make_ugly(ugly kind, uint64_t seed, test_mesh *out)
     }
 }
 
-static void robust_hits_in_ugly_cells_are_the_reference(void **state)
+static void robust_hits_in_ill_shaped_cells_match_the_reference(void **state)
 {
     (void)state;
-    static const char *const names[UGLY_COUNT] = {"warped hexes", "concave hexes", "twisted wedges", "pyramid apexes"};
-    for (ugly kind = 0; kind < UGLY_COUNT; kind++) {
+    static const char *const names[ILL_SHAPED_COUNT] = {"warped hexes", "concave hexes", "twisted wedges",
+                                                        "pyramid apexes"};
+    for (ill_shaped kind = 0; kind < ILL_SHAPED_COUNT; kind++) {
         tally t = {.rays = 0};
         for (uint64_t seed = 0; seed < 24; seed++) {
             test_mesh mesh;
             render_fixture f;
-            make_ugly(kind, seed, &mesh);
+            make_ill_shaped(kind, seed, &mesh);
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                            (const double[]){0, 0, 0});
-            fixture_look(&f, seed % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 31, 29);
+            fixture_set_camera(&f, seed % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 31, 29);
             /* Close to the apex: the middle of the picture is its neighbourhood. */
-            if (kind == UGLY_APEX)
+            if (kind == ILL_SHAPED_APEX)
                 assert_true(render_camera_look_at(&f.job.camera, (const double[]){2.4, 1.6, 3.0},
                                                   mesh.coordinates + 3 * 4, (const double[]){0, 1, 0}, 2, 31, 29));
             add_many_robust(&f);
-            judge_frame(&f, 1e-6, &t);
+            verify_frame(&f, 1e-6, &t);
             fixture_free(&f);
             test_mesh_free(&mesh);
         }
-        tell(names[kind], &t);
+        print_tally(names[kind], &t);
         assert_few_left_out(&t);
         assert_true(t.hits > 800);
         assert_int_equal(t.different, 0);
@@ -276,8 +283,8 @@ static double normal_error(const render_fixture *f, const fragment *hit, const d
  * range and size; eight of them and the cell's distortion make 2e-6 of range / size, relative to the gradient's length.
  * The place is off by 1e-6 cells, which second derivatives of a range or two turn into as much again. Seen edge-on,
  * either side may face the eye. */
-static void judge_normal(const render_fixture *f, const reference_scene *scene, const reference_hit *truth,
-                         const fragment *hit, int64_t *checked)
+static void verify_normal(const render_fixture *f, const reference_scene *scene, const reference_hit *truth,
+                          const fragment *hit, int64_t *checked)
 {
     const int x = (int)hit->pixel % f->job.camera.width, y = (int)hit->pixel / f->job.camera.width;
     double slope, gradient[3];
@@ -289,7 +296,7 @@ static void judge_normal(const render_fixture *f, const reference_scene *scene, 
     ++*checked;
 }
 
-static void cell_gradients_are_the_reference(void **state)
+static void cell_gradients_match_the_reference(void **state)
 {
     (void)state;
     for (int k = 0; k < 4; k++) {
@@ -298,7 +305,7 @@ static void cell_gradients_are_the_reference(void **state)
         render_light lights[3];
         int64_t checked = 0, rays = 0, left_out = 0;
         fixture_create_lattice(&f, kinds[k], 3, 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 43, 37);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 43, 37);
         add_robust(&f, 0.5f);
         light_by_axes(&f, lights);
         fixture_draw(&f, &drawn);
@@ -314,7 +321,7 @@ static void cell_gradients_are_the_reference(void **state)
                 continue;
             }
             assert_int_equal(count, ray.hit_count);
-            for (int i = 0; i < count; i++) judge_normal(&f, scene, &ray.hits[i], hits[i], &checked);
+            for (int i = 0; i < count; i++) verify_normal(&f, scene, &ray.hits[i], hits[i], &checked);
         }
         printf("%s: %d normals, %d of %d rays left out\n", test_mesh_kind_name(kinds[k]), (int)checked, (int)left_out,
                (int)rays);
@@ -351,7 +358,7 @@ static void differences_of_a_linear_field_are_exact(void **state)
                 render_light lights[3];
                 double worst = 0;
                 fixture_create_lattice(&f, kind, 3, 0.2, test_linear);
-                fixture_look(&f, camera, 35, 31);
+                fixture_set_camera(&f, camera, 35, 31);
                 add_differences(&f, values, 3, opaque ? 1 : 0.5f, 0.5, lights);
                 fixture_draw(&f, &drawn);
                 for (int64_t i = 0; i < drawn.list.count; i++)
@@ -377,7 +384,7 @@ static double quadratic_error(int n, render_normal normal, double difference)
     render_light lights[3];
     double sum = 0;
     fixture_create_lattice(&f, TEST_HEXES, n, 0, quadratic);
-    fixture_look(&f, CAMERA_OUTSIDE, 64, 64);
+    fixture_set_camera(&f, CAMERA_OUTSIDE, 64, 64);
     add_differences(&f, value, 1, 1, difference, lights);
     f.surfaces[0].normal = normal;
     fixture_draw(&f, &drawn);
@@ -415,8 +422,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(robust_hits_are_on_the_surface),
-        cmocka_unit_test(robust_hits_in_ugly_cells_are_the_reference),
-        cmocka_unit_test(cell_gradients_are_the_reference),
+        cmocka_unit_test(robust_hits_in_ill_shaped_cells_match_the_reference),
+        cmocka_unit_test(cell_gradients_match_the_reference),
         cmocka_unit_test(differences_of_a_linear_field_are_exact),
         cmocka_unit_test(differences_of_a_quadratic_field_are_of_second_order),
     };

@@ -82,7 +82,7 @@ static insitu_status write_picture(const picture_case *c, base_error *error)
 }
 
 /* EXR has the second in which it was written: a text behind its length. */
-static void forget_date(file_bytes *file)
+static void clear_date(file_bytes *file)
 {
     static const char before[] = "capDate\0string";
     enum { DATE = 19 };
@@ -97,7 +97,7 @@ static bool read_picture(const picture_case *c, file_bytes *out)
     FILE *file = fopen(path, "rb");
     out->count = file ? fread(out->bytes, 1, MOST_BYTES, file) : 0;
     if (file) fclose(file);
-    forget_date(out);
+    clear_date(out);
     return file;
 }
 
@@ -156,17 +156,17 @@ static insitu_status write_in_shortage(const picture_case *c, const shortage *s,
     tight = before;
     tight.rlim_cur = address_bytes() + s->spare;
     if (s->n)
-        heap_arm(s->n, false);
+        heap_start_failing(s->n, false);
     else
         setrlimit(RLIMIT_AS, &tight);
     const insitu_status status = write_picture(c, &error);
-    if (s->n) out->allocations = heap_disarm();
+    if (s->n) out->allocations = heap_stop_failing();
     setrlimit(RLIMIT_AS, &before);
     snprintf(out->message, sizeof out->message, "%.255s", error.message);
     return status;
 }
 
-static verdict judge(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
+static verdict verify(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
 {
     static file_bytes found;
     const insitu_status status = write_in_shortage(c, s, out);
@@ -195,15 +195,15 @@ static bool try_in_child(const picture_case *c, const file_bytes *expected, cons
         setrlimit(RLIMIT_CORE, &no_core);
         alarm(SECONDS);
         outcome mine = {0};
-        mine.verdict = judge(c, expected, s, &mine);
+        mine.verdict = verify(c, expected, s, &mine);
         _exit(write(pipe_ends[1], &mine, sizeof mine) == (ssize_t)sizeof mine ? 0 : 1);
     }
     close(pipe_ends[1]);
-    const bool is_told = read(pipe_ends[0], out, sizeof *out) == (ssize_t)sizeof *out;
+    const bool is_reported = read(pipe_ends[0], out, sizeof *out) == (ssize_t)sizeof *out;
     close(pipe_ends[0]);
     waitpid(child, &status, 0);
     remove_picture(c);
-    return is_told && WIFEXITED(status);
+    return is_reported && WIFEXITED(status);
 }
 
 static void expect(const picture_case *c, file_bytes *expected)

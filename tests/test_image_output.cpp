@@ -79,7 +79,7 @@ insitu_status write(const insitu_image &image, insitu_image_format format, const
     return session_write_image(&image, format, path.c_str(), &error);
 }
 
-void write_well(const insitu_image &image, insitu_image_format format, const fs::path &path)
+void write_ok(const insitu_image &image, insitu_image_format format, const fs::path &path)
 {
     base_error error;
     if (write(image, format, path, error) != INSITU_OK) fail_msg("%s", error.message);
@@ -111,7 +111,7 @@ template <typename code>
 void check_png(const picture &p, insitu_image_format format, OIIO::TypeDesc type, std::size_t channels)
 {
     const fs::path path = folder / "png" / "round_trip.png";
-    write_well(p.view(true), format, path);
+    write_ok(p.view(true), format, path);
     OIIO::ImageSpec spec;
     const std::vector<code> codes = read_back<code>(path, type, spec);
     assert_int_equal(spec.width, p.width);
@@ -172,7 +172,7 @@ void png_of_numbers_that_are_not_is_black(void **)
 {
     const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
     const picture p{2, 1, {nan, infinity, -infinity, 1, nan, nan, nan, nan}, {0, 0}};
-    write_well(p.view(false), INSITU_PNG8, folder / "nan.png");
+    write_ok(p.view(false), INSITU_PNG8, folder / "nan.png");
     OIIO::ImageSpec spec;
     const auto codes = read_back<std::uint8_t>(folder / "nan.png", OIIO::TypeDesc::UINT8, spec);
     assert_int_equal(codes.size(), 8);
@@ -188,7 +188,7 @@ void exr_has_channels_of_other_numbers(void **)
     insitu_image image = p.view(true);
     image.channel_count = 2;
     image.channels = channels;
-    write_well(image, INSITU_EXR, path);
+    write_ok(image, INSITU_EXR, path);
     OIIO::ImageSpec spec;
     const std::vector<float> values = read_back<float>(path, OIIO::TypeDesc::FLOAT, spec);
     assert_int_equal(spec.nchannels, 7);
@@ -203,7 +203,7 @@ void exr_has_channels_of_other_numbers(void **)
         assert_true(pixel[x] == p.rgba[4 * i + 1] && pixel[green] == p.rgba[4 * i + 1]);
         assert_true(pixel[value] == p.depth[i] && pixel[z] == p.depth[i]);
     }
-    write_well(image, INSITU_PNG8, folder / "png" / "channels.png"); /* which passes them over */
+    write_ok(image, INSITU_PNG8, folder / "png" / "channels.png"); /* which passes them over */
 }
 
 void exr_is_bitwise(void **)
@@ -212,7 +212,7 @@ void exr_is_bitwise(void **)
         for (const std::size_t channels : {std::size_t{4}, std::size_t{5}}) {
             const picture p = make_picture(size[0], size[1], false);
             const fs::path path = folder / "deep" / "er" / "round_trip.exr";
-            write_well(p.view(channels == 5), INSITU_EXR, path);
+            write_ok(p.view(channels == 5), INSITU_EXR, path);
             OIIO::ImageSpec spec;
             const std::vector<float> values = read_back<float>(path, OIIO::TypeDesc::FLOAT, spec);
             assert_int_equal(spec.nchannels, channels);
@@ -340,8 +340,8 @@ void writing_leaves_the_picture_alone(void **)
 {
     const fs::path in = folder / "alone";
     const picture first = make_picture(20, 10, true), second = make_picture(5, 4, true);
-    write_well(first.view(false), INSITU_PNG8, in / "a.png");
-    write_well(second.view(false), INSITU_PNG8, in / "a.png");
+    write_ok(first.view(false), INSITU_PNG8, in / "a.png");
+    write_ok(second.view(false), INSITU_PNG8, in / "a.png");
     assert_int_equal(count_files(in), 1);
     OIIO::ImageSpec spec;
     read_back<std::uint8_t>(in / "a.png", OIIO::TypeDesc::UINT8, spec);
@@ -349,12 +349,12 @@ void writing_leaves_the_picture_alone(void **)
 }
 
 /* Root may write anywhere, so nothing here depends on permissions. */
-void unwritable_places_are_told(void **)
+void unwritable_places_are_reported(void **)
 {
     const fs::path in = folder / "unwritable";
     fs::create_directories(in / "taken.png" / "below");
     const picture p = make_picture(3, 2, true);
-    write_well(p.view(false), INSITU_PNG8, in / "file.png");
+    write_ok(p.view(false), INSITU_PNG8, in / "file.png");
     const std::size_t before = count_files(in);
     const struct {
         fs::path path;
@@ -379,13 +379,13 @@ void unwritable_places_are_told(void **)
 }
 
 /* A full disk, in small: no file of this process may grow beyond 4 KiB. */
-void full_disk_is_told_and_leaves_the_old_picture(void **)
+void full_disk_is_reported_and_leaves_the_old_picture(void **)
 {
     const fs::path in = folder / "full";
     const picture small = make_picture(2, 2, true), large = make_picture(200, 200, false);
     for (const auto format : {INSITU_PNG8, INSITU_PNG16, INSITU_EXR}) {
         const fs::path path = in / "a";
-        write_well(small.view(true), format, path);
+        write_ok(small.view(true), format, path);
         const std::uintmax_t size = fs::file_size(path);
         rlimit before;
         getrlimit(RLIMIT_FSIZE, &before);
@@ -418,7 +418,7 @@ void longest_legal_name_is_written(void **)
     const picture p = make_picture(3, 2, true);
     for (const std::size_t length : {std::size_t{244}, std::size_t{255}}) {
         const fs::path path = in / (std::string(length - 4, 'a') + ".png");
-        write_well(p.view(false), INSITU_PNG8, path);
+        write_ok(p.view(false), INSITU_PNG8, path);
         assert_true(fs::is_regular_file(path));
     }
     assert_int_equal(count_files(in), 2);
@@ -431,7 +431,7 @@ void planted_links_keep_their_victims(void **)
     fs::create_directories(in);
     std::ofstream(victim) << "precious";
     fs::create_symlink(fs::absolute(victim), in / (".a.png." + std::to_string(getpid()) + ".part.png"));
-    write_well(make_picture(3, 2, true).view(false), INSITU_PNG8, in / "a.png");
+    write_ok(make_picture(3, 2, true).view(false), INSITU_PNG8, in / "a.png");
     std::string found;
     std::ifstream(victim) >> found;
     assert_string_equal(found.c_str(), "precious");
@@ -453,14 +453,14 @@ void files_of_killed_runs_are_removed(void **)
     assert_int_equal(mkfifo((in / pipe).c_str(), 0600), 0);
     const int writer = open((in / held).c_str(), O_RDWR);
     assert_int_equal(flock(writer, LOCK_EX), 0);
-    write_well(make_picture(3, 2, true).view(false), INSITU_PNG8, in / "a.png");
+    write_ok(make_picture(3, 2, true).view(false), INSITU_PNG8, in / "a.png");
     assert_false(fs::exists(in / left));
     for (const std::string &name : {held, others[0], others[1], others[2]}) assert_true(fs::exists(in / name));
     assert_true(fs::is_symlink(fs::symlink_status(in / link)) && fs::is_fifo(in / pipe));
     close(writer);
 }
 
-void pipe_in_the_picture_s_place_is_told(void **)
+void pipe_in_the_picture_s_place_is_reported(void **)
 {
     const fs::path in = folder / "pipe";
     fs::create_directories(in);
@@ -534,12 +534,12 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(deep_exr_is_bitwise),
         cmocka_unit_test(deep_exr_is_flattened_by_openimageio),
         cmocka_unit_test(writing_leaves_the_picture_alone),
-        cmocka_unit_test(unwritable_places_are_told),
-        cmocka_unit_test(full_disk_is_told_and_leaves_the_old_picture),
+        cmocka_unit_test(unwritable_places_are_reported),
+        cmocka_unit_test(full_disk_is_reported_and_leaves_the_old_picture),
         cmocka_unit_test(longest_legal_name_is_written),
         cmocka_unit_test(planted_links_keep_their_victims),
         cmocka_unit_test(files_of_killed_runs_are_removed),
-        cmocka_unit_test(pipe_in_the_picture_s_place_is_told),
+        cmocka_unit_test(pipe_in_the_picture_s_place_is_reported),
         cmocka_unit_test(pictures_are_put_into_places),
         cmocka_unit_test(nonsense_is_refused),
     };

@@ -172,7 +172,7 @@ static void brute_slopes(const render_transfer *t, long double x, long double b,
     out[5] = fabsl(slope);
 }
 
-/* As kernel_swing, from many values of the range and several b. */
+/* As kernel_light_variation, from many values of the range and several b. */
 static void brute_swing(const render_transfer *t, double low, double high, double out[4])
 {
     enum { VALUES = 300, BEHIND = 4 };
@@ -216,8 +216,8 @@ static double worst_of(integral *of, int count, double most, double tolerance, d
         make_transfer(&r, seed, most);
         const double v_in = 1.5 * coarse(1, seed + 7) - 0.25;
         const bool is_level = n % 11 == 0;
-        const double span = n % 3 == 0 ? 1 / 64.0 : 1.5,
-                     v_out = is_level ? v_in : v_in + span * (coarse(2, seed + 7) - 0.5);
+        const double interval = n % 3 == 0 ? 1 / 64.0 : 1.5,
+                     v_out = is_level ? v_in : v_in + interval * (coarse(2, seed + 7) - 0.5);
         const double length = ldexp(1, (int)(38 * test_uniform(3, seed)) - 28);
         long double truth[5];
         double found[4];

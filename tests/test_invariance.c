@@ -125,9 +125,9 @@ static const char *scene_of_all(void)
 
 /* ---- meshes and partitions ------------------------------------------------------------------------------------ */
 
-typedef enum dealing { BLOCK, MORTON, RANDOM, CHECKERBOARD, RANK_EMPTY, DEALINGS } dealing;
+typedef enum distribution { BLOCK, MORTON, RANDOM, CHECKERBOARD, RANK_EMPTY, DEALINGS } distribution;
 
-static const char *const dealing_names[DEALINGS] = {"block", "Morton", "random", "checkerboard", "a rank empty"};
+static const char *const distribution_names[DEALINGS] = {"block", "Morton", "random", "checkerboard", "a rank empty"};
 
 static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_TETS, TEST_POLYHEDRA, TEST_MIXED};
 enum { KINDS = sizeof kinds / sizeof *kinds };
@@ -178,7 +178,7 @@ static int compare_codes(const void *a, const void *b)
     return (first > second) - (first < second);
 }
 
-static void deal_morton(const test_mesh *mesh, int *owners)
+static void distribute_morton(const test_mesh *mesh, int *owners)
 {
     const size_t cells = (size_t)mesh->cell_count;
     uint64_t *codes = calloc(cells, sizeof *codes);
@@ -190,13 +190,13 @@ static void deal_morton(const test_mesh *mesh, int *owners)
     free(codes);
 }
 
-static void deal(const test_mesh *mesh, dealing how, int side, int *owners)
+static void distribute(const test_mesh *mesh, distribution how, int side, int *owners)
 {
     static const test_partition_kind known[] = {TEST_BLOCK, TEST_BLOCK, TEST_RANDOM, TEST_CHECKERBOARD, TEST_RANDOM};
     const int empty = rank_count / 2;
     const bool has_empty = how == RANK_EMPTY && rank_count > 1;
     test_partition(mesh, known[how], side, has_empty ? rank_count - 1 : rank_count, owners);
-    if (how == MORTON) deal_morton(mesh, owners);
+    if (how == MORTON) distribute_morton(mesh, owners);
     for (int64_t i = 0; has_empty && i < mesh->cell_count; i++) owners[i] += owners[i] >= empty;
 }
 
@@ -258,7 +258,7 @@ static void free_input(input *in)
     free(in->cell_values);
 }
 
-static void take_part(const test_mesh *mesh, const int *owners, int layers, input *out)
+static void extract_rank_cells(const test_mesh *mesh, const int *owners, int layers, input *out)
 {
     const size_t cells = (size_t)mesh->cell_count;
     unsigned char *taken = calloc(cells, 1);
@@ -274,7 +274,7 @@ static void take_part(const test_mesh *mesh, const int *owners, int layers, inpu
     *out = (input){0};
     test_mesh_part(mesh, of_part, 0, &out->vertices.part);
     for (int i = 0; i < count; i++) out->vertices.part.ghosts[i] = owners[origin[i]] != own_rank;
-    test_mesh_turn(&out->vertices.part, 11 + (uint64_t)own_rank);
+    test_mesh_reorder_vertices(&out->vertices.part, 11 + (uint64_t)own_rank);
     describe(out, origin);
     free(taken);
     free(of_part);
@@ -297,8 +297,8 @@ static void take_whole(const test_mesh *mesh, input *out)
 
 static void draw(insitu_session *session, const input *in, int cycle)
 {
-    forget_pictures();
-    insitu_status status = hand_over(session, &in->vertices);
+    discard_pictures();
+    insitu_status status = submit(session, &in->vertices);
     if (!status) status = insitu_set_field(session, "m", &in->cells);
     if (!status) status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "rank %d: %s\n", own_rank, insitu_error(session));
@@ -362,7 +362,7 @@ static bool is_due(int kind, int how, int layers)
     return test_is_whole() || (kind + how + layers) % 6 == 0;
 }
 
-static bool judge_mesh(insitu_session *session, int kind, int side, const test_mesh *mesh, const caught_picture *whole)
+static bool verify_mesh(insitu_session *session, int kind, int side, const test_mesh *mesh, const caught_picture *whole)
 {
     static int cycle;
     bool are_well = true;
@@ -373,10 +373,10 @@ static bool judge_mesh(insitu_session *session, int kind, int side, const test_m
             char what[96];
             input part;
             if (!is_due(kind, how, layers)) continue;
-            snprintf(what, sizeof what, "%s, %s, %d ghost layers", test_mesh_kind_name(kinds[kind]), dealing_names[how],
-                     layers);
-            deal(mesh, (dealing)how, side, owners);
-            take_part(mesh, owners, layers, &part);
+            snprintf(what, sizeof what, "%s, %s, %d ghost layers", test_mesh_kind_name(kinds[kind]),
+                     distribution_names[how], layers);
+            distribute(mesh, (distribution)how, side, owners);
+            extract_rank_cells(mesh, owners, layers, &part);
             draw(session, &part, cycle++);
             if (own_rank == 0) are_well = are_the_same(whole, what) && are_well;
             free_input(&part);
@@ -392,8 +392,8 @@ static void draw_whole(const char *scene, const test_mesh *mesh, caught_picture 
     input whole;
     take_whole(mesh, &whole);
     insitu_session *session = open_session(MPI_COMM_SELF, scene);
-    forget_pictures();
-    assert_int_equal(hand_over(session, &whole.vertices), INSITU_OK);
+    discard_pictures();
+    assert_int_equal(submit(session, &whole.vertices), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &whole.cells), INSITU_OK);
     assert_int_equal(insitu_step(session, cycle++, 0), INSITU_OK);
     assert_int_equal(caught_count, case_count);
@@ -415,7 +415,7 @@ static void pictures_do_not_depend_on_the_partition(void **state)
         caught_picture whole[MOST_CASES] = {{0}};
         test_mesh_lattice(kinds[kind], side, 0.2, test_wave, &mesh);
         if (own_rank == 0) draw_whole(scene, &mesh, whole);
-        are_well = judge_mesh(session, kind, side, &mesh, whole) && are_well;
+        are_well = verify_mesh(session, kind, side, &mesh, whole) && are_well;
         for (int i = 0; i < case_count && own_rank == 0; i++) free_caught(&whole[i]);
         test_mesh_free(&mesh);
     }

@@ -62,7 +62,7 @@ void check_bar(const block &b)
 }
 
 /* All is placed once or named; labels may be missing. */
-void check_all_are_told(const layout &places, const insitu_decorations &what)
+void check_all_are_reported(const layout &places, const insitu_decorations &what)
 {
     int wanted = what.bar_count + (what.scale_bar.length > 0) + what.has_axes;
     for (int i = 0; i < what.words_count; i++) wanted += *what.words[i].text != 0;
@@ -82,7 +82,7 @@ void check_layout(const layout &places, const insitu_image &image)
         check_lines(b);
         if (b.kind == block_kind::bar) check_bar(b);
     }
-    check_all_are_told(places, *image.decorations);
+    check_all_are_reported(places, *image.decorations);
 }
 
 void random_blocks_neither_overlap_nor_leave_the_picture(void **)

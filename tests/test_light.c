@@ -79,7 +79,7 @@ static void start_of(const render_fixture *f, const render_hit *hit, const doubl
 }
 
 typedef struct tally {
-    int64_t rays, blocked, unsure, wrong;
+    int64_t rays, blocked, undecided_rays, wrong;
 } tally;
 
 static void grow_box(const double place[3], double low[3], double high[3])
@@ -108,7 +108,8 @@ static double size_of(const test_mesh *mesh, int64_t cell)
 
 /* Tells by brute force whether the ray meets something in front: 1, 0, or -1 where rounding may decide. Roots of the
  * hit's own surface lie behind the start by the lift less what hits are off by. */
-static int look(const render_fixture *f, const test_mesh *mesh, const double start[3], const double d[3], double reach)
+static int is_blocked_by_brute_force(const render_fixture *f, const test_mesh *mesh, const double start[3],
+                                     const double d[3], double reach)
 {
     static const float nothing[4] = {0, 0, 0, 0};
     const double *across = fabs(d[1]) < 0.9 ? (const double[]){0, 1, 0} : (const double[]){1, 0, 0};
@@ -138,17 +139,17 @@ static int look(const render_fixture *f, const test_mesh *mesh, const double sta
     return is_met;
 }
 
-static void judge(int said, bool is_open, const char *what, tally *t)
+static void verify(int said, bool is_open, const char *what, tally *t)
 {
     t->rays++;
     t->blocked += said == 1;
-    t->unsure += said < 0;
+    t->undecided_rays += said < 0;
     if (said < 0 || said != is_open) return;
     if (!t->wrong++) fprintf(stderr, "%s: %s\n", what, said ? "a blocked ray is open" : "an open ray is blocked");
 }
 
-static void judge_hit(const render_fixture *f, const test_mesh *mesh, const hits *h, int64_t i, const char *what,
-                      tally *t)
+static void verify_hit(const render_fixture *f, const test_mesh *mesh, const hits *h, int64_t i, const char *what,
+                       tally *t)
 {
     const render_hit *hit = &h->hits[i];
     double n[3], start[3], d[3];
@@ -156,20 +157,21 @@ static void judge_hit(const render_fixture *f, const test_mesh *mesh, const hits
     start_of(f, hit, n, start);
     for (int k = 0; k < SAMPLES; k += 3) {
         test_hemisphere(hit->pixel, WIDTH, SAMPLES, k, n, d);
-        judge(look(f, mesh, start, d, radius), h->open[i].samples >> k & 1, what, t);
+        verify(is_blocked_by_brute_force(f, mesh, start, d, radius), h->open[i].samples >> k & 1, what, t);
     }
     for (int k = 0; k < LIGHTS; k++)
         if (h->rays[i].lights >> k & 1)
-            judge(look(f, mesh, start, f->lights[k].direction, INFINITY), h->open[i].lights >> k & 1, what, t);
+            verify(is_blocked_by_brute_force(f, mesh, start, f->lights[k].direction, INFINITY),
+                   h->open[i].lights >> k & 1, what, t);
 }
 
-static void judge_mesh(const test_mesh *mesh, fixture_camera camera, float contact, const char *what)
+static void verify_mesh(const test_mesh *mesh, fixture_camera camera, float contact, const char *what)
 {
     static const render_occlusion occlusion = {3, SAMPLES, 0.6};
     render_fixture f;
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(&f, camera, WIDTH, HEIGHT);
+    fixture_set_camera(&f, camera, WIDTH, HEIGHT);
     fixture_add_surface(&f, isovalues, 2, 1);
     f.surfaces[0].contact = contact;
     f.job.paint = RENDER_UNLIT;
@@ -187,11 +189,11 @@ static void judge_mesh(const test_mesh *mesh, fixture_camera camera, float conta
         render_occluders_free(occluders);
         for (int64_t i = 0; i < h.count; i++)
             if (test_is_whole() || i % (set + 1 == fixture_set_count() ? 2 : 7) == 0)
-                judge_hit(&f, mesh, &h, i, what, &t);
+                verify_hit(&f, mesh, &h, i, what, &t);
         free_hits(&h);
-        if (t.wrong || t.unsure * 4 > t.rays || t.blocked < t.rays / 20 || t.rays < 50)
+        if (t.wrong || t.undecided_rays * 4 > t.rays || t.blocked < t.rays / 20 || t.rays < 50)
             fail_msg("%s, %s: of %lld rays %lld blocked, %lld unsure, %lld wrong", what, fixture_set_name(set),
-                     (long long)t.rays, (long long)t.blocked, (long long)t.unsure, (long long)t.wrong);
+                     (long long)t.rays, (long long)t.blocked, (long long)t.undecided_rays, (long long)t.wrong);
     }
     fixture_free(&f);
 }
@@ -202,8 +204,8 @@ static void rays_meet_what_all_cells_say(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
         test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
-        judge_mesh(&mesh, kind % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, test_mesh_kind_name(kind));
-        judge_mesh(&mesh, kind % 2 ? CAMERA_INSIDE : CAMERA_ORTHOGRAPHIC, 0.5F, test_mesh_kind_name(kind));
+        verify_mesh(&mesh, kind % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, test_mesh_kind_name(kind));
+        verify_mesh(&mesh, kind % 2 ? CAMERA_INSIDE : CAMERA_ORTHOGRAPHIC, 0.5F, test_mesh_kind_name(kind));
         test_mesh_free(&mesh);
     }
 }
@@ -213,8 +215,8 @@ static void rays_meet_what_honeycombs_say(void **state)
     test_mesh mesh;
     (void)state;
     test_mesh_honeycomb(SIDE, 0.2, test_wave, &mesh);
-    judge_mesh(&mesh, CAMERA_OUTSIDE, 0, "honeycomb");
-    judge_mesh(&mesh, CAMERA_ORTHOGRAPHIC, 0.5F, "honeycomb");
+    verify_mesh(&mesh, CAMERA_OUTSIDE, 0, "honeycomb");
+    verify_mesh(&mesh, CAMERA_ORTHOGRAPHIC, 0.5F, "honeycomb");
     test_mesh_free(&mesh);
 }
 

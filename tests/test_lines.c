@@ -197,7 +197,7 @@ static void create_frame(lines_frame *out, const lines_case *of, test_mesh_kind 
     test_view_create(&lines, layout, &out->field);
     test_mesh_free(&lines);
     fixture_create(&out->f, &out->mesh, 1, layout, 2.0 / of->cubes, 1, (const double[]){0, 0, 0});
-    fixture_look(&out->f, of->camera, WIDTH, HEIGHT);
+    fixture_set_camera(&out->f, of->camera, WIDTH, HEIGHT);
     fixture_add_surface(&out->f, &through, 1, 1);
     out->lines = (render_lines){.field = {&out->field.field, out->f.ranges},
                                 .count = of->count,
@@ -308,7 +308,7 @@ static void lines_are_the_same_on_any_partition(void **state)
                 test_mesh_free(&part);
                 lines[rank] = whole.lines;
                 lines[rank].field = (render_field){&fields[rank].field, parts[rank].ranges};
-                fixture_look(&parts[rank], of->camera, WIDTH, HEIGHT);
+                fixture_set_camera(&parts[rank], of->camera, WIDTH, HEIGHT);
                 fixture_add_surface(&parts[rank], &through, 1, 1);
                 parts[rank].surfaces[0] = whole.f.surfaces[0];
                 parts[rank].surfaces[0].field = (render_field){parts[rank].fields, parts[rank].ranges};

@@ -112,7 +112,7 @@ static void reverse(int64_t *items, int64_t count)
 }
 
 /* Another beginning, and by seed the other way. */
-static void turn_loop(int64_t *items, int64_t count, uint64_t seed)
+static void rotate_loop(int64_t *items, int64_t count, uint64_t seed)
 {
     const int64_t by = (int64_t)(test_hash(1, seed) % (uint64_t)count);
     reverse(items, by);
@@ -120,11 +120,11 @@ static void turn_loop(int64_t *items, int64_t count, uint64_t seed)
     if (test_hash(2, seed) & 1) reverse(items, count);
 }
 
-void test_mesh_turn(test_mesh *mesh, uint64_t seed)
+void test_mesh_reorder_vertices(test_mesh *mesh, uint64_t seed)
 {
     for (int64_t i = 0; i < mesh->face_count; i++)
-        turn_loop(mesh->face_connectivity + mesh->face_offsets[i], mesh->face_offsets[i + 1] - mesh->face_offsets[i],
-                  test_hash((uint64_t)i, seed));
+        rotate_loop(mesh->face_connectivity + mesh->face_offsets[i], mesh->face_offsets[i + 1] - mesh->face_offsets[i],
+                    test_hash((uint64_t)i, seed));
     for (int64_t i = 0; i < mesh->cell_count; i++) {
         if (mesh->types[i] == GRID_POLYHEDRON) {
             int64_t *faces = mesh->connectivity + mesh->offsets[i];

@@ -19,8 +19,8 @@ const char formed_scene[] =
                     IMAGE("g", "      - surface: {threshold: {field: f, from: -0.5, to: 0.5}, colour_by: {field: i}}\n"
                                "      - isosurface: {field: i, values: [0.3], normals: differences}\n");
 
-const char formed_torn_scene[] = "threads: 1\nimages:\n" IMAGE("a", "      - isosurface: {field: d, values: [0.1]}\n"
-                                                                    "      - surface: {colour_by: {field: d}}\n")
+const char formed_corner_scene[] = "threads: 1\nimages:\n" IMAGE("a", "      - isosurface: {field: d, values: [0.1]}\n"
+                                                                      "      - surface: {colour_by: {field: d}}\n")
     IMAGE("b", "      - volume: {field: "
                "d}\n");
 
@@ -231,7 +231,7 @@ void formed_renew(formed_mesh *m)
     formed_create(last.form, last.side, last.rank, last.count, m);
 }
 
-insitu_status formed_hand_over(insitu_session *session, const formed_mesh *m, bool with_corners)
+insitu_status formed_submit(insitu_session *session, const formed_mesh *m, bool with_corners)
 {
     insitu_status status = insitu_set_mesh(session, "m", &m->mesh);
     for (int i = 0; i < FORMED_FIELDS; i++) {

@@ -49,10 +49,10 @@ void formed_fit_fields(formed_mesh *m);
 bool formed_has_corners(mesh_form form);
 
 /* Hands the mesh "m" and its fields over, those at corners if with_corners. Returns the first status that is not OK. */
-insitu_status formed_hand_over(insitu_session *session, const formed_mesh *m, bool with_corners);
+insitu_status formed_submit(insitu_session *session, const formed_mesh *m, bool with_corners);
 
 /* Scenes of pictures of all layers on "m", one of them with the field at corners. */
-extern const char formed_scene[], formed_torn_scene[];
-enum { FORMED_PICTURES = 6, FORMED_TORN_PICTURES = 2 };
+extern const char formed_scene[], formed_corner_scene[];
+enum { FORMED_PICTURES = 6, FORMED_CORNER_PICTURES = 2 };
 
 #endif

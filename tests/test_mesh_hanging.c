@@ -33,7 +33,7 @@ static void to_ball(const double p[3], double out[3])
 }
 
 /* About (1, 2, 3), by an angle of cosine 0.8, to 0.55 of the size. */
-static void turn(const double p[3], double out[3])
+static void rotate(const double p[3], double out[3])
 {
     const double length = sqrt(14), axis[3] = {1 / length, 2 / length, 3 / length};
     const double along = axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2];
@@ -48,8 +48,8 @@ static void map(const hanging *h, const double p[3], double out[3])
 {
     if (h->shape >= TEST_HANGING_CURVED)
         to_ball(p, out);
-    else if (h->shape == TEST_HANGING_TURNED)
-        turn(p, out);
+    else if (h->shape == TEST_HANGING_ROTATED)
+        rotate(p, out);
     else
         memcpy(out, p, 3 * sizeof *out);
 }

@@ -5,10 +5,10 @@
 #include "test_meshes.h"
 
 typedef enum test_hanging_shape {
-    TEST_HANGING_DYADIC, /* the cube [-1, 1]^3: coordinates that float32 holds, if n is a power of two */
-    TEST_HANGING_TURNED, /* turned and shrunk: the same planes, but no coordinate that is exact */
-    TEST_HANGING_CURVED, /* into a ball; hanging nodes are on the patch of the coarse face, exact but for rounding */
-    TEST_HANGING_ROUND,  /* into a ball, hanging nodes too: there are gaps and overlaps between the patches in truth */
+    TEST_HANGING_DYADIC,  /* the cube [-1, 1]^3: coordinates that float32 holds, if n is a power of two */
+    TEST_HANGING_ROTATED, /* turned and shrunk: the same planes, but no coordinate that is exact */
+    TEST_HANGING_CURVED,  /* into a ball; hanging nodes are on the patch of the coarse face, exact but for rounding */
+    TEST_HANGING_ROUND,   /* into a ball, hanging nodes too: there are gaps and overlaps between the patches in truth */
     TEST_HANGING_SHAPE_COUNT
 } test_hanging_shape;
 

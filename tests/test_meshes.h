@@ -94,7 +94,7 @@ void test_mesh_shuffle(test_mesh *mesh, uint64_t seed);
 
 /* Reorders each cell's vertices by a random symmetry of its kind (rotations and mirrors); faces begin at another vertex
  * and run the other way, and a polyhedron's faces are in another order. Geometry and field stay the same. */
-void test_mesh_turn(test_mesh *mesh, uint64_t seed);
+void test_mesh_reorder_vertices(test_mesh *mesh, uint64_t seed);
 
 /* position * scale + offset. */
 void test_mesh_transform(test_mesh *mesh, double scale, const double offset[3]);

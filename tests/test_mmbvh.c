@@ -300,7 +300,7 @@ static void refitted_ranges_equal_a_fresh_build(void **state)
     mmbvh fresh = build_by(&l, &l.field, 2);
     assert_memory_not_equal(node_bytes(&old), node_bytes(&fresh), (size_t)fresh.node_count * node_size(&fresh));
     for (int threads = 1; threads <= 3; threads++) {
-        for (int64_t i = 0; i < old.node_count; i++) spoil_range(&old, i);
+        for (int64_t i = 0; i < old.node_count; i++) corrupt_range(&old, i);
         assert_int_equal(mmbvh_refit_ranges(&old, &l.g, &l.field, &(mmbvh_options){.threads = threads}), INSITU_OK);
         assert_same_nodes(&old, &fresh);
         assert_int_equal(old.unusable_cells, unusable);
@@ -514,8 +514,8 @@ static void refit_reaches_all_below_a_leafs_sibling(void **state)
         mmbvh tree = build_by(&l, &l.field, 2);
         assert_true(mmbvh_node_count(&tree, 1 + side) > 0 && mmbvh_node_count(&tree, 2 - side) == 0);
         for (int64_t i = 0; i < tree.node_count; i++) {
-            spoil_range(&tree, i);
-            spoil_box(&tree, i);
+            corrupt_range(&tree, i);
+            corrupt_box(&tree, i);
         }
         mmbvh_refit_ranges(&tree, &l.g, &l.field, &(mmbvh_options){.threads = 2});
         mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){.threads = 2});

@@ -145,7 +145,7 @@ static int64_t cells_tested_at(const mmbvh *tree, const double p[3])
 /* Hexes of size 1, ten in the middle of each side shrunk to 2e-5: all ten are less than a step of the builder's first
  * grid, 9 / 32767. A point in a cell of a jittered lattice is in the boxes of a few leaves; without a finer grid the
  * 1000 cells that are small on all axes look alike, and a leaf holds any four of them. */
-static void cells_of_very_different_sizes_are_told_apart(void **state)
+static void cells_of_very_different_sizes_are_distinguished(void **state)
 {
     (void)state;
     for (int layout = MMBVH_COMPACT; layout <= MMBVH_REFERENCE; layout++) {
@@ -283,7 +283,7 @@ int main(void)
         cmocka_unit_test(box_beyond_the_grid_is_refused),
         cmocka_unit_test(layouts_hold_one_tree),
         cmocka_unit_test(boxes_without_end_take_the_reference_layout),
-        cmocka_unit_test(cells_of_very_different_sizes_are_told_apart),
+        cmocka_unit_test(cells_of_very_different_sizes_are_distinguished),
         cmocka_unit_test(vertices_of_no_cell_do_not_coarsen_the_tree),
         cmocka_unit_test(refit_follows_a_mesh_that_grows_and_shrinks),
         cmocka_unit_test(curve_costs_little_more_than_planes),

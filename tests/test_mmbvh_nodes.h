@@ -49,7 +49,7 @@ static inline const void *node_bytes(const mmbvh *tree)
         assert_memory_equal(node_bytes(a), node_bytes(b), (size_t)(a)->node_count *node_size(a));                      \
     } while (0)
 
-static inline void spoil_range(const mmbvh *tree, int64_t index)
+static inline void corrupt_range(const mmbvh *tree, int64_t index)
 {
     if (tree->compact) {
         tree->compact[index].range_low = tree->compact[index].range_high = NAN;
@@ -58,7 +58,7 @@ static inline void spoil_range(const mmbvh *tree, int64_t index)
     }
 }
 
-static inline void spoil_box(const mmbvh *tree, int64_t index)
+static inline void corrupt_box(const mmbvh *tree, int64_t index)
 {
     if (tree->compact) {
         tree->compact[index].axis[0] = 0;

@@ -18,13 +18,13 @@ enum { SIDE = 7, LARGE_SIDE = 15 /* cells for several blocks of several threads 
 static const mmbvh_interval at_one[] = {{0.25f, 0.25f}}, at_three[] = {{-1, -1}, {0.1f, 0.1f}, {0.9f, 0.9f}},
                             in_two[] = {{-0.4f, -0.3f}, {1, INFINITY}}, at_least[] = {{-2, -2}}, at_most[] = {{2, 2}};
 
-static void make_wishes(const grid_field *field, mmbvh_wish wishes[WISHES])
+static void make_wishes(const grid_field *field, mmbvh_query queries[WISHES])
 {
-    wishes[0] = (mmbvh_wish){field, 1, at_one};
-    wishes[1] = (mmbvh_wish){field, 3, at_three};
-    wishes[2] = (mmbvh_wish){field, 2, in_two};
-    wishes[3] = (mmbvh_wish){field, 1, at_least};
-    wishes[4] = (mmbvh_wish){field, 1, at_most};
+    queries[0] = (mmbvh_query){field, 1, at_one};
+    queries[1] = (mmbvh_query){field, 3, at_three};
+    queries[2] = (mmbvh_query){field, 2, in_two};
+    queries[3] = (mmbvh_query){field, 1, at_least};
+    queries[4] = (mmbvh_query){field, 1, at_most};
 }
 
 /* Every fifth cell a ghost, and one value in two hundred not finite. */
@@ -44,7 +44,7 @@ static test_mesh make_mesh(test_mesh_kind kind, int side)
 }
 
 /* -1: not to be used; else whether the wish can show it. */
-static int look(const test_view *view, const mmbvh_wish *wish, int64_t cell)
+static int expected_selection(const test_view *view, const mmbvh_query *query, int64_t cell)
 {
     double low = (double)INFINITY, high = -(double)INFINITY;
     grid_walk walk = grid_walk_cell(&view->cells, cell);
@@ -55,24 +55,24 @@ static int look(const test_view *view, const mmbvh_wish *wish, int64_t cell)
         low = fmin(v, low);
         high = fmax(v, high);
     }
-    for (int i = 0; i < wish->interval_count; i++)
-        if ((float)low <= wish->intervals[i].high && (float)high >= wish->intervals[i].low) return 1;
+    for (int i = 0; i < query->interval_count; i++)
+        if ((float)low <= query->intervals[i].high && (float)high >= query->intervals[i].low) return 1;
     return 0;
 }
 
 /* Returns how many cells are selected. */
-static int64_t assert_selects(const test_view *view, const mmbvh_wish *wishes, int count)
+static int64_t assert_selects(const test_view *view, const mmbvh_query *queries, int count)
 {
     mmbvh_selection selection;
     int64_t unusable[WISHES], unusable_by_hand[WISHES] = {0}, found = 0;
     base_error error;
     assert_int_equal(
-        mmbvh_select(&view->cells, wishes, count, &(mmbvh_options){.threads = 2}, &selection, unusable, &error),
+        mmbvh_select(&view->cells, queries, count, &(mmbvh_options){.threads = 2}, &selection, unusable, &error),
         INSITU_OK);
     for (int64_t cell = 0; cell < view->cells.cell_count; cell++) {
         bool shows = false;
         for (int i = 0; i < count && !grid_is_ghost(&view->cells, cell); i++) {
-            const int seen = look(view, &wishes[i], cell);
+            const int seen = expected_selection(view, &queries[i], cell);
             shows |= seen > 0;
             unusable_by_hand[i] += seen < 0;
         }
@@ -89,14 +89,14 @@ static int64_t assert_selects(const test_view *view, const mmbvh_wish *wishes, i
 static void assert_selects_all_wishes(const test_mesh *mesh, test_layout layout)
 {
     test_view view;
-    mmbvh_wish wishes[WISHES];
+    mmbvh_query queries[WISHES];
     test_view_create(mesh, layout, &view);
-    make_wishes(&view.field, wishes);
+    make_wishes(&view.field, queries);
     for (int i = 0; i < WISHES; i++) {
-        const int64_t count = assert_selects(&view, &wishes[i], 1);
+        const int64_t count = assert_selects(&view, &queries[i], 1);
         assert_true(count > 0 && count < view.cells.cell_count);
     }
-    assert_selects(&view, wishes, WISHES);
+    assert_selects(&view, queries, WISHES);
     test_view_free(&view);
 }
 
@@ -150,7 +150,7 @@ static void fields_of_other_kinds_are_selected_by(void **state)
             const float root = sqrtf(3);
             const mmbvh_interval at[] = {{1, 1}, {root, root}, {2, 2}};
             view.field = fields[i];
-            assert_true(assert_selects(&view, &(mmbvh_wish){&view.field, 3, at}, 1) > 0);
+            assert_true(assert_selects(&view, &(mmbvh_query){&view.field, 3, at}, 1) > 0);
         }
         free(vectors);
         free(integers);
@@ -159,17 +159,17 @@ static void fields_of_other_kinds_are_selected_by(void **state)
     }
 }
 
-static void what_nobody_wishes_is_not_selected(void **state)
+static void cells_without_a_query_are_not_selected(void **state)
 {
     (void)state;
     test_mesh mesh = make_mesh(TEST_TETS, SIDE);
     test_view view;
     test_view_create(&mesh, (test_layout){false}, &view);
     const mmbvh_interval beyond = {7, 8};
-    assert_int_equal(assert_selects(&view, &(mmbvh_wish){&view.field, 1, &beyond}, 1), 0);
-    assert_int_equal(assert_selects(&view, &(mmbvh_wish){&view.field, 0, NULL}, 1), 0);
+    assert_int_equal(assert_selects(&view, &(mmbvh_query){&view.field, 1, &beyond}, 1), 0);
+    assert_int_equal(assert_selects(&view, &(mmbvh_query){&view.field, 0, NULL}, 1), 0);
     view.cells.cell_count = 0;
-    assert_int_equal(assert_selects(&view, &(mmbvh_wish){&view.field, 1, at_one}, 1), 0);
+    assert_int_equal(assert_selects(&view, &(mmbvh_query){&view.field, 1, at_one}, 1), 0);
     test_view_free(&view);
     test_mesh_free(&mesh);
 }
@@ -179,7 +179,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(just_the_cells_that_can_show_are_selected),
         cmocka_unit_test(fields_of_other_kinds_are_selected_by),
-        cmocka_unit_test(what_nobody_wishes_is_not_selected),
+        cmocka_unit_test(cells_without_a_query_are_not_selected),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

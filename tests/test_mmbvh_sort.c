@@ -95,7 +95,7 @@ static void keys_ascend(void **state)
     }
 }
 
-static void lack_of_memory_is_told(void **state)
+static void lack_of_memory_is_reported(void **state)
 {
     static uint64_t keys[20000], other[20000];
     const double lower[3] = {0, 0, 0}, upper[3] = {1, 1, 1};
@@ -110,7 +110,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(keys_ascend),
-        cmocka_unit_test(lack_of_memory_is_told),
+        cmocka_unit_test(lack_of_memory_is_reported),
     };
     return cmocka_run_group_tests_name("mmbvh_sort", tests, NULL, NULL);
 }

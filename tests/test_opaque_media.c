@@ -49,7 +49,7 @@ static void set_medium(render_fixture *f, method how, double depth)
 static void stage(render_fixture *f, test_mesh_kind kind, int n, method how, double depth)
 {
     fixture_create_lattice(f, kind, n, 0.2, front_to_back);
-    fixture_look(f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
+    fixture_set_camera(f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
     set_medium(f, how, depth);
 }
 
@@ -125,7 +125,7 @@ static void ranks_leave_out_what_nobody_sees(void **state)
                     test_mesh_part(&mesh, owners, rank, &part);
                     fixture_create(&parts[rank], &part, 1, (test_layout){.wide_coordinates = true, .wide_values = true},
                                    whole.cell_size, 1, (const double[]){0, 0, 0});
-                    fixture_look(&parts[rank], CAMERA_OUTSIDE, WIDTH, HEIGHT);
+                    fixture_set_camera(&parts[rank], CAMERA_OUTSIDE, WIDTH, HEIGHT);
                     set_medium(&parts[rank], how, 12);
                     parts[rank].job.is_alone = false;
                     parts[rank].job.extent = whole.job.extent = 2 * sqrt(3);
@@ -150,7 +150,7 @@ static int64_t cells_placed(test_mesh_kind kind, render_traversal traversal, dou
     render_fixture f;
     drawn_frame drawn;
     stage(&f, kind, 24, SAMPLES, depth);
-    fixture_look(&f, CAMERA_OUTSIDE, 8 * WIDTH, 8 * HEIGHT);
+    fixture_set_camera(&f, CAMERA_OUTSIDE, 8 * WIDTH, 8 * HEIGHT);
     f.job.step = 0.5 * f.cell_size;
     f.job.traversal = traversal;
     fixture_draw(&f, &drawn);

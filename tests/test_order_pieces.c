@@ -25,7 +25,7 @@ static double nothing(const double p[3])
 }
 
 /* Axes in one of six orders, each with one of two signs. */
-static void turn(order_mesh *mesh, int way)
+static void permute_axes(order_mesh *mesh, int way)
 {
     static const signed char orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
     for (int64_t i = 0; i < mesh->vertex_count; i++) {
@@ -129,12 +129,12 @@ static void volumes_add_up(const grid *g, bool is_mirrored)
     assert_true(fabs(sum - 8) < 1e-9);
 }
 
-static void cut_and_judge(const order_kind *kind, int way, double bend)
+static void cut_and_verify(const order_kind *kind, int way, double bend)
 {
     order_mesh mesh;
     base_error error = {.status = INSITU_OK};
     order_mesh_create(kind, SIDE, bend, nothing, 0, 1, &mesh);
-    turn(&mesh, way);
+    permute_axes(&mesh, way);
     session_mesh cut = {.name = (char[]){"m"}, .given = mesh.mesh};
     assert_int_equal(session_split_cells(&cut, 1, &error), INSITU_OK);
     const grid g = grid_of(&mesh, &cut.topology);
@@ -153,8 +153,8 @@ static void pieces_fill_their_cells(void **state)
     for (int k = 0; k < order_kind_count; k++)
         for (int way = 0; way < WAYS; way++) {
             if (order_kinds[k].order > 2 && way) continue; /* cut by nothing that turns */
-            cut_and_judge(&order_kinds[k], way, 0);
-            cut_and_judge(&order_kinds[k], way, 0.08);
+            cut_and_verify(&order_kinds[k], way, 0);
+            cut_and_verify(&order_kinds[k], way, 0.08);
         }
 }
 

@@ -115,7 +115,7 @@ static void stage(staged *s, const test_mesh *mesh, const drawing *d)
 {
     fixture_create(&s->f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(&s->f, d->camera, WIDTH, HEIGHT);
+    fixture_set_camera(&s->f, d->camera, WIDTH, HEIGHT);
     if (d->scene == OPAQUE_VOLUME || d->scene == TRANSPARENT_VOLUME)
         fixture_add_surface(&s->f, surface_values, 2, d->scene == OPAQUE_VOLUME ? 1 : 0.4f);
     fixture_set_volume(&s->f, 0.3);
@@ -378,7 +378,7 @@ static void tangled_lattices_are_the_same_everywhere(void **state)
 
 /* Tells whether the turns of the last frame were as many as fragment_limit makes necessary: it is reached by steps of
  * 8, and one turn may make half of what the one before lets expect. */
-static bool are_turns_few(int64_t fragment_limit)
+static bool are_passes_few(int64_t fragment_limit)
 {
     int64_t most = 0;
     MPI_Allreduce(&frame.fragments, &most, 1, MPI_INT64_T, MPI_MAX, MPI_COMM_WORLD);
@@ -386,14 +386,14 @@ static bool are_turns_few(int64_t fragment_limit)
 }
 
 /* Turns only change when a pixel is drawn. */
-static void draw_in_turns(const test_mesh *mesh, drawing d, int64_t fragment_limit)
+static void draw_in_passes(const test_mesh *mesh, drawing d, int64_t fragment_limit)
 {
     image at_once, in_turns;
     draw_shares(mesh, TEST_RANDOM, &d, &at_once);
     assert_everywhere(frame.turns == 1);
     d.fragment_limit = fragment_limit;
     draw_shares(mesh, TEST_RANDOM, &d, &in_turns);
-    const bool is_few = are_turns_few(d.fragment_limit);
+    const bool is_few = are_passes_few(d.fragment_limit);
     const bool is_same = my_rank != 0 || (!memcmp(at_once.rgba, in_turns.rgba, 4 * PIXELS * sizeof(float)) &&
                                           !memcmp(at_once.depth, in_turns.depth, PIXELS * sizeof(float)));
     free_image(&at_once);
@@ -402,13 +402,13 @@ static void draw_in_turns(const test_mesh *mesh, drawing d, int64_t fragment_lim
 }
 
 /* Rays of samples make as many fragments as is estimated before the first turn, those of segments far fewer. */
-static void turns_make_the_same_bits(void **state)
+static void passes_make_the_same_bits(void **state)
 {
     (void)state;
     test_mesh mesh;
     interpenetrating(TEST_MIXED, &mesh);
-    draw_in_turns(&mesh, (drawing){TRANSPARENT_VOLUME, CAMERA_OUTSIDE, 0, MANY, 0, false}, 1000);
-    draw_in_turns(&mesh, (drawing){TWO_VOLUMES, CAMERA_OUTSIDE, 0, MANY, 0.01, false}, 3000);
+    draw_in_passes(&mesh, (drawing){TRANSPARENT_VOLUME, CAMERA_OUTSIDE, 0, MANY, 0, false}, 1000);
+    draw_in_passes(&mesh, (drawing){TWO_VOLUMES, CAMERA_OUTSIDE, 0, MANY, 0.01, false}, 3000);
     test_mesh_free(&mesh);
 }
 
@@ -493,7 +493,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(segments_in_one_another_are_as_integrated),
         cmocka_unit_test(segments_of_two_volumes_are_as_integrated),
         cmocka_unit_test(tangled_lattices_are_the_same_everywhere),
-        cmocka_unit_test(turns_make_the_same_bits),
+        cmocka_unit_test(passes_make_the_same_bits),
         cmocka_unit_test(differences_among_overlapping_cells_are_the_same_bits),
         cmocka_unit_test(conforming_meshes_have_no_overlap),
         cmocka_unit_test(a_cell_does_not_overlap_itself),

@@ -73,7 +73,7 @@ static void draw(const test_mesh *mesh, double cell_size, const double *value, i
                  drawn_frame *out)
 {
     fixture_create(f, mesh, 1, doubles, cell_size, 1, (const double[]){0, 0, 0});
-    fixture_look(f, CAMERA_OUTSIDE, width, height);
+    fixture_set_camera(f, CAMERA_OUTSIDE, width, height);
     fixture_add_surface(f, value, 1, 1);
     fixture_draw(f, out);
 }

@@ -54,7 +54,7 @@ static void draw(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool 
     base_error error = {0};
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(&f, scene->camera, WIDTH, HEIGHT);
+    fixture_set_camera(&f, scene->camera, WIDTH, HEIGHT);
     if (scene->opacity > 0) fixture_add_surface(&f, values, 2, scene->opacity);
     if (scene->has_volume) fixture_set_volume(&f, 0.3);
     f.job.integration = scene->integration;
@@ -102,7 +102,7 @@ static bool same_images(const image *whole, const image *other, const scene *sce
 }
 
 /* Takes this rank's share; with ghosts, all cells, with those of others as ghosts. */
-static void take_part(const test_mesh *mesh, const int *owners, bool ghosts, test_mesh *out)
+static void extract_rank_cells(const test_mesh *mesh, const int *owners, bool ghosts, test_mesh *out)
 {
     int *all = calloc((size_t)mesh->cell_count, sizeof *all);
     test_mesh_part(mesh, ghosts ? all : owners, ghosts ? 0 : my_rank, out);
@@ -115,7 +115,7 @@ static void compare(const test_mesh *mesh, const int *owners, bool ghosts, const
     test_mesh part;
     image whole = {0}, ours = {0};
     int good = 1;
-    take_part(mesh, owners, ghosts, &part);
+    extract_rank_cells(mesh, owners, ghosts, &part);
     draw(&part, scene, MPI_COMM_WORLD, rank_count == 1, &ours);
     if (my_rank == 0) {
         draw(mesh, scene, MPI_COMM_SELF, true, &whole);

@@ -128,7 +128,7 @@ static void cut_polygon(const polygon *p, cut *out)
 {
     void *room = malloc(polygon_work_bytes(p->count));
     assert_non_null(room);
-    polygon_cut((const double(*)[3])p->corners, p->count, room, out->triangles);
+    polygon_triangulate((const double(*)[3])p->corners, p->count, room, out->triangles);
     out->count = p->count - 2;
     free(room);
 }
@@ -236,7 +236,7 @@ static void triangles_depend_on_places_alone(void **state)
             place(which, bent, &p);
             cut_polygon(&p, &c);
             const int count = list_places(&p, &c, own);
-            c.count = reference_polygon_cut((const double(*)[3])p.corners, p.count, c.triangles);
+            c.count = reference_polygon_triangulate((const double(*)[3])p.corners, p.count, c.triangles);
             assert_int_equal(list_places(&p, &c, found), count);
             assert_memory_equal(own, found, (size_t)count * sizeof *own);
             for (int turn = 0; turn < 6; turn++) {

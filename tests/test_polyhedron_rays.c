@@ -48,11 +48,11 @@ typedef struct subject {
 } subject;
 
 /* A ray in a tet, from z[0] to z[1] with the values v; is_face: this end is on the cell's surface. */
-typedef struct span {
+typedef struct interval {
     double z[2], v[2], slope;
     bool is_face[2];
     int sign;
-} span;
+} interval;
 
 /* The field along a stay in the cell, jumps as two points in one place. */
 typedef struct path {
@@ -169,18 +169,18 @@ static reference_line line_of(const render_camera *camera, int x, int y)
 }
 
 /* value + slope z along the line. */
-static void along_line(const linear *f, const reference_line *line, double *value, double *slope)
+static void direction_along_line(const linear *f, const reference_line *line, double *value, double *slope)
 {
     *value = at_place(f, (const double[3]){line->base[0], line->base[1], 0});
     *slope = f->gradient[0] * line->slope[0] + f->gradient[1] * line->slope[1] + f->gradient[2];
 }
 
-static bool clip(const tet *t, const reference_line *line, span *out)
+static bool clip(const tet *t, const reference_line *line, interval *out)
 {
     double value, slope;
-    *out = (span){.z = {-(double)INFINITY, (double)INFINITY}, .slope = t->slope, .sign = t->sign};
+    *out = (interval){.z = {-(double)INFINITY, (double)INFINITY}, .slope = t->slope, .sign = t->sign};
     for (int i = 0; i < 4; i++) {
-        along_line(&t->inside[i], line, &value, &slope);
+        direction_along_line(&t->inside[i], line, &value, &slope);
         if (slope == 0 && value < 0) return false;
         if (slope == 0) continue;
         const int end = slope < 0;
@@ -189,7 +189,7 @@ static bool clip(const tet *t, const reference_line *line, span *out)
         out->z[end] = z;
         out->is_face[end] = i == 3;
     }
-    along_line(&t->value, line, &value, &slope);
+    direction_along_line(&t->value, line, &value, &slope);
     for (int end = 0; end < 2; end++) out->v[end] = value + slope * out->z[end];
     return out->z[0] < out->z[1];
 }
@@ -200,31 +200,31 @@ static int compare_numbers(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-static double span_at(const span *s, double z)
+static double interval_at(const interval *s, double z)
 {
     return s->v[0] + (z - s->z[0]) / (s->z[1] - s->z[0]) * (s->v[1] - s->v[0]);
 }
 
 /* The ray's spans, and their ends in order. */
-static int spans_of(const subject *s, const reference_line *line, span *spans, double *ends)
+static int intervals_of(const subject *s, const reference_line *line, interval *ray_intervals, double *ends)
 {
     int count = 0;
-    for (int i = 0; i < s->tet_count; i++) count += clip(&s->tets[i], line, &spans[count]);
-    for (int i = 0; i < 2 * count; i++) ends[i] = spans[i / 2].z[i % 2];
+    for (int i = 0; i < s->tet_count; i++) count += clip(&s->tets[i], line, &ray_intervals[count]);
+    for (int i = 0; i < 2 * count; i++) ends[i] = ray_intervals[i / 2].z[i % 2];
     qsort(ends, 2 * (size_t)count, sizeof *ends, compare_numbers);
     return count;
 }
 
 /* The value of the face that is met at z. */
-static double face_value(const span *spans, int count, double z)
+static double face_value(const interval *ray_intervals, int count, double z)
 {
     double nearest = (double)INFINITY, value = 0;
     for (int i = 0; i < count; i++)
         for (int end = 0; end < 2; end++) {
-            const double away = fabs(spans[i].z[end] - z);
-            if (!spans[i].is_face[end] || away >= nearest) continue;
+            const double away = fabs(ray_intervals[i].z[end] - z);
+            if (!ray_intervals[i].is_face[end] || away >= nearest) continue;
             nearest = away;
-            value = spans[i].v[end];
+            value = ray_intervals[i].v[end];
         }
     assert_true(nearest < 1e-9);
     return value;
@@ -238,36 +238,36 @@ static void add_point(path *p, double z, double v)
 }
 
 /* Add the field from one end of a tet to the next, where the place is in the cell. */
-static bool add_piece(const span *spans, int count, double z0, double z1, path *p)
+static bool add_piece(const interval *ray_intervals, int count, double z0, double z1, path *p)
 {
     const double middle = 0.5 * (z0 + z1);
     double v[2] = {0, 0};
     int cover = 0;
     for (int i = 0; i < count; i++) {
-        if (!(spans[i].z[0] < middle && middle < spans[i].z[1])) continue;
-        cover += spans[i].sign;
-        v[0] += spans[i].sign * span_at(&spans[i], z0);
-        v[1] += spans[i].sign * span_at(&spans[i], z1);
+        if (!(ray_intervals[i].z[0] < middle && middle < ray_intervals[i].z[1])) continue;
+        cover += ray_intervals[i].sign;
+        v[0] += ray_intervals[i].sign * interval_at(&ray_intervals[i], z0);
+        v[1] += ray_intervals[i].sign * interval_at(&ray_intervals[i], z1);
     }
     if (cover != 1) {
         if (cover && z1 - z0 > 1e-9) fail_msg("a place is in the cell %d times", cover);
         return false;
     }
-    if (!p->count) add_point(p, z0, face_value(spans, count, z0));
+    if (!p->count) add_point(p, z0, face_value(ray_intervals, count, z0));
     add_point(p, z0, v[0]);
     add_point(p, z1, v[1]);
     return true;
 }
 
 /* The next stay from the end number *next on; false where there is none. */
-static bool next_stay(const span *spans, int count, const double *ends, int *next, path *p)
+static bool next_stay(const interval *ray_intervals, int count, const double *ends, int *next, path *p)
 {
     p->count = 0;
     for (; *next + 1 < 2 * count; ++*next) {
         if (ends[*next + 1] - ends[*next] < 1e-13) continue;
-        if (!add_piece(spans, count, ends[*next], ends[*next + 1], p) && p->count) break;
+        if (!add_piece(ray_intervals, count, ends[*next], ends[*next + 1], p) && p->count) break;
     }
-    if (p->count) add_point(p, p->z[p->count - 1], face_value(spans, count, p->z[p->count - 1]));
+    if (p->count) add_point(p, p->z[p->count - 1], face_value(ray_intervals, count, p->z[p->count - 1]));
     return p->count > 0;
 }
 
@@ -296,16 +296,16 @@ typedef struct ray_hits {
     bool is_good[REFERENCE_MAX_HITS];
 } ray_hits;
 
-typedef struct judge {
+typedef struct verify {
     const render_fixture *f;
     const subject *s;
     double iso, place;
     bool is_opaque;
     tally *t;
-} judge;
+} verify;
 
 /* Hits in [from, to], a little more on both sides. */
-static bool has_hit(const judge *j, const ray_hits *hits, double from, double to)
+static bool has_hit(const verify *j, const ray_hits *hits, double from, double to)
 {
     for (int i = 0; i < hits->count; i++)
         if (from - j->place <= hits->z[i] && hits->z[i] <= to + j->place) return true;
@@ -313,7 +313,7 @@ static bool has_hit(const judge *j, const ray_hits *hits, double from, double to
 }
 
 /* Mark the hits that are beside a place where the path comes within the band. */
-static void mark_hits(const judge *j, const path *p, double band, ray_hits *hits)
+static void mark_hits(const verify *j, const path *p, double band, ray_hits *hits)
 {
     for (int i = 0; i < hits->count; i++)
         for (int k = 0; k + 1 < p->count; k++) {
@@ -327,7 +327,7 @@ static void mark_hits(const judge *j, const path *p, double band, ray_hits *hits
 }
 
 /* Each certain crossing of the path; of an opaque surface, where a hit hides the rest, the first. */
-static bool judge_path(const judge *j, const path *p, double band, const ray_hits *hits)
+static bool verify_path(const verify *j, const path *p, double band, const ray_hits *hits)
 {
     const bool is_inner = (p->v[0] >= j->iso) == (p->v[p->count - 1] >= j->iso);
     int side = 0;
@@ -352,19 +352,19 @@ static bool judge_path(const judge *j, const path *p, double band, const ray_hit
 }
 
 /* Where tets overlap, the slopes of a sum's terms add up, mostly three of them. */
-static double band_of(const judge *j, const span *spans, int count)
+static double band_of(const verify *j, const interval *ray_intervals, int count)
 {
     double steepest = 0;
-    for (int i = 0; i < count; i++) steepest = fmax(steepest, spans[i].slope);
+    for (int i = 0; i < count; i++) steepest = fmax(steepest, ray_intervals[i].slope);
     return 2e-6 * (j->s->high - j->s->low) + j->place * steepest * (j->s->is_star ? 1 : 3);
 }
 
-static void judge_ray(const judge *j, const reference_line *line, ray_hits *hits)
+static void verify_ray(const verify *j, const reference_line *line, ray_hits *hits)
 {
-    static span spans[REFERENCE_MAX_TRIANGLES];
+    static interval ray_intervals[REFERENCE_MAX_TRIANGLES];
     static double ends[2 * REFERENCE_MAX_TRIANGLES];
     static path p;
-    const int count = spans_of(j->s, line, spans, ends);
+    const int count = intervals_of(j->s, line, ray_intervals, ends);
     int next = 0;
     bool goes_on = true;
     if (!count && !hits->count) return;
@@ -373,12 +373,12 @@ static void judge_ray(const judge *j, const reference_line *line, ray_hits *hits
         return;
     }
     j->t->rays++;
-    const double band = band_of(j, spans, count);
-    while (next_stay(spans, count, ends, &next, &p)) {
+    const double band = band_of(j, ray_intervals, count);
+    while (next_stay(ray_intervals, count, ends, &next, &p)) {
         cut_at_eye(&p);
         if (!p.count) continue;
         mark_hits(j, &p, band, hits);
-        goes_on = goes_on && judge_path(j, &p, band, hits);
+        goes_on = goes_on && verify_path(j, &p, band, hits);
     }
     for (int i = 0; i < hits->count; i++) j->t->wrong += !hits->is_good[i];
 }
@@ -393,7 +393,7 @@ static void hits_of(const render_fixture *f, const drawn_frame *drawn, int64_t p
 /* ---- frames ---- */
 
 /* Looks from a random side, now and then from the inside or without perspective. */
-static void look_at_random(render_fixture *f, uint64_t seed)
+static void view_from_random_side(render_fixture *f, uint64_t seed)
 {
     const double angle = test_uniform_in(0, seed, 0, 6.283), height = test_uniform_in(1, seed, -0.9, 0.9);
     const double distance = seed % 8 == 7 ? 0.1 : 3, across = distance * sqrt(1 - height * height);
@@ -406,17 +406,17 @@ static void look_at_random(render_fixture *f, uint64_t seed)
     f->job.space.depth_origin = seed % 8 == 7 ? 0 : distance;
 }
 
-static void judge_frame(const render_fixture *f, const double iso, tally *t)
+static void verify_frame(const render_fixture *f, const double iso, tally *t)
 {
     static subject s;
     drawn_frame drawn;
     make_subject(f, &s);
-    const judge j = {.f = f,
-                     .s = &s,
-                     .iso = iso,
-                     .place = 3e-6 / f->job.space.scale,
-                     .is_opaque = f->surfaces[0].opacity >= 1,
-                     .t = t};
+    const verify j = {.f = f,
+                      .s = &s,
+                      .iso = iso,
+                      .place = 3e-6 / f->job.space.scale,
+                      .is_opaque = f->surfaces[0].opacity >= 1,
+                      .t = t};
     t->cells++;
     t->stars += s.is_star;
     fixture_draw(f, &drawn);
@@ -425,20 +425,20 @@ static void judge_frame(const render_fixture *f, const double iso, tally *t)
             ray_hits hits;
             hits_of(f, &drawn, (int64_t)y * WIDTH + x, &hits);
             const reference_line line = line_of(&f->job.camera, x, y);
-            judge_ray(&j, &line, &hits);
+            verify_ray(&j, &line, &hits);
         }
     drawn_free(&drawn);
 }
 
-static void judge_cell(const test_mesh *mesh, uint64_t seed, tally *t)
+static void verify_cell(const test_mesh *mesh, uint64_t seed, tally *t)
 {
     render_fixture f;
     const double values[1] = {test_uniform_in(4, seed, -0.6, 0.6)};
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                    (const double[]){0, 0, 0});
-    look_at_random(&f, seed);
+    view_from_random_side(&f, seed);
     fixture_add_surface(&f, values, 1, seed % 2 ? 1 : 0.4f);
-    judge_frame(&f, values[0], t);
+    verify_frame(&f, values[0], t);
     fixture_free(&f);
 }
 
@@ -464,7 +464,7 @@ static void random_polyhedra_miss_no_crossing(void **state)
             test_mesh mesh;
             test_mesh_random(kind, 1000 * kind + seed, &mesh);
             test_mesh_split_quads(&mesh);
-            judge_cell(&mesh, seed, &t);
+            verify_cell(&mesh, seed, &t);
             test_mesh_free(&mesh);
         }
         assert_none_missed(test_random_name(kind), &t);
@@ -485,7 +485,7 @@ static void concave_polyhedra_miss_no_crossing(void **state)
             mesh.values[i] = test_uniform_in(i, seed + 1000, -1, 1);
         }
         test_mesh_split_quads(&mesh);
-        judge_cell(&mesh, seed, &t);
+        verify_cell(&mesh, seed, &t);
         test_mesh_free(&mesh);
     }
     assert_none_missed("concave cells", &t);
@@ -494,12 +494,12 @@ static void concave_polyhedra_miss_no_crossing(void **state)
 /* Tells whether the field passes the value on the ray. */
 static bool passes(const subject *s, const reference_line *line, double value)
 {
-    static span spans[REFERENCE_MAX_TRIANGLES];
+    static interval ray_intervals[REFERENCE_MAX_TRIANGLES];
     static double ends[2 * REFERENCE_MAX_TRIANGLES];
     static path p;
     int next = 0;
-    const int count = spans_of(s, line, spans, ends);
-    while (next_stay(spans, count, ends, &next, &p))
+    const int count = intervals_of(s, line, ray_intervals, ends);
+    while (next_stay(ray_intervals, count, ends, &next, &p))
         for (int k = 0; k < p.count; k++)
             if (p.v[k] > value) return true;
     return false;
@@ -537,7 +537,7 @@ static void sums_beyond_the_vertices_show_no_surface(void **state)
                    (const double[]){0, 0, 0});
     fixture_add_surface(&f, &value, 1, 0.4f);
     for (uint64_t seed = 0; seed < 16; seed++) {
-        look_at_random(&f, seed);
+        view_from_random_side(&f, seed);
         make_subject(&f, &s);
         fixture_draw(&f, &drawn);
         assert_int_equal(drawn.list.count, 0);
@@ -555,7 +555,7 @@ static void sums_beyond_the_vertices_show_no_surface(void **state)
 
 int main(int argc, char **argv)
 {
-    if (fixture_lacks_set()) return 77;
+    if (fixture_set_is_unavailable()) return 77;
     if (argc > 1) wanted_rays = atoll(argv[1]);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_polyhedra_miss_no_crossing),

@@ -369,7 +369,7 @@ def blocks_of_two_dimensions_are_their_quads():
             s.set_field("m", "f", (x + j).reshape(-1))
         return hand_over
 
-    def hand_block(**named):
+    def submit_block(**named):
         def hand_over(s):
             s.set_block("m", (5, 4), **named)
             s.set_field("m", "f", x + j)
@@ -377,9 +377,9 @@ def blocks_of_two_dimensions_are_their_quads():
 
     bent, flat = drawn("quads", hand_quads(z), scene), drawn("quads", hand_quads(0 * z), scene)
     everywhere(bent != flat and len(flat) > 300, "the quads are seen")
-    everywhere(drawn("quads", hand_block(coordinates=(x, 1.0 * j, z)), scene) == bent, "a surface in space")
-    everywhere(drawn("quads", hand_block(coordinates=(x[:, 0], j[0] * 1.0)), scene) == flat, "axes")
-    everywhere(drawn("quads", hand_block(spacing=(1, 1), first=(5 * comm.rank, 0)), scene) == flat, "uniform")
+    everywhere(drawn("quads", submit_block(coordinates=(x, 1.0 * j, z)), scene) == bent, "a surface in space")
+    everywhere(drawn("quads", submit_block(coordinates=(x[:, 0], j[0] * 1.0)), scene) == flat, "axes")
+    everywhere(drawn("quads", submit_block(spacing=(1, 1), first=(5 * comm.rank, 0)), scene) == flat, "uniform")
 
 
 def wrong_blocks_are_refused():

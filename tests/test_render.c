@@ -34,14 +34,14 @@ static int lattice_side(test_mesh_kind kind)
     return kind == TEST_HEXES ? 6 : kind == TEST_WEDGES ? 5 : 4;
 }
 
-static void surface_is_the_reference_for_every_kind_and_camera(void **state)
+static void surface_matches_the_reference_for_every_kind_and_camera(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++) {
             render_fixture f;
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-            fixture_look(&f, camera, 39, 33);
+            fixture_set_camera(&f, camera, 39, 33);
             fixture_add_surface(&f, one_value, 1, 1);
             const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "one value"));
             assert_true(o.hits > 150);
@@ -56,7 +56,7 @@ static bool is_due(test_mesh_kind kind, fixture_camera camera, int variant)
     return test_is_whole() || ((int)kind + (int)camera + variant) % 3 == 0;
 }
 
-static void surfaces_of_several_values_are_the_reference(void **state)
+static void surfaces_of_several_values_match_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -64,7 +64,7 @@ static void surfaces_of_several_values_are_the_reference(void **state)
             render_fixture f;
             if (!is_due(kind, camera, 0)) continue;
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-            fixture_look(&f, camera, 27, 23);
+            fixture_set_camera(&f, camera, 27, 23);
             fixture_add_surface(&f, four_values, 4, 1);
             fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "four values"));
             f.surfaces[0].opacity = 0.4f;
@@ -73,13 +73,13 @@ static void surfaces_of_several_values_are_the_reference(void **state)
         }
 }
 
-static void transparent_surfaces_before_an_opaque_one_are_the_reference(void **state)
+static void transparent_surfaces_before_an_opaque_one_match_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         render_fixture f;
         fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, four_values, 2, 0.3f);
         fixture_add_surface(&f, four_values + 2, 2, 1);
         fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "transparent before opaque"));
@@ -96,7 +96,7 @@ static void lights_behind_surfaces_leave_them_dark(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {
             render_fixture f;
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-            fixture_look(&f, camera, 33, 29);
+            fixture_set_camera(&f, camera, 33, 29);
             fixture_add_surface(&f, one_value, 1, 1);
             f.surfaces[0].material = (render_material){.ambient = 0.1f, .diffuse = 0.3f, .specular = 1, .shininess = 4};
             for (int a = 0; a < 3; a++) {
@@ -109,21 +109,21 @@ static void lights_behind_surfaces_leave_them_dark(void **state)
         }
 }
 
-static void volume_is_the_reference_for_every_kind_and_camera(void **state)
+static void volume_matches_the_reference_for_every_kind_and_camera(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++) {
             render_fixture f;
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-            fixture_look(&f, camera, 37, 31);
+            fixture_set_camera(&f, camera, 37, 31);
             fixture_set_volume(&f, 0.3);
             fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "volume"));
             fixture_free(&f);
         }
 }
 
-static void volume_and_surfaces_are_the_reference_together(void **state)
+static void volume_and_surfaces_match_the_reference_together(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -132,7 +132,7 @@ static void volume_and_surfaces_are_the_reference_together(void **state)
                 render_fixture f;
                 if (!is_due(kind, camera, transparent)) continue;
                 fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-                fixture_look(&f, camera, 25, 21);
+                fixture_set_camera(&f, camera, 25, 21);
                 fixture_add_surface(&f, four_values + 1, 2, transparent ? 0.5f : 1);
                 fixture_set_volume(&f, 0.4);
                 const char *what = transparent ? "volume and transparent surfaces" : "volume and surfaces";
@@ -149,7 +149,7 @@ static double short_wave(const double p[3])
 }
 
 /* Rays that cross more surfaces than a packet keeps: their fragments of volume end at every sample. */
-static void volume_between_many_surfaces_is_the_reference(void **state)
+static void volume_between_many_surfaces_matches_the_reference(void **state)
 {
     static const float colours[48] = {0.8f, 0.2f, 0.1f};
     double values[16];
@@ -160,7 +160,7 @@ static void volume_between_many_surfaces_is_the_reference(void **state)
         drawn_frame drawn;
         int crowded = 0;
         fixture_create_lattice(&f, TEST_TETS, 7, 0.2, short_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 29, 27);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 29, 27);
         fixture_add_surface(&f, values, 16, 0.03f);
         f.surfaces[0].colours = colours;
         fixture_set_volume(&f, 0.2);
@@ -196,7 +196,7 @@ static void compare_plane(test_mesh_kind kind, fixture_camera camera, bool is_wa
     render_fixture f;
     drawn_frame drawn;
     fixture_create_lattice(&f, kind, 3, is_warped ? 0.2 : 0, test_linear);
-    fixture_look(&f, camera, 41, 37);
+    fixture_set_camera(&f, camera, 41, 37);
     fixture_add_surface(&f, linear_values, 3, 0.5f);
     fixture_draw(&f, &drawn);
     for (int64_t i = 0; i < drawn.list.count; i++) {
@@ -231,7 +231,7 @@ static void constant_volume_counts_every_sample_once(void **state)
             drawn_frame drawn;
             int off = 0, met = 0;
             fixture_create_lattice(&f, kind, 4, camera == CAMERA_ALONG_X ? 0 : 0.2, test_linear);
-            fixture_look(&f, camera, 43, 41);
+            fixture_set_camera(&f, camera, 43, 41);
             fixture_set_volume(&f, 0.23);
             f.transfer.opacity_count = 1;
             f.transfer.opacities = constant;
@@ -271,7 +271,7 @@ static void lattice_lines_have_no_holes(void **state)
         drawn_frame drawn;
         int met = 0;
         fixture_create_lattice(&f, kind, 4, 0, test_linear);
-        fixture_look(&f, CAMERA_ALONG_X, 43, 41);
+        fixture_set_camera(&f, CAMERA_ALONG_X, 43, 41);
         static const double value[1] = {0.1};
         fixture_add_surface(&f, value, 1, 0.5f);
         fixture_draw(&f, &drawn);
@@ -292,7 +292,7 @@ static void lattice_lines_have_no_holes(void **state)
 
 /* ---- single cells, ugly ones too ---- */
 
-static void single_cells_are_the_reference(void **state)
+static void single_cells_match_the_reference(void **state)
 {
     (void)state;
     static const double values[3] = {-0.25, 0.1, 0.35};
@@ -305,7 +305,7 @@ static void single_cells_are_the_reference(void **state)
             test_mesh_single(shape, test_linear, &mesh);
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                            (const double[]){0, 0, 0});
-            fixture_look(&f, camera, 39, 33);
+            fixture_set_camera(&f, camera, 39, 33);
             fixture_add_surface(&f, values, 3, 0.5f);
             fixture_set_volume(&f, 0.05);
             const bool is_thin = shape == TEST_SLIVER_TET || shape >= TEST_FLAT_TET;
@@ -316,7 +316,7 @@ static void single_cells_are_the_reference(void **state)
 }
 
 /* A field across the thickness, whose surfaces lie along the sliver: met where the sliver is, and where it is known. */
-static void surfaces_along_slivers_are_the_reference(void **state)
+static void surfaces_along_slivers_match_the_reference(void **state)
 {
     (void)state;
     static const double values[3] = {-0.25, 0.1, 0.35};
@@ -327,7 +327,7 @@ static void surfaces_along_slivers_are_the_reference(void **state)
         for (int v = 0; v < 4; v++) mesh.values[v] = v == 3 ? 0.5 : -0.5;
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                        (const double[]){0, 0, 0});
-        fixture_look(&f, camera, 121, 101);
+        fixture_set_camera(&f, camera, 121, 101);
         fixture_add_surface(&f, values, 3, 0.5f);
         const fixture_outcome met = fixture_compare(&f, &fixture_usual_bounds, fixture_camera_name(camera));
         assert_true(met.hits > 100);
@@ -336,7 +336,7 @@ static void surfaces_along_slivers_are_the_reference(void **state)
     }
 }
 
-static void left_handed_cells_are_the_reference(void **state)
+static void left_handed_cells_match_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
@@ -346,7 +346,7 @@ static void left_handed_cells_are_the_reference(void **state)
         test_mesh_mirror(&mesh, true);
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / 3, 1,
                        (const double[]){0, 0, 0});
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, one_value, 1, 0.5f);
         fixture_set_volume(&f, 0.3);
         fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "left-handed"));
@@ -357,7 +357,7 @@ static void left_handed_cells_are_the_reference(void **state)
 
 /* Far from the origin, in double: the same picture relative to the cells. The double coordinates themselves round by
  * 5.8e6 · 1e-16 = 6e-10 of cells of 2000 / 4 and the camera's as much. */
-static void far_coordinates_are_the_reference(void **state)
+static void far_coordinates_match_the_reference(void **state)
 {
     (void)state;
     static const double far_away[3] = {5.8e6, -4.9e5, 3.1e6};
@@ -367,7 +367,7 @@ static void far_coordinates_are_the_reference(void **state)
         test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
         test_mesh_transform(&mesh, 1000, far_away);
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 500, 1000, far_away);
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_add_surface(&f, one_value, 1, 0.5f);
         fixture_set_volume(&f, 0.3);
         fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "far away"));
@@ -386,7 +386,7 @@ static void two_volumes_share_their_light(void **state)
         test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
         test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &second);
         fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_set_volume(&f, 0.3);
         float *pairs = malloc((size_t)f.trees[0].node_count * 2 * sizeof *pairs);
         int64_t unusable;
@@ -414,7 +414,7 @@ static void two_volumes_share_their_light(void **state)
 
 /* A value a cell: a volume of blocks. A sample near a face may be either cell's, which the margin leaves out: 2 · 1e-6
  * of each of some 20 cells a ray. */
-static void cell_centred_volume_is_the_reference(void **state)
+static void cell_centred_volume_matches_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -429,7 +429,7 @@ static void cell_centred_volume_is_the_reference(void **state)
             assert_int_equal(
                 mmbvh_refit_ranges(&f.trees[0], &f.views[0].cells, &f.fields[0], &(mmbvh_options){.threads = 1}),
                 INSITU_OK);
-            fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+            fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
             fixture_set_volume(&f, 0.2);
             f.job.is_alone = is_alone;
             fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "cell-centred"));
@@ -448,7 +448,7 @@ static double tiny_wave(const double p[3])
     return 1e-30 * test_wave(p);
 }
 
-static void values_of_any_size_are_the_reference(void **state)
+static void values_of_any_size_match_the_reference(void **state)
 {
     (void)state;
     static const double huge_values[1] = {0.3e30}, tiny_values[1] = {0.3e-30};
@@ -457,7 +457,7 @@ static void values_of_any_size_are_the_reference(void **state)
             render_fixture f;
             const double scale = tiny ? 1e-30 : 1e30, tent[3] = {-0.6 * scale, 0, 0.6 * scale};
             fixture_create_lattice(&f, kind, 3, 0.2, tiny ? tiny_wave : huge_wave);
-            fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+            fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
             fixture_add_surface(&f, tiny ? tiny_values : huge_values, 1, 0.5f);
             fixture_set_volume(&f, 0.3);
             f.transfer.low *= scale;
@@ -468,7 +468,7 @@ static void values_of_any_size_are_the_reference(void **state)
         }
 }
 
-static void surface_coloured_by_the_field_is_the_reference(void **state)
+static void surface_coloured_by_the_field_matches_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
@@ -478,7 +478,7 @@ static void surface_coloured_by_the_field_is_the_reference(void **state)
         test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
         test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
         fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 33, 29);
         fixture_set_volume(&f, 0.3);
         f.job.volume_count = 0;
         fixture_add_surface(&f, four_values, 4, 1);
@@ -491,14 +491,14 @@ static void surface_coloured_by_the_field_is_the_reference(void **state)
     }
 }
 
-static void one_pixel_images_are_the_reference(void **state)
+static void one_pixel_images_match_the_reference(void **state)
 {
     (void)state;
     static const int sizes[4][2] = {{1, 1}, {1, 9}, {17, 1}, {3, 5}};
     for (int i = 0; i < 4; i++) {
         render_fixture f;
         fixture_create_lattice(&f, TEST_HEXES, 3, 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, sizes[i][0], sizes[i][1]);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, sizes[i][0], sizes[i][1]);
         fixture_add_surface(&f, one_value, 1, 0.5f);
         fixture_set_volume(&f, 0.3);
         fixture_compare(&f, &fixture_usual_bounds, "small images");
@@ -518,7 +518,7 @@ static void build_reference_layout(render_fixture *f)
 }
 
 /* Where cells are smaller than pixels, tiles go down the trees themselves and leave out what is hidden. */
-static void surfaces_of_cells_smaller_than_pixels_are_the_reference(void **state)
+static void surfaces_of_cells_smaller_than_pixels_match_the_reference(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -526,7 +526,7 @@ static void surfaces_of_cells_smaller_than_pixels_are_the_reference(void **state
             render_fixture f;
             drawn_frame drawn[2];
             fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
-            fixture_look(&f, camera, 9, 5);
+            fixture_set_camera(&f, camera, 9, 5);
             fixture_add_surface(&f, four_values, 2, 1);
             fixture_add_surface(&f, one_value, 1, 1);
             if (camera % 2) build_reference_layout(&f);
@@ -546,27 +546,27 @@ static void surfaces_of_cells_smaller_than_pixels_are_the_reference(void **state
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(surface_is_the_reference_for_every_kind_and_camera),
-        cmocka_unit_test(surfaces_of_several_values_are_the_reference),
-        cmocka_unit_test(transparent_surfaces_before_an_opaque_one_are_the_reference),
+        cmocka_unit_test(surface_matches_the_reference_for_every_kind_and_camera),
+        cmocka_unit_test(surfaces_of_several_values_match_the_reference),
+        cmocka_unit_test(transparent_surfaces_before_an_opaque_one_match_the_reference),
         cmocka_unit_test(lights_behind_surfaces_leave_them_dark),
-        cmocka_unit_test(volume_is_the_reference_for_every_kind_and_camera),
-        cmocka_unit_test(volume_and_surfaces_are_the_reference_together),
+        cmocka_unit_test(volume_matches_the_reference_for_every_kind_and_camera),
+        cmocka_unit_test(volume_and_surfaces_match_the_reference_together),
         cmocka_unit_test(linear_surface_is_a_plane_in_every_kind),
-        cmocka_unit_test(single_cells_are_the_reference),
-        cmocka_unit_test(surfaces_along_slivers_are_the_reference),
-        cmocka_unit_test(left_handed_cells_are_the_reference),
-        cmocka_unit_test(far_coordinates_are_the_reference),
+        cmocka_unit_test(single_cells_match_the_reference),
+        cmocka_unit_test(surfaces_along_slivers_match_the_reference),
+        cmocka_unit_test(left_handed_cells_match_the_reference),
+        cmocka_unit_test(far_coordinates_match_the_reference),
         cmocka_unit_test(two_volumes_share_their_light),
-        cmocka_unit_test(cell_centred_volume_is_the_reference),
-        cmocka_unit_test(values_of_any_size_are_the_reference),
-        cmocka_unit_test(surface_coloured_by_the_field_is_the_reference),
-        cmocka_unit_test(one_pixel_images_are_the_reference),
-        cmocka_unit_test(surfaces_of_cells_smaller_than_pixels_are_the_reference),
+        cmocka_unit_test(cell_centred_volume_matches_the_reference),
+        cmocka_unit_test(values_of_any_size_match_the_reference),
+        cmocka_unit_test(surface_coloured_by_the_field_matches_the_reference),
+        cmocka_unit_test(one_pixel_images_match_the_reference),
+        cmocka_unit_test(surfaces_of_cells_smaller_than_pixels_match_the_reference),
     };
     /* Tests that draw by themselves, by each instruction set. */
     const struct CMUnitTest of_a_set[] = {
-        cmocka_unit_test(volume_between_many_surfaces_is_the_reference),
+        cmocka_unit_test(volume_between_many_surfaces_matches_the_reference),
         cmocka_unit_test(constant_volume_counts_every_sample_once),
         cmocka_unit_test(lattice_lines_have_no_holes),
     };

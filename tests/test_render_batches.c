@@ -21,7 +21,7 @@ static void create_as(render_fixture *f, const test_mesh *meshes, int count, int
                       test_layout layout)
 {
     fixture_create(f, meshes, count, layout, 2.0 / n, 1, (const double[]){0, 0, 0});
-    fixture_look(f, camera, WIDTH, HEIGHT);
+    fixture_set_camera(f, camera, WIDTH, HEIGHT);
 }
 
 static void create(render_fixture *f, const test_mesh *meshes, int count, int n, fixture_camera camera)
@@ -92,7 +92,7 @@ static void cells_are_numbered_anyhow(void **state)
             test_mesh_lattice(kinds[turn / 6], n, 0.2, test_wave, &mesh);
             for (int64_t c = 0; turn % 6 < 4 && c < mesh.cell_count; c += 7)
                 mesh.connectivity[mesh.offsets[c] + 1] = mesh.connectivity[mesh.offsets[c]];
-            test_mesh_turn(&mesh, (uint64_t)turn);
+            test_mesh_reorder_vertices(&mesh, (uint64_t)turn);
             create_as(
                 &f, &mesh, 1, n, camera,
                 (test_layout){.wide_coordinates = turn % 2, .wide_indices = turn % 6 == 4, .is_interleaved = true});
@@ -182,8 +182,8 @@ static void lines_are_those_of_single_cells(void **state)
         test_view view;
         test_mesh_lattice(kinds[turn / 4], n, 0.2, test_wave, &mesh);
         test_mesh_lattice(kinds[turn / 4], n, 0.2, test_linear, &other);
-        test_mesh_turn(&mesh, 3);
-        test_mesh_turn(&other, 3);
+        test_mesh_reorder_vertices(&mesh, 3);
+        test_mesh_reorder_vertices(&other, 3);
         test_view_create(&other, (test_layout){.is_interleaved = true}, &view);
         create(&f, &mesh, 1, n, (fixture_camera)(turn % (int)CAMERA_COUNT));
         fixture_add_surface(&f, values, 2, 1);
@@ -205,7 +205,7 @@ static void lines_are_those_of_single_cells(void **state)
 
 int main(void)
 {
-    if (fixture_lacks_set()) return 77;
+    if (fixture_set_is_unavailable()) return 77;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(batches_draw_what_single_cells_do), cmocka_unit_test(cells_are_numbered_anyhow),
         cmocka_unit_test(meshes_and_layers_take_turns),      cmocka_unit_test(ties_are_kept),

@@ -73,7 +73,7 @@ void fixture_create(render_fixture *f, const test_mesh *meshes, int count, test_
     f->job.jitter = true;
     f->job.is_alone = true;
     f->job.threads = 1;
-    fixture_look(f, CAMERA_OUTSIDE, 48, 40);
+    fixture_set_camera(f, CAMERA_OUTSIDE, 48, 40);
 }
 
 void fixture_create_lattice(render_fixture *f, test_mesh_kind kind, int n, double jitter, test_function *field)
@@ -94,7 +94,7 @@ void fixture_free(render_fixture *f)
     memset(f, 0, sizeof *f);
 }
 
-void fixture_look(render_fixture *f, fixture_camera camera, int width, int height)
+void fixture_set_camera(render_fixture *f, fixture_camera camera, int width, int height)
 {
     static const double views[CAMERA_COUNT][2][3] = {{{2.4, 1.6, 3.0}, {0, 0, 0}},
                                                      {{2.4, 1.6, 3.0}, {0, 0, 0}},
@@ -207,10 +207,10 @@ void fixture_use_set(int set)
     render_isa_limit(set);
 }
 
-bool fixture_lacks_set(void)
+bool fixture_set_is_unavailable(void)
 {
-    const char *wish = getenv("INSITU_ISA");
-    const bool is_lacking = wish && strcmp(wish, render_isa()) != 0;
+    const char *query = getenv("INSITU_ISA");
+    const bool is_lacking = query && strcmp(query, render_isa()) != 0;
     if (is_lacking) fprintf(stderr, "skipped: %s\n", render_isa_warning());
     return is_lacking;
 }
@@ -249,7 +249,7 @@ void drawn_free(drawn_frame *drawn)
     memset(drawn, 0, sizeof *drawn);
 }
 
-static void tell_difference(const drawn_frame *a, const drawn_frame *b, int64_t p)
+static void print_difference(const drawn_frame *a, const drawn_frame *b, int64_t p)
 {
     const float *x = a->picture.rgba + 4 * p, *y = b->picture.rgba + 4 * p;
     fail_msg("pixel %d, %d: depth %.9g and %.9g, red %.9g and %.9g, green %.9g and %.9g, alpha %.9g and %.9g",
@@ -262,7 +262,7 @@ void drawn_assert_same_depth(const drawn_frame *a, const drawn_frame *b)
 {
     const int64_t pixels = (int64_t)a->picture.width * a->picture.height;
     for (int64_t p = 0; p < pixels; p++)
-        if (memcmp(a->picture.depth + p, b->picture.depth + p, sizeof(float))) tell_difference(a, b, p);
+        if (memcmp(a->picture.depth + p, b->picture.depth + p, sizeof(float))) print_difference(a, b, p);
 }
 
 void drawn_assert_same(const drawn_frame *a, const drawn_frame *b)
@@ -270,7 +270,7 @@ void drawn_assert_same(const drawn_frame *a, const drawn_frame *b)
     const int64_t pixels = (int64_t)a->picture.width * a->picture.height;
     drawn_assert_same_depth(a, b);
     for (int64_t p = 0; p < pixels; p++)
-        if (memcmp(a->picture.rgba + 4 * p, b->picture.rgba + 4 * p, 4 * sizeof(float))) tell_difference(a, b, p);
+        if (memcmp(a->picture.rgba + 4 * p, b->picture.rgba + 4 * p, 4 * sizeof(float))) print_difference(a, b, p);
 }
 
 double drawn_difference(const drawn_frame *a, const drawn_frame *b)
@@ -315,8 +315,8 @@ static int surface_fragments(const drawn_frame *drawn, int64_t pixel, const frag
     return count;
 }
 
-static void tell_hits(const comparison *c, int x, int y, const reference_ray *ray, int count,
-                      const fragment *const *hits)
+static void print_hits(const comparison *c, int x, int y, const reference_ray *ray, int count,
+                       const fragment *const *hits)
 {
     fprintf(stderr, "%s, pixel %d, %d: edge margin %.3g, value margin %.3g%s%s\n", c->what, x, y, ray->edge_margin,
             ray->value_margin, ray->ambiguous ? ", ambiguous" : "", ray->map_failed ? ", map failed" : "");
@@ -335,7 +335,7 @@ static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
     bool same = count == ray->hit_count;
     for (int i = 0; same && i < count; i++) same = hits[i]->kind - FRAGMENT_SURFACE == (uint32_t)ray->hits[i].surface;
     if (!same && !ray->ambiguous) {
-        tell_hits(c, x, y, ray, count, hits);
+        print_hits(c, x, y, ray, count, hits);
         fail_msg("%s: not the same hits", c->what);
     }
     c->outcome.hits += count > 0;
@@ -352,7 +352,7 @@ static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
         worst = test_worse(worst, off / c->f->cell_size - grazing);
     }
     double *kept = ray->ambiguous ? &c->outcome.worst_ambiguous : &c->outcome.worst_depth;
-    if (worst > *kept && !ray->ambiguous && worst > c->bounds->depth) tell_hits(c, x, y, ray, count, hits);
+    if (worst > *kept && !ray->ambiguous && worst > c->bounds->depth) print_hits(c, x, y, ray, count, hits);
     *kept = fmax(*kept, worst);
 }
 
@@ -396,7 +396,7 @@ static void compare_rays(const render_job *job, comparison *sets, int count)
     reference_free(scene);
 }
 
-static void judge(const comparison *c, const char *set)
+static void verify(const comparison *c, const char *set)
 {
     const fixture_outcome *o = &c->outcome;
     if (getenv("INSITU_TEST_VERBOSE"))
@@ -423,7 +423,7 @@ fixture_outcome fixture_compare(const render_fixture *f, const fixture_bounds *b
     fixture_use_set(used_before);
     compare_rays(&f->job, sets, count);
     for (int i = 0; i < count; i++) {
-        judge(&sets[i], fixture_set_name(i));
+        verify(&sets[i], fixture_set_name(i));
         drawn_free(&drawn[i]);
     }
     return sets[count - 1].outcome;

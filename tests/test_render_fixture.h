@@ -44,7 +44,7 @@ void fixture_create(render_fixture *f, const test_mesh *meshes, int count, test_
 void fixture_create_lattice(render_fixture *f, test_mesh_kind kind, int n, double jitter, test_function *field);
 void fixture_free(render_fixture *f);
 
-void fixture_look(render_fixture *f, fixture_camera camera, int width, int height);
+void fixture_set_camera(render_fixture *f, fixture_camera camera, int width, int height);
 /* A further surface layer with isovalues (static). */
 void fixture_add_surface(render_fixture *f, const double *values, int count, float opacity);
 /* A volume of a tent of opacity for |value| < 0.6. step in cells. */
@@ -81,7 +81,7 @@ const char *fixture_set_name(int set);
 void fixture_use_set(int set);
 /* For programs that run once for each set: tells whether INSITU_ISA names one that this machine lacks. They then return
  * 77. */
-bool fixture_lacks_set(void);
+bool fixture_set_is_unavailable(void);
 /* Each fixture drawn as a rank of its own, all their fragments merged. */
 void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *out);
 void drawn_free(drawn_frame *drawn);

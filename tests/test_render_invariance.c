@@ -29,14 +29,14 @@ static void mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, 
                          fixture_camera camera)
 {
     fixture_create(f, meshes, count, wide, 2.0 / n, 1, origin);
-    fixture_look(f, camera, 61, 47);
+    fixture_set_camera(f, camera, 61, 47);
     add_layers(f, scene);
 }
 
 static void lattice_fixture(render_fixture *f, test_mesh_kind kind, scene_kind scene, fixture_camera camera)
 {
     fixture_create_lattice(f, kind, 4, 0.2, test_wave);
-    fixture_look(f, camera, 61, 47);
+    fixture_set_camera(f, camera, 61, 47);
     add_layers(f, scene);
 }
 
@@ -60,16 +60,16 @@ static void threads_do_not_change_a_bit(void **state)
 
 /* ---- tile by tile -------------------------------------------------------------------------------------------- */
 
-typedef struct taken_tiles {
+typedef struct received_tiles {
     fragment_list list;
     unsigned char pixels[64 * 64]; /* how often a tile had them */
     int width, refuse_after;       /* tiles; negative: never */
-    bool is_astray;
-} taken_tiles;
+    bool has_stray_pixel;
+} received_tiles;
 
 static bool take_tile(void *state, int thread, const pixel_area *area, fragment *items, int64_t count)
 {
-    taken_tiles *t = state;
+    received_tiles *t = state;
     bool is_well;
     (void)thread;
 #pragma omp critical
@@ -79,7 +79,7 @@ static bool take_tile(void *state, int thread, const pixel_area *area, fragment 
             for (int x = area->x; x < area->x + area->width; x++) t->pixels[y * t->width + x]++;
         for (int64_t i = 0; i < count; i++) {
             const int x = (int)items[i].pixel % t->width - area->x, y = (int)items[i].pixel / t->width - area->y;
-            t->is_astray = t->is_astray || x < 0 || y < 0 || x >= area->width || y >= area->height;
+            t->has_stray_pixel = t->has_stray_pixel || x < 0 || y < 0 || x >= area->width || y >= area->height;
             t->list.items[t->list.count++] = items[i];
         }
     }
@@ -95,13 +95,13 @@ static void compare_tiles_with_list(render_fixture *f)
 {
     const render_camera *camera = &f->job.camera;
     const int64_t pixels = (int64_t)camera->width * camera->height;
-    taken_tiles t = {.width = camera->width, .refuse_after = -1};
+    received_tiles t = {.width = camera->width, .refuse_after = -1};
     fragment_list list = {0};
     base_error error = {0};
     assert_int_equal(render_frame(&f->job, &list, NULL, &error), INSITU_OK);
     t.list.items = malloc((size_t)list.count * sizeof *t.list.items + 1);
     assert_int_equal(render_frame_tiles(&f->job, take_tile, &t, NULL, &error), INSITU_OK);
-    assert_false(t.is_astray);
+    assert_false(t.has_stray_pixel);
     for (int64_t p = 0; p < pixels; p++) assert_int_equal(t.pixels[p], 1);
     assert_int_equal(t.list.count, list.count);
     qsort(list.items, (size_t)list.count, sizeof *list.items, by_bytes);
@@ -137,7 +137,7 @@ static void refused_tiles_end_the_frame(void **state)
     render_fixture f;
     lattice_fixture(&f, TEST_TETS, TRANSPARENT, CAMERA_OUTSIDE);
     for (int after = 0; after < 12; after += 5) {
-        taken_tiles t = {.width = f.job.camera.width, .refuse_after = after};
+        received_tiles t = {.width = f.job.camera.width, .refuse_after = after};
         base_error error = {0};
         t.list.items = malloc(sizeof(fragment) * 61 * 47 * 64);
         assert_int_equal(render_frame_tiles(&f.job, take_tile, &t, NULL, &error), INSITU_ERROR_MEMORY);
@@ -170,7 +170,7 @@ static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fix
     for (int64_t p = 0; p < WIDTH * HEIGHT; p++)
         if (p * p % 7 < 3) pixel_set_add(pixels, p);
     fixture_create_lattice(&f, kind, n, 0.2, test_wave);
-    fixture_look(&f, camera, WIDTH, HEIGHT);
+    fixture_set_camera(&f, camera, WIDTH, HEIGHT);
     add_layers(&f, scene);
     if (scene == TRANSPARENT && kind == TEST_HEXES) {
         f.surfaces[0].normal = RENDER_DIFFERENCES;
@@ -256,7 +256,7 @@ static double depth_difference(const drawn_frame *a, const drawn_frame *b)
 /* A cell written in another of its symmetries has the same faces, so exactly the same rays hit it. The map inside has
  * other coordinates and rounds differently: t to some 1e-7 times the conditioning, which is up to 30 among 61 × 47
  * rays. */
-static void turned_cells_draw_the_same(void **state)
+static void reordered_cells_draw_the_same(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
@@ -268,7 +268,7 @@ static void turned_cells_draw_the_same(void **state)
             mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &first);
             fixture_free(&f);
-            test_mesh_turn(&mesh, 78);
+            test_mesh_reorder_vertices(&mesh, 78);
             mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
             fixture_draw(&f, &other);
             if (getenv("INSITU_TEST_VERBOSE"))
@@ -297,7 +297,7 @@ static void layouts_do_not_change_a_bit(void **state)
             render_fixture f;
             drawn_frame other;
             fixture_create(&f, &mesh, 1, layout, 2.0 / 3, 1, origin);
-            fixture_look(&f, CAMERA_OUTSIDE, 29, 23);
+            fixture_set_camera(&f, CAMERA_OUTSIDE, 29, 23);
             add_layers(&f, TRANSPARENT_VOLUME);
             fixture_draw(&f, bits ? &other : &first);
             if (bits) {
@@ -314,7 +314,8 @@ static void layouts_do_not_change_a_bit(void **state)
 /* ---- parts and ranks ---- */
 
 /* Deals the mesh's cells out. With ghosts, every part holds all cells, with those of others as ghosts. */
-static void deal(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts, test_mesh *out)
+static void distribute(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts,
+                       test_mesh *out)
 {
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
     test_partition(mesh, partition, n, parts, owners);
@@ -340,25 +341,26 @@ static void assert_same_to_rounding(const drawn_frame *whole, const drawn_frame 
     if (scene == OPAQUE || scene == TRANSPARENT) drawn_assert_same(whole, parts);
 }
 
-static void compare_dealt(test_mesh_kind kind, scene_kind scene, test_partition_kind partition, int parts, bool ghosts)
+static void compare_distributed(test_mesh_kind kind, scene_kind scene, test_partition_kind partition, int parts,
+                                bool ghosts)
 {
     const fixture_camera camera = (int)scene % 2 ? CAMERA_INSIDE : CAMERA_OUTSIDE;
-    test_mesh mesh, dealt[5];
+    test_mesh mesh, distributed[5];
     render_fixture f, apart[5];
     drawn_frame whole, other;
     test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
     mesh_fixture(&f, &mesh, 1, 4, scene, camera);
     fixture_draw(&f, &whole);
     fixture_free(&f);
-    deal(&mesh, partition, 4, parts, ghosts, dealt);
+    distribute(&mesh, partition, 4, parts, ghosts, distributed);
     for (int i = 0; i < parts; i++) {
-        mesh_fixture(&apart[i], &dealt[i], 1, 4, scene, camera);
+        mesh_fixture(&apart[i], &distributed[i], 1, 4, scene, camera);
         apart[i].job.is_alone = false;
     }
     fixture_draw_apart(apart, parts, &other);
     assert_same_to_rounding(&whole, &other, scene);
     drawn_free(&other);
-    mesh_fixture(&f, dealt, parts, 4, scene, camera);
+    mesh_fixture(&f, distributed, parts, 4, scene, camera);
     fixture_draw(&f, &other);
     assert_same_to_rounding(&whole, &other, scene);
     drawn_free(&other);
@@ -366,7 +368,7 @@ static void compare_dealt(test_mesh_kind kind, scene_kind scene, test_partition_
     fixture_free(&f);
     for (int i = 0; i < parts; i++) {
         fixture_free(&apart[i]);
-        test_mesh_free(&dealt[i]);
+        test_mesh_free(&distributed[i]);
     }
     test_mesh_free(&mesh);
 }
@@ -378,9 +380,9 @@ static void compare_volume_traversals(test_mesh_kind kind, scene_kind scene, fix
     render_fixture f;
     test_mesh mesh, parts[2];
     test_mesh_lattice(kind, 5, 0.2, test_wave, &mesh);
-    deal(&mesh, TEST_CHECKERBOARD, 5, 2, false, parts);
+    distribute(&mesh, TEST_CHECKERBOARD, 5, 2, false, parts);
     fixture_create(&f, parts, 2, layout, 0.4, 1, origin);
-    fixture_look(&f, camera, 61, 47);
+    fixture_set_camera(&f, camera, 61, 47);
     add_layers(&f, scene);
     for (f.job.sample_group = 3; f.job.sample_group <= 64; f.job.sample_group += 61) draw_by_traversals(&f);
     fixture_free(&f);
@@ -404,7 +406,7 @@ static void parts_and_ranks_draw_the_whole(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
             for (test_partition_kind partition = 0; partition < TEST_PARTITION_COUNT; partition++)
-                compare_dealt(kind, scene, partition, 2 + ((int)kind + (int)partition) % 4, false);
+                compare_distributed(kind, scene, partition, 2 + ((int)kind + (int)partition) % 4, false);
 }
 
 /* Samples exactly on the faces between ranks: the eye 3.125 from the middle of a lattice of half units, samples at (k +
@@ -416,13 +418,13 @@ static void samples_on_faces_have_one_owner(void **state)
     static const float constant[1] = {0.2f};
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (test_partition_kind partition = 0; partition < TEST_PARTITION_COUNT; partition++) {
-            test_mesh mesh, dealt[3];
+            test_mesh mesh, distributed[3];
             render_fixture apart[3];
             drawn_frame drawn;
             test_mesh_lattice(kind, 4, 0, test_wave, &mesh);
-            deal(&mesh, partition, 4, 3, false, dealt);
+            distribute(&mesh, partition, 4, 3, false, distributed);
             for (int i = 0; i < 3; i++) {
-                mesh_fixture(&apart[i], &dealt[i], 1, 4, VOLUME, CAMERA_ALONG_X);
+                mesh_fixture(&apart[i], &distributed[i], 1, 4, VOLUME, CAMERA_ALONG_X);
                 apart[i].job.camera.eye[0] = 3.125;
                 apart[i].job.space.depth_origin = 3;
                 apart[i].job.is_alone = apart[i].job.jitter = false;
@@ -442,7 +444,7 @@ static void samples_on_faces_have_one_owner(void **state)
             drawn_free(&drawn);
             for (int i = 0; i < 3; i++) {
                 fixture_free(&apart[i]);
-                test_mesh_free(&dealt[i]);
+                test_mesh_free(&distributed[i]);
             }
             test_mesh_free(&mesh);
         }
@@ -452,22 +454,22 @@ static void ghosts_change_nothing(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) compare_dealt(kind, scene, TEST_RANDOM, 3, true);
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) compare_distributed(kind, scene, TEST_RANDOM, 3, true);
 }
 
 static void parent_tree_changes_nothing(void **state)
 {
     (void)state;
     for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
-        test_mesh mesh, dealt[5];
+        test_mesh mesh, distributed[5];
         render_fixture f;
         drawn_frame without, with;
         float lower[5][3], upper[5][3], ranges[5][2];
         mmbvh parent;
         base_error error = {0};
         test_mesh_lattice(TEST_MIXED, 4, 0.2, test_wave, &mesh);
-        deal(&mesh, TEST_BLOCK, 4, 5, false, dealt);
-        mesh_fixture(&f, dealt, 5, 4, scene, CAMERA_OUTSIDE);
+        distribute(&mesh, TEST_BLOCK, 4, 5, false, distributed);
+        mesh_fixture(&f, distributed, 5, 4, scene, CAMERA_OUTSIDE);
         fixture_draw(&f, &without);
         for (int i = 0; i < 5; i++) {
             float low[4], high[4];
@@ -488,7 +490,7 @@ static void parent_tree_changes_nothing(void **state)
         drawn_free(&without);
         drawn_free(&with);
         fixture_free(&f);
-        for (int i = 0; i < 5; i++) test_mesh_free(&dealt[i]);
+        for (int i = 0; i < 5; i++) test_mesh_free(&distributed[i]);
         test_mesh_free(&mesh);
     }
 }
@@ -592,7 +594,7 @@ static void isovalue_at_vertices_leaves_no_hole(void **state)
             int met = 0, several = 0;
             if (camera == CAMERA_INSIDE) continue; /* looks away from the plane */
             fixture_create_lattice(&f, kind, 4, 0, plane_field);
-            fixture_look(&f, camera, 43, 41);
+            fixture_set_camera(&f, camera, 43, 41);
             fixture_add_surface(&f, zero, 1, 0.5f);
             fixture_draw(&f, &drawn);
             for (int p = 0; p < 43 * 41; p++) {
@@ -641,7 +643,7 @@ int main(void)
         cmocka_unit_test(traversals_do_not_change_a_bit),
         cmocka_unit_test(sample_groups_draw_the_same),
         cmocka_unit_test(order_and_numbering_do_not_change_a_bit),
-        cmocka_unit_test(turned_cells_draw_the_same),
+        cmocka_unit_test(reordered_cells_draw_the_same),
         cmocka_unit_test(layouts_do_not_change_a_bit),
         cmocka_unit_test(traversals_of_volumes_do_not_change_a_bit),
         cmocka_unit_test(parts_and_ranks_draw_the_whole),

@@ -46,7 +46,7 @@ static void draw_scene(int frame, float *numbers)
     render_fixture f;
     drawn_frame drawn;
     fixture_create_lattice(&f, (test_mesh_kind)(frame / (SCENES * CAMERA_PLANE)), 4, 0.2, test_wave);
-    fixture_look(&f, (fixture_camera)(frame / SCENES % CAMERA_PLANE), WIDTH, HEIGHT);
+    fixture_set_camera(&f, (fixture_camera)(frame / SCENES % CAMERA_PLANE), WIDTH, HEIGHT);
     if (scene % 2 == 0) fixture_add_surface(&f, values, 2, scene == 0 ? 1 : 0.4f);
     if (scene != 0) fixture_set_volume(&f, 0.3);
     if (scene == 3) set_steps(&f);

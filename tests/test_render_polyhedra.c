@@ -35,7 +35,7 @@ static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bo
     render_fixture f;
     test_mesh_polyhedron(shape, is_linear ? test_linear : test_wave, &mesh);
     mesh_fixture(&f, &mesh, 1, 1);
-    fixture_look(&f, camera, 49, 43);
+    fixture_set_camera(&f, camera, 49, 43);
     fixture_add_surface(&f, values, 3, 0.5f);
     fixture_set_volume(&f, 0.05);
     const fixture_outcome o =
@@ -46,7 +46,7 @@ static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bo
     test_mesh_free(&mesh);
 }
 
-static void shapes_are_the_reference(void **state)
+static void shapes_match_the_reference(void **state)
 {
     (void)state;
     for (test_polyhedron_shape shape = 0; shape < TEST_POLYHEDRON_COUNT; shape++)
@@ -76,7 +76,7 @@ static void aim_at_spoke(render_fixture *f, const test_mesh *mesh, uint64_t ray)
  * neighbours in the wrong order, as it does on rays through the line that many of them share. A wrong sum would be off
  * by another tet's value, some tenths; float32's values err by some 1e-6, and so does the length in a steep stretch of
  * the function. As the field is continuous, the ray's own rounding changes the sum by no more than that. */
-static void sums_through_spokes_are_the_reference(void **state)
+static void sums_through_spokes_match_the_reference(void **state)
 {
     static const test_polyhedron_shape shapes[3] = {TEST_L_PRISM, TEST_BENT_SPIKES, TEST_CAVITY};
     (void)state;
@@ -142,7 +142,7 @@ static void draw_mesh(const test_mesh *mesh, fixture_camera camera, scene_set *s
 {
     render_fixture f;
     mesh_fixture(&f, mesh, 1, 0.5);
-    fixture_look(&f, camera, 61, 47);
+    fixture_set_camera(&f, camera, 61, 47);
     set(&f);
     fixture_draw(&f, out);
     fixture_free(&f);
@@ -186,7 +186,7 @@ static void intervals_of_polyhedra_are_those_of_the_types(void **state)
             assert_same_as_polyhedra(kind, pass % 2 ? 0.5 : 1, pass / 2 ? 0 : 0.2, set_constant_volume);
 }
 
-static void polyhedra_beside_other_cells_are_the_reference(void **state)
+static void polyhedra_beside_other_cells_match_the_reference(void **state)
 {
     (void)state;
     static const test_mesh_kind kinds[3] = {TEST_HEXES, TEST_WEDGES, TEST_MIXED};
@@ -198,7 +198,7 @@ static void polyhedra_beside_other_cells_are_the_reference(void **state)
                 test_mesh_lattice(kinds[i], 4, 0.2, test_wave, &mesh);
                 test_mesh_to_polyhedra(&mesh, half ? 0.5 : 1);
                 mesh_fixture(&f, &mesh, 1, 0.5);
-                fixture_look(&f, camera, 33, 29);
+                fixture_set_camera(&f, camera, 33, 29);
                 fixture_add_surface(&f, wave_values, 2, 0.5f);
                 fixture_set_volume(&f, 0.3);
                 fixture_compare(&f, &fixture_usual_bounds, case_name(test_mesh_kind_name(kinds[i]), camera));
@@ -217,7 +217,7 @@ static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
     test_mesh_lattice(TEST_HEXES, 4, 0.2, test_linear, &mesh);
     test_mesh_to_polyhedra(&mesh, 0.7);
     mesh_fixture(&f, &mesh, 1, 0.5);
-    fixture_look(&f, CAMERA_OUTSIDE, 61, 47);
+    fixture_set_camera(&f, CAMERA_OUTSIDE, 61, 47);
     fixture_add_surface(&f, values, 3, 0.5f);
     fixture_draw(&f, &drawn);
     for (int64_t i = 0; i < drawn.list.count; i++) {
@@ -238,7 +238,7 @@ static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
 enum { RANKS = 7 };
 
 /* is_turned: the cells' own orders change as well, which polyhedra do not see (a hex's inverse map does). */
-static void draw_dealt(const test_mesh *mesh, bool is_turned, scene_set *set, drawn_frame *out)
+static void draw_distributed(const test_mesh *mesh, bool is_turned, scene_set *set, drawn_frame *out)
 {
     render_fixture parts[RANKS];
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
@@ -247,9 +247,9 @@ static void draw_dealt(const test_mesh *mesh, bool is_turned, scene_set *set, dr
         test_mesh part;
         test_mesh_part(mesh, owners, rank, &part);
         test_mesh_shuffle(&part, (uint64_t)rank + 20);
-        if (is_turned) test_mesh_turn(&part, (uint64_t)rank + 40);
+        if (is_turned) test_mesh_reorder_vertices(&part, (uint64_t)rank + 40);
         mesh_fixture(&parts[rank], &part, 1, 0.5);
-        fixture_look(&parts[rank], CAMERA_OUTSIDE, 61, 47);
+        fixture_set_camera(&parts[rank], CAMERA_OUTSIDE, 61, 47);
         set(&parts[rank]);
         parts[rank].job.is_alone = false;
         test_mesh_free(&part);
@@ -265,18 +265,19 @@ static void random_ownership_changes_nothing(void **state)
     (void)state;
     for (int pass = 0; pass < 6; pass++) {
         test_mesh mesh;
-        drawn_frame alone, dealt;
+        drawn_frame alone, distributed;
         test_mesh_lattice(pass % 3 == 0   ? TEST_POLYHEDRA
                           : pass % 3 == 1 ? TEST_HEXES
                                           : TEST_MIXED,
                           4, 0.2, test_wave, &mesh);
         if (pass % 3) test_mesh_to_polyhedra(&mesh, pass % 3 == 1 ? 1 : 0.6);
         draw_mesh(&mesh, CAMERA_OUTSIDE, pass < 3 ? set_surfaces : set_volume, &alone);
-        draw_dealt(&mesh, pass % 3 < 2, pass < 3 ? set_surfaces : set_volume, &dealt);
-        if (pass < 3) drawn_assert_same(&alone, &dealt);
-        if (!(drawn_difference(&alone, &dealt) <= 1e-6)) fail_msg("off by %g", drawn_difference(&alone, &dealt));
+        draw_distributed(&mesh, pass % 3 < 2, pass < 3 ? set_surfaces : set_volume, &distributed);
+        if (pass < 3) drawn_assert_same(&alone, &distributed);
+        if (!(drawn_difference(&alone, &distributed) <= 1e-6))
+            fail_msg("off by %g", drawn_difference(&alone, &distributed));
         drawn_free(&alone);
-        drawn_free(&dealt);
+        drawn_free(&distributed);
         test_mesh_free(&mesh);
     }
 }
@@ -285,11 +286,11 @@ static void random_ownership_changes_nothing(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shapes_are_the_reference),
-        cmocka_unit_test(sums_through_spokes_are_the_reference),
+        cmocka_unit_test(shapes_match_the_reference),
+        cmocka_unit_test(sums_through_spokes_match_the_reference),
         cmocka_unit_test(tets_given_as_polyhedra_are_tets),
         cmocka_unit_test(intervals_of_polyhedra_are_those_of_the_types),
-        cmocka_unit_test(polyhedra_beside_other_cells_are_the_reference),
+        cmocka_unit_test(polyhedra_beside_other_cells_match_the_reference),
         cmocka_unit_test(linear_surface_of_warped_polyhedra_is_a_plane),
         cmocka_unit_test(random_ownership_changes_nothing),
     };

@@ -222,7 +222,7 @@ typedef struct count {
     double worst; /* residual */
 } count;
 
-static void judge_robust(count *c, const cubic *g, const truth *t, bool hit, long double at_t)
+static void verify_robust(count *c, const cubic *g, const truth *t, bool hit, long double at_t)
 {
     c->rays++;
     c->certain += t->certain;
@@ -236,14 +236,14 @@ static void judge_robust(count *c, const cubic *g, const truth *t, bool hit, lon
 
 typedef struct rates {
     count robust;
-    int64_t monotone; /* packets in whose cells the field is known to be monotone along all rays */
-    int64_t later;    /* further crossings that the robust search did not find, or found too many of */
+    int64_t monotone;          /* packets in whose cells the field is known to be monotone along all rays */
+    int64_t further_crossings; /* further crossings that the robust search did not find, or found too many of */
 } rates;
 
-static void judge_bundle(bundle *b, rates *r)
+static void verify_bundle(bundle *b, rates *r)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_curved_room room;
+    kernel_curved_storage room;
     kernel_curved curved = {.room = &room};
     const int intervals = bundle_intervals(b, list, &curved);
     r->monotone += room.bounds.jump[0] >= 0;
@@ -255,9 +255,9 @@ static void judge_bundle(bundle *b, rates *r)
             if (!(vm_bits(list[n].mask) >> lane & 1)) continue;
             const cubic g = exact_cubic(b, lane);
             const truth truth = find_truth(&g, (long double)list[n].t_in[lane], (long double)list[n].t_out[lane]);
-            judge_robust(&r->robust, &g, &truth, hit >> lane & 1, (long double)t[lane]);
+            verify_robust(&r->robust, &g, &truth, hit >> lane & 1, (long double)t[lane]);
             /* Crossings alternate, so their number is odd where the faces differ. */
-            if (((int)hits[lane] & 1) != (int)(vm_bits(change) >> lane & 1)) r->later++;
+            if (((int)hits[lane] & 1) != (int)(vm_bits(change) >> lane & 1)) r->further_crossings++;
         }
     }
 }
@@ -265,11 +265,11 @@ static void judge_bundle(bundle *b, rates *r)
 static void robust_misses_no_first_root(void **state)
 {
     (void)state;
-    rates r = {.later = 0};
+    rates r = {.further_crossings = 0};
     bundle b;
     for (int64_t n = 0; r.robust.rays < cubics; n++) {
         make_bundle(&b, n);
-        judge_bundle(&b, &r);
+        verify_bundle(&b, &r);
     }
     printf("robust: %lld cubics, %lld with a certain crossing, %lld missed, worst residual %.2g; monotone %lld cells\n",
            (long long)r.robust.rays, (long long)r.robust.certain, (long long)r.robust.missed, r.robust.worst,
@@ -278,7 +278,7 @@ static void robust_misses_no_first_root(void **state)
     assert_true(r.monotone > cubics / 2000);
     assert_int_equal(r.robust.missed, 0);
     assert_int_equal(r.robust.off, 0);
-    assert_int_equal(r.later, 0);
+    assert_int_equal(r.further_crossings, 0);
     assert_int_equal(b.thread.map_failures, 0);
 }
 

@@ -40,19 +40,19 @@ typedef struct knot {
     double t, f, slope;
 } knot;
 
-enum { COURSE_LEAST_HALVINGS = 3, COURSE_MOST_HALVINGS = 10, COURSE_MAX = (3 << COURSE_MOST_HALVINGS) + 1 };
+enum { PROFILE_LEAST_HALVINGS = 3, PROFILE_MOST_HALVINGS = 10, PROFILE_MAX = (3 << PROFILE_MOST_HALVINGS) + 1 };
 
-typedef struct course {
+typedef struct ray_profile {
     const reference_cell *cell;
     const double *values;
     reference_line line;
     double steepest[3]; /* the gradient's largest components */
     bool has_failed;
     int count;
-    knot knots[COURSE_MAX]; /* the field is monotone from each to the next */
-} course;
+    knot knots[PROFILE_MAX]; /* the field is monotone from each to the next */
+} ray_profile;
 
-static knot course_at(course *c, double t)
+static knot ray_profile_at(ray_profile *c, double t)
 {
     const double point[3] = {c->line.base[0] + c->line.slope[0] * t, c->line.base[1] + c->line.slope[1] * t, t};
     double gradient[3];
@@ -63,13 +63,13 @@ static knot course_at(course *c, double t)
     return k;
 }
 
-static void course_add(course *c, knot k)
+static void ray_profile_add(ray_profile *c, knot k)
 {
     c->knots[c->count++] = k;
 }
 
 /* The end b, and before it where the cubic of both ends turns. */
-static void course_add_piece(course *c, knot a, knot b)
+static void ray_profile_add_piece(ray_profile *c, knot a, knot b)
 {
     const double h = b.t - a.t, d0 = a.slope * h, d1 = b.slope * h, rise = b.f - a.f;
     /* Its slope is d0 + 2 q u + 3 p u^2. */
@@ -82,42 +82,42 @@ static void course_add_piece(course *c, knot a, knot b)
         turns[1] = swap;
     }
     for (int i = 0; i < 2 && square > 0; i++)
-        if (turns[i] > 0 && turns[i] < 1) course_add(c, course_at(c, a.t + turns[i] * h));
-    course_add(c, b);
+        if (turns[i] > 0 && turns[i] < 1) ray_profile_add(c, ray_profile_at(c, a.t + turns[i] * h));
+    ray_profile_add(c, b);
 }
 
-static void course_halve(course *c, knot a, knot b, int halvings)
+static void ray_profile_halve(ray_profile *c, knot a, knot b, int halvings)
 {
     const double h = b.t - a.t;
-    const knot middle = course_at(c, 0.5 * (a.t + b.t));
+    const knot middle = ray_profile_at(c, 0.5 * (a.t + b.t));
     const double f = 0.5 * (a.f + b.f) + 0.125 * h * (a.slope - b.slope);
     const double slope = 1.5 * (b.f - a.f) - 0.25 * h * (a.slope + b.slope);
     const bool is_cubic = fabs(middle.f - f) < 1e-9 && fabs(middle.slope * h - slope) < 1e-9;
-    if (halvings >= COURSE_LEAST_HALVINGS && (is_cubic || halvings == COURSE_MOST_HALVINGS - 1)) {
-        course_add_piece(c, a, middle);
-        course_add_piece(c, middle, b);
+    if (halvings >= PROFILE_LEAST_HALVINGS && (is_cubic || halvings == PROFILE_MOST_HALVINGS - 1)) {
+        ray_profile_add_piece(c, a, middle);
+        ray_profile_add_piece(c, middle, b);
         return;
     }
-    course_halve(c, a, middle, halvings + 1);
-    course_halve(c, middle, b, halvings + 1);
+    ray_profile_halve(c, a, middle, halvings + 1);
+    ray_profile_halve(c, middle, b, halvings + 1);
 }
 
-static void course_trace(course *c, double low, double high)
+static void ray_profile_trace(ray_profile *c, double low, double high)
 {
-    const knot first = course_at(c, low);
+    const knot first = ray_profile_at(c, low);
     c->count = 0;
-    course_add(c, first);
-    course_halve(c, first, course_at(c, high), 0);
+    ray_profile_add(c, first);
+    ray_profile_halve(c, first, ray_profile_at(c, high), 0);
 }
 
 /* Finds where the field passes v between two knots. */
-static double course_pass(course *c, const knot *from, const knot *to, double v)
+static double ray_profile_pass(ray_profile *c, const knot *from, const knot *to, double v)
 {
     const bool rises = to->f > from->f;
     double low = from->t, high = to->t;
     for (int i = 0; i < 50; i++) {
         const double middle = 0.5 * (low + high);
-        if ((course_at(c, middle).f < v) == rises)
+        if ((ray_profile_at(c, middle).f < v) == rises)
             low = middle;
         else
             high = middle;
@@ -126,7 +126,7 @@ static double course_pass(course *c, const knot *from, const knot *to, double v)
 }
 
 /* Tells whether a crossing is certain, and until where a hit must have come. */
-static bool course_certain(course *c, double band, double *t)
+static bool ray_profile_certain(ray_profile *c, double band, double *t)
 {
     int side = 0;
     for (int i = 0; i < c->count; i++) {
@@ -134,7 +134,7 @@ static bool course_certain(course *c, double band, double *t)
         if (fabs(v) <= band) continue;
         const int now = v < 0 ? -1 : 1;
         if (side && now != side) {
-            *t = course_pass(c, &c->knots[i - 1], &c->knots[i], now * band);
+            *t = ray_profile_pass(c, &c->knots[i - 1], &c->knots[i], now * band);
             return true;
         }
         side = now;
@@ -267,12 +267,12 @@ static reference_line line_of(const bundle *b, int lane)
 }
 
 /* Ray 0 in the cell. */
-static bool trace_first(const bundle *b, const reference_cell *cell, course *c)
+static bool trace_first(const bundle *b, const reference_cell *cell, ray_profile *c)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
-    *c = (course){.cell = cell, .values = b->values, .line = line_of(b, 0)};
+    *c = (ray_profile){.cell = cell, .values = b->values, .line = line_of(b, 0)};
     if (reference_crossings(cell, &c->line, ends) < 2 || !(ends[1].z - ends[0].z > 0.01)) return false;
-    course_trace(c, ends[0].z, ends[1].z);
+    ray_profile_trace(c, ends[0].z, ends[1].z);
     return true;
 }
 
@@ -282,7 +282,7 @@ static void shift_values(bundle *b, const reference_cell *cell, double level, do
 }
 
 /* Shift the values so that the field on ray 0 turns at a depth of miss beyond 0. */
-static void make_double_root(bundle *b, const reference_cell *cell, course *c, double miss)
+static void make_double_root(bundle *b, const reference_cell *cell, ray_profile *c, double miss)
 {
     if (!trace_first(b, cell, c)) return;
     for (int i = 1; i + 1 < c->count; i++)
@@ -294,7 +294,7 @@ static void make_double_root(bundle *b, const reference_cell *cell, course *c, d
 
 /* Every cell can represent t as a field. Adding a multiple of it and a constant makes the field 0 at its steepest or
  * flattest point on ray 0, with the given slope there: a triple root, or three close ones. */
-static void make_triple_root(bundle *b, const reference_cell *cell, course *c, double slope)
+static void make_triple_root(bundle *b, const reference_cell *cell, ray_profile *c, double slope)
 {
     if (!trace_first(b, cell, c)) return;
     for (int i = 1; i + 1 < c->count; i++) {
@@ -304,12 +304,12 @@ static void make_triple_root(bundle *b, const reference_cell *cell, course *c, d
         const double side = k->slope < k[-1].slope ? 1 : -1;
         for (int step = 0; step < 60; step++) {
             const double x = low + (high - low) / 3, y = high - (high - low) / 3;
-            if (side * course_at(c, x).slope < side * course_at(c, y).slope)
+            if (side * ray_profile_at(c, x).slope < side * ray_profile_at(c, y).slope)
                 high = y;
             else
                 low = x;
         }
-        const knot flat = course_at(c, 0.5 * (low + high));
+        const knot flat = ray_profile_at(c, 0.5 * (low + high));
         shift_values(b, cell, (flat.slope - slope) * flat.t - flat.f, slope - flat.slope);
         return;
     }
@@ -323,7 +323,7 @@ static void normalize(double *values, int count)
     for (int i = 0; i < count; i++) values[i] = (double)(float)(values[i] / largest);
 }
 
-static void make_bundle(bundle *b, reference_cell *cell, course *scratch, bent kind, int roots)
+static void make_bundle(bundle *b, reference_cell *cell, ray_profile *scratch, bent kind, int roots)
 {
     const double small = (uniform(0, 1) < 0.5 ? -1 : 1) * pow(10, uniform(-9, -1));
     do place_vertices(kind, cell);
@@ -356,19 +356,19 @@ static double sum_of(const vf c[8])
     return sum;
 }
 
-static double band_of(const kernel_map *map, const course *c)
+static double band_of(const kernel_map *map, const ray_profile *c)
 {
     double band = 7 * 6e-8 * sum_of(map->field);
     for (int a = 0; a < 3; a++) band += c->steepest[a] * 6e-8 * (7 * sum_of(map->position[a]) + 3 * 1.5 + 0.5);
     return band;
 }
 
-static void judge_ray(count *n, const kernel_map *map, course *c, double low, double high, bool hit, double hit_t)
+static void verify_ray(count *n, const kernel_map *map, ray_profile *c, double low, double high, bool hit, double hit_t)
 {
     double certain_t = 0;
-    course_trace(c, low, high);
+    ray_profile_trace(c, low, high);
     const double band = band_of(map, c);
-    const bool certain = course_certain(c, band, &certain_t);
+    const bool certain = ray_profile_certain(c, band, &certain_t);
     n->rays++;
     n->certain += certain;
     n->inverse_failures += c->has_failed;
@@ -376,7 +376,7 @@ static void judge_ray(count *n, const kernel_map *map, course *c, double low, do
     /* t itself is rounded: half a unit of 2. */
     if (certain && (!hit || hit_t > certain_t + 1.2e-7)) n->missed++;
     if (!hit) return;
-    const double residual = fabs(course_at(c, hit_t).f) / band;
+    const double residual = fabs(ray_profile_at(c, hit_t).f) / band;
     n->worst = fmax(n->worst, residual);
     n->off += residual > 1;
 }
@@ -397,11 +397,11 @@ static int64_t differ_alone(bundle *b, const kernel_curved *curved, const kernel
     return differing;
 }
 
-static void judge_bundle(bundle *b, const reference_cell *cell, course *c, count *n)
+static void verify_bundle(bundle *b, const reference_cell *cell, ray_profile *c, count *n)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_map map;
-    kernel_curved_room room;
+    kernel_curved_storage room;
     kernel_curved curved = {.room = &room};
     const int intervals = bundle_intervals(b, list, &curved);
     kernel_map_setup(&map, &b->cell);
@@ -411,9 +411,9 @@ static void judge_bundle(bundle *b, const reference_cell *cell, course *c, count
         n->differing += differ_alone(b, &curved, &list[i], t, hits);
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
             if (!(vm_bits(list[i].mask) >> lane & 1)) continue;
-            *c = (course){.cell = cell, .values = b->values, .line = line_of(b, lane)};
-            judge_ray(n, &map, c, (double)list[i].t_in[lane], (double)list[i].t_out[lane], hit >> lane & 1,
-                      (double)t[lane]);
+            *c = (ray_profile){.cell = cell, .values = b->values, .line = line_of(b, lane)};
+            verify_ray(n, &map, c, (double)list[i].t_in[lane], (double)list[i].t_out[lane], hit >> lane & 1,
+                       (double)t[lane]);
         }
     }
 }
@@ -423,7 +423,7 @@ static void curved_rays_miss_no_first_root(void **state)
     (void)state;
     static const char *const names[BENT_COUNT] = {"warped hexes", "concave hexes", "twisted hexes", "twisted wedges",
                                                   "pyramids near the apex"};
-    static course c;
+    static ray_profile c;
     static reference_cell cell;
     for (bent kind = 0; kind < BENT_COUNT; kind++) {
         count n = {.rays = 0};
@@ -431,7 +431,7 @@ static void curved_rays_miss_no_first_root(void **state)
         int64_t map_failures = 0;
         for (int roots = 0; n.rays < rays_wanted / BENT_COUNT; roots = (roots + 1) % 5) {
             make_bundle(&b, &cell, &c, kind, roots);
-            judge_bundle(&b, &cell, &c, &n);
+            verify_bundle(&b, &cell, &c, &n);
             map_failures += b.thread.map_failures;
         }
         printf("%s: %lld rays, %lld with a certain crossing, %lld missed, %lld off; worst residual %.2g bands, of at "

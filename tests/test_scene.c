@@ -780,7 +780,7 @@ enum { good_line_count = sizeof good_lines / sizeof *good_lines };
 static const struct bad_file {
     int line; /* replaced */
     const char *by;
-    int told; /* the line in the message */
+    int reported; /* the line in the message */
     const char *words[3];
 } bad_files[] = {
     {1, "thread: 1", 1, {"the key \"thread\" is unknown", "threads, tree, schedule, writing, images"}},
@@ -1208,7 +1208,7 @@ static void scene_that_bad_files_are_made_of_is_good(void **state)
     scene_free(&s);
 }
 
-static void scene_bad_files_are_told_line_key_and_expectation(void **state)
+static void scene_bad_files_are_reported_line_key_and_expectation(void **state)
 {
     (void)state;
     int failures = 0;
@@ -1218,19 +1218,19 @@ static void scene_bad_files_are_told_line_key_and_expectation(void **state)
         scene s;
         base_error error;
         text_with_line(bad->line, bad->by, text);
-        snprintf(where, sizeof where, "scene.yaml:%d: ", bad->told);
+        snprintf(where, sizeof where, "scene.yaml:%d: ", bad->reported);
         const int64_t held = base_memory_held();
         const insitu_status status = parse(text, &s, &error);
-        bool is_told = status == INSITU_ERROR_SCENE && strncmp(error.message, where, strlen(where)) == 0;
-        for (int w = 0; w < 3 && bad->words[w]; w++) is_told = is_told && strstr(error.message, bad->words[w]);
-        is_told = is_told && s.image_count == 0 && !s.images && base_memory_held() == held;
-        if (!is_told) print_error("%s\n  status %d: %s\n", bad->by, status, error.message);
-        failures += !is_told;
+        bool is_reported = status == INSITU_ERROR_SCENE && strncmp(error.message, where, strlen(where)) == 0;
+        for (int w = 0; w < 3 && bad->words[w]; w++) is_reported = is_reported && strstr(error.message, bad->words[w]);
+        is_reported = is_reported && s.image_count == 0 && !s.images && base_memory_held() == held;
+        if (!is_reported) print_error("%s\n  status %d: %s\n", bad->by, status, error.message);
+        failures += !is_reported;
     }
     assert_int_equal(failures, 0);
 }
 
-static void scene_whole_file_faults_are_told(void **state)
+static void scene_whole_file_faults_are_reported(void **state)
 {
     (void)state;
     static const char *const files[][2] = {
@@ -1267,7 +1267,7 @@ static void scene_huge_file_is_refused(void **state)
 }
 
 /* Each prefix of a good file is cut somewhere else: most are errors, none may be worse. */
-static void scene_truncated_files_end_well(void **state)
+static void scene_truncated_files_fail_cleanly(void **state)
 {
     (void)state;
     const int64_t held = base_memory_held();
@@ -1480,10 +1480,10 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
         cmocka_unit_test_prestate(scene_examples_are_good, argument_count > 1 ? arguments[1] : NULL),
         cmocka_unit_test(scene_that_bad_files_are_made_of_is_good),
-        cmocka_unit_test(scene_bad_files_are_told_line_key_and_expectation),
-        cmocka_unit_test(scene_whole_file_faults_are_told),
+        cmocka_unit_test(scene_bad_files_are_reported_line_key_and_expectation),
+        cmocka_unit_test(scene_whole_file_faults_are_reported),
         cmocka_unit_test(scene_huge_file_is_refused),
-        cmocka_unit_test(scene_truncated_files_end_well),
+        cmocka_unit_test(scene_truncated_files_fail_cleanly),
         cmocka_unit_test(scene_every_failed_allocation_is_an_error_without_a_leak),
         cmocka_unit_test(scene_numbers_do_not_follow_the_locale),
         cmocka_unit_test(scene_texts_have_their_placeholders_replaced),

@@ -343,7 +343,7 @@ static const char *const bad_keys[][3] = {
     {", range: symmetric, scale: log", "range: symmetric is not allowed beside scale: log", "symlog"},
 };
 
-static void wrong_keys_are_told_with_place_and_expectation(void **state)
+static void wrong_keys_are_reported_with_place_and_expectation(void **state)
 {
     (void)state;
     const int64_t held = base_memory_held();
@@ -353,10 +353,10 @@ static void wrong_keys_are_told_with_place_and_expectation(void **state)
         base_error error;
         scene_attachments files = {.read = read_stored};
         const insitu_status status = parse(bad_keys[i][0], &files, &s, &error);
-        const bool is_told = strncmp(error.message, place, strlen(place)) == 0 &&
-                             strstr(error.message, bad_keys[i][1]) && strstr(error.message, bad_keys[i][2]);
+        const bool is_reported = strncmp(error.message, place, strlen(place)) == 0 &&
+                                 strstr(error.message, bad_keys[i][1]) && strstr(error.message, bad_keys[i][2]);
         scene_attachments_free(&files);
-        if (status != INSITU_ERROR_SCENE || !is_told) fail_msg("%s: %s", bad_keys[i][0], error.message);
+        if (status != INSITU_ERROR_SCENE || !is_reported) fail_msg("%s: %s", bad_keys[i][0], error.message);
         assert_int_equal(base_memory_held(), held);
     }
 }
@@ -410,7 +410,7 @@ int main(void)
         cmocka_unit_test(ranges_say_where_they_come_from),
         cmocka_unit_test(files_of_paraview_become_tables),
         cmocka_unit_test(files_are_read_once_and_then_passed_on),
-        cmocka_unit_test(wrong_keys_are_told_with_place_and_expectation),
+        cmocka_unit_test(wrong_keys_are_reported_with_place_and_expectation),
         cmocka_unit_test(volumes_refuse_what_only_surfaces_have),
         cmocka_unit_test(failed_allocations_are_errors_without_a_leak),
     };

@@ -945,7 +945,7 @@ static void write_scene(const mistake *m, char *text, size_t size)
     }
 }
 
-static bool is_told(const mistake *m, const char *message)
+static bool is_reported(const mistake *m, const char *message)
 {
     char start[64];
     snprintf(start, sizeof start, "heat.yaml:%d: ", m->at);
@@ -954,7 +954,7 @@ static bool is_told(const mistake *m, const char *message)
     return strstr(message, m->words[1]) && strstr(message, m->words[2]);
 }
 
-static void mistakes_are_told_with_line_key_and_what_to_write(void **state)
+static void mistakes_are_reported_with_line_key_and_what_to_write(void **state)
 {
     (void)state;
     int wrong = 0;
@@ -965,7 +965,7 @@ static void mistakes_are_told_with_line_key_and_what_to_write(void **state)
         write_scene(&mistakes[i], text, sizeof text);
         const insitu_status status = scene_parse(text, strlen(text), "heat.yaml", NULL, &s, &error);
         if (status == INSITU_OK) scene_free(&s);
-        if (status == INSITU_ERROR_SCENE && is_told(&mistakes[i], error.message)) continue;
+        if (status == INSITU_ERROR_SCENE && is_reported(&mistakes[i], error.message)) continue;
         print_error("%s\n  %s\n", mistakes[i].by, status == INSITU_OK ? "is taken" : error.message);
         wrong++;
     }
@@ -1002,7 +1002,7 @@ static void a_mistake_behind_many_lines_is_found(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mistakes_are_told_with_line_key_and_what_to_write),
+        cmocka_unit_test(mistakes_are_reported_with_line_key_and_what_to_write),
         cmocka_unit_test(the_scene_without_mistakes_is_taken),
         cmocka_unit_test(a_mistake_behind_many_lines_is_found),
     };

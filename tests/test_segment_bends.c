@@ -29,10 +29,10 @@ static const char *const aim_names[AIMS] = {"level", "blind", "any"};
 /* ---- what the looks say, as linear functions of the values at the vertices ---- */
 
 /* At the quarters and the middle how far the field is off the ends' chord, by vertex, and of that the mean. */
-typedef struct bend_looks {
+typedef struct chord_deviations {
     int count;
     double off[3][8], mean[8];
-} bend_looks;
+} chord_deviations;
 
 static void cell_of(const render_fixture *f, const test_mesh *mesh, reference_cell *cell)
 {
@@ -77,7 +77,7 @@ static bool is_unfolded(const test_mesh *mesh)
 static const reference_line middle_line = {{0, 0}, {0, 0}};
 
 /* False where the ray does not cross the cell from one face to another. */
-static bool look(const reference_cell *cell, bend_looks *out)
+static bool sample_deviations(const reference_cell *cell, chord_deviations *out)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
     out->count = cell->count;
@@ -110,7 +110,7 @@ static void take_out(int count, const double b[8], double a[8])
 }
 
 /* Values within 0 .. 1 for which the wanted functions are 0 and the mean is off by the most. */
-static void aim_values(const bend_looks *looks, bend_aim aim, double *values)
+static void aim_values(const chord_deviations *looks, bend_aim aim, double *values)
 {
     double found[3][8], largest = 0;
     int wanted = aim == BLIND ? 3 : 1;
@@ -134,13 +134,13 @@ static void aim_values(const bend_looks *looks, bend_aim aim, double *values)
 /* ---- pictures ---- */
 
 /* Draws one cell; false where the middle ray is not for the aim. */
-static bool judge_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, double worst[3])
+static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, double worst[3])
 {
     test_mesh mesh;
     render_fixture f;
     fixture_function function;
     reference_cell cell;
-    bend_looks looks;
+    chord_deviations looks;
     const double jitter = test_uniform_in(0, 100 * seed + 3, 0.1, 0.35);
     test_mesh_single(shape, test_linear, &mesh);
     for (uint64_t i = 0; i < 3 * (uint64_t)mesh.vertex_count; i++)
@@ -149,7 +149,7 @@ static bool judge_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doubl
         mesh.values[i] = test_uniform_in(i, 100 * seed + 2, 0, 1);
     step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, SIDE);
     cell_of(&f, &mesh, &cell);
-    bool is_seen = is_unfolded(&mesh) && look(&cell, &looks);
+    bool is_seen = is_unfolded(&mesh) && sample_deviations(&cell, &looks);
     if (is_seen && aim != ANY) aim_values(&looks, aim, mesh.values);
     fixture_free(&f);
     if (is_seen) {
@@ -157,7 +157,7 @@ static bool judge_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doubl
         f.job.camera.half_height = 0.03;
         const double unit = pow(10, test_uniform_in(0, 100 * seed, -2, 1));
         fixture_set_function(&f, &function, 100 * seed + 9, false, 0.95, unit);
-        step_judge(&f, test_effort(2, 1), 1e-7, worst);
+        step_verify(&f, test_effort(2, 1), 1e-7, worst);
         fixture_free(&f);
     }
     test_mesh_free(&mesh);
@@ -173,7 +173,7 @@ static void max_error_is_kept_where_looks_say_little(void **state)
     (void)state;
     double worst_of_hard[3] = {0};
     for (size_t i = 0; i < sizeof hard_seeds / sizeof hard_seeds[0]; i++)
-        assert_true(judge_cell(TEST_UNIT_HEX, BLIND, hard_seeds[i], worst_of_hard));
+        assert_true(verify_cell(TEST_UNIT_HEX, BLIND, hard_seeds[i], worst_of_hard));
     step_assert_kept(worst_of_hard, "hard cells");
     for (int s = 0; s < SHAPES; s++)
         for (bend_aim aim = 0; aim < AIMS; aim++) {
@@ -183,7 +183,7 @@ static void max_error_is_kept_where_looks_say_little(void **state)
             if (aim == BLIND && shapes[s] != TEST_UNIT_HEX) continue;
             const int wanted = test_effort(20, 1500);
             for (uint64_t seed = 0; seen < wanted && seed < 8 * (uint64_t)wanted; seed++)
-                seen += judge_cell(shapes[s], aim, seed, worst);
+                seen += verify_cell(shapes[s], aim, seed, worst);
             snprintf(what, sizeof what, "%s, %s, %d cells", test_cell_shape_name(shapes[s]), aim_names[aim], seen);
             step_assert_kept(worst, what);
             assert_true(2 * seen > wanted);

@@ -76,7 +76,7 @@ static void thin_tets_are_not_lost(void **state)
         make_layers(thickness, &mesh);
         fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / LAYERS, 1,
                        (const double[]){0, 0, 0});
-        fixture_look(&f, CAMERA_ORTHOGRAPHIC, SIDE, SIDE);
+        fixture_set_camera(&f, CAMERA_ORTHOGRAPHIC, SIDE, SIDE);
         assert_true(render_camera_look_at(&f.job.camera, (const double[]){0.03, 0.02, 4},
                                           (const double[]){0.03, 0.02, 0}, (const double[]){0, 1, 0}, 30, SIDE, SIDE));
         set_segments(&f, 0);
@@ -98,7 +98,7 @@ static double bent_field(const double p[3])
 }
 
 /* The worst of each error asked for, 1e-2 to 1e-4, of one mesh and function. Returns whether there is a step. */
-static bool judge(const test_mesh *mesh, uint64_t seed, bool step, float opacity, double worst[3])
+static bool verify(const test_mesh *mesh, uint64_t seed, bool step, float opacity, double worst[3])
 {
     static const double values[2] = {0.35, 0.6};
     render_fixture f;
@@ -106,7 +106,7 @@ static bool judge(const test_mesh *mesh, uint64_t seed, bool step, float opacity
     double truth[4 * PIXELS];
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(&f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE, SIDE);
+    fixture_set_camera(&f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE, SIDE);
     set_segments(&f, 0);
     fixture_set_function(&f, &function, 100 * seed + 9, step, seed % 3 ? 0.5 : 0.9,
                          pow(10, test_uniform_in(0, 100 * seed + 10, -2, 4)));
@@ -135,7 +135,7 @@ static void max_error_is_kept_in_dense_media(void **state)
                 test_mesh mesh;
                 test_mesh_lattice(kind, 2, 0.2, bent_field, &mesh);
                 /* The two densest media step, one for each camera. */
-                steps += judge(&mesh, seed, seed % 5 == 0, opacities[surface], worst);
+                steps += verify(&mesh, seed, seed % 5 == 0, opacities[surface], worst);
                 test_mesh_free(&mesh);
             }
             fprintf(stderr, "%s, surfaces of opacity %g: %.2g, %.2g, %.2g\n", test_mesh_kind_name(kind),

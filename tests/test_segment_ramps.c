@@ -46,8 +46,8 @@ typedef enum ramp_scene { ALONE, CUT, POLYHEDRON } ramp_scene;
 #define FILM 1e-7f
 
 /* first, every: of the seeds. */
-static void judge_ramp(test_cell_shape shape, ramp_scene scene, double width, uint64_t first, uint64_t every,
-                       double worst[3])
+static void verify_ramp(test_cell_shape shape, ramp_scene scene, double width, uint64_t first, uint64_t every,
+                        double worst[3])
 {
     double raw = 0;
     static const float opacities[3][4] = {{0, 0, 0.9f, 0.9f}, {0.8f, 0.8f, 0, 0.3f}, {0.1f, 0.2f, 0.6f, 0.1f}};
@@ -66,7 +66,7 @@ static void judge_ramp(test_cell_shape shape, ramp_scene scene, double width, ui
         step_begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE);
         step_set_function(&f, &function, begin, width, unit);
         if (scene == CUT) fixture_add_surface(&f, &middle, 1, FILM);
-        step_judge(&f, 1, 1e-7, cell_worst);
+        step_verify(&f, 1, 1e-7, cell_worst);
         for (int i = 0; i < 3; i++) {
             raw = fmax(raw, cell_worst[i]);
             if (scene == POLYHEDRON) cell_worst[i] -= rounding_of(&function, width, unit);
@@ -79,7 +79,7 @@ static void judge_ramp(test_cell_shape shape, ramp_scene scene, double width, ui
 }
 
 /* Usually a quarter of the seeds, which has each sort of field; another one for the next width and shape. */
-static void judge_ramps(ramp_scene scene)
+static void verify_ramps(ramp_scene scene)
 {
     static const char *const how[] = {"", " cut by a surface", " as polyhedron"};
     for (int kind = 0; kind < STEP_SHAPES; kind++)
@@ -87,7 +87,7 @@ static void judge_ramps(ramp_scene scene)
             double worst[3] = {0};
             char what[80];
             const int every = test_effort(SEEDS, 1);
-            judge_ramp(step_shapes[kind], scene, widths[k], (uint64_t)((kind + k) % every), (uint64_t)every, worst);
+            verify_ramp(step_shapes[kind], scene, widths[k], (uint64_t)((kind + k) % every), (uint64_t)every, worst);
             snprintf(what, sizeof what, "%s%s within a ramp of %g", test_cell_shape_name(step_shapes[kind]), how[scene],
                      widths[k]);
             step_assert_kept(worst, what);
@@ -97,20 +97,20 @@ static void judge_ramps(ramp_scene scene)
 static void fields_within_a_narrow_ramp(void **state)
 {
     (void)state;
-    judge_ramps(ALONE);
+    verify_ramps(ALONE);
 }
 
 /* A surface that lets all but a ten-millionth through cuts the cell: the picture is the same. */
 static void cut_fields_within_a_narrow_ramp(void **state)
 {
     (void)state;
-    judge_ramps(CUT);
+    verify_ramps(CUT);
 }
 
 static void polyhedra_within_a_narrow_ramp(void **state)
 {
     (void)state;
-    judge_ramps(POLYHEDRON);
+    verify_ramps(POLYHEDRON);
 }
 
 int main(int argc, char **argv)

@@ -70,7 +70,7 @@ static bool extreme_of(const double values[SAMPLES], double sign, double *at)
 /* ---- the hex that was seen to be off by 2.8e-3 ---- */
 
 /* Its picture with the opacity's ramp at 0.6, or a step. */
-static void judge_hex(step_function function, fixture_camera camera, double width, double unit)
+static void verify_hex(step_function function, fixture_camera camera, double width, double unit)
 {
     test_mesh mesh;
     render_fixture f;
@@ -79,7 +79,7 @@ static void judge_hex(step_function function, fixture_camera camera, double widt
     step_make_hex(&mesh);
     step_begin(&f, &mesh, camera, STEP_SIDE);
     step_set_function(&f, &function, 0.6, width, unit);
-    step_judge(&f, test_effort(2, 1), 1e-7, worst);
+    step_verify(&f, test_effort(2, 1), 1e-7, worst);
     snprintf(what, sizeof what, "a ramp of %g, unit distance %g, %s", width, unit, fixture_camera_name(camera));
     step_assert_kept(worst, what);
     fixture_free(&f);
@@ -92,7 +92,7 @@ static void a_hex_that_barely_reaches_a_step(void **state)
     (void)state;
     for (int k = 0; k < 2; k++)
         for (fixture_camera camera = 0; camera <= CAMERA_ORTHOGRAPHIC; camera++)
-            judge_hex((step_function){.opacities = {0, 0, 0.9f, 0.9f}}, camera, 0, units[k]);
+            verify_hex((step_function){.opacities = {0, 0, 0.9f, 0.9f}}, camera, 0, units[k]);
 }
 
 /* Along the middle ray, the hex's diagonal, the field is 0.2 - 0.4 s + 3 s^2 - 2 s^3: it falls to 0.186 and rises to
@@ -123,7 +123,7 @@ static void a_cubic_that_dips_below_a_step(void **state)
     memcpy(mesh.values, values, sizeof values);
     step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
     step_set_function(&f, &function, 0.187, 0, 0.005); /* not in the bin of bounds that 0.2 is in */
-    step_judge(&f, 1, 1e-7, worst);
+    step_verify(&f, 1, 1e-7, worst);
     step_assert_kept(worst, "a dip");
     fixture_free(&f);
     test_mesh_free(&mesh);
@@ -135,7 +135,7 @@ static double hex_past_step(render_fixture *f, const test_mesh *mesh, double sid
 {
     static double values[SAMPLES];
     double most;
-    fixture_look(f, CAMERA_ORTHOGRAPHIC, 1, 1);
+    fixture_set_camera(f, CAMERA_ORTHOGRAPHIC, 1, 1);
     render_camera *c = &f->job.camera;
     for (int a = 0; a < 3; a++) c->eye[a] += sideways * c->right[a] + up * c->up[a];
     if (!values_on_ray(f, mesh, GRID_HEX, values) || !extreme_of(values, 1, &most)) return (double)NAN;
@@ -143,7 +143,7 @@ static double hex_past_step(render_fixture *f, const test_mesh *mesh, double sid
 }
 
 /* Move the eye to where the hex comes to 0.6 and so much beyond. */
-static void look_past_step(render_fixture *f, const test_mesh *mesh, double past)
+static void move_eye_past_step(render_fixture *f, const test_mesh *mesh, double past)
 {
     const double step = 0.05;
     for (double up = -1; up < 1; up += step) {
@@ -177,13 +177,13 @@ static void a_ray_on_which_it_barely_does(void **state)
         render_fixture f;
         step_make_hex(&mesh);
         step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
-        look_past_step(&f, &mesh, passes[n]);
+        move_eye_past_step(&f, &mesh, passes[n]);
         for (int k = 0; k < 2; k++) {
             step_function function = {.opacities = {0, 0, 0.9f, 0.9f}};
             double worst[3] = {0};
             char what[64];
             step_set_function(&f, &function, 0.6, 0, units[k]);
-            step_judge(&f, 1, 1e-7, worst);
+            step_verify(&f, 1, 1e-7, worst);
             snprintf(what, sizeof what, "unit distance %g, by %g", units[k], passes[n]);
             step_assert_kept(worst, what);
         }
@@ -215,7 +215,7 @@ static void random_cells_and_steps(void **state)
                 fixture_set_function(&f, &function, 100 * seed + 9, true, seed % 3 ? 0.5 : 0.9,
                                      pow(10, test_uniform_in(0, 100 * seed + 10, -2.2, 0)));
                 assert_true(function.values[1] == function.values[2]);
-                step_judge(&f, test_effort(2, 1), 1e-7, worst);
+                step_verify(&f, test_effort(2, 1), 1e-7, worst);
                 fixture_free(&f);
                 test_mesh_free(&mesh);
             }
@@ -242,7 +242,7 @@ static bool graze(render_fixture *f, const double values[SAMPLES], double sign, 
     for (int k = 0; k < PASSES; k++)
         for (int dense = 0; dense < 2; dense++) {
             step_set_function(f, &function, at - sign * passes[k], width, dense ? 0.005 : 0.1);
-            step_judge(f, 1, 1e-7, worst[k]);
+            step_verify(f, 1, 1e-7, worst[k]);
         }
     return true;
 }
@@ -298,8 +298,8 @@ static void steep_ramps_are_kept_as_steps_are(void **state)
     for (int k = 0; k < (int)(sizeof widths / sizeof *widths); k++)
         for (int dense = 0; dense < 2; dense++)
             if (test_is_whole() || dense == k % 2)
-                judge_hex((step_function){.opacities = {0, 0.02f, 0.9f, 0.5f}}, CAMERA_OUTSIDE, widths[k],
-                          dense ? 0.005 : 0.1);
+                verify_hex((step_function){.opacities = {0, 0.02f, 0.9f, 0.5f}}, CAMERA_OUTSIDE, widths[k],
+                           dense ? 0.005 : 0.1);
 }
 
 /* ---- the same rays everywhere ---- */

@@ -83,7 +83,7 @@ static void tets_are_exact_for_every_camera(void **state)
     for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
         render_fixture f;
         fixture_create_lattice(&f, TEST_TETS, 4, camera == CAMERA_ALONG_X ? 0 : 0.2, test_wave);
-        fixture_look(&f, camera, 29, 23);
+        fixture_set_camera(&f, camera, 29, 23);
         set_segments(&f, 1, 0);
         double *truth = truth_of(&f), worst = error_of(&f, truth, NULL);
         fprintf(stderr, "tets, %s: %.2g\n", fixture_camera_name(camera), worst);
@@ -115,7 +115,7 @@ static void begin_random_tet(uint64_t seed, test_mesh *mesh, render_fixture *f)
     for (uint64_t i = 0; i < 4; i++) mesh->values[i] = test_uniform_in(i, 100 * seed + 8, -0.1, 1.1);
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 15, 13);
+    fixture_set_camera(f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 15, 13);
     set_segments(f, 1, 0);
 }
 
@@ -155,7 +155,7 @@ static void linear_fields_are_exact_on_every_kind(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         render_fixture f;
         fixture_create_lattice(&f, kind, 4, 0.2, test_linear);
-        fixture_look(&f, CAMERA_OUTSIDE, 29, 23);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 29, 23);
         set_segments(&f, 100, 0);
         double *truth = truth_of(&f), worst = error_of(&f, truth, NULL);
         fprintf(stderr, "linear, %s: %.2g\n", test_mesh_kind_name(kind), worst);
@@ -172,7 +172,7 @@ static void surfaces_cut_segments(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         render_fixture f;
         fixture_create_lattice(&f, kind, 3, 0.2, test_wave);
-        fixture_look(&f, CAMERA_OUTSIDE, 25, 21);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 25, 21);
         set_segments(&f, 1, 1e-4);
         fixture_add_surface(&f, values, 3, 0.4f);
         fixture_add_surface(&f, values + 3, 1, 1);
@@ -210,7 +210,7 @@ static void orders_on_jittered_hexes(void **state)
     (void)state;
     render_fixture f;
     fixture_create_lattice(&f, TEST_HEXES, 5, 0.2, test_wave);
-    fixture_look(&f, CAMERA_OUTSIDE, 29, 23);
+    fixture_set_camera(&f, CAMERA_OUTSIDE, 29, 23);
     set_segments(&f, 1, 0);
     double *truth = truth_of(&f);
     const double segments = order_of(&f, truth, RENDER_SEGMENTS, 4), samples = order_of(&f, truth, RENDER_SAMPLES, 5);
@@ -252,7 +252,7 @@ static void random_tets_keep_max_error(void **state)
 }
 
 /* Rays and cells are the same, and segments as well: only the order of those that begin at one place may differ. */
-static void judge_tiles(test_mesh_kind kind, int side, bool with_surface, double max_error)
+static void verify_tiles(test_mesh_kind kind, int side, bool with_surface, double max_error)
 {
     static const double value = 0.5, nowhere = 1e6;
     render_fixture f;
@@ -264,7 +264,7 @@ static void judge_tiles(test_mesh_kind kind, int side, bool with_surface, double
     fixture_create(&f, &mesh, 1, (test_layout){.is_interleaved = with_surface}, 2.0 / side, 1,
                    (const double[]){0, 0, 0});
     test_mesh_free(&mesh);
-    fixture_look(&f, CAMERA_OUTSIDE, 61, 47);
+    fixture_set_camera(&f, CAMERA_OUTSIDE, 61, 47);
     set_segments(&f, 0.02, max_error); /* more parts than a window has room for */
     if (with_surface) fixture_add_surface(&f, &value, 1, 1);
     /* Beside a transparent surface, which is nowhere here, cells are taken one by one. */
@@ -290,7 +290,7 @@ static void lanes_have_what_cells_alone_have(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (int with_surface = 0; with_surface < 2; with_surface++) judge_tiles(kind, 9, with_surface, 0);
+        for (int with_surface = 0; with_surface < 2; with_surface++) verify_tiles(kind, 9, with_surface, 0);
 }
 
 /* By float32 ends: tiles take tets of few pixels a ray and its tet a lane (kernel_small_tets.h). A ray meets more tets
@@ -298,7 +298,7 @@ static void lanes_have_what_cells_alone_have(void **state)
 static void small_tets_are_the_same_in_lanes(void **state)
 {
     (void)state;
-    for (int with_surface = 0; with_surface < 2; with_surface++) judge_tiles(TEST_TETS, 20, with_surface, 1e-2);
+    for (int with_surface = 0; with_surface < 2; with_surface++) verify_tiles(TEST_TETS, 20, with_surface, 1e-2);
 }
 
 /* Usually each kind from one of the cameras. */
@@ -310,7 +310,7 @@ static void max_error_is_kept_on_every_kind(void **state)
             render_fixture f;
             if (!test_is_whole() && (int)camera != (int)kind % 3) continue;
             fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
-            fixture_look(&f, camera, 21, 17);
+            fixture_set_camera(&f, camera, 21, 17);
             set_segments(&f, 1, 0);
             double *truth = truth_of(&f);
             for (int i = 2; i <= 4; i++) {
@@ -331,7 +331,7 @@ static void parts_make_the_whole(void **state)
     static const double values[2] = {-0.2, 0.3};
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (test_partition_kind deal = 0; deal < TEST_PARTITION_COUNT; deal++)
+        for (test_partition_kind distribute = 0; distribute < TEST_PARTITION_COUNT; distribute++)
             for (int surfaces = 0; surfaces < 2; surfaces++) {
                 enum { N = 4, RANKS = 3 };
                 test_mesh mesh;
@@ -339,7 +339,7 @@ static void parts_make_the_whole(void **state)
                 drawn_frame at_once, apart;
                 test_mesh_lattice(kind, N, 0.2, test_wave, &mesh);
                 int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
-                test_partition(&mesh, deal, N, RANKS, owners);
+                test_partition(&mesh, distribute, N, RANKS, owners);
                 for (int i = 0; i <= RANKS; i++) {
                     render_fixture *f = i ? &parts[i - 1] : &whole;
                     test_mesh part = mesh;
@@ -347,8 +347,8 @@ static void parts_make_the_whole(void **state)
                     fixture_create(f, &part, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / N,
                                    1, (const double[]){0, 0, 0});
                     if (i) test_mesh_free(&part);
-                    fixture_look(f, CAMERA_OUTSIDE, 37, 31);
-                    set_segments(f, 0.3, deal == TEST_RANDOM ? 1e-3 : 0);
+                    fixture_set_camera(f, CAMERA_OUTSIDE, 37, 31);
+                    set_segments(f, 0.3, distribute == TEST_RANDOM ? 1e-3 : 0);
                     f->job.extent = 3.5;
                     if (surfaces) fixture_add_surface(f, values, 2, 0.4f);
                     f->job.is_alone = i == 0;
@@ -360,7 +360,7 @@ static void parts_make_the_whole(void **state)
                     assert_true(
                         !comp_pixel_overlaps(apart.list.items + apart.first[p], apart.first[p + 1] - apart.first[p]));
                 if (!(off <= 1e-6))
-                    fail_msg("%s, %s: %g", test_mesh_kind_name(kind), test_partition_kind_name(deal), off);
+                    fail_msg("%s, %s: %g", test_mesh_kind_name(kind), test_partition_kind_name(distribute), off);
                 drawn_free(&at_once);
                 drawn_free(&apart);
                 for (int i = 0; i < RANKS; i++) fixture_free(&parts[i]);
@@ -388,7 +388,7 @@ static void values_of_any_size_are_held(void **state)
                 }
                 fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = wide, .wide_values = wide}, 0.4, 1,
                                (const double[]){0, 0, 0});
-                fixture_look(&f, CAMERA_OUTSIDE, 29, 23);
+                fixture_set_camera(&f, CAMERA_OUTSIDE, 29, 23);
                 set_segments(&f, 1, digits ? pow(10, -digits) : 0);
                 fixture_draw(&f, &drawn[held]);
                 fixture_free(&f);
@@ -424,7 +424,7 @@ static void overlapping_meshes_are_all_seen(void **state)
     for (int all = 0; all < 2; all++) {
         fixture_create(&f, all ? &many : &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                        (const double[]){0, 0, 0});
-        fixture_look(&f, CAMERA_OUTSIDE, 23, 21);
+        fixture_set_camera(&f, CAMERA_OUTSIDE, 23, 21);
         set_segments(&f, 1, 0);
         f.transfer.opacity_count = 1;
         f.transfer.opacities = constant;
@@ -456,7 +456,7 @@ static void pictures_do_not_depend_on_the_order_of_cells(void **state)
             if (i) test_mesh_shuffle(&mesh, 3);
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.5, 1,
                            (const double[]){0, 0, 0});
-            fixture_look(&f, CAMERA_OUTSIDE, 39, 33);
+            fixture_set_camera(&f, CAMERA_OUTSIDE, 39, 33);
             set_segments(&f, 0.1, 0);
             fixture_draw(&f, &drawn[i]);
             fixture_free(&f);

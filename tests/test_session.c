@@ -23,9 +23,9 @@ static session_input input;
 
 static void step_draws(insitu_session *session, int64_t cycle, int images)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0.5 * (double)cycle);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == images);
     everywhere(caught_count == (own_rank == 0 ? images : 0));
 }
@@ -45,7 +45,7 @@ static void images_are_drawn_when_due(void **context)
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "2", SURFACE, "") IMAGE("b", "3", VOLUME, "")));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     const int expected[] = {2, 0, 1, 1, 1, 0, 2};
     for (int cycle = 0; cycle < 7; cycle++) step_draws(session, cycle, expected[cycle]);
     everywhere(own_rank != 0 || (!strcmp(caught[0].path, "a_6.exr") && !strcmp(caught[1].path, "b_6.exr")));
@@ -58,27 +58,27 @@ static void unchanged_input_rebuilds_nothing(void **context)
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", SURFACE, "      - " VOLUME "\n")));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     everywhere(insitu_last_report(session)->build_ms > 0 || input.part.cell_count == 0);
     session_input same = input;
     same.mesh.changed = same.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(hand_over(session, &same) == INSITU_OK);
+    everywhere(submit(session, &same) == INSITU_OK);
     step_draws(session, 1, 1);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
     everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
     same.field.changed = INSITU_CHANGED_VALUES; /* as the caller says; the values say otherwise */
-    everywhere(hand_over(session, &same) == INSITU_OK);
+    everywhere(submit(session, &same) == INSITU_OK);
     step_draws(session, 2, 1);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
     everywhere(strstr(report->left_out, "\"f\" has the values of the last picture"));
     everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
     same.field.changed = INSITU_CHANGED_NOTHING;
     same.mesh.changed = INSITU_CHANGED_GEOMETRY;
-    everywhere(hand_over(session, &same) == INSITU_OK);
+    everywhere(submit(session, &same) == INSITU_OK);
     step_draws(session, 3, 1);
     everywhere(report->build_ms == 0 && (report->refit_ms > 0 || input.part.cell_count == 0));
     everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
@@ -93,14 +93,14 @@ static void changed_values_are_noticed(void **context)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", VOLUME, "")));
     session_input in;
     input_create(&in, TEST_TETS, 4, TEST_BLOCK, own_rank, rank_count);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_draws(session, 0, 1);
     in.mesh.changed = INSITU_CHANGED_NOTHING;
     for (int64_t cycle = 1; cycle < 20; cycle++) {
         const int64_t spots[] = {0, in.part.vertex_count / 3 + cycle, in.part.vertex_count - cycle};
         if (in.part.vertex_count > 60)
             in.part.values[spots[cycle % 3]] = nextafter(in.part.values[spots[cycle % 3]], 9);
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_draws(session, cycle, 1);
         everywhere(insitu_last_report(session)->refit_ms > 0 || in.part.vertex_count <= 60);
     }
@@ -113,7 +113,7 @@ static void moved_mesh_gives_the_moved_picture(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
@@ -123,7 +123,7 @@ static void moved_mesh_gives_the_moved_picture(void **context)
     insitu_mesh_interleaved(&moved.mesh, coordinates, INSITU_FLOAT64);
     moved.mesh.changed = INSITU_CHANGED_GEOMETRY;
     moved.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(hand_over(session, &moved) == INSITU_OK);
+    everywhere(submit(session, &moved) == INSITU_OK);
     step_draws(session, 1, 1);
     for (int i = 0; own_rank == 0 && i < 24 * 16; i++) caught[0].depth[i] /= 64;
     everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
@@ -200,13 +200,13 @@ static void plain_layouts_are_not_copied(void **context)
     input_free(&in);
 }
 
-static void what_no_picture_shows_is_left_out(void **context)
+static void cells_that_no_picture_shows_are_left_out(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     insitu_field other = input.field;
     other.name = "g";
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const int64_t trees = insitu_last_report(session)->bytes_trees;
     everywhere(insitu_set_field(session, "m", &other) == INSITU_OK);
@@ -236,7 +236,7 @@ static void mirrored_cells_are_counted(void **context)
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
         session_input in;
         input_create(&in, (test_mesh_kind)kind, 3, TEST_BLOCK, own_rank, rank_count);
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_draws(session, 0, 1);
         const int64_t before = insitu_last_report(session)->cells_inverted, cells = in.part.cell_count;
         if (kind == TEST_PYRAMIDS)
@@ -244,7 +244,7 @@ static void mirrored_cells_are_counted(void **context)
         else
             everywhere(kind == TEST_MIXED || before == 0);
         test_mesh_mirror(&in.part, false);
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_draws(session, 1, 1);
         everywhere(insitu_last_report(session)->cells_inverted == cells - before);
         insitu_destroy(&session);
@@ -260,13 +260,13 @@ static void ghosts_are_counted_and_not_drawn(void **context)
     input_create(&in, TEST_HEXES, 4, TEST_BLOCK, own_rank, rank_count);
     for (int64_t cell = 0; cell < in.part.cell_count; cell += 3) in.part.ghosts[cell] = 1;
     test_mesh_mirror(&in.part, false);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_draws(session, 0, 1);
     const int64_t ghosts = (in.part.cell_count + 2) / 3;
     everywhere(insitu_last_report(session)->cells_ghost == ghosts);
     everywhere(insitu_last_report(session)->cells_inverted == in.part.cell_count - ghosts);
     memset(in.part.ghosts, 1, (size_t)in.part.cell_count);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_draws(session, 1, 1);
     everywhere(own_rank != 0 || covered_pixels(&caught[0]) == 0);
     insitu_destroy(&session);
@@ -300,7 +300,7 @@ static void cells_of_one_rank_are_seen(void **context)
         insitu_mesh none;
         insitu_mesh_defaults(&none);
         if (own_rank == holder)
-            everywhere(hand_over(session, &all) == INSITU_OK);
+            everywhere(submit(session, &all) == INSITU_OK);
         else /* an empty mesh on odd ranks, none on even ones */
             everywhere(insitu_set_mesh(session, "m", own_rank % 2 ? &none : NULL) == INSITU_OK);
         step_draws(session, holder, 1);
@@ -322,7 +322,7 @@ static void meshes_of_many_names_make_one_picture(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
@@ -355,15 +355,15 @@ static void overlapping_meshes_make_one_picture(void **context)
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", VOLUME, "    sampling: {frames: 2}\n")));
-    session_input whole[2], dealt[2];
+    session_input whole[2], distributed[2];
     caught_picture first = {0};
     for (int i = 0; i < 2; i++) {
         const test_mesh_kind kind = i ? TEST_TETS : TEST_HEXES;
         input_create(&whole[i], kind, 3 + i, TEST_BLOCK, 0, 1);
-        input_create(&dealt[i], kind, 3 + i, TEST_RANDOM, own_rank, rank_count);
+        input_create(&distributed[i], kind, 3 + i, TEST_RANDOM, own_rank, rank_count);
     }
     for (int turn = 0; turn < 2; turn++) {
-        const session_input *in = turn ? dealt : whole;
+        const session_input *in = turn ? distributed : whole;
         for (int i = 0; i < 2; i++) {
             const bool has_part = turn || own_rank == rank_count - 1;
             const char *const name = i ? "tets" : "hexes";
@@ -383,8 +383,8 @@ static void overlapping_meshes_make_one_picture(void **context)
     everywhere(insitu_set_mesh(session, "tets", NULL) == INSITU_OK);
     step_draws(session, 2, 1);
     everywhere(!warns_of_overlaps(session));
-    everywhere(insitu_set_mesh(session, "tets", &dealt[1].mesh) == INSITU_OK);
-    everywhere(insitu_set_field(session, "tets", &dealt[1].field) == INSITU_OK);
+    everywhere(insitu_set_mesh(session, "tets", &distributed[1].mesh) == INSITU_OK);
+    everywhere(insitu_set_field(session, "tets", &distributed[1].field) == INSITU_OK);
     step_draws(session, 3, 1);
     everywhere(warns_of_overlaps(session)); /* and again when it has ceased to be true */
     free(first.rgba);
@@ -392,7 +392,7 @@ static void overlapping_meshes_make_one_picture(void **context)
     insitu_destroy(&session);
     for (int i = 0; i < 2; i++) {
         input_free(&whole[i]);
-        input_free(&dealt[i]);
+        input_free(&distributed[i]);
     }
 }
 
@@ -405,7 +405,7 @@ static void constant_fields_are_drawn(void **context)
     const double constants[] = {0, 7, -1e30, 1e-300};
     for (int i = 0; i < 4; i++) {
         for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] = constants[i];
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_draws(session, i, 1);
         bool is_finite = true;
         for (int p = 0; own_rank == 0 && p < 24 * 16 * 4; p++) is_finite = is_finite && isfinite(caught[0].rgba[p]);
@@ -424,11 +424,11 @@ static void missing_field_leaves_the_other_picture(void **context)
     insitu_session *session = open_session(
         MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", "isosurface: {field: presure, values: [1]}", "") IMAGE(
                             "b", "1", SURFACE, "") IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
-    everywhere(hand_over(session, &input) == INSITU_OK);
-    forget_pictures();
+    everywhere(submit(session, &input) == INSITU_OK);
+    discard_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"; there are",
-                    "\"f\" (mesh \"m\")");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"; there are",
+                        "\"f\" (mesh \"m\")");
     everywhere(insitu_last_report(session)->images == 1);
     everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_0.exr")));
     insitu_destroy(&session);
@@ -439,10 +439,10 @@ static void component_that_is_not_there_is_named(void **context)
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"",
-                    "it has components 0 to 0");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"",
+                        "it has components 0 to 0");
     insitu_destroy(&session);
 }
 
@@ -456,47 +456,47 @@ static void images_are_drawn_when_their_time_has_passed(void **context)
         open_session(MPI_COMM_WORLD, write_scene("images:\n  - name: a\n    size: [24, 16]\n    every_time: 0.25\n"
                                                  "    layers:\n      - " SURFACE "\n"
                                                  "    outputs:\n      - path: a_{cycle}_{time:.2f}.exr\n"));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     double time = 0;
     for (int cycle = 0; cycle < 11; cycle++, time += 0.1) {
-        forget_pictures();
-        told_everywhere(session, insitu_step(session, cycle, time), INSITU_OK, "");
+        discard_pictures();
+        reported_everywhere(session, insitu_step(session, cycle, time), INSITU_OK, "");
         everywhere(insitu_last_report(session)->images == expected[cycle]);
     }
     everywhere(own_rank != 0 || !strcmp(caught[0].path, "a_10_1.00.exr"));
     const double later[] = {7.1, 7.1, 7.2, 7.3};
     const int then[] = {1, 0, 0, 1};
     for (int i = 0; i < 4; i++) {
-        told_everywhere(session, insitu_step(session, 11 + i, later[i]), INSITU_OK, "");
+        reported_everywhere(session, insitu_step(session, 11 + i, later[i]), INSITU_OK, "");
         everywhere(insitu_last_report(session)->images == then[i]);
     }
-    forget_pictures();
+    discard_pictures();
     insitu_destroy(&session);
 }
 
-static void ranks_at_different_cycles_are_told(void **context)
+static void ranks_at_different_cycles_are_reported(void **context)
 {
     (void)context;
     if (rank_count < 2) return;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, own_rank == 1 ? 5 : 4, 0);
-    told_everywhere(session, status, INSITU_ERROR_MPI, "ranks disagree on the cycle: 4 on one, 5 on another");
+    reported_everywhere(session, status, INSITU_ERROR_MPI, "ranks disagree on the cycle: 4 on one, 5 on another");
     step_draws(session, 6, 1);
     insitu_destroy(&session);
 }
 
-static void picture_that_cannot_be_written_is_told_to_all(void **context)
+static void picture_that_cannot_be_written_is_reported_on_all_ranks(void **context)
 {
     (void)context;
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", SURFACE, "") IMAGE("b", "1", VOLUME, "")));
-    everywhere(hand_over(session, &input) == INSITU_OK);
-    forget_pictures();
+    everywhere(submit(session, &input) == INSITU_OK);
+    discard_pictures();
     unwritable = "a_";
     const insitu_status status = insitu_step(session, 3, 0);
     unwritable = NULL;
-    told_everywhere(session, status, INSITU_ERROR_IO, "rank 0: image \"a\": a_3.exr: cannot be written");
+    reported_everywhere(session, status, INSITU_ERROR_IO, "rank 0: image \"a\": a_3.exr: cannot be written");
     everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_3.exr")));
     step_draws(session, 4, 2);
     insitu_destroy(&session);
@@ -507,7 +507,7 @@ static void edited_scene_is_taken_and_a_broken_one_is_not(void **context)
     (void)context;
     static const char edited[] = "the scene file was edited: its images are drawn from this step on";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     write_scene("images:\n" IMAGE("first", "1", SURFACE, "") IMAGE("second", "1", VOLUME, ""));
     for (int again = 0; again < 2; again++) {
@@ -533,16 +533,16 @@ static void images_without_outputs_are_for_memory(void **context)
     static const char scene[] = "images:\n  - {name: a, size: [24, 16], layers: [" SURFACE "]}\n";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     int count = 0;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     for (int cycle = 0; cycle < 4; cycle++) {
         if (cycle == 2) everywhere(insitu_keep_pictures(session, 1) == INSITU_OK);
-        forget_pictures();
+        discard_pictures();
         everywhere(insitu_step(session, cycle, 0) == INSITU_OK && caught_count == 0);
         everywhere(insitu_last_report(session)->images == (cycle > 1));
         const insitu_picture *kept = insitu_last_pictures(session, &count);
         everywhere(count == (cycle > 1 && own_rank == 0) && (!kept || kept->width == 24));
-        const bool is_told = strstr(insitu_last_report(session)->warnings, "\"a\": it has no outputs") != NULL;
-        everywhere(is_told == (cycle == 0));
+        const bool is_reported = strstr(insitu_last_report(session)->warnings, "\"a\": it has no outputs") != NULL;
+        everywhere(is_reported == (cycle == 0));
     }
     insitu_destroy(&session);
 }
@@ -553,14 +553,14 @@ static void bad_scene_opens_no_session(void **context)
     insitu_session *session = (insitu_session *)&input;
     insitu_status status = insitu_create(MPI_COMM_WORLD, write_scene("images:\n  - nmae: a\n"), &session);
     everywhere(session == NULL);
-    told_everywhere(NULL, status, INSITU_ERROR_SCENE, ".yaml:2: ", "nmae");
+    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, ".yaml:2: ", "nmae");
     status = insitu_create(MPI_COMM_WORLD, own_rank == 0 ? "/nowhere/at/all.yaml" : NULL, &session);
-    told_everywhere(NULL, status, INSITU_ERROR_SCENE, "/nowhere/at/all.yaml: cannot be read");
+    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, "/nowhere/at/all.yaml: cannot be read");
     status = insitu_create(MPI_COMM_WORLD, own_rank == 0 ? NULL : "x", &session);
-    told_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "insitu_create: no scene is given");
+    reported_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "insitu_create: no scene is given");
     write_scene(plain_scene);
     status = insitu_create(MPI_COMM_WORLD, write_scene(plain_scene), own_rank == rank_count - 1 ? NULL : &session);
-    told_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "no place for the session");
+    reported_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "no place for the session");
     everywhere(insitu_create(MPI_COMM_NULL, "x", &session) == INSITU_ERROR_ARGUMENT);
     everywhere(insitu_destroy(&session) == INSITU_OK && insitu_destroy(NULL) == INSITU_OK);
 }
@@ -572,21 +572,21 @@ static const char full_scene[] =
                       "      - isosurface: {field: c, values: [0], colour_by: {field: f}, opacity: 0.5}\n"
                       "      - " VOLUME "\n    sampling: {frames: 2}\n");
 
-static insitu_status hand_over_both(insitu_session *session, insitu_field *cells)
+static insitu_status submit_both(insitu_session *session, insitu_field *cells)
 {
-    const insitu_status status = hand_over(session, &input);
+    const insitu_status status = submit(session, &input);
     return status ? status : insitu_set_field(session, "m", cells);
 }
 
 /* Opening a pipe that nobody writes to would wait for ever. */
-static void scene_that_is_no_file_is_told(void **context)
+static void scene_that_is_no_file_is_reported(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
     const char *scene = write_scene(plain_scene);
     char kept[1100];
     snprintf(kept, sizeof kept, "%s.kept", scene);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     everywhere(own_rank != 0 || (rename(scene, kept) == 0 && mkfifo(scene, 0600) == 0));
     for (int cycle = 1; cycle < 3; cycle++) {
@@ -595,11 +595,11 @@ static void scene_that_is_no_file_is_told(void **context)
     }
     insitu_session *other = NULL;
     const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &other);
-    told_everywhere(NULL, status, INSITU_ERROR_SCENE, scene, "is a named pipe (FIFO), expected a regular file");
+    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, scene, "is a named pipe (FIFO), expected a regular file");
     everywhere(own_rank != 0 || (unlink(scene) == 0 && rename(kept, scene) == 0));
     const insitu_status of_folder = insitu_create(MPI_COMM_WORLD, "/", &other);
-    told_everywhere(NULL, of_folder, INSITU_ERROR_SCENE,
-                    "/: cannot be read: it is a directory, expected a regular file");
+    reported_everywhere(NULL, of_folder, INSITU_ERROR_SCENE,
+                        "/: cannot be read: it is a directory, expected a regular file");
     insitu_destroy(&session);
 }
 
@@ -612,7 +612,7 @@ static void memory_is_given_back(void **context)
     cells.name = "c", cells.centring = INSITU_CELL, cells.count = input.part.cell_count;
     int64_t held = 0;
     for (int cycle = 0; cycle < 4; cycle++) {
-        everywhere(hand_over_both(session, &cells) == INSITU_OK);
+        everywhere(submit_both(session, &cells) == INSITU_OK);
         step_draws(session, cycle, 1);
         everywhere(cycle < 2 || base_memory_held() == held);
         held = base_memory_held();
@@ -631,14 +631,14 @@ static void picture_memory_is_kept_to_a_limit(void **context)
     static const char huge[] = "images:\n  - name: h\n    size: [2049, 2048]\n    layers:\n      - " SURFACE
                                "\n    outputs: [{path: h.png}]\n";
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
     everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 24 * 16 * 20 : 0));
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(large));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) {
         step_draws(session, cycle, 2);
         everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 100 * 70 * 16 : 0));
@@ -646,7 +646,7 @@ static void picture_memory_is_kept_to_a_limit(void **context)
     }
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(huge));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_draws(session, 0, 1);
     everywhere(insitu_last_report(session)->bytes_pictures == 0);
     everywhere(own_rank != 0 || insitu_last_report(session)->bytes_peak >= 2049 * 2048 * 16);
@@ -661,7 +661,7 @@ static void failing_allocation_is_an_error_and_no_more(void **context)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
     insitu_field cells = input.field;
     cells.name = "c", cells.centring = INSITU_CELL, cells.count = input.part.cell_count;
-    everywhere(hand_over_both(session, &cells) == INSITU_OK);
+    everywhere(submit_both(session, &cells) == INSITU_OK);
     step_draws(session, 0, 1);
     const caught_picture first = caught[0];
     caught_count = 0;
@@ -672,19 +672,19 @@ static void failing_allocation_is_an_error_and_no_more(void **context)
             const int64_t count_before = base_memory_allocations();
             const bool is_armed = with_all || own_rank == rank_count - 1;
             base_memory_fail_nth(is_armed ? n : 0);
-            hand_over_both(session, &cells);
+            submit_both(session, &cells);
             const insitu_status status = insitu_step(session, n, 0);
             base_memory_fail_nth(0);
             int is_over = !is_armed || base_memory_allocations() - count_before < n;
             MPI_Allreduce(MPI_IN_PLACE, &is_over, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
             if (is_over) {
-                told_everywhere(session, status, INSITU_OK, "");
+                reported_everywhere(session, status, INSITU_OK, "");
                 break;
             }
             failures += status != INSITU_OK;
             if (status != INSITU_OK && status != INSITU_ERROR_FIELD) /* a field may follow on a refused mesh */
-                told_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
-            everywhere(hand_over_both(session, &cells) == INSITU_OK);
+                reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
+            everywhere(submit_both(session, &cells) == INSITU_OK);
             step_draws(session, n, 1);
             everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
         }
@@ -707,7 +707,7 @@ static void failing_allocation_opens_no_session(void **context)
         const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &session);
         base_memory_fail_nth(0);
         everywhere((status == INSITU_OK) == (session != NULL));
-        if (status != INSITU_OK) told_everywhere(NULL, status, INSITU_ERROR_MEMORY, "memory");
+        if (status != INSITU_OK) reported_everywhere(NULL, status, INSITU_ERROR_MEMORY, "memory");
         insitu_destroy(&session);
         everywhere(base_memory_held() == before);
         if (status == INSITU_OK) break;
@@ -736,7 +736,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(changed_values_are_noticed),
         cmocka_unit_test(moved_mesh_gives_the_moved_picture),
         cmocka_unit_test(plain_layouts_are_not_copied),
-        cmocka_unit_test(what_no_picture_shows_is_left_out),
+        cmocka_unit_test(cells_that_no_picture_shows_are_left_out),
         cmocka_unit_test(mirrored_cells_are_counted),
         cmocka_unit_test(ghosts_are_counted_and_not_drawn),
         cmocka_unit_test(no_cells_anywhere_give_the_background),
@@ -746,13 +746,13 @@ int main(int argc, char **argv)
         cmocka_unit_test(constant_fields_are_drawn),
         cmocka_unit_test(missing_field_leaves_the_other_picture),
         cmocka_unit_test(component_that_is_not_there_is_named),
-        cmocka_unit_test(ranks_at_different_cycles_are_told),
+        cmocka_unit_test(ranks_at_different_cycles_are_reported),
         cmocka_unit_test(images_are_drawn_when_their_time_has_passed),
-        cmocka_unit_test(picture_that_cannot_be_written_is_told_to_all),
+        cmocka_unit_test(picture_that_cannot_be_written_is_reported_on_all_ranks),
         cmocka_unit_test(edited_scene_is_taken_and_a_broken_one_is_not),
         cmocka_unit_test(images_without_outputs_are_for_memory),
         cmocka_unit_test(bad_scene_opens_no_session),
-        cmocka_unit_test(scene_that_is_no_file_is_told),
+        cmocka_unit_test(scene_that_is_no_file_is_reported),
         cmocka_unit_test(memory_is_given_back),
         cmocka_unit_test(picture_memory_is_kept_to_a_limit),
         cmocka_unit_test(failing_allocation_is_an_error_and_no_more),

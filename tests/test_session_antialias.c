@@ -94,11 +94,11 @@ static bool is_mean(const float *rgba, int pixel, int count)
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, int64_t *rays)
 {
     insitu_session *session = open_session(comm, scene);
-    forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
+    discard_pictures();
+    assert_int_equal(submit(session, in), INSITU_OK);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     *rays = insitu_last_report(session)->rays;
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }

@@ -17,7 +17,7 @@ enum {
     MOST = (WIDE + 1) * (WIDE + 1) * (WIDE + 1)
 };
 
-static const int deal[3] = {3, 2, 2}; /* blocks along each axis */
+static const int distribute[3] = {3, 2, 2}; /* blocks along each axis */
 
 static const char *const images[] = {
     "[{isosurface: {field: c, values: [0.55], normals: vertex}}]",
@@ -198,10 +198,11 @@ static void fill_block(block *b)
 
 static void make_block(int number, block *b)
 {
-    const int place[3] = {number % deal[0], number / deal[0] % deal[1], number / deal[0] / deal[1]};
+    const int place[3] = {number % distribute[0], number / distribute[0] % distribute[1],
+                          number / distribute[0] / distribute[1]};
     *b = (block){.number = number};
     for (int axis = 0; axis < 3; axis++) {
-        const int width = CELLS / deal[axis], first = place[axis] * width, end = first + width;
+        const int width = CELLS / distribute[axis], first = place[axis] * width, end = first + width;
         const int low = first > 0, high = end < CELLS;
         b->first[axis] = first - low;
         b->cells[axis] = width + low + high;
@@ -247,7 +248,7 @@ static void destroy_block(block *b)
     free(b->ids);
 }
 
-static bool hand_block(insitu_session *session, const block *b, unsigned changed)
+static bool submit_block(insitu_session *session, const block *b, unsigned changed)
 {
     return set_block(session, b, changed) == INSITU_OK && set_fields(session, b->number, &b->a, set_one_block_field);
 }
@@ -256,7 +257,7 @@ static bool hand_block(insitu_session *session, const block *b, unsigned changed
  * only where slabs meet. */
 static int owner_of(int number)
 {
-    if (are_in_slabs) return number % deal[0] % rank_count;
+    if (are_in_slabs) return number % distribute[0] % rank_count;
     return rank_count < 3 ? number % rank_count : (7 * number + 3) % 11 % (rank_count - 1);
 }
 
@@ -266,7 +267,7 @@ static block blocks[BLOCKS];
 static caught_picture truth[IMAGES];
 static char true_numbers[4096];
 
-static void step_well(insitu_session *session, int cycle)
+static void step_ok(insitu_session *session, int cycle)
 {
     const insitu_status status = insitu_step(session, cycle, cycle);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -283,7 +284,7 @@ static int begin_tests(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, scene());
     everywhere(set_list(session, &list));
     if (!own_rank) remove("numbers.csv");
-    step_well(session, 0);
+    step_ok(session, 0);
     everywhere(own_rank || caught_count == IMAGES);
     for (int i = 0; i < caught_count; i++) truth[i] = caught[i];
     caught_count = 0;
@@ -316,7 +317,7 @@ static void pictures_are_the_truth(void)
         assert_true(covered(&truth[i]) > 100);
         assert_true(same_pictures(&caught[i], &truth[i]));
     }
-    forget_pictures();
+    discard_pictures();
 }
 
 static void blocks_are_the_list_of_their_cells(void **state)
@@ -326,10 +327,10 @@ static void blocks_are_the_list_of_their_cells(void **state)
     insitu_session *session = open_session(MPI_COMM_WORLD, scene());
     bool is_set = true;
     for (int number = 0; number < BLOCKS; number++)
-        if (owner_of(number) == own_rank) is_set = is_set && hand_block(session, &blocks[number], INSITU_CHANGED_ALL);
+        if (owner_of(number) == own_rank) is_set = is_set && submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
     everywhere(is_set);
     if (!own_rank) remove("numbers.csv");
-    step_well(session, 0);
+    step_ok(session, 0);
     pictures_are_the_truth();
     read_file("numbers.csv", sizeof numbers, numbers);
     everywhere(strcmp(numbers, true_numbers) == 0);
@@ -359,10 +360,10 @@ static void blocks_come_and_go(void **state)
             const bool was_here = cycle && (number + (number % 2 ? cycle - 1 : 0)) % rank_count == own_rank;
             if (was_here && !is_here) is_set = is_set && !insitu_set_block(session, "m", number, NULL);
             if (is_here && !(was_here && number % 4 == 0))
-                is_set = is_set && hand_block(session, &blocks[number], was_here ? 0 : INSITU_CHANGED_ALL);
+                is_set = is_set && submit_block(session, &blocks[number], was_here ? 0 : INSITU_CHANGED_ALL);
         }
         everywhere(is_set);
-        step_well(session, cycle);
+        step_ok(session, cycle);
         pictures_are_the_truth();
     }
     insitu_destroy(&session);
@@ -379,11 +380,11 @@ static void whole_and_blocks_replace_each_other(void **state)
         bool is_set = true;
         for (int number = 0; number < BLOCKS && cycle % 2; number++)
             if (number % rank_count == own_rank)
-                is_set = is_set && hand_block(session, &blocks[number], INSITU_CHANGED_ALL);
+                is_set = is_set && submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
         if (cycle % 2 && BLOCKS <= own_rank) is_set = is_set && !insitu_set_mesh(session, "m", NULL);
         if (cycle % 2 == 0) is_set = set_list(session, &list);
         everywhere(is_set);
-        step_well(session, cycle);
+        step_ok(session, cycle);
         pictures_are_the_truth();
     }
     destroy(&list);
@@ -395,10 +396,10 @@ static void whole_and_blocks_replace_each_other(void **state)
 static void set_all(insitu_session *session)
 {
     for (int number = 0; number < BLOCKS; number++)
-        if (owner_of(number) == own_rank) hand_block(session, &blocks[number], INSITU_CHANGED_ALL);
+        if (owner_of(number) == own_rank) submit_block(session, &blocks[number], INSITU_CHANGED_ALL);
 }
 
-static void wrong_calls_are_told_at_once(void **state)
+static void wrong_calls_are_reported_at_once(void **state)
 {
     insitu_field field;
     insitu_mesh mesh;
@@ -421,32 +422,33 @@ static void wrong_calls_are_told_at_once(void **state)
 }
 
 /* One block is spoilt; then it is mended, and the picture is the truth. */
-static void faults_of_one_block_are_told_to_all(void **state)
+static void faults_of_one_block_are_reported_on_all_ranks(void **state)
 {
-    const int spoilt = 5;
-    const bool is_mine = owner_of(spoilt) == own_rank;
+    const int corrupted = 5;
+    const bool is_mine = owner_of(corrupted) == own_rank;
     insitu_mesh mesh;
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, scene());
     set_all(session);
     insitu_mesh_defaults(&mesh);
     mesh.vertex_count = -1;
-    if (is_mine) insitu_set_block(session, "m", spoilt, &mesh);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT, "mesh \"m[5]\": vertex_count is -1");
-    blocks[spoilt].a.hexes[77] = -4; /* by its number it is a list of cells */
-    if (is_mine) hand_block(session, &blocks[spoilt], INSITU_CHANGED_ALL);
-    told_everywhere(session, insitu_step(session, 1, 1), INSITU_ERROR_MESH, "mesh \"m[5]\": cell 9 ");
-    blocks[spoilt].a.hexes[77] = blocks[spoilt].a.hexes[69] + 1;
-    if (is_mine) insitu_set_block(session, "m", spoilt, NULL);
-    destroy_block(&blocks[spoilt]);
-    make_block(spoilt, &blocks[spoilt]);
-    if (is_mine) set_block(session, &blocks[spoilt], INSITU_CHANGED_ALL); /* without its fields */
+    if (is_mine) insitu_set_block(session, "m", corrupted, &mesh);
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT,
+                        "mesh \"m[5]\": vertex_count is -1");
+    blocks[corrupted].a.hexes[77] = -4; /* by its number it is a list of cells */
+    if (is_mine) submit_block(session, &blocks[corrupted], INSITU_CHANGED_ALL);
+    reported_everywhere(session, insitu_step(session, 1, 1), INSITU_ERROR_MESH, "mesh \"m[5]\": cell 9 ");
+    blocks[corrupted].a.hexes[77] = blocks[corrupted].a.hexes[69] + 1;
+    if (is_mine) insitu_set_block(session, "m", corrupted, NULL);
+    destroy_block(&blocks[corrupted]);
+    make_block(corrupted, &blocks[corrupted]);
+    if (is_mine) set_block(session, &blocks[corrupted], INSITU_CHANGED_ALL); /* without its fields */
     if (rank_count > 1 || is_mine)
-        told_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
-                        "mesh \"m[5]\": field \"c\" is not set, other blocks have it");
-    forget_pictures();
-    if (is_mine) hand_block(session, &blocks[spoilt], 0);
-    step_well(session, 3);
+        reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
+                            "mesh \"m[5]\": field \"c\" is not set, other blocks have it");
+    discard_pictures();
+    if (is_mine) submit_block(session, &blocks[corrupted], 0);
+    step_ok(session, 3);
     pictures_are_the_truth();
     insitu_destroy(&session);
 }
@@ -457,7 +459,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(ids_join_blocks),
                                        cmocka_unit_test(blocks_come_and_go),
                                        cmocka_unit_test(whole_and_blocks_replace_each_other),
-                                       cmocka_unit_test(wrong_calls_are_told_at_once),
-                                       cmocka_unit_test(faults_of_one_block_are_told_to_all)};
+                                       cmocka_unit_test(wrong_calls_are_reported_at_once),
+                                       cmocka_unit_test(faults_of_one_block_are_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

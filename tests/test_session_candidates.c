@@ -34,9 +34,9 @@ static insitu_session *open_tree(scene_tree tree, const char *scene)
 /* A step of the one and of the other, which have their meshes: is the picture the same? */
 static void step_both(insitu_session *full, insitu_session *other, int64_t cycle)
 {
-    forget_pictures();
-    told_everywhere(full, insitu_step(full, cycle, 0), INSITU_OK, "");
-    told_everywhere(other, insitu_step(other, cycle, 0), INSITU_OK, "");
+    discard_pictures();
+    reported_everywhere(full, insitu_step(full, cycle, 0), INSITU_OK, "");
+    reported_everywhere(other, insitu_step(other, cycle, 0), INSITU_OK, "");
     if (own_rank == 0) {
         const caught_picture *a = &caught[0], *b = &caught[1];
         const size_t pixels = (size_t)a->width * (size_t)a->height;
@@ -52,7 +52,7 @@ static void step_both(insitu_session *full, insitu_session *other, int64_t cycle
 
 static void step_same(insitu_session *full, insitu_session *other, const session_input *in, int64_t cycle)
 {
-    everywhere(hand_over(full, in) == INSITU_OK && hand_over(other, in) == INSITU_OK);
+    everywhere(submit(full, in) == INSITU_OK && submit(other, in) == INSITU_OK);
     step_both(full, other, cycle);
 }
 
@@ -127,11 +127,11 @@ static void partial_trees_are_of_the_cells_that_show(void **context)
     }
     MPI_Allreduce(&straddling, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
     insitu_session *session = open_tree(SCENE_TREE_PARTIAL, write_scene(IMAGE(SURFACE)));
-    everywhere(hand_over(session, &in) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    everywhere(submit(session, &in) == INSITU_OK);
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(tree_cells(session) == all);
     everywhere(in.part.cell_count == 0 || strstr(insitu_last_report(session)->left_out, "show nothing in this step"));
-    forget_pictures();
+    discard_pictures();
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -148,24 +148,24 @@ static void standing_cells_get_a_full_tree(void **context)
     insitu_session *session = open_tree(SCENE_TREE_AUTO, write_scene(IMAGE(PEAKS)));
     int64_t cycle = 0;
     for (; cycle < 3; cycle++) {
-        everywhere(hand_over(session, &in) == INSITU_OK);
-        told_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+        everywhere(submit(session, &in) == INSITU_OK);
+        reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
         everywhere(tree_cells(session) < all);
     }
     in.mesh.changed = INSITU_CHANGED_NOTHING;
     while (tree_cells(session) < all && cycle < 1000) {
         change_values(&in, 1e-6);
-        everywhere(hand_over(session, &in) == INSITU_OK);
-        told_everywhere(session, insitu_step(session, cycle++, 0), INSITU_OK, "");
-        forget_pictures();
+        everywhere(submit(session, &in) == INSITU_OK);
+        reported_everywhere(session, insitu_step(session, cycle++, 0), INSITU_OK, "");
+        discard_pictures();
     }
     everywhere(tree_cells(session) == all);
     change_values(&in, 1e-6);
-    everywhere(hand_over(session, &in) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+    everywhere(submit(session, &in) == INSITU_OK);
+    reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
     everywhere(insitu_last_report(session)->build_ms == 0 &&
                (insitu_last_report(session)->refit_ms > 0 || in.part.cell_count == 0));
-    forget_pictures();
+    discard_pictures();
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -181,10 +181,10 @@ static void full_trees_are_built_where_most_cells_show(void **context)
     insitu_session *session =
         open_tree(SCENE_TREE_AUTO,
                   write_scene(IMAGE("      - volume: {field: f, range: [-4, 4], opacity: [[0, 0.1], [1, 0.5]]}\n")));
-    everywhere(hand_over(session, &in) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    everywhere(submit(session, &in) == INSITU_OK);
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(tree_cells(session) == all && !session->meshes.items[0]->is_partial);
-    forget_pictures();
+    discard_pictures();
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -208,9 +208,9 @@ static void trees_of_one_step_are_built_fast(void **context)
     static const bool is_anew[] = {true, true, true, false, true}, is_fast[] = {false, true, true, true, false};
     for (int step = 0; step < 5; step++) {
         in.mesh.changed = step ? INSITU_CHANGED_NOTHING : INSITU_CHANGED_ALL;
-        everywhere(hand_over(still, &in) == INSITU_OK);
+        everywhere(submit(still, &in) == INSITU_OK);
         in.mesh.changed = is_anew[step] ? INSITU_CHANGED_ALL : INSITU_CHANGED_NOTHING;
-        everywhere(hand_over(moving, &in) == INSITU_OK);
+        everywhere(submit(moving, &in) == INSITU_OK);
         step_both(still, moving, step);
         everywhere(in.part.cell_count < 100 || (tree_cost(moving) != tree_cost(still)) == is_fast[step]);
     }
@@ -249,9 +249,9 @@ static void compare_moving(const char *images, test_mesh_kind kind)
         change_values(&in, steps[i].change);
         in.mesh.changed = INSITU_CHANGED_ALL;
         in.field.changed = INSITU_CHANGED_VALUES;
-        everywhere(hand_over(anew, &in) == INSITU_OK);
+        everywhere(submit(anew, &in) == INSITU_OK);
         if (i) in.mesh.changed = steps[i].sway != 0 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
-        everywhere(hand_over(kept, &in) == INSITU_OK);
+        everywhere(submit(kept, &in) == INSITU_OK);
         step_both(anew, kept, 3 * i + 2 + i % 2);
         was_partial = was_partial || kept->meshes.items[0]->are_bounds_partial;
         everywhere(!kept->meshes.items[0]->are_bounds_partial || steps[i].is_partial);
@@ -292,9 +292,9 @@ static void bounds_of_one_image_do_not_serve_another(void **context)
         const bool is_moved = i == 1 || i == 2;
         for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.coordinates[3 * v + 2] += is_moved ? 0.12 : 0;
         in.mesh.changed = INSITU_CHANGED_ALL;
-        everywhere(hand_over(anew, &in) == INSITU_OK);
+        everywhere(submit(anew, &in) == INSITU_OK);
         if (i) in.mesh.changed = is_moved ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
-        everywhere(hand_over(kept, &in) == INSITU_OK);
+        everywhere(submit(kept, &in) == INSITU_OK);
         if (i != 1)
             step_both(anew, kept, cycles[i]);
         else

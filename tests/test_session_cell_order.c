@@ -32,7 +32,7 @@ static int place_in(insitu_vertex_order order, int type, int n)
     return n;
 }
 
-static void turn_cells(test_mesh *part, insitu_vertex_order order)
+static void reorder_cells(test_mesh *part, insitu_vertex_order order)
 {
     for (int64_t cell = 0; cell < part->cell_count; cell++) {
         int64_t *first = part->connectivity + part->offsets[cell], held[8];
@@ -113,19 +113,19 @@ static moved move_arrays(session_input *in, layout how)
 typedef struct drawing {
     caught_picture pictures[PICTURES];
     int64_t copied;
-    bool is_warned, tells_why;
+    bool is_warned, gives_reason;
 } drawing;
 
 static drawing step_and_catch(insitu_session *session, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
     const insitu_report *report = insitu_last_report(session);
     drawing out = {.copied = report->bytes_copied,
                    .is_warned = strstr(report->warnings, "INSITU_ORDER_") != NULL,
-                   .tells_why =
+                   .gives_reason =
                        strstr(report->copied_why, "cells' vertices, one after the other in VTK's order") != NULL};
     for (int i = 0; i < PICTURES && own_rank == 0; i++) out.pictures[i] = caught[i];
     caught_count = 0;
@@ -135,7 +135,7 @@ static drawing step_and_catch(insitu_session *session, int cycle)
 static drawing draw(const session_input *in)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
-    const insitu_status status = hand_over(session, in);
+    const insitu_status status = submit(session, in);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
     drawing out = step_and_catch(session, 0);
@@ -158,7 +158,7 @@ static void free_drawing(drawing *d)
 }
 
 /* Tells whether any cell is another one in this order. */
-static bool has_turned(const test_mesh *part, insitu_vertex_order order)
+static bool has_reordered(const test_mesh *part, insitu_vertex_order order)
 {
     bool turned = false;
     for (int64_t cell = 0; cell < part->cell_count; cell++)
@@ -173,16 +173,16 @@ static void check(test_mesh_kind kind, insitu_vertex_order order, layout how, in
     session_input plain = {0}, in = {0};
     input_create(&plain, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-    turn_cells(&in.part, order);
+    reorder_cells(&in.part, order);
     in.mesh.vertex_order = order;
     in.mesh.index_base = base;
     moved plain_arrays = move_arrays(&plain, how >= NARROW ? NARROW : how == ROWS ? PACKED : how);
     moved arrays = move_arrays(&in, how);
     drawing expected = draw(&plain), drawn = draw(&in);
-    const bool is_copied = in.part.cell_count && (in.mesh.connectivity_row || has_turned(&in.part, order));
+    const bool is_copied = in.part.cell_count && (in.mesh.connectivity_row || has_reordered(&in.part, order));
     everywhere(are_same(&expected, &drawn));
     everywhere(drawn.copied == expected.copied + is_copied * 4 * (in.part.connectivity_count + 1));
-    everywhere(drawn.tells_why == is_copied && !drawn.is_warned);
+    everywhere(drawn.gives_reason == is_copied && !drawn.is_warned);
     free_drawing(&expected);
     free_drawing(&drawn);
     free_moved(&plain_arrays);
@@ -212,13 +212,13 @@ static void recognised_cells_go_with_any_order(void **state)
     test_mesh_to_polyhedra(&in.part, 0.5);
     input_describe(&in);
     drawing expected = draw(&in);
-    turn_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
+    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
     in.mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     drawing drawn = draw(&in);
     everywhere(are_same(&expected, &drawn) && expected.copied == drawn.copied);
     in.mesh.keep_polyhedra = 1;
     drawing kept = draw(&in);
-    everywhere(kept.copied < drawn.copied && kept.tells_why);
+    everywhere(kept.copied < drawn.copied && kept.gives_reason);
     free_drawing(&kept);
     free_drawing(&expected);
     free_drawing(&drawn);
@@ -261,18 +261,18 @@ static void the_order_may_be_set_right(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     drawing expected = draw(&in);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
-    turn_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
+    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
     for (int step = 0; step < 3; step++) {
         in.mesh.changed = step == 2 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
         in.mesh.vertex_order = step ? INSITU_ORDER_LEXICOGRAPHIC : INSITU_ORDER_VTK;
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         drawing drawn = step_and_catch(session, step);
         everywhere(drawn.is_warned == (step == 0));
         everywhere(own_rank != 0 || are_same(&expected, &drawn) == (step > 0));
         free_drawing(&drawn);
     }
     insitu_destroy(&session);
-    turn_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC); /* back again */
+    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC); /* back again */
     drawing drawn = draw(&in);
     everywhere(drawn.is_warned);
     free_drawing(&drawn);
@@ -282,12 +282,12 @@ static void the_order_may_be_set_right(void **state)
 
 /* ---- errors --------------------------------------------------------------------------------------------------- */
 
-static moved spoilt;
+static moved corrupted;
 
 static void in_rows(session_input *in)
 {
-    free_moved(&spoilt);
-    spoilt = move_arrays(in, ROWS);
+    free_moved(&corrupted);
+    corrupted = move_arrays(in, ROWS);
 }
 static void unknown_order(session_input *in)
 {
@@ -333,19 +333,19 @@ static void vertex_in_row(session_input *in)
 {
     in_rows(in);
     in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
-    ((int64_t *)spoilt.connectivity)[3 * ROW + 2] = -5;
+    ((int64_t *)corrupted.connectivity)[3 * ROW + 2] = -5;
 }
 /* Cut to 4 bytes it would be a good index. */
 static void far_vertex_in_row(session_input *in)
 {
     in_rows(in);
-    ((int64_t *)spoilt.connectivity)[ROW + 1] = ((int64_t)1 << 32) + 1;
+    ((int64_t *)corrupted.connectivity)[ROW + 1] = ((int64_t)1 << 32) + 1;
 }
 static void vertex_before_one(session_input *in)
 {
     in->mesh.index_base = 1;
     in_rows(in);
-    ((int64_t *)spoilt.connectivity)[ROW + 7] = 0;
+    ((int64_t *)corrupted.connectivity)[ROW + 7] = 0;
 }
 static void offsets_in_order(session_input *in)
 {
@@ -363,7 +363,7 @@ static void type_in_order(session_input *in)
     in->part.types[1] = 99;
 }
 
-static const spoilt_case cases[] = {
+static const corrupted_case cases[] = {
     {"order", unknown_order, INSITU_ERROR_ARGUMENT, true, {"vertex_order is 6, expected 0 (VTK's), 1 (lexicographic)"}},
     {"row -8", negative_row, INSITU_ERROR_MESH, true, {"connectivity_row is -8, a cell has 8 vertices"}},
     {"row 7", short_row, INSITU_ERROR_MESH, true, {"connectivity_row is 7, a cell has 8 vertices"}},
@@ -380,14 +380,14 @@ static const spoilt_case cases[] = {
     {"bad type", type_in_order, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 99"}},
 };
 
-static void what_is_wrong_is_told_to_all(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_told(&in, cases, sizeof cases / sizeof cases[0]);
+    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
-    free_moved(&spoilt);
+    free_moved(&corrupted);
 }
 
 int main(int argc, char **argv)
@@ -395,6 +395,6 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_order_and_layout_draws_the_same), cmocka_unit_test(recognised_cells_go_with_any_order),
         cmocka_unit_test(quads_are_shells_in_any_order), cmocka_unit_test(the_order_may_be_set_right),
-        cmocka_unit_test(what_is_wrong_is_told_to_all)};
+        cmocka_unit_test(wrong_input_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

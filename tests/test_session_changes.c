@@ -28,7 +28,7 @@ static void create_input(void)
 static insitu_session *open_and_draw(void)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 0);
     return session;
 }
@@ -84,7 +84,7 @@ static char *copy_elsewhere(insitu_mesh *mesh, const moved_array *moved)
     return copy;
 }
 
-static void spoilt_arrays_elsewhere_are_told(void **context)
+static void corrupted_arrays_elsewhere_are_reported(void **context)
 {
     (void)context;
     for (size_t i = 0; i < sizeof moved_arrays / sizeof moved_arrays[0]; i++) {
@@ -96,7 +96,7 @@ static void spoilt_arrays_elsewhere_are_told(void **context)
         memcpy(copy + (size_t)moved->at * moved->bytes, &moved->value, moved->bytes == 1 ? 1 : 8);
         everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
         const insitu_status status = insitu_step(session, 1, 0);
-        told_everywhere(session, status, INSITU_ERROR_MESH, "rank 0: mesh \"m\": cell", moved->words);
+        reported_everywhere(session, status, INSITU_ERROR_MESH, "rank 0: mesh \"m\": cell", moved->words);
         insitu_destroy(&session);
         free(copy);
     }
@@ -111,7 +111,7 @@ static void next_picture_is(insitu_session *session, const session_input *now, i
     caught_picture first = {0};
     step_is_good(session, 1);
     if (own_rank == 0) first = caught[0], caught_count = 0;
-    everywhere(hand_over(fresh, now) == INSITU_OK);
+    everywhere(submit(fresh, now) == INSITU_OK);
     step_is_good(fresh, 0);
     everywhere(own_rank != 0 || !memcmp(first.rgba, caught[0].rgba, 4 * pixels * sizeof(float)));
     free(first.rgba);
@@ -174,19 +174,19 @@ static void values_elsewhere_are_drawn(void **context)
     free(values);
 }
 
-static void turn_values(void)
+static void invert_values(void)
 {
     for (int64_t v = 0; v < input.part.vertex_count; v++) input.part.values[v] = 0.5 - input.part.values[v];
 }
 
 /* Values that change in place, and are said not to have or are not set again, are drawn as they are, with a warning. */
-static void values_that_change_without_a_word_are_told(void **context)
+static void values_that_change_without_a_word_are_reported(void **context)
 {
     (void)context;
     static const char words[] = "mesh \"m\": field \"f\" has other values than in the last picture";
     for (int is_set = 0; is_set < 2; is_set++) {
         insitu_session *session = open_and_draw(), *fresh = open_session(MPI_COMM_WORLD, scene);
-        turn_values();
+        invert_values();
         insitu_field unchanged = input.field;
         unchanged.changed = INSITU_CHANGED_NOTHING;
         everywhere(!is_set || insitu_set_field(session, "m", &unchanged) == INSITU_OK);
@@ -194,7 +194,7 @@ static void values_that_change_without_a_word_are_told(void **context)
         everywhere(strstr(insitu_last_report(session)->warnings, words) != NULL);
         step_is_good(session, 2);
         everywhere(!*insitu_last_report(session)->warnings);
-        turn_values();
+        invert_values();
         everywhere(insitu_set_field(session, "m", &input.field) == INSITU_OK);
         next_picture_is(session, &input, fresh);
         everywhere(!*insitu_last_report(session)->warnings);
@@ -221,11 +221,11 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spoilt_arrays_elsewhere_are_told),
+        cmocka_unit_test(corrupted_arrays_elsewhere_are_reported),
         cmocka_unit_test(vertices_elsewhere_are_drawn_there),
         cmocka_unit_test(cells_elsewhere_are_drawn_with_their_fields),
         cmocka_unit_test(values_elsewhere_are_drawn),
-        cmocka_unit_test(values_that_change_without_a_word_are_told),
+        cmocka_unit_test(values_that_change_without_a_word_are_reported),
     };
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -29,7 +29,7 @@ static void make_input(session_input *in)
     input_create(in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
 }
 
-static void forget_files(void)
+static void remove_files(void)
 {
     if (own_rank != 0) return;
     unlink("out/a.cdb/data.csv");
@@ -52,9 +52,9 @@ static void run_steps(const char *scene, const session_input *in, int first, int
     double *values = calloc((size_t)in->part.vertex_count + 1, sizeof *values);
     assert_non_null(values);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    forget_pictures();
+    discard_pictures();
     for (int cycle = first; cycle < end; cycle++) {
-        assert_int_equal(hand_over(session, in), INSITU_OK);
+        assert_int_equal(submit(session, in), INSITU_OK);
         set_second_field(session, in, values);
         const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -114,7 +114,7 @@ static void tables_have_a_line_a_picture(void **state)
     (void)state;
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     run_steps(swept, &in, 0, 5);
     everywhere(is_table(0, 5));
     everywhere(caught_count == (own_rank == 0 ? 24 : 0));
@@ -155,7 +155,7 @@ static void runs_that_begin_again_go_on_with_the_table(void **state)
     static char text[MOST];
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     run_steps(swept, &in, 0, 7);
     run_steps(swept, &in, 3, 7); /* the first picture is of cycle 4 */
     everywhere(is_table(0, 7));
@@ -185,7 +185,7 @@ static void lines_go_from_the_first_step_on(void **state)
     (void)state;
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     run_steps(swept, &in, 0, 5);
     static const char late[] = "images:\n" IMAGE(
         "a", "    camera: {orbit: {views: 2, elevation: [-20, 10.5]}}\n    sweep: {isovalues: true}\n    every: 6\n",
@@ -206,12 +206,12 @@ static void steps_that_go_back_drop_what_was_after(void **state)
     (void)state;
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
     static const int cycles[] = {0, 2, 4, 6, 2, 2};
     for (int i = 0; i < 6; i++) {
-        forget_pictures();
-        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        discard_pictures();
+        assert_int_equal(submit(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycles[i], 0.5 * cycles[i]) == INSITU_OK);
         everywhere(is_table(0, cycles[i] + 1));
     }
@@ -221,26 +221,27 @@ static void steps_that_go_back_drop_what_was_after(void **state)
 
 /* ---- what fails ------------------------------------------------------------------------------------------------ */
 
-static void tables_that_cannot_be_written_are_told_and_written_later(void **state)
+static void tables_that_cannot_be_written_are_reported_and_written_later(void **state)
 {
     (void)state;
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     if (own_rank == 0) mkdir("out/a.cdb/data.csv", 0777);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
-    forget_pictures();
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv", "cannot be");
+    assert_int_equal(submit(session, &in), INSITU_OK);
+    discard_pictures();
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv",
+                        "cannot be");
     everywhere(caught_count == (own_rank == 0 ? 8 : 0));
     if (own_rank == 0) rmdir("out/a.cdb/data.csv");
     put_file("out/a.cdb/data.csv", "a,b\n1,2\n");
-    told_everywhere(session, insitu_step(session, 2, 1), INSITU_ERROR_IO, "out/a.cdb/data.csv", "other columns",
-                    "\"cycle,time,phi,theta,isovalue,FILE\"");
-    forget_files();
+    reported_everywhere(session, insitu_step(session, 2, 1), INSITU_ERROR_IO, "out/a.cdb/data.csv", "other columns",
+                        "\"cycle,time,phi,theta,isovalue,FILE\"");
+    remove_files();
     if (own_rank == 0) mkdir("out/a.cdb/data.js", 0777);
-    forget_pictures();
-    told_everywhere(session, insitu_step(session, 4, 2), INSITU_ERROR_IO, "cinema: out/a.cdb/data.js", "written");
+    discard_pictures();
+    reported_everywhere(session, insitu_step(session, 4, 2), INSITU_ERROR_IO, "cinema: out/a.cdb/data.js", "written");
     if (own_rank == 0) rmdir("out/a.cdb/data.js");
     everywhere(insitu_step(session, 6, 3) == INSITU_OK);
     everywhere(is_table(4, 7)); /* what could not be written at cycle 4 is there */
@@ -254,12 +255,12 @@ static void pictures_that_cannot_be_written_have_no_line(void **state)
     static char text[MOST];
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
-    forget_pictures();
+    assert_int_equal(submit(session, &in), INSITU_OK);
+    discard_pictures();
     unwritable = "_002_";
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "image \"a\"", "a_000000_002_0.25.png");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "image \"a\"", "a_000000_002_0.25.png");
     unwritable = NULL;
     read_file("out/a.cdb/data.csv", MOST, text);
     everywhere(own_rank != 0 || (!strstr(text, "_002_") && strstr(text, "_003_-0.5.png\n")));
@@ -275,12 +276,12 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
     static char text[MOST];
     session_input in = {0};
     make_input(&in);
-    forget_files();
+    remove_files();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     int cycle = 0, failures = 0;
     for (int n = 1; n < 1500; n += 7, cycle += 2) {
-        forget_pictures();
+        discard_pictures();
         if (own_rank == 0) base_memory_fail_nth(n);
         const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
         base_memory_fail_nth(0);
@@ -295,10 +296,10 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
         }
         everywhere(is_whole);
         if (status == INSITU_OK && cycle > 40) break;
-        if (cycle > 80) forget_files(), cycle = 0;
+        if (cycle > 80) remove_files(), cycle = 0;
     }
     everywhere(failures > 3);
-    forget_pictures();
+    discard_pictures();
     everywhere(insitu_step(session, 1000, 500) == INSITU_OK);
     read_file("out/a.cdb/data.csv", MOST, text);
     everywhere(own_rank != 0 || strstr(text, "a_001000_003_-0.5.png\n"));
@@ -309,7 +310,7 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
 /* ---- news ------------------------------------------------------------------------------------------------------ */
 
 /* Compares a database's news with a pattern, in which # stands for a stamp of the scene's file. */
-static bool is_news(const char *path, const char *pattern)
+static bool report_matches(const char *path, const char *pattern)
 {
     static char text[MOST];
     read_file(path, MOST, text);
@@ -325,7 +326,7 @@ static bool is_news(const char *path, const char *pattern)
 
 /* report.json tells what a program that watches the run cannot know otherwise: warnings, errors of steps and of edits.
  */
-static void news_tell_of_warnings_and_edits(void **state)
+static void reports_have_warnings_and_edits(void **state)
 {
     (void)state;
     static const char news[] = "out/n.cdb/report.json";
@@ -338,7 +339,7 @@ static void news_tell_of_warnings_and_edits(void **state)
     const char *scene = write_scene(SCENE("parameters: {a: 0.5, b: -2e+300}\n", "f"));
     char expected[4096];
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     everywhere(insitu_step(session, 0, -0.25) == INSITU_OK);
     const char *warning = insitu_last_report(session)->warnings;
     everywhere(strncmp(warning, "image \"a\": the isosurface", 24) == 0 && !strpbrk(warning, "\n\\"));
@@ -355,7 +356,7 @@ static void news_tell_of_warnings_and_edits(void **state)
              " \"parameters\": {\"a\": 0.5, \"b\": -2.0000000000000001e+300},\n"
              " \"warnings\": [\n  {\"cycle\": 0, \"text\": \"%s\"}]}\n",
              scene, escaped);
-    everywhere(is_news(news, expected));
+    everywhere(report_matches(news, expected));
     if (own_rank == 0) unlink(news);
     everywhere(insitu_step(session, 1, 0) ==
                INSITU_OK); /* nothing is due, nothing is new, but what was never asked for */
@@ -373,8 +374,8 @@ static void news_tell_of_warnings_and_edits(void **state)
                (strstr(text, "\"error\": \"") && strstr(text, ".yaml:2: images[0]: the key \\\"nmae\\\" is unknown") &&
                 strstr(text, "\"a\": 0.5") && !strstr(text, "last edit was not taken")));
     write_scene(SCENE("", "g"));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
-    told_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_FIELD, "\"g\"");
+    assert_int_equal(submit(session, &in), INSITU_OK);
+    reported_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_FIELD, "\"g\"");
     read_file(news, MOST, text);
     everywhere(own_rank != 0 || (strstr(text, "\"error\": null}") && strstr(text, "\"g\\\"") &&
                                  strstr(text, "\"parameters\": {}") && strstr(text, "the scene file was edited")));
@@ -478,10 +479,10 @@ static void conditions_hold_for_all_pictures_of_an_image(void **state)
                         IMAGE("b", "    when: {field: f, below: 50}\n", SURFACE, "{path: b.png}")));
     static const int drawn[] = {1, 6, 0, 1};
     for (int cycle = 0; cycle < 4; cycle++) {
-        forget_pictures();
+        discard_pictures();
         for (int64_t v = 0; v < in.part.vertex_count; v++)
             in.part.values[v] = (cycle == 1 || cycle == 2 ? 100 : 1) * test_linear(in.part.coordinates + 3 * v);
-        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        assert_int_equal(submit(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
         everywhere(insitu_last_report(session)->images == drawn[cycle]);
         everywhere(own_rank != 0 || caught_count == drawn[cycle]);
@@ -492,7 +493,7 @@ static void conditions_hold_for_all_pictures_of_an_image(void **state)
 
 /* An isovalue that the field does not reach is told once, though each picture has one value and is drawn at each step.
  */
-static void warnings_of_swept_isovalues_are_told_once(void **state)
+static void warnings_of_swept_isovalues_are_reported_once(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -503,8 +504,8 @@ static void warnings_of_swept_isovalues_are_told_once(void **state)
                          "a", "    camera: {orbit: {views: 2}}\n    sweep: {isovalues: true}\n",
                          "{isosurface: {field: f, values: [0.25, 1e6, 2e6]}}", "{path: \"a{view}{isovalue}.png\"}")));
     for (int cycle = 0; cycle < 3; cycle++) {
-        forget_pictures();
-        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        discard_pictures();
+        assert_int_equal(submit(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
         const char *warnings = insitu_last_report(session)->warnings;
         everywhere((strstr(warnings, "at 1e+06 is empty") != NULL) == (cycle == 0));
@@ -527,14 +528,14 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(runs_that_begin_again_go_on_with_the_table),
                                        cmocka_unit_test(lines_go_from_the_first_step_on),
                                        cmocka_unit_test(steps_that_go_back_drop_what_was_after),
-                                       cmocka_unit_test(tables_that_cannot_be_written_are_told_and_written_later),
+                                       cmocka_unit_test(tables_that_cannot_be_written_are_reported_and_written_later),
                                        cmocka_unit_test(pictures_that_cannot_be_written_have_no_line),
                                        cmocka_unit_test(tables_stay_whole_where_memory_runs_out),
-                                       cmocka_unit_test(news_tell_of_warnings_and_edits),
+                                       cmocka_unit_test(reports_have_warnings_and_edits),
                                        cmocka_unit_test(sweeps_draw_what_each_image_alone_would),
                                        cmocka_unit_test(orbits_draw_what_each_camera_alone_would),
                                        cmocka_unit_test(paths_draw_what_a_camera_there_would),
                                        cmocka_unit_test(conditions_hold_for_all_pictures_of_an_image),
-                                       cmocka_unit_test(warnings_of_swept_isovalues_are_told_once)};
+                                       cmocka_unit_test(warnings_of_swept_isovalues_are_reported_once)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -63,13 +63,13 @@ static double meet(const ray *r, const half_space *plane)
     return (plane->distance - dot(plane->normal, r->base)) / dot(plane->normal, r->direction);
 }
 
-typedef struct span {
+typedef struct interval {
     double begin, end;
-} span;
+} interval;
 
-static span cut(const ray *r, const half_space *planes, size_t count)
+static interval cut(const ray *r, const half_space *planes, size_t count)
 {
-    span out = {0, INFINITY};
+    interval out = {0, INFINITY};
     for (size_t i = 0; i < count; i++) {
         const double depth = meet(r, &planes[i]);
         if (dot(planes[i].normal, r->direction) > 0)
@@ -80,33 +80,33 @@ static span cut(const ray *r, const half_space *planes, size_t count)
     return out;
 }
 
-static span meet_ball(const ray *r, double radius)
+static interval intersect_ball(const ray *r, double radius)
 {
     double from[3];
     for (int a = 0; a < 3; a++) from[a] = ball[a] - r->base[a];
     const double square = dot(r->direction, r->direction), nearest = dot(from, r->direction) / square;
     const double left = (radius * radius - dot(from, from)) / square + nearest * nearest;
-    return left > 0 ? (span){nearest - sqrt(left), nearest + sqrt(left)} : (span){INFINITY, -INFINITY};
+    return left > 0 ? (interval){nearest - sqrt(left), nearest + sqrt(left)} : (interval){INFINITY, -INFINITY};
 }
 
-static span meet_both(span a, span b)
+static interval intersect_both(interval a, interval b)
 {
-    return (span){fmax(a.begin, b.begin), fmin(a.end, b.end)};
+    return (interval){fmax(a.begin, b.begin), fmin(a.end, b.end)};
 }
 
-static span kept_span(const region *g, const ray *r)
+static interval visible_interval(const region *g, const ray *r)
 {
-    const span within = cut(r, g->planes, g->plane_count);
-    return g->radius > 0 && !g->is_outside ? meet_both(within, meet_ball(r, g->radius)) : within;
+    const interval within = cut(r, g->planes, g->plane_count);
+    return g->radius > 0 && !g->is_outside ? intersect_both(within, intersect_ball(r, g->radius)) : within;
 }
 
-static span hole_span(const region *g, const ray *r)
+static interval hole_interval(const region *g, const ray *r)
 {
-    if (g->is_outside) return meet_ball(r, g->radius);
-    return g->hole_count ? cut(r, g->hole, g->hole_count) : (span){INFINITY, -INFINITY};
+    if (g->is_outside) return intersect_ball(r, g->radius);
+    return g->hole_count ? cut(r, g->hole, g->hole_count) : (interval){INFINITY, -INFINITY};
 }
 
-static span cube_span(const ray *r)
+static interval cube_range(const ray *r)
 {
     return cut(r, cube, 6);
 }
@@ -115,7 +115,7 @@ static span cube_span(const ray *r)
 
 enum { MOST = 3 };
 
-static bool is_at(double depth, span s)
+static bool is_at(double depth, interval s)
 {
     return fabs(depth - s.begin) < 1e-4 || fabs(depth - s.end) < 1e-4;
 }
@@ -123,7 +123,7 @@ static bool is_at(double depth, span s)
 /* Keeps the depths of crossings within the region, in order; -1: rounding decides. */
 static int keep(const region *g, const ray *r, const double *depths, int count, double out[MOST])
 {
-    const span within = kept_span(g, r), hole = hole_span(g, r);
+    const interval within = visible_interval(g, r), hole = hole_interval(g, r);
     int kept = 0;
     for (int i = 0; i < count; i++) {
         if (is_at(depths[i], within) || is_at(depths[i], hole)) return -1;
@@ -135,7 +135,7 @@ static int keep(const region *g, const ray *r, const double *depths, int count, 
 
 static int see_cube(const region *g, const ray *r, double out[MOST])
 {
-    const span s = cube_span(r);
+    const interval s = cube_range(r);
     if (fabs(s.end - s.begin) < 1e-4) return -1;
     if (s.end < s.begin) return 0;
     const double depths[2] = {s.begin, s.end};
@@ -144,7 +144,7 @@ static int see_cube(const region *g, const ray *r, double out[MOST])
 
 static int see_plane(const region *g, const ray *r, double out[MOST])
 {
-    const span s = cube_span(r);
+    const interval s = cube_range(r);
     const double depth = meet(r, &linear);
     if (is_at(depth, s)) return -1;
     if (!(depth > s.begin && depth < s.end)) return 0;
@@ -176,7 +176,7 @@ static bool has_surfaces(const caught_picture *picture, const region *g, see_fun
     return hits > PIXELS / 60 && behind > PIXELS / 80;
 }
 
-static double length_of(span s)
+static double length_of(interval s)
 {
     return fmax(s.end - s.begin, 0);
 }
@@ -188,9 +188,9 @@ static bool has_medium(const caught_picture *picture, const region *g, double me
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         const ray r = ray_of(pixel);
-        const span within = meet_both(cube_span(&r), kept_span(g, &r));
-        const double length =
-            (length_of(within) - length_of(meet_both(within, hole_span(g, &r)))) * sqrt(dot(r.direction, r.direction));
+        const interval within = intersect_both(cube_range(&r), visible_interval(g, &r));
+        const double length = (length_of(within) - length_of(intersect_both(within, hole_interval(g, &r)))) *
+                              sqrt(dot(r.direction, r.direction));
         const double alpha = 1 - pow(0.5, media * length), own = (double)picture->rgba[4 * pixel + 3];
         hits += alpha > 0.1;
         if (fabs(own - alpha) < tolerance) continue;
@@ -292,8 +292,8 @@ static double difference(const caught_picture *a, const caught_picture *b)
     return memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0 ? worst : (double)INFINITY;
 }
 
-static void judge(test_mesh_kind kind, const clip_case *c, const region *g, clip_place place,
-                  const session_input inputs[2])
+static void verify(test_mesh_kind kind, const clip_case *c, const region *g, clip_place place,
+                   const session_input inputs[2])
 {
     const char *scene = scene_of(c, g, place);
     caught_picture ours = draw_scene(MPI_COMM_WORLD, scene, &inputs[1]), alone = {0};
@@ -313,12 +313,12 @@ static void judge(test_mesh_kind kind, const clip_case *c, const region *g, clip
 
 /* Two of the region and place pairs a case, others for each kind of mesh: over all kinds, every case has all of them.
  */
-static void judge_all(test_mesh_kind kind, const session_input inputs[2])
+static void verify_all(test_mesh_kind kind, const session_input inputs[2])
 {
     for (int i = 0; i < CASES; i++)
         for (int turn = 0; turn < 2; turn++) {
             const int pair = (2 * (int)kind + turn + i) % (REGIONS * PLACES);
-            judge(kind, &cases[i], &regions[pair / PLACES], (clip_place)(pair % PLACES), inputs);
+            verify(kind, &cases[i], &regions[pair / PLACES], (clip_place)(pair % PLACES), inputs);
         }
 }
 
@@ -330,9 +330,9 @@ static void layers_are_clipped(void **state)
         memset(inputs, 0, sizeof inputs);
         test_mesh_lattice(kind, SIDE, 0.2, test_linear, &inputs[0].part);
         input_describe(&inputs[0]);
-        take_own_cells(&inputs[0].part, TEST_RANDOM, SIDE, kind % 2, &inputs[1].part);
+        extract_own_cells(&inputs[0].part, TEST_RANDOM, SIDE, kind % 2, &inputs[1].part);
         input_describe(&inputs[1]);
-        judge_all(kind, inputs);
+        verify_all(kind, inputs);
         input_free(&inputs[0]);
         input_free(&inputs[1]);
     }
@@ -352,7 +352,7 @@ static void slices_in_the_clipping_plane_are_seen(void **state)
     bool is_well = true;
     for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) {
         const ray r = ray_of(pixel);
-        const span s = cube_span(&r), box = cut(&r, clips + 1, 4);
+        const interval s = cube_range(&r), box = cut(&r, clips + 1, 4);
         const double depth = meet(&r, &clips[0]);
         if (!(depth > fmax(s.begin, box.begin) + 1e-4 && depth < fmin(s.end, box.end) - 1e-4)) continue;
         hits++;

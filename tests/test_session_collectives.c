@@ -116,7 +116,7 @@ static void count_steps(const counted_scene *s)
     assert_non_null(values);
     for (int64_t i = 0; i < in.part.cell_count; i++) values[i] = test_uniform_in((uint64_t)i, 4, -1, 1);
     cells.name = "c", cells.centring = INSITU_CELL, cells.count = in.part.cell_count, cells.values.data = values;
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &cells) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
@@ -135,7 +135,7 @@ static void count_steps(const counted_scene *s)
     everywhere(insitu_destroy(&session) == INSITU_OK);
     input_free(&in);
     free(values);
-    forget_pictures();
+    discard_pictures();
 }
 
 static void a_step_waits_few_times(void **state)
@@ -147,7 +147,7 @@ static void a_step_waits_few_times(void **state)
 }
 
 /* Whichever way fragments go, the picture is the same, and the report has the way and its bytes. */
-static void schedules_change_no_bit_and_are_told(void **context)
+static void schedules_change_no_bit_and_are_reported(void **context)
 {
     static const char *const names[] = {"auto", "direct", "nodes", "radix", "binary"};
     enum { BYTES = 64 * 48 * 4 * sizeof(float) };
@@ -162,8 +162,8 @@ static void schedules_change_no_bit_and_are_told(void **context)
                  "      - isosurface: {field: f, values: [-0.2, 0.1], opacity: 0.5}\n"
                  "    outputs: [{path: a.exr}]\n");
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
-        everywhere(hand_over(session, &in) == INSITU_OK);
-        told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+        everywhere(submit(session, &in) == INSITU_OK);
+        reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
         const insitu_report *report = insitu_last_report(session);
         int64_t sent = 0;
         MPI_Allreduce(&report->bytes_sent, &sent, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
@@ -173,7 +173,7 @@ static void schedules_change_no_bit_and_are_told(void **context)
                                    : !strcmp(report->schedule, names[i]));
         if (own_rank == 0 && i == 0) memcpy(first, caught[0].rgba, BYTES);
         everywhere(own_rank != 0 || memcmp(first, caught[0].rgba, BYTES) == 0);
-        forget_pictures();
+        discard_pictures();
         insitu_destroy(&session);
     }
     input_free(&in);
@@ -182,6 +182,6 @@ static void schedules_change_no_bit_and_are_told(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_waits_few_times),
-                                       cmocka_unit_test(schedules_change_no_bit_and_are_told)};
+                                       cmocka_unit_test(schedules_change_no_bit_and_are_reported)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

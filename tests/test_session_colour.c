@@ -14,7 +14,7 @@ enum { SIDE = 4 };
 static const test_mesh_kind kind = TEST_MIXED;
 
 static char folder[512], image_name[32];
-static session_input block, dealt;
+static session_input block, distributed;
 
 /* A coloured surface and a volume, both with the keys. */
 static const char *scene_with(const char *surface_keys, const char *volume_keys)
@@ -33,14 +33,14 @@ static const char *scene_with(const char *surface_keys, const char *volume_keys)
 static caught_picture draw_step(insitu_session *session, int cycle)
 {
     step_is_good(session, cycle);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     return picture;
 }
 
 static caught_picture draw(const session_input *in, const char *surface_keys, const char *volume_keys)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with(surface_keys, volume_keys)));
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     const caught_picture picture = draw_step(session, 0);
     insitu_destroy(&session);
     return picture;
@@ -108,7 +108,7 @@ static void check_source(const char *keys, const char *scale, double low, double
     snprintf(by_source, sizeof by_source, "%s, range: %s", scale, keys);
     caught_picture truth = draw(&block, "", fixed), found = draw(&block, "", by_source);
     assert_alike(&found, &truth, 0);
-    truth = draw(&block, "", fixed), found = draw(&dealt, "", by_source);
+    truth = draw(&block, "", fixed), found = draw(&distributed, "", by_source);
     assert_alike(&found, &truth, 1e-6);
 }
 
@@ -158,12 +158,12 @@ static void ranges_over_a_run_widen_and_outlive_it(void **state)
     snprintf(widest, sizeof widest, ", range: [%.17g, %.17g]", 2 * t.least, 2 * t.most);
     free(t.middles);
     remove_ranges();
-    caught_picture plain = draw(&dealt, "", ""), by_data = draw(&dealt, "", ", range: data");
-    caught_picture fixed = draw(&dealt, "", widest);
+    caught_picture plain = draw(&distributed, "", ""), by_data = draw(&distributed, "", ", range: data");
+    caught_picture fixed = draw(&distributed, "", widest);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with(run, run)));
     for (int cycle = 0; cycle < 3; cycle++) {
-        if (cycle) scale_values(&dealt, cycle == 1 ? 2 : 0.5);
-        everywhere(hand_over(session, &dealt) == INSITU_OK);
+        if (cycle) scale_values(&distributed, cycle == 1 ? 2 : 0.5);
+        everywhere(submit(session, &distributed) == INSITU_OK);
         caught_picture picture = draw_step(session, cycle);
         if (cycle == 0)
             assert_alike(&picture, &by_data, 0);
@@ -173,14 +173,14 @@ static void ranges_over_a_run_widen_and_outlive_it(void **state)
     insitu_destroy(&session);
     everywhere(own_rank != 0 || access(ranges_file(), R_OK) == 0);
     /* Another session goes on; volumes alone, as the surface's colours are of another field. */
-    caught_picture again = draw(&dealt, "", run);
+    caught_picture again = draw(&distributed, "", run);
     assert_alike(&again, &fixed, 0);
     /* For another field there is no range yet. */
-    caught_picture other = draw(&dealt, "", ", component: magnitude, range: run"), fresh;
-    fresh = draw(&dealt, "", ", component: magnitude");
+    caught_picture other = draw(&distributed, "", ", component: magnitude, range: run"), fresh;
+    fresh = draw(&distributed, "", ", component: magnitude");
     assert_alike(&other, &fresh, 0);
     remove_ranges();
-    caught_picture anew = draw(&dealt, "", run);
+    caught_picture anew = draw(&distributed, "", run);
     assert_alike(&anew, &plain, 0);
     remove_ranges();
 }
@@ -206,7 +206,7 @@ static void every_kind_of_layer_has_a_range_over_a_run(void **state)
                      "    outputs: [{path: \"%s/a.exr\"}]\n",
                      image_name, layer, folder);
             insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
-            everywhere(hand_over(session, &block) == INSITU_OK);
+            everywhere(submit(session, &block) == INSITU_OK);
             pictures[is_run] = draw_step(session, 0);
             insitu_destroy(&session);
             FILE *file = own_rank == 0 ? fopen(ranges_file(), "r") : NULL;
@@ -220,7 +220,7 @@ static void every_kind_of_layer_has_a_range_over_a_run(void **state)
     remove_ranges();
 }
 
-static void broken_file_of_ranges_is_told_to_all(void **state)
+static void broken_file_of_ranges_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     static const char *const lines[] = {"volume 0 -2 3 1 f", "volume 0 -2 nan 1 f", "volume 0 -2 1 f", "whatever"};
@@ -229,13 +229,13 @@ static void broken_file_of_ranges_is_told_to_all(void **state)
         if (file) fprintf(file, "# kept\nvolume 7 -2 0 1 f\n%s\n", lines[i]);
         if (file) fclose(file);
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with("", ", range: run")));
-        everywhere(hand_over(session, &block) == INSITU_OK);
+        everywhere(submit(session, &block) == INSITU_OK);
         const insitu_status status = insitu_step(session, 0, 0);
-        told_everywhere(session, status, INSITU_ERROR_SCENE, image_name, ".ranges:3: is no range",
-                        "delete the file to begin anew");
+        reported_everywhere(session, status, INSITU_ERROR_SCENE, image_name, ".ranges:3: is no range",
+                            "delete the file to begin anew");
         remove_ranges();
         step_is_good(session, 1);
-        forget_pictures();
+        discard_pictures();
         insitu_destroy(&session);
         remove_ranges();
     }
@@ -341,11 +341,11 @@ static void maps_from_files_are_every_ranks(void **state)
     write_map("[{\"Name\": \"a\", \"RGBPoints\": [0, 0, 0, 1, 5, 1, 1, 0, 10, 1, 0, 0]}]");
     snprintf(keys, sizeof keys, ", map: {file: %s.json}", image_name);
     const char *list = ", map: {colours: [[0, 0, 1], [1, 1, 0], [1, 0, 0]]}";
-    caught_picture by_file = draw(&dealt, keys, keys), by_list = draw(&dealt, list, list);
+    caught_picture by_file = draw(&distributed, keys, keys), by_list = draw(&distributed, list, list);
     assert_alike(&by_file, &by_list, 0);
 }
 
-static void missing_and_broken_maps_are_told_to_all(void **state)
+static void missing_and_broken_maps_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     char keys[128];
@@ -368,7 +368,7 @@ static int begin_tests(void **state)
     snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(scene, '/') - scene), scene);
     snprintf(image_name, sizeof image_name, "colour_np%d", rank_count);
     input_create(&block, kind, SIDE, TEST_BLOCK, own_rank, rank_count);
-    input_create(&dealt, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+    input_create(&distributed, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     return 0;
 }
 
@@ -376,7 +376,7 @@ static int end_tests(void **state)
 {
     (void)state;
     input_free(&block);
-    input_free(&dealt);
+    input_free(&distributed);
     return 0;
 }
 
@@ -388,9 +388,9 @@ int main(int argc, char **argv)
         cmocka_unit_test(every_kind_of_layer_has_a_range_over_a_run),
         cmocka_unit_test(volumes_have_bands_and_colours_outside),
         cmocka_unit_test(points_of_the_opacity_are_where_the_scale_has_them),
-        cmocka_unit_test(broken_file_of_ranges_is_told_to_all),
+        cmocka_unit_test(broken_file_of_ranges_is_reported_on_all_ranks),
         cmocka_unit_test(maps_from_files_are_every_ranks),
-        cmocka_unit_test(missing_and_broken_maps_are_told_to_all),
+        cmocka_unit_test(missing_and_broken_maps_are_reported_on_all_ranks),
     };
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -120,7 +120,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shells *s)
     insitu_session *session = open_session(comm, scene);
     insitu_mesh mesh;
     insitu_field field;
-    forget_pictures();
+    discard_pictures();
     insitu_mesh_defaults(&mesh);
     mesh.vertex_count = s->vertex_count;
     insitu_mesh_interleaved(&mesh, s->coordinates, INSITU_FLOAT64);
@@ -138,7 +138,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shells *s)
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -179,7 +179,7 @@ static truth truth_at(const tile tiles[TILES], int pixel)
     return out;
 }
 
-typedef bool judge_function(const truth *t, const double at[2], const float *rgba, float depth);
+typedef bool verify_function(const truth *t, const double at[2], const float *rgba, float depth);
 
 /* Depths and colours to what test_session_surfaces.c derives. */
 static bool is_value(const truth *t, const double at[2], const float *rgba, float depth)
@@ -220,7 +220,8 @@ static bool is_clipped(const truth *t, const double at[2], const float *rgba, fl
     return is_value(&cut, at, rgba, depth);
 }
 
-static bool is_well(const tile tiles[TILES], const caught_picture *picture, judge_function *judge, const char *what)
+static bool is_correct(const tile tiles[TILES], const caught_picture *picture, verify_function *verify,
+                       const char *what)
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
@@ -229,7 +230,7 @@ static bool is_well(const tile tiles[TILES], const caught_picture *picture, judg
         double at[2];
         place_of(pixel, at);
         hits += rgba[3] > 0;
-        if (judge(&t, at, rgba, picture->depth[pixel])) continue;
+        if (verify(&t, at, rgba, picture->depth[pixel])) continue;
         fprintf(stderr, "%s: (%g, %g): opacity %g, grey %g, depth %g; hit %d, %g from an edge, depth %g\n", what, at[0],
                 at[1], (double)rgba[3], (double)rgba[0], (double)picture->depth[pixel], t.is_hit, t.margin, t.depth);
         return false;
@@ -240,13 +241,13 @@ static bool is_well(const tile tiles[TILES], const caught_picture *picture, judg
 static bool are_one(const caught_picture *a, const caught_picture *b, const char *what)
 {
     if (same_pictures(a, b)) return true;
-    for (int pixel = 0, told = 0; pixel < PIXELS && told < 5; pixel++) {
+    for (int pixel = 0, reported = 0; pixel < PIXELS && reported < 5; pixel++) {
         double at[2];
         place_of(pixel, at);
         if (memcmp(a->rgba + 4 * (ptrdiff_t)pixel, b->rgba + 4 * (ptrdiff_t)pixel, 4 * sizeof(float)) == 0 &&
             a->depth[pixel] == b->depth[pixel])
             continue;
-        told++;
+        reported++;
         fprintf(stderr, "%s: (%g, %g): %.9g, %.9g on ranks, %.9g, %.9g on one\n", what, at[0], at[1],
                 (double)a->rgba[4 * pixel], (double)a->depth[pixel], (double)b->rgba[4 * pixel],
                 (double)b->depth[pixel]);
@@ -259,7 +260,7 @@ static void concave_shells_are_what_they_are(void **state)
     (void)state;
     static const struct {
         const char *what, *scene;
-        judge_function *judge;
+        verify_function *verify;
     } cases[] = {
         {"values", IMAGE("", BY_FIELD), is_value},
         {"light", IMAGE("", "colour: [1, 1, 1]"), is_lit},
@@ -277,7 +278,8 @@ static void concave_shells_are_what_they_are(void **state)
         bool is_good = true;
         if (own_rank == 0) {
             alone = draw(MPI_COMM_SELF, scene, &whole);
-            is_good = is_well(tiles, &alone, cases[i].judge, cases[i].what) && are_one(&ours, &alone, cases[i].what);
+            is_good =
+                is_correct(tiles, &alone, cases[i].verify, cases[i].what) && are_one(&ours, &alone, cases[i].what);
         }
         everywhere(is_good);
         free_caught(&ours);
@@ -301,12 +303,12 @@ static void concave_prisms_have_their_tops(void **state)
             const int around = (int)in.part.vertex_count / 2;
             for (int i = 0; i < around; i++)
                 add(&top, in.part.coordinates[3 * (around + i)], in.part.coordinates[3 * (around + i) + 1]);
-            if (turn) test_mesh_turn(&in.part, turn);
+            if (turn) test_mesh_reorder_vertices(&in.part, turn);
             input_describe(&in);
             bool is_good = true;
             if (own_rank == 0) {
                 insitu_session *session = open_drawn(MPI_COMM_SELF, scene, &in);
-                caught_picture picture = take_caught();
+                caught_picture picture = pop_caught_picture();
                 for (int pixel = 0; pixel < PIXELS && is_good; pixel++) {
                     double at[3] = {0, 0, 0.45}, margin = INFINITY;
                     place_of(pixel, at);

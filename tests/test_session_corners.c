@@ -44,9 +44,9 @@ typedef struct form {
 typedef struct values {
     int64_t corners;
     double *at_vertices, *at_corners, *at_cells, *gathered;
-    double *dealt;  /* corners' values as the form has them */
-    int64_t *index; /* NULL: none */
-    int64_t dealt_count;
+    double *distributed; /* corners' values as the form has them */
+    int64_t *index;      /* NULL: none */
+    int64_t distributed_count;
     double *coordinates; /* of the doubled mesh */
     int64_t *connectivity, *ids, *doubled_ids;
 } values;
@@ -81,16 +81,16 @@ static int64_t corner_place(const form *of, const test_mesh *part, int64_t cell,
 
 static void fill(values *v, const form *of, const test_mesh *part, double scale)
 {
-    for (int64_t i = 0; i < v->dealt_count; i++) v->dealt[i] = (double)NAN;
+    for (int64_t i = 0; i < v->distributed_count; i++) v->distributed[i] = (double)NAN;
     for (int64_t i = 0; i < part->vertex_count; i++) v->at_vertices[i] = scale * part->values[i];
     for (int64_t cell = 0; cell < part->cell_count; cell++) {
         v->at_cells[cell] = own_of(part, cell);
         for (int64_t i = part->offsets[cell]; i < part->offsets[cell + 1]; i++) {
             const int64_t place = corner_place(of, part, cell, i),
-                          at = of->is_by_index ? v->dealt_count - 1 - i : place;
+                          at = of->is_by_index ? v->distributed_count - 1 - i : place;
             v->at_corners[i] = scale * (part->values[part->connectivity[i]] + own_of(part, cell));
             v->gathered[i] = v->at_vertices[part->connectivity[i]];
-            v->dealt[at] = v->at_corners[i];
+            v->distributed[at] = v->at_corners[i];
             if (of->is_by_index) v->index[place] = at;
         }
     }
@@ -114,9 +114,9 @@ static values make_values(const form *of, const test_mesh *part)
                 .at_corners = numbers(corners),
                 .at_cells = numbers(part->cell_count),
                 .gathered = numbers(corners),
-                .dealt = numbers(places + corners),
+                .distributed = numbers(places + corners),
                 .index = integers(places),
-                .dealt_count = places + (of->is_by_index ? 5 : 0),
+                .distributed_count = places + (of->is_by_index ? 5 : 0),
                 .coordinates = numbers(3 * corners)};
     v.connectivity = integers(corners);
     v.ids = integers(part->vertex_count);
@@ -129,12 +129,13 @@ static values make_values(const form *of, const test_mesh *part)
 
 static void free_values(values *v)
 {
-    free(v->at_vertices), free(v->at_corners), free(v->at_cells), free(v->gathered), free(v->dealt), free(v->index);
+    free(v->at_vertices), free(v->at_corners), free(v->at_cells), free(v->gathered), free(v->distributed),
+        free(v->index);
     free(v->coordinates), free(v->connectivity), free(v->ids), free(v->doubled_ids);
 }
 
 /* Each cell's vertices in lexicographic order: a turn that is its own inverse. */
-static void turn_hexes(test_mesh *part)
+static void sort_hex_vertices(test_mesh *part)
 {
     for (int64_t i = 0; i + 3 < part->connectivity_count; i += 4) {
         const int64_t third = part->connectivity[i + 2];
@@ -166,7 +167,7 @@ static insitu_mesh shape_mesh(const session_input *in, const values *v, const fo
 }
 
 static void set_field(insitu_session *session, const char *name, insitu_centring centring, int64_t count,
-                      const double *of, const form *dealt, const values *v)
+                      const double *of, const form *distributed, const values *v)
 {
     insitu_field field;
     insitu_field_defaults(&field);
@@ -174,8 +175,8 @@ static void set_field(insitu_session *session, const char *name, insitu_centring
     field.centring = centring;
     field.count = count;
     field.values = (insitu_array){of, INSITU_FLOAT64, 0};
-    if (dealt && dealt->is_by_index) field.index = (insitu_array){v->index, INSITU_INT64, 0};
-    if (dealt && dealt->is_in_rows) field.corner_row = ROW;
+    if (distributed && distributed->is_by_index) field.index = (insitu_array){v->index, INSITU_INT64, 0};
+    if (distributed && distributed->is_in_rows) field.corner_row = ROW;
     const insitu_status status = insitu_set_field(session, "m", &field);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -190,7 +191,7 @@ static void set_fields(insitu_session *session, const session_input *in, const v
         set_field(session, "f", INSITU_VERTEX, v->corners, v->at_corners, NULL, v);
         set_field(session, "g", INSITU_VERTEX, v->corners, v->gathered, NULL, v);
     } else {
-        set_field(session, "f", INSITU_CORNER, v->dealt_count, v->dealt, of, v);
+        set_field(session, "f", INSITU_CORNER, v->distributed_count, v->distributed, of, v);
         set_field(session, "g", INSITU_VERTEX, part->vertex_count, v->at_vertices, NULL, v);
     }
 }
@@ -204,7 +205,7 @@ typedef struct drawing {
 
 static void step_and_catch(insitu_session *session, int cycle, caught_picture out[PICTURES])
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -261,7 +262,7 @@ static void check(test_mesh_kind kind, const form *of)
     session_input in = {0};
     input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     if (of->has_ids && rank_count > 1) return input_free(&in); /* the ids are of one rank */
-    if (of->is_lexicographic) turn_hexes(&in.part);
+    if (of->is_lexicographic) sort_hex_vertices(&in.part);
     values v = make_values(of, &in.part);
     drawing doubled = draw(&in, &v, of, true), torn = draw(&in, &v, of, false);
     /* coordinates and an index a corner, g, and f where it is not read in place */
@@ -272,7 +273,7 @@ static void check(test_mesh_kind kind, const form *of)
     input_free(&in);
 }
 
-static void torn_cells_are_those_of_doubled_vertices(void **state)
+static void corner_fields_match_duplicated_vertices(void **state)
 {
     (void)state;
     static const form forms[] = {{0}, {.is_by_index = true}, {.has_ids = true}};
@@ -377,7 +378,7 @@ static void unknown_centring(session_input *in)
     in->field.centring = (insitu_centring)3;
 }
 
-static const spoilt_case cases[] = {
+static const corrupted_case cases[] = {
     {"few", too_few, INSITU_ERROR_FIELD, true, {"field \"f\": has ", "corners of cells"}},
     {"polyhedra", of_owned_cells, INSITU_ERROR_FIELD, true, {"the mesh has polyhedra, whose corners have no order"}},
     {"short", in_short_rows, INSITU_ERROR_FIELD, true, {"corner_row is 7, a cell has 8 vertices"}},
@@ -386,17 +387,17 @@ static const spoilt_case cases[] = {
     {"centring", unknown_centring, INSITU_ERROR_ARGUMENT, true, {"unknown centring 3"}},
 };
 
-static void what_is_wrong_is_told_to_all(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_told(&in, cases, sizeof cases / sizeof cases[0]);
+    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
 }
 
 /* These are seen by a step; the centring is one on all ranks. */
-static void what_arrays_hold_is_told_to_all(void **state)
+static void wrong_array_contents_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -405,12 +406,12 @@ static void what_arrays_hold_is_told_to_all(void **state)
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
     values v = make_values(&of, &in.part);
     everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
-    set_field(session, "f", INSITU_CORNER, v.dealt_count, v.dealt, &of, &v);
+    set_field(session, "f", INSITU_CORNER, v.distributed_count, v.distributed, &of, &v);
     const int64_t good = v.index[9];
-    if (own_rank == rank_count - 1) v.index[9] = v.dealt_count;
+    if (own_rank == rank_count - 1) v.index[9] = v.distributed_count;
     for (int step = 0; step < 2; step++)
-        told_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD, "the index of corner 9 is ",
-                        "outside 0..");
+        reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD, "the index of corner 9 is ",
+                            "outside 0..");
     v.index[9] = good;
     step_is_good(session, 2);
     insitu_destroy(&session);
@@ -423,7 +424,8 @@ static void what_arrays_hold_is_told_to_all(void **state)
     assert_non_null(zeros);
     everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
     set_field(session, "f", INSITU_CORNER, in.part.connectivity_count, zeros, NULL, NULL);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "is a polyhedron, whose corners", "cell ");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "is a polyhedron, whose corners",
+                        "cell ");
     insitu_destroy(&session);
     free(zeros);
     input_free(&in);
@@ -431,10 +433,10 @@ static void what_arrays_hold_is_told_to_all(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(torn_cells_are_those_of_doubled_vertices),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(corner_fields_match_duplicated_vertices),
                                        cmocka_unit_test(corners_in_rows_and_other_orders_are_plain_ones),
                                        cmocka_unit_test(joined_corners_have_their_means),
-                                       cmocka_unit_test(what_is_wrong_is_told_to_all),
-                                       cmocka_unit_test(what_arrays_hold_is_told_to_all)};
+                                       cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
+                                       cmocka_unit_test(wrong_array_contents_are_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

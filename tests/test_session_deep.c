@@ -134,7 +134,7 @@ static void free_pictures(two_pictures *pictures)
     free_caught(&pictures->deep);
 }
 
-static bool judge_case(const deep_case *c, const session_input *whole, const session_input *part)
+static bool verify_case(const deep_case *c, const session_input *whole, const session_input *part)
 {
     const char *scene = write_scene(c->scene);
     two_pictures ours = draw(MPI_COMM_WORLD, scene, part), alone = {0};
@@ -152,13 +152,13 @@ static bool judge_case(const deep_case *c, const session_input *whole, const ses
     return is_well;
 }
 
-static void judge(test_mesh_kind kind, test_partition_kind dealt)
+static void verify(test_mesh_kind kind, test_partition_kind distributed)
 {
     session_input whole = {0}, part = {0};
-    input_create(&whole, kind, SIDE, dealt, 0, 1);
-    input_create(&part, kind, SIDE, dealt, own_rank, rank_count);
+    input_create(&whole, kind, SIDE, distributed, 0, 1);
+    input_create(&part, kind, SIDE, distributed, own_rank, rank_count);
     for (int i = 0; i < CASES; i++) {
-        const bool is_well = judge_case(&cases[i], &whole, &part);
+        const bool is_well = verify_case(&cases[i], &whole, &part);
         if (!is_well) fprintf(stderr, "%s: %s\n", test_mesh_kind_name(kind), cases[i].name);
         everywhere(is_well);
     }
@@ -169,10 +169,10 @@ static void judge(test_mesh_kind kind, test_partition_kind dealt)
 static void deep_pictures_are_the_flat_ones(void **state)
 {
     (void)state;
-    judge(TEST_TETS, TEST_BLOCK);
-    judge(TEST_HEXES, TEST_CHECKERBOARD);
-    judge(TEST_POLYHEDRA, TEST_RANDOM);
-    judge(TEST_MIXED, TEST_RANDOM);
+    verify(TEST_TETS, TEST_BLOCK);
+    verify(TEST_HEXES, TEST_CHECKERBOARD);
+    verify(TEST_POLYHEDRA, TEST_RANDOM);
+    verify(TEST_MIXED, TEST_RANDOM);
 }
 
 int main(int argc, char **argv)

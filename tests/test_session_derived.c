@@ -73,7 +73,7 @@ static insitu_session *begin(MPI_Comm comm, const char *scene, const session_inp
     insitu_status status = insitu_create_from_text(comm, scene, &session);
     if (status) fprintf(stderr, "%s\n", insitu_error(NULL));
     assert_int_equal(status, INSITU_OK);
-    assert_int_equal(hand_over(session, in), INSITU_OK);
+    assert_int_equal(submit(session, in), INSITU_OK);
     if (u) assert_int_equal(insitu_set_field(session, "m", &u->field), INSITU_OK);
     return session;
 }
@@ -330,13 +330,13 @@ static void partitions_do_not_show(void **state)
     static const char *const names[] = {"q", "w", "l", "mixed"};
     static const char scene[] = "threads: 1\n" PARTITION_SCENE, two_threads[] = "threads: 2\n" PARTITION_SCENE;
     for (int kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (test_partition_kind dealt = TEST_BLOCK; dealt <= TEST_RANDOM; dealt++) {
+        for (test_partition_kind distributed = TEST_BLOCK; distributed <= TEST_RANDOM; distributed++) {
             session_input whole = {0}, in = {0};
             vector_field u, c, whole_u, whole_c;
             test_mesh_lattice((test_mesh_kind)kind, SIDE, 0.2, test_wave, &whole.part);
             input_describe(&whole);
-            take_own_cells(&whole.part, dealt, SIDE, kind == TEST_HEXES, &in.part);
-            if (kind != TEST_POLYHEDRA) test_mesh_turn(&in.part, (uint64_t)own_rank + 3);
+            extract_own_cells(&whole.part, distributed, SIDE, kind == TEST_HEXES, &in.part);
+            if (kind != TEST_POLYHEDRA) test_mesh_reorder_vertices(&in.part, (uint64_t)own_rank + 3);
             input_describe(&in);
             make_vector(&in.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &u);
             make_vector(&whole.part, swirl, INSITU_VERTEX, kind % 2 == 0, "u", &whole_u);
@@ -369,7 +369,7 @@ static void blocks_show_no_seam(void **state)
     (void)state;
     static const char *const meshes[] = {"m", "n"};
     const char *const scene = SCENE("q: {q_criterion: u}", "q");
-    for (test_partition_kind dealt = TEST_BLOCK; dealt <= TEST_RANDOM; dealt++) {
+    for (test_partition_kind distributed = TEST_BLOCK; distributed <= TEST_RANDOM; distributed++) {
         session_input whole = {0}, parts[2] = {0};
         vector_field whole_u, u[2];
         test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &whole.part);
@@ -378,7 +378,7 @@ static void blocks_show_no_seam(void **state)
         insitu_session *alone = open_stepped(MPI_COMM_SELF, scene, &whole, &whole_u), *session = NULL;
         int *owners = calloc((size_t)whole.part.cell_count, sizeof *owners);
         assert_non_null(owners);
-        test_partition(&whole.part, dealt, SIDE, 2 * rank_count, owners);
+        test_partition(&whole.part, distributed, SIDE, 2 * rank_count, owners);
         assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, scene, &session), INSITU_OK);
         for (int i = 0; i < 2; i++) {
             test_mesh_part(&whole.part, owners, 2 * own_rank + i, &parts[i].part);
@@ -562,7 +562,7 @@ static void an_edited_scene_has_its_own(void **state)
     make_vector(&in.part, linear, INSITU_VERTEX, true, "u", &u);
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene(SCENE("a: u.x + 0, b: {gradient: a}, c: b.y + f", "c")));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    assert_int_equal(submit(session, &in), INSITU_OK);
     step_again(session, &u, INSITU_CHANGED_ALL, 0);
     everywhere(in.part.cell_count == 0 || fabs(value_of(session, "b", 1, 0) - slopes[0][1]) < 1e-9);
     write_scene(SCENE("longer: u.z + 0, a: {gradient: longer, component: y}, c: a - longer", "c"));
@@ -597,7 +597,7 @@ static const wrong_case wrong[] = {
 };
 
 /* Each is told in the step, to all ranks alike, with the line; an image of other fields is drawn all the same. */
-static void what_is_wrong_is_told_to_all(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -615,13 +615,13 @@ static void what_is_wrong_is_told_to_all(void **state)
         insitu_session *session = begin(MPI_COMM_WORLD, scene, &in, &u);
         assert_int_equal(insitu_set_field(session, "m", &velocity.field), INSITU_OK);
         for (int cycle = 0; cycle < 2; cycle++) {
-            forget_pictures();
+            discard_pictures();
             const insitu_status status = insitu_step(session, cycle, 0);
             if (is_right)
                 everywhere(status == INSITU_OK);
             else
-                told_everywhere(session, status, INSITU_ERROR_FIELD, ":1: ", wrong[i].words[0], wrong[i].words[1],
-                                wrong[i].words[2]);
+                reported_everywhere(session, status, INSITU_ERROR_FIELD, ":1: ", wrong[i].words[0], wrong[i].words[1],
+                                    wrong[i].words[2]);
             everywhere(own_rank != 0 || caught_count == (is_right ? 2 : 1));
         }
         insitu_destroy(&session);
@@ -633,7 +633,7 @@ static void what_is_wrong_is_told_to_all(void **state)
 
 /* A name that the simulation has, too; one that is nearly a derived field's; and a field whose components differ on one
  * rank. */
-static void clashes_are_told_to_all(void **state)
+static void clashes_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -642,13 +642,13 @@ static void clashes_are_told_to_all(void **state)
     make_vector(&in.part, swirl, INSITU_VERTEX, true, "u", &u);
     insitu_session *session = begin(MPI_COMM_WORLD, SCENE("f: u.x + 1", "f"), &in, &u);
     insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, ":1: fields.f: mesh \"m\" has a field of this name already",
-                    "expected another name");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD,
+                        ":1: fields.f: mesh \"m\" has a field of this name already", "expected another name");
     insitu_destroy(&session);
     session = begin(MPI_COMM_WORLD, SCENE("speed: mag(u)", "sped"), &in, &u);
     status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, "no mesh has the field \"sped\" (did you mean speed?)",
-                    "there are: ");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, "no mesh has the field \"sped\" (did you mean speed?)",
+                        "there are: ");
     insitu_destroy(&session);
     /* It may come later. */
     session = open_stepped(MPI_COMM_WORLD, SCENE("late: u.x + 1", "late"), &in, &u);
@@ -656,15 +656,16 @@ static void clashes_are_told_to_all(void **state)
     late.name = "late";
     assert_int_equal(insitu_set_field(session, "m", &late), INSITU_OK);
     status = insitu_step(session, 1, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, "fields.late: mesh \"m\" has a field of this name already");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD,
+                        "fields.late: mesh \"m\" has a field of this name already");
     insitu_destroy(&session);
     if (rank_count > 1) {
         session = begin(MPI_COMM_WORLD, SCENE("q: {q_criterion: u}", "q"), &in, NULL);
         if (own_rank == rank_count - 1) u.field.component_count = 2;
         assert_int_equal(insitu_set_field(session, "m", &u.field), INSITU_OK);
         status = insitu_step(session, 0, 0);
-        told_everywhere(session, status, INSITU_ERROR_FIELD, "fields.q.q_criterion: rank ", "field \"u\"",
-                        "another centring or number of components");
+        reported_everywhere(session, status, INSITU_ERROR_FIELD, "fields.q.q_criterion: rank ", "field \"u\"",
+                            "another centring or number of components");
         insitu_destroy(&session);
     }
     free(u.values);
@@ -674,11 +675,16 @@ static void clashes_are_told_to_all(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(linear_velocities_are_exact),     cmocka_unit_test(expressions_are_those_of_c),
-        cmocka_unit_test(partitions_do_not_show),          cmocka_unit_test(blocks_show_no_seam),
-        cmocka_unit_test(gradients_of_shells_lie_in_them), cmocka_unit_test(velocities_of_cells_and_corners_are_taken),
-        cmocka_unit_test(what_stays_is_not_made_again),    cmocka_unit_test(an_edited_scene_has_its_own),
-        cmocka_unit_test(what_is_wrong_is_told_to_all),    cmocka_unit_test(clashes_are_told_to_all),
+        cmocka_unit_test(linear_velocities_are_exact),
+        cmocka_unit_test(expressions_are_those_of_c),
+        cmocka_unit_test(partitions_do_not_show),
+        cmocka_unit_test(blocks_show_no_seam),
+        cmocka_unit_test(gradients_of_shells_lie_in_them),
+        cmocka_unit_test(velocities_of_cells_and_corners_are_taken),
+        cmocka_unit_test(what_stays_is_not_made_again),
+        cmocka_unit_test(an_edited_scene_has_its_own),
+        cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
+        cmocka_unit_test(clashes_are_reported_on_all_ranks),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

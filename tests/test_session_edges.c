@@ -170,7 +170,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
 {
     insitu_session *session = open_drawn(comm, scene, in);
     if (b) *b = make_body(&session_find_mesh(&session->meshes, "m")->cells, in->part.cell_count > 1);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -256,7 +256,7 @@ static void any_ranks_draw_one_picture(void **state)
         input_create(&whole, kind, SIDE, TEST_BLOCK, 0, 1);
         if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole, NULL);
         input_create(&part, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-        test_mesh_turn(&part.part, 3 + (uint64_t)own_rank);
+        test_mesh_reorder_vertices(&part.part, 3 + (uint64_t)own_rank);
         test_mesh_shuffle(&part.part, 7 + (uint64_t)own_rank);
         input_describe(&part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);

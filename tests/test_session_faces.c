@@ -152,7 +152,7 @@ static void coordinate_nan(session_input *in)
 
 #define CELL_0 "cell 0 (polyhedron): "
 
-static const spoilt_case at_once[] = {
+static const corrupted_case at_once[] = {
     {"no face offsets", no_face_offsets, INSITU_ERROR_MESH, true, {"face offsets are not given"}},
     {"no face vertices", no_face_vertices, INSITU_ERROR_MESH, true, {"face vertex indices are not given"}},
     {"face count", face_count_negative, INSITU_ERROR_ARGUMENT, true, {"face_count is -5"}},
@@ -169,7 +169,7 @@ static const spoilt_case at_once[] = {
      {"offsets are not given: polyhedra need them"}},
 };
 
-static const spoilt_case at_the_step[] = {
+static const corrupted_case at_the_step[] = {
     {"no faces at all",
      no_faces_at_all,
      INSITU_ERROR_MESH,
@@ -250,30 +250,31 @@ static const spoilt_case at_the_step[] = {
     {"NaN", coordinate_nan, INSITU_ERROR_MESH, false, {CELL_0, "vertex 0 has a coordinate that is not finite"}},
 };
 
-static void spoilt_arrays_are_told_at_once(void **context)
+static void corrupted_arrays_are_reported_at_once(void **context)
 {
     (void)context;
-    for (size_t i = 0; i < sizeof at_once / sizeof at_once[0]; i++) spoilt_is_told_to_all(session, &input, &at_once[i]);
+    for (size_t i = 0; i < sizeof at_once / sizeof at_once[0]; i++)
+        corrupted_is_reported_on_all_ranks(session, &input, &at_once[i]);
 }
 
-static void spoilt_faces_are_told_at_the_step(void **context)
+static void corrupted_faces_are_reported_at_the_step(void **context)
 {
     (void)context;
     for (size_t i = 0; i < sizeof at_the_step / sizeof at_the_step[0]; i++)
-        spoilt_is_told_to_all(session, &input, &at_the_step[i]);
+        corrupted_is_reported_on_all_ranks(session, &input, &at_the_step[i]);
 }
 
 /* A ghost is not drawn: its vertices may be anywhere, its faces must be faces all the same. */
 static void ghosts_are_proved_but_for_coordinates(void **context)
 {
     (void)context;
-    static const spoilt_case ghost = {
+    static const corrupted_case ghost = {
         "ghost", face_vertex_large, INSITU_ERROR_MESH, false, {CELL_0 "face 0: vertex index 1000000 is outside 0.."}};
     for (int64_t cell = 0; cell < input.part.cell_count; cell++) input.part.ghosts[cell] = 1;
     coordinate_nan(&input);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     everywhere(insitu_step(session, 3, 0) == INSITU_OK);
-    spoilt_is_told_to_all(session, &input, &ghost);
+    corrupted_is_reported_on_all_ranks(session, &input, &ghost);
 }
 
 /* ---- cells of no volume -------------------------------------------------------------------------------------- */
@@ -315,7 +316,7 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
 {
     (void)context;
     session_input more = input;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 5);
     everywhere(insitu_last_report(session)->cells_flat == 0);
     const size_t numbers = own_rank == 0 ? (size_t)4 * 24 * 16 : 0;
@@ -323,12 +324,12 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
     if (own_rank == 0) memcpy(before, caught[0].rgba, numbers * sizeof *before);
     const int64_t flat = add_flat_cells(&input.part, &more.part);
     input_describe(&more);
-    everywhere(hand_over(session, &more) == INSITU_OK);
+    everywhere(submit(session, &more) == INSITU_OK);
     step_is_good(session, 6);
     everywhere(insitu_last_report(session)->cells_flat == flat);
     everywhere(insitu_last_report(session)->cells_inverted == 0);
     everywhere(own_rank != 0 || memcmp(before, caught[0].rgba, numbers * sizeof *before) == 0);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 7);
     test_mesh_free(&more.part);
     test_free(before);
@@ -336,17 +337,17 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
 
 /* The first allocation of a step that checks polyhedra, and need not recognise any, is for their edges. If it fails,
  * the cells are unchecked, and the next step must check them again. */
-static void check_without_memory_is_told_and_repeated(void **context)
+static void check_without_memory_is_reported_and_repeated(void **context)
 {
     (void)context;
     char rank_words[32];
     snprintf(rank_words, sizeof rank_words, "rank %d: ", rank_count - 1);
     input.mesh.keep_polyhedra = 1;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     base_memory_fail_nth(own_rank == rank_count - 1);
     const insitu_status status = insitu_step(session, 8, 0);
     base_memory_fail_nth(0);
-    told_everywhere(session, status, INSITU_ERROR_MEMORY, rank_words, "mesh \"m\": no memory to check cell 0");
+    reported_everywhere(session, status, INSITU_ERROR_MEMORY, rank_words, "mesh \"m\": no memory to check cell 0");
     const int64_t cells = input.part.cell_count;
     step_is_good(session, 9);
     everywhere(insitu_last_report(session)->cells == cells && insitu_last_report(session)->bytes_trees > 0);
@@ -371,11 +372,11 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spoilt_arrays_are_told_at_once),
-        cmocka_unit_test(spoilt_faces_are_told_at_the_step),
+        cmocka_unit_test(corrupted_arrays_are_reported_at_once),
+        cmocka_unit_test(corrupted_faces_are_reported_at_the_step),
         cmocka_unit_test(ghosts_are_proved_but_for_coordinates),
         cmocka_unit_test(flat_polyhedra_are_counted_and_change_no_picture),
-        cmocka_unit_test(check_without_memory_is_told_and_repeated),
+        cmocka_unit_test(check_without_memory_is_reported_and_repeated),
     };
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

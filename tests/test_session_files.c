@@ -126,7 +126,7 @@ static void check_read(const char *what, const char *path)
         if (own_rank == 0) put_plant(p, path);
         const insitu_status status = insitu_create(MPI_COMM_WORLD, "scene.yaml", &session);
         if (refusals[p])
-            told_everywhere(NULL, status, INSITU_ERROR_SCENE, path, refusals[p]);
+            reported_everywhere(NULL, status, INSITU_ERROR_SCENE, path, refusals[p]);
         else
             everywhere(status == INSITU_OK);
         insitu_destroy(&session);
@@ -187,8 +187,8 @@ static insitu_status step(insitu_session *session, int cycle)
 {
     input_renew(&input);
     for (int64_t v = 0; v < input.part.vertex_count; v++) input.part.values[v] *= 1 + cycle;
-    forget_pictures();
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    discard_pictures();
+    everywhere(submit(session, &input) == INSITU_OK);
     return insitu_step(session, cycle, cycle);
 }
 
@@ -227,7 +227,7 @@ static void plant_in_run(const own_file *file, plant p, bool is_later)
     const char *refusal = refusal_of(file, p, is_later);
     insitu_status status = step(session, 1);
     if (refusal) {
-        told_everywhere(session, status, INSITU_ERROR_IO, file->path, refusal);
+        reported_everywhere(session, status, INSITU_ERROR_IO, file->path, refusal);
         if (own_rank == 0) remove_plant(file->path);
         MPI_Barrier(MPI_COMM_WORLD);
         status = step(session, 2);
@@ -298,7 +298,7 @@ static void missing_folders_are_made(void **state)
 }
 
 /* Nothing can be made in a regular file; in a folder without the right to write, by users who need it. */
-static void folders_that_cannot_be_made_are_told(void **state)
+static void folders_that_cannot_be_made_are_reported(void **state)
 {
     (void)state;
     struct folder {
@@ -314,8 +314,8 @@ static void folders_that_cannot_be_made_are_told(void **state)
             name_scenes(folders[f].name);
             insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(own_files[i].scene));
             for (int cycle = 0; cycle < 2; cycle++)
-                told_everywhere(session, step(session, cycle), INSITU_ERROR_IO, folders[f].name,
-                                strrchr(own_files[i].path, '/'), folders[f].reason);
+                reported_everywhere(session, step(session, cycle), INSITU_ERROR_IO, folders[f].name,
+                                    strrchr(own_files[i].path, '/'), folders[f].reason);
             insitu_destroy(&session);
         }
 }
@@ -341,7 +341,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scenes_are_regular_files),       cmocka_unit_test(colour_maps_are_regular_files),
         cmocka_unit_test(plants_are_refused_or_replaced), cmocka_unit_test(linked_ranges_are_read),
-        cmocka_unit_test(missing_folders_are_made),       cmocka_unit_test(folders_that_cannot_be_made_are_told),
+        cmocka_unit_test(missing_folders_are_made),       cmocka_unit_test(folders_that_cannot_be_made_are_reported),
     };
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -26,7 +26,7 @@ typedef struct maker {
     double *values, scale;
     int calls;
     insitu_status status;
-    void (*spoil)(insitu_field *field);
+    void (*corrupt)(insitu_field *field);
     unsigned changed;
 } maker;
 
@@ -41,7 +41,7 @@ static insitu_status make(void *data, insitu_field *field)
     field->count = count;
     field->values = (insitu_array){m->values, INSITU_FLOAT64, 0};
     field->changed = m->changed;
-    if (m->spoil) m->spoil(field);
+    if (m->corrupt) m->corrupt(field);
     return m->status;
 }
 
@@ -105,7 +105,7 @@ static album draw(const session_input *in, bool is_filled)
             const insitu_field field = describe(names[k], &makers[k], is_filled);
             if (!is_filled) everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
         }
-        forget_pictures();
+        discard_pictures();
         const insitu_status status = insitu_step(session, step, 0);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
         everywhere(status == INSITU_OK);
@@ -152,12 +152,12 @@ static void other_centring(insitu_field *field)
     field->centring = INSITU_CELL;
 }
 
-static void what_goes_wrong_is_told_to_all(void **state)
+static void errors_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     static const struct {
         insitu_status status;
-        void (*spoil)(insitu_field *field);
+        void (*corrupt)(insitu_field *field);
         const char *words;
     } cases[] = {{INSITU_ERROR_IO, NULL, "field \"f\": its fill returned 5 (INSITU_ERROR_IO)"},
                  {INSITU_OK, too_few, "field \"f\": has "},
@@ -175,18 +175,18 @@ static void what_goes_wrong_is_told_to_all(void **state)
     for (int i = 0; i < 2; i++) everywhere(insitu_set_field(session, "m", &fields[i]) == INSITU_OK);
     for (int i = 0; i < (int)(sizeof cases / sizeof cases[0]); i++) {
         f.calls = g.calls = 0;
-        if (own_rank == rank_count - 1) f.status = cases[i].status, f.spoil = cases[i].spoil;
-        forget_pictures();
-        told_everywhere(session, insitu_step(session, 2 * i, 0), INSITU_ERROR_FIELD, cases[i].words, "rank ");
+        if (own_rank == rank_count - 1) f.status = cases[i].status, f.corrupt = cases[i].corrupt;
+        discard_pictures();
+        reported_everywhere(session, insitu_step(session, 2 * i, 0), INSITU_ERROR_FIELD, cases[i].words, "rank ");
         everywhere(caught_count == 0 && f.calls == 1 && g.calls == 1);
         f.status = INSITU_OK;
-        f.spoil = NULL;
+        f.corrupt = NULL;
         step_is_good(session, 2 * i + 1);
     }
     insitu_field both = fields[0];
     both.values = (insitu_array){f.values, INSITU_FLOAT64, 0};
     everywhere(insitu_set_field(session, "m", &both) == INSITU_ERROR_FIELD);
-    told_everywhere(session, insitu_step(session, 20, 0), INSITU_ERROR_FIELD, "values and fill are given");
+    reported_everywhere(session, insitu_step(session, 20, 0), INSITU_ERROR_FIELD, "values and fill are given");
     insitu_destroy(&session);
     free(f.values);
     free(g.values);
@@ -254,8 +254,8 @@ static void calls_of_a_fill_are_refused(void **state)
         snprintf(words, sizeof words, "field \"f\": its fill called %s() of its session", calls[i % CALLS]);
         f.call = calls_now ? i % CALLS : -1;
         f.is_refused = false;
-        forget_pictures();
-        told_everywhere(f.session, insitu_step(f.session, 2 * i, 0), INSITU_ERROR_ARGUMENT, words, "rank ");
+        discard_pictures();
+        reported_everywhere(f.session, insitu_step(f.session, 2 * i, 0), INSITU_ERROR_ARGUMENT, words, "rank ");
         everywhere(f.is_refused == calls_now && caught_count == 0 && insitu_last_report(f.session)->cycle == 2 * i);
         f.call = -1;
         step_is_good(f.session, 2 * i + 1);
@@ -269,7 +269,7 @@ static void calls_of_a_fill_are_refused(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_a_function_makes_is_drawn_and_nothing_else_made),
-                                       cmocka_unit_test(what_goes_wrong_is_told_to_all),
+                                       cmocka_unit_test(errors_are_reported_on_all_ranks),
                                        cmocka_unit_test(calls_of_a_fill_are_refused)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -29,8 +29,8 @@ void assert_everywhere(bool is_well, const char *what, const char *file, int lin
     assert_true(all);
 }
 
-void assert_told(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
-                 const char *file, int line)
+void assert_reported(const insitu_session *session, insitu_status status, insitu_status expected,
+                     const char *const *words, const char *file, int line)
 {
     char first[1024] = "";
     const char *message = insitu_error(session);
@@ -78,7 +78,7 @@ int run_session_group(int argc, char **argv, const struct CMUnitTest *tests, siz
     if (argc > 1) folder = argv[1];
     snprintf(scene_name, sizeof scene_name, "%s/%s_np%d.yaml", folder, name, rank_count);
     const int failed = _cmocka_run_group_tests(name, tests, count, begin, end);
-    forget_pictures();
+    discard_pictures();
     MPI_Finalize();
     return failed;
 }
@@ -129,18 +129,19 @@ void input_describe(session_input *in)
     in->field.values = (insitu_array){in->part.values, INSITU_FLOAT64, 0};
 }
 
-void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count)
+void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind distributed, int rank,
+                  int count)
 {
     test_mesh whole;
     in->kind = kind;
     in->side = side;
-    in->dealt = dealt;
+    in->distributed = distributed;
     in->rank = rank;
     in->count = count;
     test_mesh_lattice(kind, side, 0.2, test_wave, &whole);
     int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
     assert_non_null(owners);
-    test_partition(&whole, dealt, side, count, owners);
+    test_partition(&whole, distributed, side, count, owners);
     test_mesh_part(&whole, owners, rank, &in->part);
     free(owners);
     test_mesh_free(&whole);
@@ -150,7 +151,7 @@ void input_create(session_input *in, test_mesh_kind kind, int side, test_partiti
 void input_renew(session_input *in)
 {
     input_free(in);
-    input_create(in, in->kind, in->side, in->dealt, in->rank, in->count);
+    input_create(in, in->kind, in->side, in->distributed, in->rank, in->count);
 }
 
 void input_free(session_input *in)
@@ -158,7 +159,7 @@ void input_free(session_input *in)
     test_mesh_free(&in->part);
 }
 
-insitu_status hand_over(insitu_session *session, const session_input *in)
+insitu_status submit(insitu_session *session, const session_input *in)
 {
     const insitu_status status = insitu_set_mesh(session, "m", &in->mesh);
     return status ? status : insitu_set_field(session, "m", &in->field);
@@ -166,40 +167,41 @@ insitu_status hand_over(insitu_session *session, const session_input *in)
 
 void step_is_good(insitu_session *session, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     everywhere(insitu_last_report(session)->images == 1);
     everywhere(caught_count == (own_rank == 0));
 }
 
-void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spoilt_case *c)
+void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *in, const corrupted_case *c)
 {
     const int bad_rank = rank_count - 1;
     const bool is_bad = own_rank == bad_rank;
     char rank_words[32];
     snprintf(rank_words, sizeof rank_words, "rank %d: ", bad_rank);
-    if (is_bad) c->spoil(in);
-    const insitu_status at_once = hand_over(session, in);
+    if (is_bad) c->corrupt(in);
+    const insitu_status at_once = submit(session, in);
     everywhere(at_once == (is_bad && c->at_once ? c->status : INSITU_OK));
     everywhere(!is_bad || !c->at_once || strstr(insitu_error(session), c->words[0]) != NULL);
     for (int again = 0; again < 2; again++) { /* it stays wrong until it is mended */
-        forget_pictures();
+        discard_pictures();
         const insitu_status status = insitu_step(session, 1, 0);
-        told_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
-                        c->words[1] ? c->words[1] : "");
+        reported_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
+                            c->words[1] ? c->words[1] : "");
         everywhere(insitu_last_report(session)->images == 0 && caught_count == 0);
     }
     input_renew(in);
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     step_is_good(session, 2);
 }
 
-void take_own_cells(const test_mesh *whole, test_partition_kind dealt, int side, bool with_ghosts, test_mesh *out)
+void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts,
+                       test_mesh *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
     int *all = test_calloc((size_t)whole->cell_count, sizeof *all);
-    test_partition(whole, dealt, side, rank_count, owners);
+    test_partition(whole, distributed, side, rank_count, owners);
     test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, out);
     for (int64_t cell = 0; cell < out->cell_count && with_ghosts; cell++) out->ghosts[cell] = owners[cell] != own_rank;
     test_free(owners);
@@ -209,10 +211,10 @@ void take_own_cells(const test_mesh *whole, test_partition_kind dealt, int side,
 const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
                            "    outputs: [{path: a.exr}]\n";
 
-void all_are_told(session_input *in, const spoilt_case *cases, size_t count)
+void all_are_reported(session_input *in, const corrupted_case *cases, size_t count)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
-    for (size_t i = 0; i < count; i++) spoilt_is_told_to_all(session, in, &cases[i]);
+    for (size_t i = 0; i < count; i++) corrupted_is_reported_on_all_ranks(session, in, &cases[i]);
     insitu_destroy(&session);
 }
 
@@ -245,14 +247,14 @@ void free_caught(caught_picture *picture)
     *picture = (caught_picture){0};
 }
 
-void forget_pictures(void)
+void discard_pictures(void)
 {
     placed_count = 0;
     for (int i = 0; i < caught_count; i++) free_caught(&caught[i]);
     caught_count = 0;
 }
 
-caught_picture take_caught(void)
+caught_picture pop_caught_picture(void)
 {
     caught_picture picture = {0};
     if (own_rank == 0) picture = caught[0];
@@ -260,10 +262,10 @@ caught_picture take_caught(void)
     return picture;
 }
 
-static void draw_well(insitu_session *session, const session_input *in)
+static void draw_ok(insitu_session *session, const session_input *in)
 {
-    forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
+    discard_pictures();
+    assert_int_equal(submit(session, in), INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
@@ -272,14 +274,14 @@ static void draw_well(insitu_session *session, const session_input *in)
 insitu_session *open_drawn(MPI_Comm comm, const char *scene, const session_input *in)
 {
     insitu_session *session = open_session(comm, scene);
-    draw_well(session, in);
+    draw_ok(session, in);
     return session;
 }
 
 caught_picture draw_once(insitu_session **session, const session_input *in)
 {
-    draw_well(*session, in);
-    const caught_picture picture = take_caught();
+    draw_ok(*session, in);
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(session);
     return picture;
 }

@@ -23,10 +23,10 @@ extern int own_rank, rank_count;
 void assert_everywhere(bool is_well, const char *what, const char *file, int line);
 
 /* Every rank was told the same, and it holds all of the count words (NULL ones are passed over). */
-#define told_everywhere(session, status, expected, ...)                                                                \
-    assert_told((session), (status), (expected), (const char *const[]){__VA_ARGS__, NULL}, __FILE__, __LINE__)
-void assert_told(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
-                 const char *file, int line);
+#define reported_everywhere(session, status, expected, ...)                                                            \
+    assert_reported((session), (status), (expected), (const char *const[]){__VA_ARGS__, NULL}, __FILE__, __LINE__)
+void assert_reported(const insitu_session *session, insitu_status status, insitu_status expected,
+                     const char *const *words, const char *file, int line);
 
 /* Returns the values' sum, rounded once, divided by their number; NAN if there are none. Recentring leaves out less
  * than 2^-85 of the largest of 100 values, so that it has the same bits unless a sum is that near to a tie. */
@@ -61,14 +61,15 @@ typedef struct session_input {
     insitu_field field; /* "f", at vertices */
     test_mesh_kind kind;
     int side, rank, count;
-    test_partition_kind dealt;
+    test_partition_kind distributed;
 } session_input;
 
 /* Describes a part as it is: with types, offsets, ghosts and faces. */
 void describe_part(const test_mesh *part, insitu_mesh *mesh);
 
 /* Hexes or any kind, side^3 cubes, dealt to count ranks; the part of rank. */
-void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count);
+void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind distributed, int rank,
+                  int count);
 /* Describe the part again, after it was spoilt. */
 void input_describe(session_input *in);
 /* Restores the input as it was created. */
@@ -76,34 +77,35 @@ void input_renew(session_input *in);
 void input_free(session_input *in);
 
 /* This rank's cells of the whole; with ghosts: all cells, of which the others' are ghosts. */
-void take_own_cells(const test_mesh *whole, test_partition_kind dealt, int side, bool with_ghosts, test_mesh *out);
+void extract_own_cells(const test_mesh *whole, test_partition_kind distributed, int side, bool with_ghosts,
+                       test_mesh *out);
 
 /* Set the mesh "m" and its field; the first status that is not OK. */
-insitu_status hand_over(insitu_session *session, const session_input *in);
+insitu_status submit(insitu_session *session, const session_input *in);
 
 /* The step is well on every rank, and its one picture is drawn. */
 void step_is_good(insitu_session *session, int cycle);
 
-typedef void spoil_function(session_input *in);
+typedef void corrupt_function(session_input *in);
 
 /* A thing that a user gets wrong. */
-typedef struct spoilt_case {
+typedef struct corrupted_case {
     const char *name;
-    spoil_function *spoil;
+    corrupt_function *corrupt;
     insitu_status status;
     bool at_once;         /* the set call fails too */
     const char *words[2]; /* of the message */
-} spoilt_case;
+} corrupted_case;
 
 /* Spoilt on the last rank alone, at every step all ranks are told the same, with the rank and the words in it, and no
  * picture is drawn; once the input is renewed the next step draws. */
-void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spoilt_case *c);
+void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *in, const corrupted_case *c);
 
 /* A scene of one small picture of "f", to which that is told; and each of the cases in a session of it. */
 extern const char error_scene[];
-void all_are_told(session_input *in, const spoilt_case *cases, size_t count);
+void all_are_reported(session_input *in, const corrupted_case *cases, size_t count);
 
-/* Pictures caught on rank 0 since the last forget_pictures(). */
+/* Pictures caught on rank 0 since the last discard_pictures(). */
 typedef struct caught_picture {
     int width, height;
     float *rgba, *depth; /* depth NULL where none was given */
@@ -119,11 +121,11 @@ typedef struct caught_picture {
 enum { MAX_CAUGHT = 64 };
 extern caught_picture caught[MAX_CAUGHT];
 extern int caught_count;
-void forget_pictures(void);
+void discard_pictures(void);
 void free_caught(caught_picture *picture);
 
 /* The first picture caught on rank 0, from now on the caller's, and the only one; on other ranks one of nothing. */
-caught_picture take_caught(void);
+caught_picture pop_caught_picture(void);
 
 /* Opens a session, hands the input over, and takes a step, which is to be well. */
 insitu_session *open_drawn(MPI_Comm comm, const char *scene, const session_input *in);

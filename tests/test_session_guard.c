@@ -41,14 +41,14 @@ static void start_threads(const session_guard *guard, int threads)
     session_guard_return();
 }
 
-static void arm_traps(void)
+static void enable_traps(void)
 {
     feclearexcept(FE_ALL_EXCEPT);
     feenableexcept(TRAPS);
 }
 
 /* Counts the threads of a team that have the traps, and those with the flag of a division by zero, and disarms all. */
-static void count_armed(int threads, int *armed, int *flagged)
+static void count_enabled(int threads, int *armed, int *flagged)
 {
     int traps = 0, flags = 0;
 #pragma omp parallel num_threads(threads) reduction(+ : traps, flags)
@@ -66,13 +66,13 @@ static void traps_are_off_inside_and_on_again_after(void **state)
     (void)state;
     session_guard guard;
     int armed, flagged;
-    arm_traps(); /* where workers take the calling thread's settings */
+    enable_traps(); /* where workers take the calling thread's settings */
 #pragma omp parallel num_threads(THREADS)
-    arm_traps(); /* where they keep their own */
+    enable_traps(); /* where they keep their own */
     session_guard_begin(&guard);
     divide_by_zero_on(THREADS); /* unguarded, this ends the process */
     session_guard_end(&guard);
-    count_armed(THREADS, &armed, &flagged);
+    count_enabled(THREADS, &armed, &flagged);
     assert_int_equal(armed, THREADS);
     assert_int_equal(flagged, 0);
 }
@@ -83,14 +83,14 @@ static void threads_first_needed_inside_are_as_the_callers_own(void **state)
     (void)state;
     session_guard guard;
     int armed, flagged;
-    arm_traps();
+    enable_traps();
 #pragma omp parallel num_threads(THREADS)
-    arm_traps();
+    enable_traps();
     session_guard_begin(&guard);
     start_threads(&guard, 2 * THREADS);
     divide_by_zero_on(2 * THREADS);
     session_guard_end(&guard);
-    count_armed(2 * THREADS, &armed, &flagged);
+    count_enabled(2 * THREADS, &armed, &flagged);
     assert_int_equal(armed, 2 * THREADS);
     assert_int_equal(flagged, 0);
 }

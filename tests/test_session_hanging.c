@@ -185,11 +185,11 @@ static void set_part(insitu_session *session, const char *name, const part *p)
 
 static caught_picture take_step(insitu_session *session)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
-    return take_caught();
+    return pop_caught_picture();
 }
 
 static caught_picture draw(MPI_Comm comm, const char *scene, const amr *a)
@@ -243,7 +243,7 @@ static void check(int cuts, amr_shape shape, insitu_cell_type type)
     free_caught(&alone);
 }
 
-static void cell_values_go_on_over_hanging_nodes(void **state)
+static void cell_values_continue_across_hanging_nodes(void **state)
 {
     (void)state;
     for (amr_shape shape = PLAIN; shape < SHAPES; shape++) check(2, shape, INSITU_HEX);
@@ -252,7 +252,7 @@ static void cell_values_go_on_over_hanging_nodes(void **state)
 }
 
 /* Triangles are flat, so that bent ones have their hanging vertices elsewhere. */
-static void cell_values_go_on_over_triangles(void **state)
+static void cell_values_continue_across_triangles(void **state)
 {
     (void)state;
     check(2, TURNED, INSITU_TET);
@@ -390,8 +390,8 @@ static void means_follow_the_other_mesh(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cell_values_go_on_over_hanging_nodes), cmocka_unit_test(cell_values_go_on_over_triangles),
-        cmocka_unit_test(a_layer_makes_meshes_one), cmocka_unit_test(vertices_on_a_common_wall_do_not_hang),
-        cmocka_unit_test(means_follow_the_other_mesh)};
+        cmocka_unit_test(cell_values_continue_across_hanging_nodes),
+        cmocka_unit_test(cell_values_continue_across_triangles), cmocka_unit_test(a_layer_makes_meshes_one),
+        cmocka_unit_test(vertices_on_a_common_wall_do_not_hang), cmocka_unit_test(means_follow_the_other_mesh)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -149,7 +149,7 @@ static const char *scene_by(int threads)
 static insitu_session *open_by(int threads)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene_by(threads));
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     return session;
 }
 
@@ -268,7 +268,7 @@ static void a_step_opens_few_regions(void **context)
                  "threads: 2\nimages:\n  - {name: a, size: [120, 90], layers: [%s], outputs: [{path: a.png}]}\n",
                  layers[i]);
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
-        everywhere(hand_over(session, &input) == INSITU_OK);
+        everywhere(submit(session, &input) == INSITU_OK);
         for (int cycle = 0; cycle < 6; cycle++) {
             const int64_t before = region_count();
             everywhere(insitu_set_field(session, "m", &input.field) == INSITU_OK);
@@ -280,14 +280,14 @@ static void a_step_opens_few_regions(void **context)
     }
 }
 
-static void smaller_teams_draw_the_same(void **context)
+static void fewer_threads_draw_the_same(void **context)
 {
     (void)context;
     cores = 5;
     gives_smaller_teams = true;
     insitu_session *session = open_by(5);
     for (int cycle = 0; cycle < 30; cycle++) {
-        everywhere(hand_over(session, &input) == INSITU_OK);
+        everywhere(submit(session, &input) == INSITU_OK);
         input.mesh.changed = cycle % 3 == 0 ? INSITU_CHANGED_ALL : cycle % 3 == 1 ? INSITU_CHANGED_GEOMETRY : 0;
         step_draws_the_same(session, cycle);
     }
@@ -380,7 +380,7 @@ int main(int argc, char **argv)
         cmocka_unit_test_setup(an_edit_of_the_scene_starts_no_more_than_can_be, begin_test),
         cmocka_unit_test_setup(threads_that_ended_are_tried_again, begin_test),
         cmocka_unit_test_setup(a_step_opens_few_regions, begin_test),
-        cmocka_unit_test_setup(smaller_teams_draw_the_same, begin_test),
+        cmocka_unit_test_setup(fewer_threads_draw_the_same, begin_test),
         cmocka_unit_test_setup(teams_of_any_size_are_the_callers_own_affair, begin_test),
         cmocka_unit_test_setup(a_parallel_region_of_the_caller_gets_one_thread, begin_test),
         cmocka_unit_test_setup(a_number_too_large_for_a_scene_is_no_trap, begin_test),

@@ -68,8 +68,8 @@ static void free_narrow(narrow_arrays *n)
 static void draw(const char *scene, const session_input *in, caught_picture out[PICTURES])
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    forget_pictures();
-    everywhere(hand_over(session, in) == INSITU_OK);
+    discard_pictures();
+    everywhere(submit(session, in) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -123,26 +123,26 @@ static void errors_count_from_one_too(void **state)
     count_from_one(&in);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     if (is_last) in.part.connectivity[3] = 0;
-    hand_over(session, &in);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "vertex index 0 is outside 1..",
-                    "index_base is 1");
+    submit(session, &in);
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "vertex index 0 is outside 1..",
+                        "index_base is 1");
     if (is_last) in.part.connectivity[3] = in.part.vertex_count + 1;
-    hand_over(session, &in);
-    told_everywhere(session, insitu_step(session, 1, 0), INSITU_ERROR_MESH, "is outside 1..");
+    submit(session, &in);
+    reported_everywhere(session, insitu_step(session, 1, 0), INSITU_ERROR_MESH, "is outside 1..");
     if (is_last) in.part.connectivity[3] = in.part.vertex_count;
     if (is_last) in.part.offsets[in.part.cell_count]--;
-    hand_over(session, &in);
-    told_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_MESH, "offsets");
+    submit(session, &in);
+    reported_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_MESH, "offsets");
     if (is_last) in.part.offsets[in.part.cell_count]++;
     in.mesh.index_base = is_last ? 2 : 1;
     everywhere((insitu_set_mesh(session, "m", &in.mesh) == INSITU_ERROR_ARGUMENT) == is_last);
-    told_everywhere(session, insitu_step(session, 3, 0), INSITU_ERROR_ARGUMENT, "index_base is 2, expected 0 or 1");
+    reported_everywhere(session, insitu_step(session, 3, 0), INSITU_ERROR_ARGUMENT, "index_base is 2, expected 0 or 1");
     insitu_destroy(&session);
     input_free(&in);
 }
 
 /* Each wrong in one place of the last rank's connectivity. */
-static void wrong_indices_are_told(insitu_session *session, const session_input *in, int32_t *place, int64_t cell)
+static void wrong_indices_are_reported(insitu_session *session, const session_input *in, int32_t *place, int64_t cell)
 {
     const int32_t wrong[] = {0, (int32_t)in->part.vertex_count + 1, -1, INT32_MIN, INT32_MAX}, good = *place;
     char word[64];
@@ -150,17 +150,17 @@ static void wrong_indices_are_told(insitu_session *session, const session_input 
     MPI_Bcast(word, sizeof word, MPI_CHAR, rank_count - 1, MPI_COMM_WORLD);
     for (int i = 0; i < (int)(sizeof wrong / sizeof *wrong); i++) {
         if (own_rank == rank_count - 1) *place = wrong[i];
-        hand_over(session, in);
-        told_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH, word, "vertex index ",
-                        " is outside 1..");
+        submit(session, in);
+        reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH, word, "vertex index ",
+                            " is outside 1..");
     }
     *place = good;
-    hand_over(session, in);
+    submit(session, in);
     everywhere(insitu_step(session, 9, 0) == INSITU_OK);
 }
 
 /* Many cells of packed arrays are looked at together. One amid them is wrong, or the last. */
-static void errors_of_many_cells_are_told(void **state)
+static void errors_of_many_cells_are_reported(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = TEST_TETS; kind <= TEST_HEXES; kind++) {
@@ -171,7 +171,7 @@ static void errors_of_many_cells_are_told(void **state)
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
         const int64_t count = kind == TEST_TETS ? 4 : 8, cells[] = {in.part.cell_count / 2, in.part.cell_count - 1};
         for (int i = 0; i < 2; i++)
-            wrong_indices_are_told(session, &in, &narrow.connectivity[count * cells[i] + i], cells[i]);
+            wrong_indices_are_reported(session, &in, &narrow.connectivity[count * cells[i] + i], cells[i]);
         insitu_destroy(&session);
         free_narrow(&narrow);
         input_free(&in);
@@ -182,6 +182,6 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_those_from_zero),
                                        cmocka_unit_test(errors_count_from_one_too),
-                                       cmocka_unit_test(errors_of_many_cells_are_told)};
+                                       cmocka_unit_test(errors_of_many_cells_are_reported)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -113,7 +113,7 @@ static insitu_field describe(const twice *t, bool is_by_index)
 typedef struct drawing {
     caught_picture pictures[STEPS][PICTURES];
     int64_t copied, borrowed;
-    bool tells_why;
+    bool gives_reason;
 } drawing;
 
 static void count_from_one(session_input *in)
@@ -128,7 +128,7 @@ static void count_from_one(session_input *in)
 
 static void step_and_catch(insitu_session *session, int cycle, caught_picture out[PICTURES])
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -155,7 +155,7 @@ static drawing draw(const session_input *in, twice *t, bool is_by_index)
     const insitu_report *report = insitu_last_report(session);
     out.copied = report->bytes_copied;
     out.borrowed = report->bytes_borrowed;
-    out.tells_why = strstr(report->copied_why, "field \"f\" by its index: ") != NULL;
+    out.gives_reason = strstr(report->copied_why, "field \"f\" by its index: ") != NULL;
     insitu_destroy(&session);
     return out;
 }
@@ -187,7 +187,7 @@ static void check(test_mesh_kind kind, const form *of)
     const int64_t size = of->is_narrow ? 4 : 8, tuples = size * of->components;
     everywhere(indexed.copied == plain.copied + t.places * tuples);
     everywhere(indexed.borrowed == plain.borrowed + (t.count - t.places) * tuples + t.places * size);
-    everywhere(indexed.tells_why && !plain.tells_why);
+    everywhere(indexed.gives_reason && !plain.gives_reason);
     compare(&plain, &indexed);
     free_twice(&t);
     input_free(&in);
@@ -213,13 +213,13 @@ static void an_index_that_nobody_needs_is_left_alone(void **state)
     insitu_field other = describe(&t, true);
     other.name = "other";
     ((int64_t *)(void *)t.index)[0] = -9;
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     const int64_t copied = insitu_last_report(session)->bytes_copied;
     everywhere(insitu_set_field(session, "m", &other) == INSITU_OK);
     everywhere(insitu_step(session, 1, 0) == INSITU_OK);
     everywhere(insitu_last_report(session)->bytes_copied == copied);
-    forget_pictures();
+    discard_pictures();
     insitu_destroy(&session);
     free_twice(&t);
     input_free(&in);
@@ -227,37 +227,37 @@ static void an_index_that_nobody_needs_is_left_alone(void **state)
 
 /* ---- errors --------------------------------------------------------------------------------------------------- */
 
-static int64_t *spoilt;
+static int64_t *corrupted;
 
 static void by_index(session_input *in)
 {
-    free(spoilt);
-    spoilt = malloc((size_t)(in->part.vertex_count + in->part.cell_count) * sizeof *spoilt);
-    assert_non_null(spoilt);
-    for (int64_t i = 0; i < in->part.vertex_count + in->part.cell_count; i++) spoilt[i] = i;
-    in->field.index = (insitu_array){spoilt, INSITU_INT64, 0};
+    free(corrupted);
+    corrupted = malloc((size_t)(in->part.vertex_count + in->part.cell_count) * sizeof *corrupted);
+    assert_non_null(corrupted);
+    for (int64_t i = 0; i < in->part.vertex_count + in->part.cell_count; i++) corrupted[i] = i;
+    in->field.index = (insitu_array){corrupted, INSITU_INT64, 0};
 }
 static void index_large(session_input *in)
 {
     by_index(in);
-    spoilt[7] = in->part.vertex_count;
-    spoilt[9] = -1; /* the first is told */
+    corrupted[7] = in->part.vertex_count;
+    corrupted[9] = -1; /* the first is told */
 }
 static void index_far(session_input *in)
 {
     by_index(in);
-    spoilt[2] = INT64_MAX;
+    corrupted[2] = INT64_MAX;
 }
 static void index_negative(session_input *in)
 {
     by_index(in);
-    spoilt[3] = -1;
+    corrupted[3] = -1;
 }
 static void index_before_one(session_input *in)
 {
     by_index(in);
     count_from_one(in);
-    for (int64_t i = 1; i < in->part.vertex_count; i++) spoilt[i]++;
+    for (int64_t i = 1; i < in->part.vertex_count; i++) corrupted[i]++;
 }
 static void fewer_values(session_input *in)
 {
@@ -295,7 +295,7 @@ static void type_alone(session_input *in)
     in->field.count++;
 }
 
-static const spoilt_case cases[] = {
+static const corrupted_case cases[] = {
     {"large", index_large, INSITU_ERROR_FIELD, false, {"field \"f\": the index of vertex 7 is ", "outside 0.."}},
     {"far", index_far, INSITU_ERROR_FIELD, false, {"the index of vertex 2 is 9223372036854775807, outside 0.."}},
     {"-1", index_negative, INSITU_ERROR_FIELD, false, {"the index of vertex 3 is -1, outside 0..", "index_base is 0"}},
@@ -309,18 +309,18 @@ static const spoilt_case cases[] = {
     {"type alone", type_alone, INSITU_ERROR_FIELD, true, {"values, the mesh has "}},
 };
 
-static void what_is_wrong_is_told_to_all(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_told(&in, cases, sizeof cases / sizeof cases[0]);
+    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
-    free(spoilt);
+    free(corrupted);
 }
 
 /* The centring is one on all ranks, so this cannot be the last one's alone. */
-static void cells_are_told_too(void **state)
+static void cells_are_reported_too(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -328,17 +328,17 @@ static void cells_are_told_too(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     by_index(&in);
     in.field.centring = INSITU_CELL;
-    if (own_rank == rank_count - 1) spoilt[in.part.cell_count - 1] = 1000000;
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    if (own_rank == rank_count - 1) corrupted[in.part.cell_count - 1] = 1000000;
+    everywhere(submit(session, &in) == INSITU_OK);
     for (int step = 0; step < 2; step++)
-        told_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
-                        "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
-    spoilt[in.part.cell_count - 1] = 0;
+        reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
+                            "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
+    corrupted[in.part.cell_count - 1] = 0;
     step_is_good(session, 2); /* mended in place, for nothing was taken of it */
     insitu_destroy(&session);
     input_free(&in);
-    free(spoilt);
-    spoilt = NULL;
+    free(corrupted);
+    corrupted = NULL;
 }
 
 /* All cells are the first rank's: the others have no vertex, and hand over their halves of the vector all the same, by
@@ -358,12 +358,12 @@ static void ranks_without_vertices_have_values(void **state)
         in.field.index.data = NULL;
     }
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_is_good(session, 0);
     insitu_destroy(&session);
     input_free(&in);
-    free(spoilt);
-    spoilt = NULL;
+    free(corrupted);
+    corrupted = NULL;
 }
 
 int main(int argc, char **argv)
@@ -371,7 +371,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {cmocka_unit_test(an_index_draws_what_values_in_order_draw),
                                        cmocka_unit_test(an_index_that_nobody_needs_is_left_alone),
                                        cmocka_unit_test(ranks_without_vertices_have_values),
-                                       cmocka_unit_test(cells_are_told_too),
-                                       cmocka_unit_test(what_is_wrong_is_told_to_all)};
+                                       cmocka_unit_test(cells_are_reported_too),
+                                       cmocka_unit_test(wrong_input_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -165,7 +165,7 @@ static void field_without_name(session_input *in)
     in->field.name = NULL;
 }
 
-static const spoilt_case cases[] = {
+static const corrupted_case cases[] = {
     {"index too large", index_too_large, INSITU_ERROR_MESH, false, {"cell 2 (hex): vertex index ", " is outside 0.."}},
     {"index negative", index_negative, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -3 is outside 0.."}},
     {"lowest cell", index_bad_in_two, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -9"}},
@@ -216,30 +216,31 @@ static const spoilt_case cases[] = {
     {"no components", no_components, INSITU_ERROR_ARGUMENT, true, {"field \"f\": component_count is 0"}},
 };
 
-static void spoilt_input_is_told_to_all(void **context)
+static void corrupted_input_is_reported_on_all_ranks(void **context)
 {
     (void)context;
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_told_to_all(session, &input, &cases[i]);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+        corrupted_is_reported_on_all_ranks(session, &input, &cases[i]);
 }
 
-static void call_without_a_mesh_is_told_once(void **context)
+static void call_without_a_mesh_is_reported_once(void **context)
 {
     (void)context;
     const bool is_bad = own_rank == 0;
     everywhere(!is_bad || insitu_set_field(session, "nowhere", &input.field) == INSITU_ERROR_FIELD);
     insitu_status status = insitu_step(session, 3, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, "rank 0: ", "\"nowhere\" is not set");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 0: ", "\"nowhere\" is not set");
     step_is_good(session, 4);
     everywhere(!is_bad || insitu_set_mesh(session, NULL, &input.mesh) == INSITU_ERROR_ARGUMENT);
     status = insitu_step(session, 5, 0);
-    told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "no name");
+    reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "no name");
     step_is_good(session, 6);
     if (is_bad) field_without_name(&input);
     everywhere(!is_bad || insitu_set_field(session, "m", &input.field) == INSITU_ERROR_ARGUMENT);
     status = insitu_step(session, 7, 0);
-    told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "without a name");
+    reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "without a name");
     input_renew(&input);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 8);
 }
 
@@ -252,8 +253,8 @@ static void field_missing_on_one_rank_names_it(void **context)
     everywhere(insitu_set_mesh(session, "m", &input.mesh) == INSITU_OK);
     everywhere(own_rank == rank_count - 1 || insitu_set_field(session, "m", &input.field) == INSITU_OK);
     insitu_status status = insitu_step(session, 9, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, words);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, words);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 10);
 }
 
@@ -261,14 +262,14 @@ static void field_of_two_centrings_is_refused(void **context)
 {
     (void)context;
     if (rank_count < 2) return;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     insitu_field other = input.field;
     other.centring = INSITU_CELL;
     other.count = input.part.cell_count; /* fewer than vertices: the array is long enough */
     everywhere(own_rank != 1 || insitu_set_field(session, "m", &other) == INSITU_OK);
     const insitu_status status = insitu_step(session, 11, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"", "another centring");
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"", "another centring");
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 12);
 }
 
@@ -286,10 +287,10 @@ static void nan_where_no_drawn_cell_is_is_fine(void **context)
     more.field.count++;
     insitu_mesh_interleaved(&more.mesh, coordinates, INSITU_FLOAT64);
     more.field.values.data = values;
-    everywhere(hand_over(session, &more) == INSITU_OK);
+    everywhere(submit(session, &more) == INSITU_OK);
     step_is_good(session, 13);
     everywhere(insitu_last_report(session)->cells_unusable == 0);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     test_free(coordinates);
     test_free(values);
 }
@@ -305,13 +306,13 @@ static void value_that_is_not_finite_is_counted(void **context)
         for (int v = 0; v < 8; v++) is_hit = is_hit || isnan(input.part.values[input.part.connectivity[8 * cell + v]]);
         expected += is_hit;
     }
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 14);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->cells_unusable == expected);
     everywhere(!is_bad || strstr(report->warnings, "values of field \"f\" are not finite"));
     input_renew(&input);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
 }
 
 /* Every vertex somewhere else: folded cells, some points of which have no coordinates in them. */
@@ -322,11 +323,11 @@ static void inverse_maps_that_fail_are_counted(void **context)
     everywhere(insitu_last_report(session)->map_failures == 0);
     for (int64_t i = 0; i < 3 * input.part.vertex_count; i++)
         input.part.coordinates[i] = 2 * test_uniform((uint64_t)i, 21 + (uint64_t)own_rank) - 1;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 16);
     everywhere(insitu_last_report(session)->map_failures > 0);
     input_renew(&input);
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
 }
 
 /* Makes cells of one type, with indices of 4 bytes instead of 8. */
@@ -353,15 +354,15 @@ static void bad_cell_of_a_mesh_of_one_type_is_named(void **context)
         snprintf(words, sizeof words, "rank 0: mesh \"m\": cell %d (hex): vertex index ", cell);
         if (own_rank == 0) input.part.connectivity[8 * cell + cell % 8] = cell % 2 ? -1 : input.part.vertex_count;
         make_plain(&input);
-        everywhere(hand_over(session, &input) == INSITU_OK);
-        told_everywhere(session, insitu_step(session, 17 + cell, 0), INSITU_ERROR_MESH, words);
+        everywhere(submit(session, &input) == INSITU_OK);
+        reported_everywhere(session, insitu_step(session, 17 + cell, 0), INSITU_ERROR_MESH, words);
         input_renew(&input);
         make_plain(&input);
-        everywhere(hand_over(session, &input) == INSITU_OK);
+        everywhere(submit(session, &input) == INSITU_OK);
         step_is_good(session, 18 + cell);
         input_renew(&input);
     }
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
 }
 
 /* ---- cells of no volume -------------------------------------------------------------------------------------- */
@@ -440,12 +441,12 @@ static void flat_cells_are_counted(void **context)
             if (layout == 1) flat.mesh.offsets = (insitu_array){offsets, INSITU_INT32, 0};
             if (layout == 2) flat.mesh.coordinates[2] = (insitu_array){narrow_z, INSITU_FLOAT32, 0};
             flat.field.values = (insitu_array){values, INSITU_FLOAT64, 0};
-            everywhere(hand_over(session, &flat) == INSITU_OK);
+            everywhere(submit(session, &flat) == INSITU_OK);
             step_is_good(session, 40 + 4 * type + layout);
             everywhere(insitu_last_report(session)->cells_flat == expected);
         }
     }
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, 60);
     everywhere(insitu_last_report(session)->cells_flat == 0);
 }
@@ -456,16 +457,16 @@ static void message_stays_until_the_next_step(void **context)
     (void)context;
     const int64_t right = input.part.connectivity[0];
     input.part.connectivity[0] = -1;
-    everywhere(hand_over(session, &input) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, 70, 0), INSITU_ERROR_MESH, "vertex index -1");
+    everywhere(submit(session, &input) == INSITU_OK);
+    reported_everywhere(session, insitu_step(session, 70, 0), INSITU_ERROR_MESH, "vertex index -1");
     input.part.connectivity[0] = right;
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     everywhere(insitu_keep_pictures(session, 0) == INSITU_OK);
     everywhere(insitu_last_report(session)->cycle == 70 && strstr(insitu_error(session), "vertex index -1"));
     everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
     everywhere(strstr(insitu_error(session), "its mesh \"none\" is not set") != NULL);
-    told_everywhere(session, insitu_step(session, 71, 0), INSITU_ERROR_FIELD,
-                    "rank 0: ", "its mesh \"none\" is not set");
+    reported_everywhere(session, insitu_step(session, 71, 0), INSITU_ERROR_FIELD,
+                        "rank 0: ", "its mesh \"none\" is not set");
     step_is_good(session, 72);
     everywhere(*insitu_error(session) == '\0');
 }
@@ -501,7 +502,7 @@ static void index_is_wrong(session_input *in)
 }
 
 /* Hands over the mesh "n" with the field "g", which may be wrong. */
-static void hand_over_other(const session_input *in)
+static void submit_other(const session_input *in)
 {
     insitu_field g = in->field;
     g.name = "g";
@@ -513,9 +514,9 @@ static void hand_over_other(const session_input *in)
 static void step_draws(const char *names, insitu_status expected, const char *words)
 {
     char drawn[8] = "";
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
-    told_everywhere(session, status, expected, words);
+    reported_everywhere(session, status, expected, words);
     for (int i = 0; i < caught_count && i < 7; i++) drawn[i] = caught[i].path[0];
     if (own_rank == 0 && strcmp(drawn, names) != 0) fprintf(stderr, "drawn: %s, expected: %s\n", drawn, names);
     everywhere(own_rank != 0 || strcmp(drawn, names) == 0);
@@ -525,7 +526,7 @@ static void images_that_need_nothing_wrong_are_drawn(void **context)
 {
     (void)context;
     static const struct {
-        spoil_function *spoil;
+        corrupt_function *corrupt;
         insitu_status status;
         const char *drawn, *words;
     } cases[] = {
@@ -542,14 +543,14 @@ static void images_that_need_nothing_wrong_are_drawn(void **context)
     input_renew(&input);
     input_create(&other, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        everywhere(hand_over(session, &input) == INSITU_OK);
-        hand_over_other(&other);
+        everywhere(submit(session, &input) == INSITU_OK);
+        submit_other(&other);
         step_draws("fgms", INSITU_OK, "");
-        if (own_rank == rank_count - 1) cases[i].spoil(&other);
-        hand_over_other(&other);
+        if (own_rank == rank_count - 1) cases[i].corrupt(&other);
+        submit_other(&other);
         for (int again = 0; again < 2; again++) step_draws(cases[i].drawn, cases[i].status, cases[i].words);
         input_renew(&other);
-        hand_over_other(&other);
+        submit_other(&other);
         step_draws("fgms", INSITU_OK, "");
         everywhere(insitu_set_field(session, "none", &input.field) == INSITU_ERROR_FIELD);
         step_draws("gms", INSITU_ERROR_FIELD, "its mesh \"none\" is not set");
@@ -578,8 +579,8 @@ static int end_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spoilt_input_is_told_to_all),
-        cmocka_unit_test(call_without_a_mesh_is_told_once),
+        cmocka_unit_test(corrupted_input_is_reported_on_all_ranks),
+        cmocka_unit_test(call_without_a_mesh_is_reported_once),
         cmocka_unit_test(field_missing_on_one_rank_names_it),
         cmocka_unit_test(field_of_two_centrings_is_refused),
         cmocka_unit_test(nan_where_no_drawn_cell_is_is_fine),

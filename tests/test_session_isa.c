@@ -36,9 +36,8 @@ static caught_picture draw_alone(const char *scene, test_mesh_kind kind)
         session_input whole;
         input_create(&whole, kind, 5, TEST_BLOCK, 0, 1);
         insitu_session *session = open_session(MPI_COMM_SELF, scene);
-        forget_pictures();
-        is_drawn =
-            hand_over(session, &whole) == INSITU_OK && insitu_step(session, 0, 0) == INSITU_OK && caught_count == 1;
+        discard_pictures();
+        is_drawn = submit(session, &whole) == INSITU_OK && insitu_step(session, 0, 0) == INSITU_OK && caught_count == 1;
         picture = caught[0];
         caught_count = 0;
         insitu_destroy(&session);
@@ -55,7 +54,7 @@ static void check(test_mesh_kind kind, int layer)
     session_input part;
     input_create(&part, kind, 5, TEST_RANDOM, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    everywhere(hand_over(session, &part) == INSITU_OK);
+    everywhere(submit(session, &part) == INSITU_OK);
     step_is_good(session, 0);
     const char *warnings = insitu_last_report(session)->warnings;
     everywhere(!strstr(warnings, "overlap"));

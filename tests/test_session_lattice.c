@@ -299,7 +299,7 @@ static void compare(place_form form, array_order order, bool layers, bool blanki
     insitu_report reports[2];
     char statistics[2][4096] = {"", ""}, left_out[2][512];
     make_block(&b, form, order, layers, blanking);
-    forget_pictures();
+    discard_pictures();
     for (int lattice = 0; lattice < 2; lattice++) {
         if (!own_rank) remove("numbers.csv");
         insitu_session *session = open_session(MPI_COMM_WORLD, some_images(count));
@@ -391,7 +391,7 @@ static caught_picture draw_sheet(int flat, bool is_lattice, bool is_uniform)
                insitu_set_field(session, "m", &field) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     insitu_destroy(&session);
-    return take_caught();
+    return pop_caught_picture();
 }
 
 static void sheets_across_any_axis_are_their_quads(void **state)
@@ -399,7 +399,7 @@ static void sheets_across_any_axis_are_their_quads(void **state)
     (void)state;
     for (int flat = 0; flat < 3; flat++)
         for (int is_uniform = 0; is_uniform < 2; is_uniform++) {
-            forget_pictures();
+            discard_pictures();
             caught_picture quads = draw_sheet(flat, false, is_uniform), lattice = draw_sheet(flat, true, is_uniform);
             everywhere(own_rank || (is_same(&quads, &lattice) && covered(&quads) > 50));
             free_caught(&quads);
@@ -433,7 +433,7 @@ static void left_handed_blocks_are_no_warning(void **state)
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     assert_string_equal(insitu_last_report(session)->warnings, "");
     insitu_destroy(&session);
-    forget_pictures();
+    discard_pictures();
 }
 
 static int begin_tests(void **state)

@@ -206,13 +206,13 @@ SPOIL(cell_field_short, b->c.count = CELLS - 1)
 
 typedef struct wrong_block {
     const char *name;
-    void (*spoil)(block *b);
+    void (*corrupt)(block *b);
     bool at_once; /* a set call fails too */
     const char *words;
     insitu_status status;
 } wrong_block;
 
-#define WRONG(spoil, at_once, words) #spoil, spoil, at_once, words, INSITU_ERROR_MESH
+#define WRONG(corrupt, at_once, words) #corrupt, corrupt, at_once, words, INSITU_ERROR_MESH
 
 static const wrong_block wrong_blocks[] = {
     {WRONG(no_cells_along_j_and_k, true, "0 and 0 along i, j and k, expected 0 along at most one of them")},
@@ -263,39 +263,39 @@ static const wrong_block wrong_blocks[] = {
     {"cell_field_short", cell_field_short, true, "119", INSITU_ERROR_FIELD},
 };
 
-static void tell(insitu_session *session, const wrong_block *wrong, int cycle)
+static void expect_report(insitu_session *session, const wrong_block *wrong, int cycle)
 {
     const bool is_last = own_rank == rank_count - 1;
     block *b = make_block();
     char rank[32];
     snprintf(rank, sizeof rank, "rank %d", rank_count - 1);
-    if (is_last) wrong->spoil(b);
+    if (is_last) wrong->corrupt(b);
     const insitu_status at_once = set_block(session, b);
     if (is_last && (at_once != 0) != wrong->at_once) fprintf(stderr, "%s: %s\n", wrong->name, insitu_error(session));
     everywhere((at_once != 0) == (is_last && wrong->at_once));
     for (int i = 0; i < 2; i++) {
         const insitu_status status = insitu_step(session, cycle + i, 0);
         if (status != wrong->status) fprintf(stderr, "%s: %s\n", wrong->name, insitu_error(session));
-        told_everywhere(session, status, wrong->status, rank, wrong->words);
+        reported_everywhere(session, status, wrong->status, rank, wrong->words);
     }
     free(b);
 }
 
-static void wrong_blocks_are_told_to_all_ranks(void **state)
+static void wrong_blocks_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     block *right = make_block();
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(blocks_scene));
-    forget_pictures();
+    discard_pictures();
     everywhere(set_block(session, right) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
-    caught_picture truth = take_caught();
+    caught_picture truth = pop_caught_picture();
     for (size_t i = 0; i < sizeof wrong_blocks / sizeof wrong_blocks[0]; i++) {
-        tell(session, &wrong_blocks[i], (int)(3 * i + 1));
-        forget_pictures();
+        expect_report(session, &wrong_blocks[i], (int)(3 * i + 1));
+        discard_pictures();
         everywhere(set_block(session, right) == INSITU_OK);
         everywhere(insitu_step(session, (int64_t)(3 * i + 3), 0) == INSITU_OK);
-        caught_picture healed = take_caught();
+        caught_picture healed = pop_caught_picture();
         everywhere(own_rank || is_same(&healed, &truth));
         free_caught(&healed);
     }
@@ -306,13 +306,13 @@ static void wrong_blocks_are_told_to_all_ranks(void **state)
 
 /* ---- blocks that change ----------------------------------------------------------------------------------------- */
 
-static void turn_order(block *b)
+static void set_row_major_strides(block *b)
 {
     memcpy(b->lattice.vertex_strides, (int64_t[]){(NJ + 1) * (NK + 1), NK + 1, 1}, sizeof b->lattice.vertex_strides);
     memcpy(b->lattice.cell_strides, (int64_t[]){NJ * NK, NK, 1}, sizeof b->lattice.cell_strides);
 }
 
-static void turn_back(block *b)
+static void set_default_strides(block *b)
 {
     memset(b->lattice.vertex_strides, 0, sizeof b->lattice.vertex_strides);
     memset(b->lattice.cell_strides, 0, sizeof b->lattice.cell_strides);
@@ -384,8 +384,8 @@ static const change changes[] = {
     {CHANGE(mirror_back, INSITU_CHANGED_NOTHING, false)},
     {CHANGE(make_rectilinear, INSITU_CHANGED_NOTHING, false)},
     {CHANGE(move_axis, INSITU_CHANGED_GEOMETRY, false)},
-    {CHANGE(turn_order, INSITU_CHANGED_NOTHING, true)},
-    {CHANGE(turn_back, INSITU_CHANGED_NOTHING, true)},
+    {CHANGE(set_row_major_strides, INSITU_CHANGED_NOTHING, true)},
+    {CHANGE(set_default_strides, INSITU_CHANGED_NOTHING, true)},
     {CHANGE(make_curvilinear, INSITU_CHANGED_NOTHING, false)},
     {CHANGE(move_vertices, INSITU_CHANGED_GEOMETRY, false)},
     {CHANGE(make_hexes, INSITU_CHANGED_NOTHING, true)},
@@ -398,11 +398,11 @@ static const change changes[] = {
 
 static bool draw(insitu_session *session, int cycle, caught_picture *out)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
-    *out = take_caught();
+    *out = pop_caught_picture();
     return true;
 }
 
@@ -443,7 +443,7 @@ static void changed_blocks_are_drawn_as_new_ones(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_blocks_are_told_to_all_ranks),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_blocks_are_reported_on_all_ranks),
                                        cmocka_unit_test(changed_blocks_are_drawn_as_new_ones)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -30,7 +30,7 @@ static void make_mesh(int kind, test_mesh *out)
     if (kind == TEST_KIND_COUNT) test_mesh_to_polyhedra(out, 1);
 }
 
-static void take_part(test_mesh *whole, session_input *out)
+static void extract_rank_cells(test_mesh *whole, session_input *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count + 1, sizeof *owners);
     test_partition(whole, TEST_RANDOM, SIDE, rank_count, owners);
@@ -41,9 +41,9 @@ static void take_part(test_mesh *whole, session_input *out)
 
 static void draw(insitu_session *session, const session_input *in, int cycle, caught_picture *out)
 {
-    forget_pictures();
-    everywhere(hand_over(session, in) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+    discard_pictures();
+    everywhere(submit(session, in) == INSITU_OK);
+    reported_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
     if (own_rank != 0) return;
     *out = caught[0];
     caught_count = 0;
@@ -84,33 +84,33 @@ static double cell_value(const test_mesh *part, int64_t cell)
     return sum / (double)(part->offsets[cell + 1] - part->offsets[cell]);
 }
 
-static bool lacks_value(int64_t cell)
+static bool value_is_missing(int64_t cell)
 {
     return test_uniform((uint64_t)(cell + 100 * own_rank), 8) < 0.3;
 }
 
-static void judge_lacking(int kind, const char *scene)
+static void verify_lacking(int kind, const char *scene)
 {
     session_input in = {0};
     test_mesh whole;
     caught_picture lacking = {0}, ghosts = {0};
     int64_t lacking_count = 0;
     make_mesh(kind, &whole);
-    take_part(&whole, &in);
+    extract_rank_cells(&whole, &in);
     double *values = test_calloc((size_t)in.part.cell_count + 1, sizeof *values);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     in.field.centring = INSITU_CELL;
     in.field.count = in.part.cell_count;
     in.field.values = (insitu_array){values, INSITU_FLOAT64, 0};
     for (int64_t cell = 0; cell < in.part.cell_count; cell++) {
-        values[cell] = lacks_value(cell) ? (double)NAN : cell_value(&in.part, cell);
-        lacking_count += lacks_value(cell);
+        values[cell] = value_is_missing(cell) ? (double)NAN : cell_value(&in.part, cell);
+        lacking_count += value_is_missing(cell);
     }
     draw(session, &in, 0, &lacking);
     everywhere(insitu_last_report(session)->cells_unusable == lacking_count);
     for (int64_t cell = 0; cell < in.part.cell_count; cell++) {
-        values[cell] = lacks_value(cell) ? 1e3 : values[cell];
-        in.part.ghosts[cell] = lacks_value(cell);
+        values[cell] = value_is_missing(cell) ? 1e3 : values[cell];
+        in.part.ghosts[cell] = value_is_missing(cell);
     }
     draw(session, &in, 1, &ghosts);
     everywhere(are_same(&lacking, &ghosts, scene == volume_scene ? 5e-7 : 0));
@@ -126,7 +126,7 @@ static void cells_without_a_value_of_their_own_are_not_there(void **context)
 {
     (void)context;
     for (int kind = 0; kind < MESHES; kind++)
-        for (int i = 0; i < SCENES; i++) judge_lacking(kind, scenes[i]);
+        for (int i = 0; i < SCENES; i++) verify_lacking(kind, scenes[i]);
 }
 
 /* The means at vertices stay as they are: of cells of one value some lose theirs, others get it back. */
@@ -136,7 +136,7 @@ static void cells_that_lose_their_value_are_gone_at_the_next_step(void **context
     session_input in = {0};
     test_mesh whole;
     make_mesh(TEST_HEXES, &whole);
-    take_part(&whole, &in);
+    extract_rank_cells(&whole, &in);
     double *values = test_calloc((size_t)in.part.cell_count + 1, sizeof *values);
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene(IMAGE("      - isosurface: {field: f, values: [0.1]}\n")));
@@ -213,14 +213,14 @@ static void add_flat_cells(test_mesh *mesh, bool as_polyhedra)
     if (as_polyhedra) test_mesh_to_polyhedra(mesh, 1);
 }
 
-static void judge_flat(bool as_polyhedra, const char *scene)
+static void verify_flat(bool as_polyhedra, const char *scene)
 {
     session_input bare = {0}, more = {0};
     test_mesh whole;
     caught_picture without = {0}, with = {0};
     test_mesh_lattice(TEST_HEXES, SIDE, as_polyhedra ? 0 : 0.1, test_wave, &whole);
-    take_part(&whole, &bare);
-    take_part(&whole, &more);
+    extract_rank_cells(&whole, &bare);
+    extract_rank_cells(&whole, &more);
     const int64_t flat = more.part.cell_count;
     add_flat_cells(&more.part, as_polyhedra);
     if (as_polyhedra) test_mesh_to_polyhedra(&bare.part, 1);
@@ -244,7 +244,7 @@ static void flat_cells_between_differing_fields_change_no_pixel(void **context)
 {
     (void)context;
     for (int as_polyhedra = 0; as_polyhedra < 2; as_polyhedra++)
-        for (int i = 0; i < SCENES; i++) judge_flat(as_polyhedra, scenes[i]);
+        for (int i = 0; i < SCENES; i++) verify_flat(as_polyhedra, scenes[i]);
 }
 
 /* Vertices move, and the arrays are the same: hexes lie flat at one step and stand at the next. */
@@ -255,7 +255,7 @@ static void cells_that_rise_from_flatness_are_drawn(void **context)
     test_mesh whole;
     caught_picture fresh = {0}, risen = {0};
     test_mesh_lattice(TEST_HEXES, SIDE, 0.1, test_wave, &whole);
-    take_part(&whole, &in);
+    extract_rank_cells(&whole, &in);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(surface_scene));
     draw(session, &in, 0, &fresh);
     double *heights = test_calloc((size_t)in.part.vertex_count + 1, sizeof *heights);

@@ -316,7 +316,7 @@ static void free_blocks(const levels *l, block blocks[MOST_BLOCKS])
     }
 }
 
-static bool hand_levels(insitu_session *session, const levels *l, const block blocks[MOST_BLOCKS])
+static bool submit_levels(insitu_session *session, const levels *l, const block blocks[MOST_BLOCKS])
 {
     bool is_set = true;
     for (int i = 0; i < l->count && is_set; i++)
@@ -406,11 +406,11 @@ static int count_slits(const caught_picture *picture)
 
 static caught_picture take_step(insitu_session *session, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, cycle);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
-    return take_caught();
+    return pop_caught_picture();
 }
 
 /* Draws the levels in a session of their own. */
@@ -419,7 +419,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const levels *l, bo
     block blocks[MOST_BLOCKS];
     insitu_session *session = open_session(comm, scene);
     make_blocks(l, blocks);
-    assert_true(hand_levels(session, l, blocks));
+    assert_true(submit_levels(session, l, blocks));
     const caught_picture picture = take_step(session, 0);
     int64_t ghosts = insitu_last_report(session)->cells_ghost;
     MPI_Allreduce(MPI_IN_PLACE, &ghosts, 1, MPI_INT64_T, MPI_SUM, comm);
@@ -460,7 +460,7 @@ static void check(levels l)
 /* By default each set of ratios is on one or on several ranks, and has values of cells or of vertices, in turn.
  *
  * With the ratio of 3, vertices of every other block differ from those at the same places in their last bits. */
-static void a_sphere_goes_on_over_levels(void **state)
+static void a_sphere_continues_across_levels(void **state)
 {
     static const int refinements[][LEVELS] = {{1, 2, 4}, {1, 4, 8}, {1, 2, 8}, {1, 3, 6}};
     (void)state;
@@ -499,13 +499,13 @@ static void outer_surfaces_have_no_wall_between_levels(void **state)
         plain.rank = own_rank;
         insitu_session *session = open_session(MPI_COMM_WORLD, scene);
         make_blocks(&l, blocks);
-        everywhere(hand_levels(session, &l, blocks));
+        everywhere(submit_levels(session, &l, blocks));
         caught_picture ours = take_step(session, 0);
         insitu_destroy(&session);
         free_blocks(&l, blocks);
         session = open_session(MPI_COMM_WORLD, scene);
         make_blocks(&plain, blocks);
-        everywhere(hand_levels(session, &plain, blocks));
+        everywhere(submit_levels(session, &plain, blocks));
         caught_picture expected = take_step(session, 0);
         insitu_destroy(&session);
         free_blocks(&plain, blocks);
@@ -534,7 +534,7 @@ static void levels_come_and_go(void **state)
         for (int i = 0; i < MOST_BLOCKS && cycle; i++)
             if (i < last.count && held[i].values && !(i < l.count && blocks[i].values))
                 is_set = is_set && !insitu_set_block(session, "m", i, NULL);
-        is_set = is_set && hand_levels(session, &l, blocks);
+        is_set = is_set && submit_levels(session, &l, blocks);
         everywhere(is_set);
         free_blocks(&last, held);
         memcpy(held, blocks, sizeof held);
@@ -567,7 +567,7 @@ static void blocks_beside_a_change_stay(void **state)
     const int gone = l.count - 1;
     rest = l;
     rest.count = gone;
-    everywhere(hand_levels(session, &l, blocks));
+    everywhere(submit_levels(session, &l, blocks));
     caught_picture picture = take_step(session, 0);
     free_caught(&picture);
     for (int i = 0; i < gone; i++)
@@ -590,7 +590,7 @@ static void blocks_beside_a_change_stay(void **state)
 }
 
 /* Level 1 ends within a cell of level 0. */
-static void blocks_that_do_not_fit_are_told(void **state)
+static void blocks_that_do_not_fit_are_reported(void **state)
 {
     levels l = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count};
     block blocks[MOST_BLOCKS];
@@ -600,12 +600,12 @@ static void blocks_that_do_not_fit_are_told(void **state)
     make_blocks(&l, blocks);
     for (int i = 0; i < l.count; i++)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]++;
-    everywhere(hand_levels(session, &l, blocks));
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[", "refinement along j is 4",
-                    "begin and end at borders of coarser cells");
+    everywhere(submit_levels(session, &l, blocks));
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[", "refinement along j is 4",
+                        "begin and end at borders of coarser cells");
     for (int i = 0; i < l.count; i++)
         if (blocks[i].values && l.boxes[i].level == 2) blocks[i].lattice.first[1]--;
-    everywhere(hand_levels(session, &l, blocks));
+    everywhere(submit_levels(session, &l, blocks));
     caught_picture picture = take_step(session, 1);
     everywhere(own_rank || count_slits(&picture) == 0);
     free_caught(&picture);
@@ -615,8 +615,8 @@ static void blocks_that_do_not_fit_are_told(void **state)
     } else {
         everywhere(true);
     }
-    told_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_MESH,
-                    "mesh \"m[0]\": lattice: refinement along k is 0, expected 1..1048576");
+    reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_MESH,
+                        "mesh \"m[0]\": lattice: refinement along k is 0, expected 1..1048576");
     insitu_destroy(&session);
     free_blocks(&l, blocks);
 }
@@ -630,8 +630,8 @@ static int begin_tests(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sphere_goes_on_over_levels), cmocka_unit_test(outer_surfaces_have_no_wall_between_levels),
-        cmocka_unit_test(levels_come_and_go), cmocka_unit_test(blocks_beside_a_change_stay),
-        cmocka_unit_test(blocks_that_do_not_fit_are_told)};
+        cmocka_unit_test(a_sphere_continues_across_levels),
+        cmocka_unit_test(outer_surfaces_have_no_wall_between_levels), cmocka_unit_test(levels_come_and_go),
+        cmocka_unit_test(blocks_beside_a_change_stay), cmocka_unit_test(blocks_that_do_not_fit_are_reported)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

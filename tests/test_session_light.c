@@ -53,23 +53,23 @@ static void normal_at(const caught_picture *picture, int pixel, double out[3])
 
 /* A mesh of its own on every rank's session: the whole of it on one rank, or dealt. */
 static void make_jittered(session_input *in, test_mesh_kind kind, double jitter, test_function *f,
-                          test_partition_kind dealt, int rank, int count)
+                          test_partition_kind distributed, int rank, int count)
 {
     test_mesh whole;
     test_mesh_lattice(kind, SIDE, jitter, f, &whole);
     int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
     assert_non_null(owners);
-    test_partition(&whole, dealt, SIDE, count, owners);
+    test_partition(&whole, distributed, SIDE, count, owners);
     test_mesh_part(&whole, owners, rank, &in->part);
     free(owners);
     test_mesh_free(&whole);
     input_describe(in);
 }
 
-static void make_part(session_input *in, test_mesh_kind kind, test_function *f, test_partition_kind dealt, int rank,
-                      int count)
+static void make_part(session_input *in, test_mesh_kind kind, test_function *f, test_partition_kind distributed,
+                      int rank, int count)
 {
-    make_jittered(in, kind, 0.2, f, dealt, rank, count);
+    make_jittered(in, kind, 0.2, f, distributed, rank, count);
 }
 
 /* ---- shadows in closed form ---------------------------------------------------------------------------------- */
@@ -103,7 +103,7 @@ typedef struct tally {
 } tally;
 
 /* lit: by the shadowless picture's own light, beside which nothing is measured. */
-static tally judge_floor(const caught_picture *shadowed, const caught_picture *lit)
+static tally verify_floor(const caught_picture *shadowed, const caught_picture *lit)
 {
     tally out = {0};
     const double full = 0.2 + 0.8 * to_light[1];
@@ -128,7 +128,7 @@ static tally draw_floor(test_mesh_kind kind, const char *scene, const char *lit_
     tally out = {0};
     make_part(&in, kind, test_linear, TEST_RANDOM, own_rank, rank_count);
     caught_picture shadowed = draw(MPI_COMM_WORLD, scene, &in), lit = draw(MPI_COMM_WORLD, lit_scene, &in);
-    if (own_rank == 0) out = judge_floor(&shadowed, &lit);
+    if (own_rank == 0) out = verify_floor(&shadowed, &lit);
     free_caught(&shadowed);
     free_caught(&lit);
     input_free(&in);
@@ -156,7 +156,7 @@ static void disks_throw_ellipses(void **context)
 
 /* A transparent disk, a disk that is cut away, a light that casts none, one below that casts none and has no highlight.
  */
-static void what_casts_no_shadow_casts_none(void **context)
+static void transparent_layers_cast_no_shadow(void **context)
 {
     static const char *const scenes[][2] = {
         {IMAGE(LIGHT("") "    shadows: true\n", FLOOR DISK(", opacity: 0.5")),
@@ -227,17 +227,17 @@ static int corner_blocks(const corner *c, const double from[3], const double d[3
 }
 
 typedef struct sky {
-    int pixels, wrong, unsure;
+    int pixels, wrong, undecided_rays;
     double sum; /* of the shares that are open, as drawn */
 } sky;
 
 /* Everything by AO alone: the picture is the unoccluded one times the share. */
-static sky judge_sky(const corner *c, const caught_picture *drawn, const caught_picture *plain)
+static sky verify_sky(const corner *c, const caught_picture *drawn, const caught_picture *plain)
 {
     sky out = {0};
     for (int p = 0; p < PIXELS; p++) {
         double place[3], n[3], d[3];
-        int open = 0, unsure = 0;
+        int open = 0, undecided_rays = 0;
         if (!isfinite(drawn->depth[p])) continue;
         place_at(p, (double)drawn->depth[p], place);
         normal_at(drawn, p, n);
@@ -245,15 +245,16 @@ static sky judge_sky(const corner *c, const caught_picture *drawn, const caught_
             test_hemisphere((uint32_t)p, WIDTH, SAMPLES, k, n, d);
             const int blocked = corner_blocks(c, place, d);
             open += blocked == 0;
-            unsure += blocked < 0;
+            undecided_rays += blocked < 0;
         }
         const double share = (double)drawn->rgba[4 * p] / (double)plain->rgba[4 * p], counted = SAMPLES * share;
         out.pixels++;
-        out.unsure += unsure > 0;
+        out.undecided_rays += undecided_rays > 0;
         out.sum += share;
-        if (fabs(counted - round(counted)) < 1e-4 && round(counted) >= open && round(counted) <= open + unsure)
+        if (fabs(counted - round(counted)) < 1e-4 && round(counted) >= open && round(counted) <= open + undecided_rays)
             continue;
-        if (!out.wrong++) fprintf(stderr, "pixel %d: %.6g open, expected %d to %d\n", p, counted, open, open + unsure);
+        if (!out.wrong++)
+            fprintf(stderr, "pixel %d: %.6g open, expected %d to %d\n", p, counted, open, open + undecided_rays);
     }
     return out;
 }
@@ -273,7 +274,7 @@ static void corners_are_as_dark_as_disk_segments(void **context)
         caught_picture plain = draw(MPI_COMM_WORLD, IMAGE(DARK, CORNER), &in);
         bool is_right = true;
         if (own_rank == 0) {
-            const sky s = judge_sky(&slices, &drawn, &plain);
+            const sky s = verify_sky(&slices, &drawn, &plain);
             double expected = 0;
             int count = 0;
             for (int p = 0; p < PIXELS; p++) {
@@ -289,11 +290,11 @@ static void corners_are_as_dark_as_disk_segments(void **context)
              * by a root of their number less, five times that at most. At the cube's ends the planes end, in a tenth of
              * the pixels at most. */
             const double off = fabs(s.sum - expected) / count;
-            is_right =
-                s.wrong == 0 && s.pixels > 200 && s.unsure < s.pixels / 10 && off < 5 * 0.125 / sqrt(count) + 0.02;
+            is_right = s.wrong == 0 && s.pixels > 200 && s.undecided_rays < s.pixels / 10 &&
+                       off < 5 * 0.125 / sqrt(count) + 0.02;
             if (!is_right)
                 fprintf(stderr, "%s: %d pixels, %d wrong, %d unsure, mean off by %g\n", test_mesh_kind_name(kind),
-                        s.pixels, s.wrong, s.unsure, off);
+                        s.pixels, s.wrong, s.undecided_rays, off);
         }
         free_caught(&drawn);
         free_caught(&plain);
@@ -328,7 +329,7 @@ static void valleys_are_dark_to_the_ground(void **context)
         caught_picture plain = draw(MPI_COMM_WORLD, IMAGE(DARK, VALLEY), &in);
         bool is_right = true;
         if (own_rank == 0) {
-            const sky s = judge_sky(&valley, &drawn, &plain);
+            const sky s = verify_sky(&valley, &drawn, &plain);
             int near = 0;
             for (int p = 0; p < PIXELS; p++) {
                 double at[3];
@@ -337,10 +338,10 @@ static void valleys_are_dark_to_the_ground(void **context)
                 const double height = fmax(above(&valley, 0, at), above(&valley, 1, at));
                 near += height > valley.least && height < 2 * valley.least;
             }
-            is_right = s.wrong == 0 && s.pixels > 200 && near > 12 && s.unsure < s.pixels / 10;
+            is_right = s.wrong == 0 && s.pixels > 200 && near > 12 && s.undecided_rays < s.pixels / 10;
             if (!is_right)
                 fprintf(stderr, "%s: %d pixels, %d wrong, %d unsure, %d near\n", test_mesh_kind_name(kind), s.pixels,
-                        s.wrong, s.unsure, near);
+                        s.wrong, s.undecided_rays, near);
         }
         free_caught(&drawn);
         free_caught(&plain);
@@ -373,17 +374,17 @@ static double difference(const caught_picture *a, const caught_picture *b)
 }
 
 /* most: 0 where there are surfaces alone, which are one picture to the bit. */
-static void judge_partition(const char *scene, const session_input *whole, const session_input *part, double most,
-                            const char *what)
+static void verify_partition(const char *scene, const session_input *whole, const session_input *part, double most,
+                             const char *what)
 {
     double off = 0;
-    caught_picture dealt = draw(MPI_COMM_WORLD, scene, part);
+    caught_picture distributed = draw(MPI_COMM_WORLD, scene, part);
     if (own_rank == 0) {
         caught_picture alone = draw(MPI_COMM_SELF, scene, whole);
-        off = difference(&dealt, &alone);
+        off = difference(&distributed, &alone);
         free_caught(&alone);
     }
-    free_caught(&dealt);
+    free_caught(&distributed);
     if (!(off <= most)) fprintf(stderr, "%s, %d ranks: off by %g\n", what, rank_count, off);
     everywhere(off <= most);
 }
@@ -392,15 +393,15 @@ static void lit_pictures_are_the_same_on_any_partition(void **context)
 {
     (void)context;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (test_partition_kind dealt = 0; dealt < TEST_PARTITION_COUNT; dealt++) {
+        for (test_partition_kind distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
             session_input whole = {0}, part = {0};
             /* At random the last rank is left without cells. */
-            const int count = dealt == TEST_RANDOM && rank_count > 1 ? rank_count - 1 : rank_count;
+            const int count = distributed == TEST_RANDOM && rank_count > 1 ? rank_count - 1 : rank_count;
             make_part(&whole, kind, test_wave, TEST_BLOCK, 0, 1);
-            make_part(&part, kind, test_wave, dealt, own_rank, count);
-            judge_partition(EVERYTHING, &whole, &part, 0, test_mesh_kind_name(kind));
-            if (dealt == TEST_CHECKERBOARD)
-                judge_partition(WITH_VOLUME, &whole, &part, 1e-6, test_mesh_kind_name(kind));
+            make_part(&part, kind, test_wave, distributed, own_rank, count);
+            verify_partition(EVERYTHING, &whole, &part, 0, test_mesh_kind_name(kind));
+            if (distributed == TEST_CHECKERBOARD)
+                verify_partition(WITH_VOLUME, &whole, &part, 1e-6, test_mesh_kind_name(kind));
             input_free(&whole);
             input_free(&part);
         }
@@ -419,7 +420,7 @@ static void ghost_cells_cast_nothing(void **context)
     for (int64_t cell = 0; cell < part.part.cell_count; cell++) part.part.ghosts[cell] = owners[cell] != own_rank;
     free(owners);
     input_describe(&part);
-    judge_partition(EVERYTHING, &whole, &part, 0, "ghost cells");
+    verify_partition(EVERYTHING, &whole, &part, 0, "ghost cells");
     input_free(&whole);
     input_free(&part);
 }
@@ -428,7 +429,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(disks_throw_ellipses),
-        cmocka_unit_test(what_casts_no_shadow_casts_none),
+        cmocka_unit_test(transparent_layers_cast_no_shadow),
         cmocka_unit_test(corners_are_as_dark_as_disk_segments),
         cmocka_unit_test(valleys_are_dark_to_the_ground),
         cmocka_unit_test(lit_pictures_are_the_same_on_any_partition),

@@ -57,13 +57,13 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     field.centring = INSITU_CELL;
     field.count = in->part.cell_count;
     field.values = (insitu_array){values, INSITU_FLOAT64, 0};
-    forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
+    discard_pictures();
+    assert_int_equal(submit(session, in), INSITU_OK);
     if (in->part.cell_count) assert_int_equal(insitu_set_field(session, "m", &field), INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     free(values);
     return picture;
@@ -108,7 +108,7 @@ static void lines_are_the_same_on_all_ranks(void **state)
         }
 }
 
-static void meshes_without_the_field_are_told(void **state)
+static void meshes_without_the_field_are_reported(void **state)
 {
     (void)state;
     session_input in;
@@ -126,8 +126,8 @@ static void meshes_without_the_field_are_told(void **state)
     field.name = "p";
     field.count = other.vertex_count;
     field.values = (insitu_array){other.values, INSITU_FLOAT64, 0};
-    forget_pictures();
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    discard_pictures();
+    assert_int_equal(submit(session, &in), INSITU_OK);
     if (own_rank == 0) {
         assert_int_equal(insitu_set_mesh(session, "n", &mesh), INSITU_OK);
         assert_int_equal(insitu_set_field(session, "n", &field), INSITU_OK);
@@ -138,12 +138,12 @@ static void meshes_without_the_field_are_told(void **state)
     insitu_destroy(&session);
     test_mesh_free(&other);
     input_free(&in);
-    forget_pictures();
+    discard_pictures();
 }
 
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(lines_are_the_same_on_all_ranks),
-                                       cmocka_unit_test(meshes_without_the_field_are_told)};
+                                       cmocka_unit_test(meshes_without_the_field_are_reported)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -166,7 +166,7 @@ static void make_needles(session_input *in)
 static const struct warning_case {
     const char *name, *scene;
     test_mesh_kind kind;
-    spoil_function *spoil;
+    corrupt_function *corrupt;
     const char *words[3]; /* none: no warning */
 } warnings[] = {
     {"hexes by rows",
@@ -383,7 +383,7 @@ static bool is_warned(const insitu_session *session, const char *const words[3])
     return is_so;
 }
 
-static bool is_told_alike(const char *text)
+static bool is_reported_alike(const char *text)
 {
     char first[2048] = "";
     if (own_rank == 0) snprintf(first, sizeof first, "%s", text);
@@ -398,18 +398,18 @@ static void check_warning(const struct warning_case *c)
     session_input in;
     if (own_rank == 0) fprintf(stderr, "%s\n", c->name);
     input_create(&in, c->kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-    if (c->spoil) c->spoil(&in);
+    if (c->corrupt) c->corrupt(&in);
     for (int cycle = 0; cycle < 2; cycle++) {
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_is_good(session, cycle);
         everywhere(is_warned(session, cycle == 0 ? c->words : none));
-        everywhere(is_told_alike(insitu_last_report(session)->warnings));
+        everywhere(is_reported_alike(insitu_last_report(session)->warnings));
     }
     insitu_destroy(&session);
     input_free(&in);
 }
 
-static void what_is_hardly_meant_is_told_once(void **context)
+static void likely_mistakes_are_reported_once(void **context)
 {
     (void)context;
     cell_value = 5;
@@ -420,7 +420,7 @@ static void what_is_hardly_meant_is_told_once(void **context)
 static void warnings_come_back_with_what_they_are_about(void **context)
 {
     (void)context;
-    static const bool is_bad[] = {true, true, false, true, true}, is_told[] = {true, false, false, true, false};
+    static const bool is_bad[] = {true, true, false, true, true}, is_reported[] = {true, false, false, true, false};
     static const char *const words[3] = {"the isosurface of \"f\" at 0.1 is empty: the field goes from 5 to 5"};
     static const char *const none[3] = {NULL};
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain));
@@ -431,9 +431,9 @@ static void warnings_come_back_with_what_they_are_about(void **context)
     for (int cycle = 0; cycle < 5; cycle++) {
         session_input now = in;
         if (is_bad[cycle]) now.field.values.data = values;
-        everywhere(hand_over(session, &now) == INSITU_OK);
+        everywhere(submit(session, &now) == INSITU_OK);
         step_is_good(session, cycle);
-        everywhere(is_warned(session, is_told[cycle] ? words : none));
+        everywhere(is_warned(session, is_reported[cycle] ? words : none));
     }
     write_scene(IMAGE("[32, 16]", "", SURFACE, ""));
     step_is_good(session, 5);
@@ -475,7 +475,7 @@ static void parameters_change_with_the_scene_on_all_ranks(void **context)
                insitu_parameter(session, "inflow", NULL) == INSITU_ERROR_ARGUMENT &&
                strcmp(insitu_error(session), "insitu_parameter: value is NULL") == 0);
     everywhere(insitu_parameter(NULL, "inflow", &(double){0}) == INSITU_ERROR_ARGUMENT);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_is_good(session, 0);
     everywhere(is_warned(session, none)); /* the code may ask later */
     step_is_good(session, 1);
@@ -495,7 +495,7 @@ static void parameters_change_with_the_scene_on_all_ranks(void **context)
 }
 
 /* Two meshes of cell values: a layer of means at vertices is told of vertex ids, one of cells is not. */
-static void meshes_with_ids_among_others_are_told(void **context)
+static void meshes_with_ids_among_others_are_reported(void **context)
 {
     (void)context;
     static const struct {
@@ -515,7 +515,7 @@ static void meshes_with_ids_among_others_are_told(void **context)
         everywhere(insitu_set_mesh(session, "n", &in.mesh) == INSITU_OK);
         everywhere(insitu_set_field(session, "n", &in.field) == INSITU_OK);
         if (cases[i].has_ids) in.mesh.vertex_ids = (insitu_array){ids, INSITU_INT64, 0};
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_is_good(session, 0);
         everywhere(is_warned(session, cases[i].words));
         insitu_destroy(&session);
@@ -525,27 +525,27 @@ static void meshes_with_ids_among_others_are_told(void **context)
 }
 
 /* In the step that draws the words first, though they are written after it; none hides another. */
-static void faults_of_words_are_told_at_once(void **context)
+static void faults_of_words_are_reported_at_once(void **context)
 {
     (void)context;
     session_input in;
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     for (int i = 0; i < 3; i++) {
-        const bool has_words = i > 0, is_told = i == 2;
+        const bool has_words = i > 0, is_reported = i == 2;
         word_faults = (insitu_word_faults){.font = ""};
-        if (is_told)
+        if (is_reported)
             word_faults = (insitu_word_faults){"no font was found", "no glyphs for U+6E29", "no room for the axes"};
         insitu_session *session =
             open_session(MPI_COMM_WORLD,
                          write_scene(has_words ? IMAGE_OF_PNG("    decorations: {title: Words}\n") : IMAGE_OF_PNG("")));
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         for (int cycle = 0; cycle < 2; cycle++) {
             step_is_good(session, cycle);
             const char *warnings = insitu_last_report(session)->warnings;
-            everywhere(is_told && cycle == 0 ? strstr(warnings, "image \"a\": no font was found") &&
-                                                   strstr(warnings, "image \"a\": no glyphs for U+6E29") &&
-                                                   strstr(warnings, "image \"a\": no room for the axes")
-                                             : !*warnings);
+            everywhere(is_reported && cycle == 0 ? strstr(warnings, "image \"a\": no font was found") &&
+                                                       strstr(warnings, "image \"a\": no glyphs for U+6E29") &&
+                                                       strstr(warnings, "image \"a\": no room for the axes")
+                                                 : !*warnings);
         }
         insitu_destroy(&session);
     }
@@ -578,10 +578,10 @@ static void pictures_that_would_take_hours_are_refused(void **context)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(refused[i].scene));
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         const insitu_status status = insitu_step(session, 0, 0);
-        told_everywhere(session, status, INSITU_ERROR_SCENE, refused[i].words[0], refused[i].words[1],
-                        refused[i].words[2] ? refused[i].words[2] : "");
+        reported_everywhere(session, status, INSITU_ERROR_SCENE, refused[i].words[0], refused[i].words[1],
+                            refused[i].words[2] ? refused[i].words[2] : "");
         insitu_destroy(&session);
     }
     input_free(&in);
@@ -593,17 +593,17 @@ static void control_characters_are_escaped(void **context)
     (void)context;
     insitu_session *session = NULL;
     insitu_status status = insitu_create(MPI_COMM_WORLD, "/no\nwhere/\x1b[31mred\x7f.yaml", &session);
-    told_everywhere(NULL, status, INSITU_ERROR_SCENE, "/no\\x0awhere/\\x1b[31mred\\x7f.yaml: cannot be read");
+    reported_everywhere(NULL, status, INSITU_ERROR_SCENE, "/no\\x0awhere/\\x1b[31mred\\x7f.yaml: cannot be read");
     session = open_session(MPI_COMM_WORLD, write_scene(plain));
     insitu_field field;
     insitu_field_defaults(&field);
     field.name = "p\x9b\xc2\x9b\tq\xc3\xa9";
     everywhere(insitu_set_field(session, "no\rmesh", &field) == INSITU_ERROR_FIELD);
     status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, "field \"p\x9b\\x9b\\x09q\xc3\xa9\"", "\"no\\x0dmesh\"");
+    reported_everywhere(session, status, INSITU_ERROR_FIELD, "field \"p\x9b\\x9b\\x09q\xc3\xa9\"", "\"no\\x0dmesh\"");
     session_input in;
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     in.field.name = "two\nlines";
     everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
     step_is_good(session, 1);
@@ -615,13 +615,13 @@ static void control_characters_are_escaped(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_hardly_meant_is_told_once),
+        cmocka_unit_test(likely_mistakes_are_reported_once),
         cmocka_unit_test(warnings_come_back_with_what_they_are_about),
-        cmocka_unit_test(meshes_with_ids_among_others_are_told),
+        cmocka_unit_test(meshes_with_ids_among_others_are_reported),
         cmocka_unit_test(pictures_that_would_take_hours_are_refused),
         cmocka_unit_test(control_characters_are_escaped),
         cmocka_unit_test(parameters_change_with_the_scene_on_all_ranks),
-        cmocka_unit_test(faults_of_words_are_told_at_once),
+        cmocka_unit_test(faults_of_words_are_reported_at_once),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -60,33 +60,33 @@ static void cells_have_the_pictures_of_a_step(void **state)
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     for (int cycle = 0; cycle < 3; cycle++) {
-        forget_pictures();
-        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        discard_pictures();
+        assert_int_equal(submit(session, &in), INSITU_OK);
         assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
         everywhere(!strstr(insitu_last_report(session)->warnings, "all_"));
         everywhere(own_rank != 0 || is_montage(cycle, cycle % 2 == 0));
     }
     insitu_destroy(&session);
     input_free(&in);
-    forget_pictures();
+    discard_pictures();
 }
 
-static void files_that_cannot_be_written_are_told(void **state)
+static void files_that_cannot_be_written_are_reported(void **state)
 {
     (void)state;
     session_input in;
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    forget_pictures();
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    discard_pictures();
+    assert_int_equal(submit(session, &in), INSITU_OK);
     unwritable = "all_0";
     const insitu_status status = insitu_step(session, 0, 0);
     unwritable = NULL;
-    told_everywhere(session, status, INSITU_ERROR_IO, "all_0.png: cannot be written");
+    reported_everywhere(session, status, INSITU_ERROR_IO, "all_0.png: cannot be written");
     everywhere(own_rank != 0 || (caught_count == 4 && find("a.png") && find("c.png")));
     insitu_destroy(&session);
     input_free(&in);
-    forget_pictures();
+    discard_pictures();
 }
 
 /* ---- shared colour bars -------------------------------------------------------------------------------------------
@@ -154,7 +154,7 @@ static void alike_colour_bars_are_drawn_once(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(cells_have_the_pictures_of_a_step),
-                                       cmocka_unit_test(files_that_cannot_be_written_are_told),
+                                       cmocka_unit_test(files_that_cannot_be_written_are_reported),
                                        cmocka_unit_test(alike_colour_bars_are_drawn_once)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -47,7 +47,7 @@ static void ramp_free(ramp *r)
     test_free(r->singles);
 }
 
-static void ramp_hand_over(const ramp *r, insitu_session *session)
+static void ramp_submit(const ramp *r, insitu_session *session)
 {
     insitu_field field = r->in.field;
     everywhere(insitu_set_mesh(session, "m", &r->in.mesh) == INSITU_OK);
@@ -169,11 +169,11 @@ static void check_case(const narrow_case *c, int layer, bool is_given)
         snprintf(keys, sizeof keys, "%srange: data", c->scale);
     ramp_create(&r, SIDE, c->low, c->high, c->is_single);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
-    forget_pictures();
-    ramp_hand_over(&r, session);
+    discard_pictures();
+    ramp_submit(&r, session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     everywhere(!strstr(insitu_last_report(session)->warnings, "too near"));
-    caught_picture picture = take_caught();
+    caught_picture picture = pop_caught_picture();
     const bool is_volume = layer == 3; /* to max_error, in linear light */
     const double allowed = allowed_of(c) + (is_volume ? 0.01 : 0);
     const double off = colours_are_off(&picture, is_volume, c->place, c->low, c->high);
@@ -229,10 +229,10 @@ static caught_picture draw_range(const ramp *r, int layer, const char *scale, co
     char keys[256];
     snprintf(keys, sizeof keys, "%srange: %s", scale, range);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
-    forget_pictures();
-    ramp_hand_over(r, session);
+    discard_pictures();
+    ramp_submit(r, session);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -313,13 +313,13 @@ static void constant_fields_have_one_tick(void **state)
 
 /* Values that rounding alone tells apart are told of, once; a constant field is not. The steps are good all the same.
  */
-static void values_too_near_are_told(void **state)
+static void values_too_near_are_reported(void **state)
 {
     (void)state;
     static const struct {
         double low, high;
         const char *range;
-        bool is_told;
+        bool is_reported;
     } near[] = {{1, 1 + 1e-15, "data", true},    {1, 1 + 1e-15, "[1, 1.000000000000001]", true},
                 {0, 1e-300, "data", true},       {0, 1e-300, "[0, 1e-300]", true},
                 {1e8, 1e8 + 1e-7, "data", true}, {1, 1, "data", false},
@@ -332,23 +332,23 @@ static void values_too_near_are_told(void **state)
             ramp_create(&r, SIDE, near[i].low, near[i].high, false);
             insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_of(layer, keys)));
             for (int cycle = 0; cycle < 2; cycle++) {
-                ramp_hand_over(&r, session);
+                ramp_submit(&r, session);
                 everywhere(insitu_step(session, cycle, 0) == INSITU_OK);
-                const bool is_told = strstr(insitu_last_report(session)->warnings, "too near") != NULL;
-                if (is_told != (near[i].is_told && cycle == 0)) fprintf(stderr, "layer %d, %s\n", layer, keys);
-                everywhere(is_told == (near[i].is_told && cycle == 0));
+                const bool is_reported = strstr(insitu_last_report(session)->warnings, "too near") != NULL;
+                if (is_reported != (near[i].is_reported && cycle == 0)) fprintf(stderr, "layer %d, %s\n", layer, keys);
+                everywhere(is_reported == (near[i].is_reported && cycle == 0));
             }
             insitu_destroy(&session);
             ramp_free(&r);
         }
-    forget_pictures();
+    discard_pictures();
 }
 
 /* ---- statistics ------------------------------------------------------------------------------------------------ */
 
 /* A linear field over a cube: its ends are at corners, its mean in the middle. The histogram's shares add up to 1, and
  * are alike on both sides of the middle as far as cells are. */
-static void statistics_tell_narrow_fields_apart(void **state)
+static void statistics_distinguish_narrow_fields(void **state)
 {
     (void)state;
     for (int is_given = 0; is_given < 2; is_given++) {
@@ -361,7 +361,7 @@ static void statistics_tell_narrow_fields_apart(void **state)
         snprintf(scene, sizeof scene, "%sstatistics: [{field: f, path: narrow.csv, histogram: {bins: 4%s}}]\n",
                  scene_of(1, "range: data"), is_given ? ", range: [100000000, 100000000.01]" : "");
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-        ramp_hand_over(&r, session);
+        ramp_submit(&r, session);
         everywhere(insitu_step(session, 0, 0) == INSITU_OK);
         insitu_destroy(&session);
         read_file("narrow.csv", MOST, text);
@@ -375,7 +375,7 @@ static void statistics_tell_narrow_fields_apart(void **state)
         if (own_rank == 0 && !is_well) fprintf(stderr, "%s", text);
         everywhere(own_rank != 0 || is_well);
         ramp_free(&r);
-        forget_pictures();
+        discard_pictures();
     }
 }
 
@@ -387,9 +387,11 @@ static int begin_tests(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(narrow_ranges_are_closed_forms), cmocka_unit_test(percentiles_are_those_of_doubles),
-        cmocka_unit_test(percentiles_are_right_among_many_equal_values), cmocka_unit_test(constant_fields_have_one_tick),
-        cmocka_unit_test(values_too_near_are_told), cmocka_unit_test(statistics_tell_narrow_fields_apart)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(narrow_ranges_are_closed_forms),
+                                       cmocka_unit_test(percentiles_are_those_of_doubles),
+                                       cmocka_unit_test(percentiles_are_right_among_many_equal_values),
+                                       cmocka_unit_test(constant_fields_have_one_tick),
+                                       cmocka_unit_test(values_too_near_are_reported),
+                                       cmocka_unit_test(statistics_distinguish_narrow_fields)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -61,9 +61,9 @@ static drawn take_drawn(void)
     return out;
 }
 
-static bool step_well(insitu_session *session, int cycle)
+static bool step_ok(insitu_session *session, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     return status == INSITU_OK;
@@ -77,7 +77,7 @@ static drawn draw(MPI_Comm comm, const char *scene, const order_mesh *mesh, cons
     assert_int_equal(insitu_set_mesh(session, "m", &mesh->mesh), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &mesh->field), INSITU_OK);
     if (more) assert_int_equal(insitu_set_field(session, "m", more), INSITU_OK);
-    const bool is_well = step_well(session, 0);
+    const bool is_well = step_ok(session, 0);
     if (report) *report = *insitu_last_report(session);
     assert_true(is_well);
     const drawn out = take_drawn();
@@ -361,7 +361,7 @@ static void corner_fields_are_the_cells_own(void **state)
 /* ---- nodes that move --------------------------------------------------------------------------------------------- */
 
 /* Turned by about a radian, which changes all orders of coordinates. */
-static void turn_nodes(order_mesh *mesh)
+static void rotate_nodes(order_mesh *mesh)
 {
     for (int64_t i = 0; i < mesh->vertex_count; i++) {
         double *p = mesh->coordinates + 3 * i;
@@ -373,19 +373,19 @@ static void turn_nodes(order_mesh *mesh)
 
 /* Draws the kind's cells, then the turned ones, of which `changed` is told. The origin that places are relative to
  * stays that of the first step, so that pictures may be compared to the bit. */
-static drawn draw_turned(const order_kind *kind, unsigned changed)
+static drawn draw_rotated(const order_kind *kind, unsigned changed)
 {
     order_mesh mesh;
     order_mesh_create(kind, 2, 0, wavy, own_rank, rank_count, &mesh);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_scene));
     assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
-    everywhere(step_well(session, 0));
-    turn_nodes(&mesh);
+    everywhere(step_ok(session, 0));
+    rotate_nodes(&mesh);
     mesh.mesh.changed = changed;
     assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
     if (changed == INSITU_CHANGED_ALL) assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
-    everywhere(step_well(session, 1));
+    everywhere(step_ok(session, 1));
     const drawn out = take_drawn();
     insitu_destroy(&session);
     order_mesh_free(&mesh);
@@ -398,8 +398,8 @@ static void moved_nodes_draw_as_new_ones(void **state)
 {
     (void)state;
     for (int k = 0; k < order_kind_count; k++) {
-        drawn moved = draw_turned(&order_kinds[k], INSITU_CHANGED_GEOMETRY);
-        drawn anew = draw_turned(&order_kinds[k], INSITU_CHANGED_ALL);
+        drawn moved = draw_rotated(&order_kinds[k], INSITU_CHANGED_GEOMETRY);
+        drawn anew = draw_rotated(&order_kinds[k], INSITU_CHANGED_ALL);
         bool is_same = moved.count == anew.count;
         for (int i = 0; own_rank == 0 && i < 3; i++)
             is_same = is_same && same_pictures(&moved.pictures[i], &anew.pictures[i]);

@@ -46,7 +46,7 @@ static caught_picture draw_picture(const char *scene, const order_mesh *mesh, co
 {
     insitu_session *session = draw(scene, mesh, more);
     insitu_destroy(&session);
-    return take_caught();
+    return pop_caught_picture();
 }
 
 static insitu_field cell_field(const char *name, insitu_centring centring, const double *values, int64_t count)
@@ -267,7 +267,7 @@ static void cells_that_cannot_be_shown_count_once(void **state)
         snprintf(words, sizeof words, ": %lld cells are not drawn", (long long)all);
         everywhere(own_rank || (all > 0 && strstr(insitu_last_report(session)->warnings, words)));
         insitu_destroy(&session);
-        forget_pictures();
+        discard_pictures();
         order_mesh_free(&mesh);
     }
 }
@@ -276,7 +276,7 @@ static void cells_that_cannot_be_shown_count_once(void **state)
 static void cells_that_show_nothing_count_once(void **state)
 {
     (void)state;
-    int told = 0;
+    int reported = 0;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         order_mesh_create(&order_kinds[k], 2, 0, plane, own_rank, rank_count, &mesh);
@@ -291,14 +291,14 @@ static void cells_that_show_nothing_count_once(void **state)
         }
         insitu_session *session = draw(IMAGE("isosurface: {field: f, values: [1.4]}"), &mesh, NULL);
         const char *text = strstr(insitu_last_report(session)->left_out, "mesh \"m\": ");
-        const bool is_told = text && sscanf(text, "mesh \"m\": %lld of %lld cells show nothing", &left, &of) == 2;
-        everywhere(!is_told || (left == expected && of == mesh.cell_count));
-        told += is_told;
+        const bool is_reported = text && sscanf(text, "mesh \"m\": %lld of %lld cells show nothing", &left, &of) == 2;
+        everywhere(!is_reported || (left == expected && of == mesh.cell_count));
+        reported += is_reported;
         insitu_destroy(&session);
-        forget_pictures();
+        discard_pictures();
         order_mesh_free(&mesh);
     }
-    everywhere(told >= order_kind_count / 2);
+    everywhere(reported >= order_kind_count / 2);
 }
 
 static void statistics_count_cells_once(void **state)
@@ -314,7 +314,7 @@ static void statistics_count_cells_once(void **state)
         if (!own_rank) remove("cells.csv");
         insitu_session *session = draw(scene, &mesh, NULL);
         insitu_destroy(&session);
-        forget_pictures();
+        discard_pictures();
         read_file("cells.csv", sizeof text, text);
         long long counted = -1;
         double volume = 0;

@@ -23,11 +23,11 @@ typedef struct input {
     double values[64];
 } input;
 
-typedef void spoil_input(input *in);
+typedef void corrupt_input(input *in);
 
 typedef struct fault {
     int kind; /* in kinds */
-    spoil_input *spoil;
+    corrupt_input *corrupt;
     insitu_status status;
     bool of_field, at_once;
     const char *words;
@@ -200,13 +200,13 @@ static void draws_when_right(insitu_session *session, const order_kind *kind)
     order_mesh_free(&whole);
 }
 
-static void is_told(insitu_session *session, const fault *f)
+static void is_reported(insitu_session *session, const fault *f)
 {
     const bool is_bad = own_rank == rank_count - 1;
     order_mesh whole;
     input in;
     begin(&kinds[f->kind], &whole, &in);
-    if (is_bad) f->spoil(&in);
+    if (is_bad) f->corrupt(&in);
     const insitu_status of_mesh = insitu_set_mesh(session, "m", &in.mesh);
     insitu_status at_once = of_mesh;
     if (!of_mesh) at_once = insitu_set_field(session, "m", &in.field);
@@ -216,26 +216,26 @@ static void is_told(insitu_session *session, const fault *f)
     everywhere(!is_bad || !f->at_once || strstr(insitu_error(session), f->words) != NULL);
     everywhere(!is_bad || !f->of_field || of_mesh == INSITU_OK);
     for (int again = 0; again < 2; again++) {
-        forget_pictures();
+        discard_pictures();
         const insitu_status status = insitu_step(session, 1, 0);
         if (!strstr(insitu_error(session), f->words)) fprintf(stderr, "%s: %s\n", f->words, insitu_error(session));
-        told_everywhere(session, status, f->status, "mesh \"m\"", f->words);
+        reported_everywhere(session, status, f->status, "mesh \"m\"", f->words);
         everywhere(caught_count == 0);
     }
     draws_when_right(session, &kinds[f->kind]);
     order_mesh_free(&whole);
 }
 
-static void mistakes_are_told_to_all(void **state)
+static void mistakes_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
-    for (size_t i = 0; i < sizeof faults / sizeof faults[0]; i++) is_told(session, &faults[i]);
+    for (size_t i = 0; i < sizeof faults / sizeof faults[0]; i++) is_reported(session, &faults[i]);
     insitu_destroy(&session);
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(mistakes_are_told_to_all)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(mistakes_are_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -35,12 +35,12 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const order_mesh *m
     insitu_session *session = open_session(comm, write_scene(scene));
     assert_int_equal(insitu_set_mesh(session, "m", &mesh->mesh), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &mesh->field), INSITU_OK);
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
     insitu_destroy(&session);
-    return take_caught();
+    return pop_caught_picture();
 }
 
 static bool is_of_order_two(const order_kind *kind)

@@ -37,9 +37,9 @@ static const overwrite_case cases[] = {
 
 static void check_step(insitu_session *session, int cycle, const char *const *words)
 {
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     everywhere(insitu_step(session, cycle, 0.4 * cycle) == INSITU_OK);
-    forget_pictures();
+    discard_pictures();
     const char *warnings = insitu_last_report(session)->warnings;
     bool is_well = words[0] || !strstr(warnings, "overwritten");
     for (int i = 0; i < 4 && words[i]; i++) is_well = is_well && strstr(warnings, words[i]);
@@ -49,7 +49,7 @@ static void check_step(insitu_session *session, int cycle, const char *const *wo
     everywhere(is_well);
 }
 
-static void overwritten_pictures_are_told(void **state)
+static void overwritten_pictures_are_reported(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -60,7 +60,7 @@ static void overwritten_pictures_are_told(void **state)
 }
 
 /* A step that a simulation repeats under its cycle is to replace the pictures. */
-static void repeated_steps_are_not_told(void **state)
+static void repeated_steps_are_not_reported(void **state)
 {
     (void)state;
     static const char *const none[4] = {NULL};
@@ -86,7 +86,7 @@ static int end_tests(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(overwritten_pictures_are_told),
-                                       cmocka_unit_test(repeated_steps_are_not_told)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(overwritten_pictures_are_reported),
+                                       cmocka_unit_test(repeated_steps_are_not_reported)};
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -33,7 +33,7 @@ typedef struct drawing {
 
 static void step_and_catch(insitu_session *session, int cycle, drawing *out)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -48,7 +48,7 @@ static drawing draw(const char *scene, const session_input *in)
 {
     drawing out;
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    const insitu_status status = hand_over(session, in);
+    const insitu_status status = submit(session, in);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
     step_and_catch(session, 0, &out);
@@ -82,7 +82,7 @@ static void free_drawing(drawing *d)
     for (int i = 0; i < PICTURES; i++) free(d->pictures[i].rgba), free(d->pictures[i].depth);
 }
 
-static int64_t everyones(int64_t mine)
+static int64_t sum_over_ranks(int64_t mine)
 {
     int64_t sum = 0;
     MPI_Allreduce(&mine, &sum, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
@@ -94,7 +94,7 @@ static void create_polyhedra(session_input *in, test_mesh_kind kind, double shar
 {
     input_create(in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
     if (kind != TEST_POLYHEDRA) test_mesh_to_polyhedra(&in->part, share);
-    test_mesh_turn(&in->part, 7);
+    test_mesh_reorder_vertices(&in->part, 7);
     input_describe(in);
 }
 
@@ -239,7 +239,7 @@ static void hexes_among_polyhedra_are_hexes(void **state)
     int64_t kept = 0;
     for (int64_t cell = 0; cell < hexes.part.cell_count; cell++) kept += is_cut[cell];
     everywhere(drawn.recognised == hexes.part.cell_count - kept);
-    everywhere(everyones(kept) > 0 && everyones(drawn.recognised) > 0);
+    everywhere(sum_over_ranks(kept) > 0 && sum_over_ranks(drawn.recognised) > 0);
     everywhere(are_same(&expected, &drawn));
     free_drawing(&drawn);
     owned faces = make_owned(&cut.part, 1);
@@ -297,7 +297,7 @@ static void six_quads_that_are_no_hex_stay(void **state)
 }
 
 /* Whichever face of a hex crosses itself, it is no hex, and not closed. The last rank has it. */
-static void hexes_with_a_crossed_face_are_told(void **state)
+static void hexes_with_a_crossed_face_are_reported(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -310,9 +310,9 @@ static void hexes_with_a_crossed_face_are_told(void **state)
         int64_t *v = has_it ? in.part.face_connectivity + 4 * i : (int64_t[]){0, 0, 0};
         const int64_t first = v[1], second = v[2];
         v[1] = second, v[2] = first;
-        hand_over(session, &in);
-        told_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH,
-                        "mesh \"m\": cell 0 (polyhedron): ", "the surface is not closed");
+        submit(session, &in);
+        reported_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH,
+                            "mesh \"m\": cell 0 (polyhedron): ", "the surface is not closed");
         v[1] = first, v[2] = second;
     }
     insitu_destroy(&session);
@@ -324,7 +324,7 @@ static drawing draw_moved(const char *scene, session_input *in)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
     drawing before, after;
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     step_and_catch(session, 0, &before);
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
         in->part.coordinates[i] = 0.7 * in->part.coordinates[i] + 0.1;
@@ -357,7 +357,7 @@ static void moved_cells_are_the_same_cells(void **state)
 }
 
 /* One allocation fails on the last rank, the next, the next: an error to all or the picture, and then the picture. */
-static void memory_that_runs_out_is_told(void **state)
+static void memory_that_runs_out_is_reported(void **state)
 {
     (void)state;
     session_input in = {0};
@@ -367,22 +367,22 @@ static void memory_that_runs_out_is_told(void **state)
     describe_owned(&faces, FORM_LISTS, 1, &in.mesh);
     drawing expected = draw(scene, &in), drawn;
     const int64_t held = base_memory_held();
-    int told = 0;
+    int reported = 0;
     for (int n = 1; n <= 12; n++) {
         insitu_session *s = open_session(MPI_COMM_WORLD, scene);
-        everywhere(hand_over(s, &in) == INSITU_OK);
+        everywhere(submit(s, &in) == INSITU_OK);
         base_memory_fail_nth(own_rank == rank_count - 1 ? n : 0);
         const insitu_status status = insitu_step(s, 0, 0);
         base_memory_fail_nth(0);
-        if (status) told_everywhere(s, status, INSITU_ERROR_MEMORY, "no memory");
-        told += status != INSITU_OK && strstr(insitu_error(s), "mesh \"m\"") != NULL;
+        if (status) reported_everywhere(s, status, INSITU_ERROR_MEMORY, "no memory");
+        reported += status != INSITU_OK && strstr(insitu_error(s), "mesh \"m\"") != NULL;
         step_and_catch(s, 1, &drawn);
         everywhere(are_same(&expected, &drawn) && drawn.recognised == expected.recognised);
         free_drawing(&drawn);
         insitu_destroy(&s);
         everywhere(base_memory_held() == held);
     }
-    everywhere(told >= 6); /* two arrays of the lists, two of owner and neighbour, types, two of the cells */
+    everywhere(reported >= 6); /* two arrays of the lists, two of owner and neighbour, types, two of the cells */
     free_drawing(&expected);
     free_owned(&faces);
     input_free(&in);
@@ -395,9 +395,9 @@ int main(int argc, char **argv)
         cmocka_unit_test(polyhedra_are_the_cells_that_they_are),
         cmocka_unit_test(hexes_among_polyhedra_are_hexes),
         cmocka_unit_test(six_quads_that_are_no_hex_stay),
-        cmocka_unit_test(hexes_with_a_crossed_face_are_told),
+        cmocka_unit_test(hexes_with_a_crossed_face_are_reported),
         cmocka_unit_test(moved_cells_are_the_same_cells),
-        cmocka_unit_test(memory_that_runs_out_is_told),
+        cmocka_unit_test(memory_that_runs_out_is_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -3,60 +3,60 @@
 #include "test_owned_faces.h"
 #include "test_session_fixture.h"
 
-static owned spoilt;
+static owned corrupted;
 
 /* The description of these is spoilt, or their arrays, on one rank. */
 static void by_owner(session_input *in, form which, int base)
 {
-    free_owned(&spoilt);
-    spoilt = make_owned(&in->part, base);
-    describe_owned(&spoilt, which, base, &in->mesh);
+    free_owned(&corrupted);
+    corrupted = make_owned(&in->part, base);
+    describe_owned(&corrupted, which, base, &in->mesh);
 }
 
 static void owner_large(session_input *in)
 {
     by_owner(in, FORM_WIDE, 0);
-    spoilt.owner[3] = 1000000;
+    corrupted.owner[3] = 1000000;
 }
 static void owner_negative(session_input *in)
 {
     by_owner(in, FORM_WIDE, 0);
-    spoilt.owner[2] = -1;
+    corrupted.owner[2] = -1;
 }
 static void owner_before_one(session_input *in)
 {
     by_owner(in, FORM_PAIRS, 1);
-    spoilt.pairs[2 * 4] = spoilt.pairs[2 * 4 + 1] = 0; /* 0 beside a cell is CGNS's way of a boundary */
+    corrupted.pairs[2 * 4] = corrupted.pairs[2 * 4 + 1] = 0; /* 0 beside a cell is CGNS's way of a boundary */
 }
 static void neighbour_large(session_input *in)
 {
     by_owner(in, FORM_PAIRS, 1);
-    spoilt.pairs[1] = (int32_t)in->part.cell_count + 1;
+    corrupted.pairs[1] = (int32_t)in->part.cell_count + 1;
 }
 static void neighbour_negative(session_input *in)
 {
     by_owner(in, FORM_WIDE, 0);
-    spoilt.neighbour[1] = -2;
+    corrupted.neighbour[1] = -2;
 }
 static void owner_is_neighbour(session_input *in)
 {
     by_owner(in, FORM_WIDE, 0);
-    spoilt.owner[1] = spoilt.neighbour[1] = 2;
+    corrupted.owner[1] = corrupted.neighbour[1] = 2;
 }
 /* The faces of cell 0 go to another. */
 static void cell_without_faces(session_input *in)
 {
     by_owner(in, FORM_WIDE, 0);
-    const int64_t inner = spoilt.inner;
+    const int64_t inner = corrupted.inner;
     for (int64_t f = 0; f < in->part.face_count; f++) {
-        if (spoilt.owner[f] == 0) spoilt.owner[f] = f < inner && spoilt.neighbour[f] == 1 ? 2 : 1;
-        if (f < inner && spoilt.neighbour[f] == 0) spoilt.neighbour[f] = spoilt.owner[f] == 1 ? 2 : 1;
+        if (corrupted.owner[f] == 0) corrupted.owner[f] = f < inner && corrupted.neighbour[f] == 1 ? 2 : 1;
+        if (f < inner && corrupted.neighbour[f] == 0) corrupted.neighbour[f] = corrupted.owner[f] == 1 ? 2 : 1;
     }
 }
 static void face_of_another_cell(session_input *in)
 {
     by_owner(in, FORM_WIDE, 0);
-    spoilt.owner[in->part.face_count - 1] = spoilt.owner[in->part.face_count - 1] ? 0 : 1;
+    corrupted.owner[in->part.face_count - 1] = corrupted.owner[in->part.face_count - 1] ? 0 : 1;
 }
 static void faces_left_out(session_input *in)
 {
@@ -111,23 +111,23 @@ static void keep_some(session_input *in)
 static void list_null(session_input *in)
 {
     by_owner(in, FORM_LISTS, 0);
-    spoilt.lists[5].labels = NULL;
+    corrupted.lists[5].labels = NULL;
 }
 static void list_negative(session_input *in)
 {
     by_owner(in, FORM_LISTS, 1);
-    spoilt.lists[5].size = -3;
+    corrupted.lists[5].size = -3;
 }
 static void list_vertex_large(session_input *in)
 {
     by_owner(in, FORM_LISTS, 1);
-    spoilt.lists[0].labels[2] = 1000000;
+    corrupted.lists[0].labels[2] = 1000000;
 }
 static void list_short(session_input *in)
 {
     by_owner(in, FORM_LISTS, 0);
     for (int64_t f = 0; f < in->part.face_count; f++)
-        if (spoilt.pairs[2 * f] == 0 || spoilt.pairs[2 * f + 1] == 0) spoilt.lists[f].size = 2;
+        if (corrupted.pairs[2 * f] == 0 || corrupted.pairs[2 * f + 1] == 0) corrupted.lists[f].size = 2;
 }
 static void lists_without_sizes(session_input *in)
 {
@@ -137,12 +137,12 @@ static void lists_without_sizes(session_input *in)
 static void sizes_without_lists(session_input *in)
 {
     by_owner(in, FORM_WIDE, 0);
-    in->mesh.face_sizes = (insitu_array){&spoilt.lists->size, INSITU_INT32, sizeof(label_list)};
+    in->mesh.face_sizes = (insitu_array){&corrupted.lists->size, INSITU_INT32, sizeof(label_list)};
 }
 static void lists_and_offsets(session_input *in)
 {
     by_owner(in, FORM_LISTS, 0);
-    in->mesh.face_offsets = (insitu_array){spoilt.offsets, INSITU_INT64, 0};
+    in->mesh.face_offsets = (insitu_array){corrupted.offsets, INSITU_INT64, 0};
 }
 static void lists_between_pointers(session_input *in)
 {
@@ -162,38 +162,38 @@ static void apart(session_input *in)
 static void neighbour_beyond_the_halo(session_input *in)
 {
     apart(in);
-    spoilt.halo_pairs[1] = (int32_t)in->part.cell_count + OWNED_HALO;
+    corrupted.halo_pairs[1] = (int32_t)in->part.cell_count + OWNED_HALO;
 }
-static void halo_not_told(session_input *in)
+static void halo_not_reported(session_input *in)
 {
     apart(in);
-    for (int64_t i = 0; i < spoilt.middle; i++) spoilt.halo_pairs[2 * i] = (int32_t)in->part.cell_count;
+    for (int64_t i = 0; i < corrupted.middle; i++) corrupted.halo_pairs[2 * i] = (int32_t)in->part.cell_count;
     in->mesh.halo_cell_count = 0;
 }
 static void boundary_owner_large(session_input *in)
 {
     apart(in);
-    spoilt.apart_owner[1] = 1000000;
+    corrupted.apart_owner[1] = 1000000;
 }
 static void boundary_owner_negative(session_input *in)
 {
     apart(in);
-    spoilt.apart_owner[0] = -2;
+    corrupted.apart_owner[0] = -2;
 }
 static void boundary_offset_large(session_input *in)
 {
     apart(in);
-    spoilt.apart_offsets[1] = 1000000;
+    corrupted.apart_offsets[1] = 1000000;
 }
 static void boundary_offset_falls(session_input *in)
 {
     apart(in);
-    spoilt.apart_offsets[1] = -1;
+    corrupted.apart_offsets[1] = -1;
 }
 static void boundary_vertex_large(session_input *in)
 {
     by_owner(in, FORM_APART, 1);
-    spoilt.narrow_vertices[spoilt.offsets[spoilt.middle]] = 1000000;
+    corrupted.narrow_vertices[corrupted.offsets[corrupted.middle]] = 1000000;
 }
 static void boundary_without_owners(session_input *in)
 {
@@ -254,13 +254,13 @@ static void boundary_beside_lists(session_input *in)
 {
     by_owner(in, FORM_LISTS, 0);
     in->mesh.boundary_face_count = 1;
-    in->mesh.boundary_face_offsets = (insitu_array){spoilt.apart_offsets, INSITU_INT32, 0};
-    in->mesh.boundary_owner = (insitu_array){spoilt.apart_owner, INSITU_INT32, 0};
+    in->mesh.boundary_face_offsets = (insitu_array){corrupted.apart_offsets, INSITU_INT32, 0};
+    in->mesh.boundary_owner = (insitu_array){corrupted.apart_owner, INSITU_INT32, 0};
 }
 
-static const spoilt_case cases[] = {
+static const corrupted_case cases[] = {
     {"beyond the halo", neighbour_beyond_the_halo, INSITU_ERROR_MESH, false, {"face 0: its neighbour ", "outside 0.."}},
-    {"no halo", halo_not_told, INSITU_ERROR_MESH, false, {"face 0: its owner ", "is outside 0.."}},
+    {"no halo", halo_not_reported, INSITU_ERROR_MESH, false, {"face 0: its owner ", "is outside 0.."}},
     {"its owner", boundary_owner_large, INSITU_ERROR_MESH, false, {"its owner 1000000 is outside 0.."}},
     {"its owner -2", boundary_owner_negative, INSITU_ERROR_MESH, false, {"its owner -2 is outside 0.."}},
     {"offset",
@@ -331,18 +331,18 @@ static const spoilt_case cases[] = {
     {"floats", float_lists, INSITU_ERROR_ARGUMENT, true, {"face lists are of element type 1, not int32 or int64"}},
 };
 
-static void what_is_wrong_is_told_to_all(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in = {0};
     input_create(&in, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);
-    all_are_told(&in, cases, sizeof cases / sizeof cases[0]);
+    all_are_reported(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
-    free_owned(&spoilt);
+    free_owned(&corrupted);
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_told_to_all)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_input_is_reported_on_all_ranks)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -82,13 +82,13 @@ static void make_mesh(mesh_kind kind, test_mesh *out)
 }
 
 /* Dealt at random, and listed in the rank's own way. */
-static void take_part(const test_mesh *whole, session_input *out)
+static void extract_rank_cells(const test_mesh *whole, session_input *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
     test_partition(whole, TEST_RANDOM, SIDE, rank_count, owners);
     test_mesh_part(whole, owners, own_rank, &out->part);
     test_free(owners);
-    test_mesh_turn(&out->part, 11 + (uint64_t)own_rank);
+    test_mesh_reorder_vertices(&out->part, 11 + (uint64_t)own_rank);
     test_mesh_shuffle(&out->part, 77 + (uint64_t)own_rank);
     input_describe(out);
 }
@@ -99,8 +99,8 @@ static void take_part(const test_mesh *whole, session_input *out)
 static double draw(MPI_Comm comm, const char *scene, const session_input *in, caught_picture *out)
 {
     insitu_session *session = open_session(comm, scene);
-    forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
+    discard_pictures();
+    assert_int_equal(submit(session, in), INSITU_OK);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     const double size = session->space.extent.cell_size;
     if (own_rank == 0) {
@@ -128,13 +128,13 @@ static bool is_one_picture(const scene_case *scene, const char *file, mesh_kind 
     return is_one;
 }
 
-static void judge(mesh_kind kind)
+static void verify(mesh_kind kind)
 {
     session_input whole = {0}, part = {0};
     bool is_one = true;
     make_mesh(kind, &whole.part);
     input_describe(&whole);
-    take_part(&whole.part, &part);
+    extract_rank_cells(&whole.part, &part);
     for (int i = kind == FLAT_AMONG_HEXES ? FIRST_SAMPLED : 0; i < SCENES; i++)
         is_one = is_one_picture(&scenes[i], write_scene(scenes[i].text), kind, &whole, &part) && is_one;
     everywhere(is_one);
@@ -169,7 +169,7 @@ static void default_volumes_are_off_by_a_hundredth_at_most(void **context)
         for (size_t i = 0; i < sizeof layers / sizeof *layers; i++) {
             session_input whole = {0}, part = {0};
             make_mesh(kind, &whole.part);
-            take_part(&whole.part, &part);
+            extract_rank_cells(&whole.part, &part);
             everywhere(is_near(layers[i], &part));
             input_free(&part);
             test_mesh_free(&whole.part);
@@ -178,44 +178,44 @@ static void default_volumes_are_off_by_a_hundredth_at_most(void **context)
 
 /* ---- one picture --------------------------------------------------------------------------------------------- */
 
-static void default_volumes_of_honeycombs_are_one_picture(void **context)
+static void default_volumes_of_honeycombs_give_one_picture(void **context)
 {
     (void)context;
-    judge(HONEYCOMB);
+    verify(HONEYCOMB);
 }
 
-static void default_volumes_of_warped_polyhedra_are_one_picture(void **context)
+static void default_volumes_of_warped_polyhedra_give_one_picture(void **context)
 {
     (void)context;
-    judge(WARPED_POLYHEDRA);
+    verify(WARPED_POLYHEDRA);
 }
 
-static void default_volumes_of_polyhedra_among_others_are_one_picture(void **context)
+static void default_volumes_of_polyhedra_among_others_give_one_picture(void **context)
 {
     (void)context;
-    judge(WARPED_MIXED);
+    verify(WARPED_MIXED);
 }
 
-static void default_volumes_of_hexes_are_one_picture(void **context)
+static void default_volumes_of_hexes_give_one_picture(void **context)
 {
     (void)context;
-    judge(HEXES);
+    verify(HEXES);
 }
 
 /* When drawn to an error, flat cells overlap others, and such pixels agree to max_error. */
 static void flat_cells_do_not_change_the_default_step(void **context)
 {
     (void)context;
-    judge(FLAT_AMONG_HEXES);
+    verify(FLAT_AMONG_HEXES);
 }
 
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(default_volumes_of_honeycombs_are_one_picture),
-        cmocka_unit_test(default_volumes_of_warped_polyhedra_are_one_picture),
-        cmocka_unit_test(default_volumes_of_polyhedra_among_others_are_one_picture),
-        cmocka_unit_test(default_volumes_of_hexes_are_one_picture),
+        cmocka_unit_test(default_volumes_of_honeycombs_give_one_picture),
+        cmocka_unit_test(default_volumes_of_warped_polyhedra_give_one_picture),
+        cmocka_unit_test(default_volumes_of_polyhedra_among_others_give_one_picture),
+        cmocka_unit_test(default_volumes_of_hexes_give_one_picture),
         cmocka_unit_test(flat_cells_do_not_change_the_default_step),
         cmocka_unit_test(default_volumes_are_off_by_a_hundredth_at_most),
     };

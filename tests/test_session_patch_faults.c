@@ -159,7 +159,7 @@ static void offsets_alone(void)
 {
     patches[0].offsets = (insitu_array){numbers, INSITU_INT64, 0};
 }
-static void told_twice(void)
+static void patch_given_twice(void)
 {
     by_vertices(outer_quad, 1);
     patches[1].faces = (insitu_array){numbers, INSITU_INT64, 0};
@@ -214,7 +214,7 @@ static void with_fill(void)
 }
 
 typedef struct fault {
-    void (*spoil)(void);
+    void (*corrupt)(void);
     insitu_status status;
     bool at_once; /* the set call fails too */
     const char *words[2];
@@ -239,7 +239,7 @@ static const fault faults[] = {
     {vertices_beyond, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 has vertices beyond the connectivity"}},
     {vertices_uneven, INSITU_ERROR_FIELD, true, {"patch 1: has 7 connectivity indices, no multiple of its 2 faces"}},
     {offsets_alone, INSITU_ERROR_FIELD, true, {"patch 0: offsets are given without connectivity"}},
-    {told_twice, INSITU_ERROR_FIELD, true, {"patch 1: faces and connectivity are given"}},
+    {patch_given_twice, INSITU_ERROR_FIELD, true, {"patch 1: faces and connectivity are given"}},
     {numbers_of_floats, INSITU_ERROR_ARGUMENT, true, {"patch 0: faces are of element type 1, not int32 or int64"}},
     {no_values, INSITU_ERROR_FIELD, true, {"patch 0: values are not given"}},
     {bytes_for_values, INSITU_ERROR_ARGUMENT, true, {"patch 0: values are of element type 5, not float32, float64"}},
@@ -259,22 +259,22 @@ static void check_fault(insitu_session *session, const fault *c, int cycle)
     snprintf(rank, sizeof rank, "rank %d: mesh \"m\": field \"f\"", rank_count - 1);
     create();
     describe();
-    if (is_last) c->spoil();
-    forget_pictures();
-    const insitu_status at_once = hand_over(session, &input);
+    if (is_last) c->corrupt();
+    discard_pictures();
+    const insitu_status at_once = submit(session, &input);
     everywhere(at_once == (is_last && c->at_once ? c->status : INSITU_OK));
     const insitu_status status = insitu_step(session, cycle, 0);
-    told_everywhere(session, status, c->status, rank, c->words[0], c->words[1]);
+    reported_everywhere(session, status, c->status, rank, c->words[0], c->words[1]);
     everywhere(caught_count == 0);
     input_free(&input);
     create();
     describe();
-    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(submit(session, &input) == INSITU_OK);
     step_is_good(session, cycle + 1);
     input_free(&input);
 }
 
-static void what_is_wrong_is_told_to_all(void **state)
+static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -295,16 +295,16 @@ static void hexes_want_vertices(void **state)
     input.field.values = (insitu_array){cell_values, INSITU_FLOAT64, 0};
     input.field.patches = patches;
     input.field.patch_count = 1;
-    everywhere(hand_over(session, &input) == INSITU_ERROR_FIELD);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "patch 0: names faces by their numbers",
-                    "the mesh has none");
+    everywhere(submit(session, &input) == INSITU_ERROR_FIELD);
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD,
+                        "patch 0: names faces by their numbers", "the mesh has none");
     insitu_destroy(&session);
     input_free(&input);
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_told_to_all),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_input_is_reported_on_all_ranks),
                                        cmocka_unit_test(hexes_want_vertices)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

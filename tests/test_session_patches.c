@@ -279,7 +279,7 @@ static bool are_means_right(const insitu_session *session)
 
 static insitu_status draw(insitu_session *session, const part_input *in, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     insitu_status status = insitu_set_mesh(session, "m", &in->mesh);
     if (!status) status = insitu_set_field(session, "m", &in->field);
     if (status) fprintf(stderr, "rank %d: %s\n", own_rank, insitu_error(session));
@@ -365,7 +365,7 @@ static void owners_take_faces_by_numbers_and_ranges(void **state)
     }
 }
 
-static void torn_meshes_take_them(void **state)
+static void meshes_with_corner_fields_take_them(void **state)
 {
     (void)state;
     make_whole(TEST_HEXES, false);
@@ -503,7 +503,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(cells_take_faces_by_vertices),
         cmocka_unit_test(polyhedra_take_faces_by_numbers_and_vertices),
         cmocka_unit_test(owners_take_faces_by_numbers_and_ranges),
-        cmocka_unit_test(torn_meshes_take_them),
+        cmocka_unit_test(meshes_with_corner_fields_take_them),
         cmocka_unit_test(means_follow_values_on_the_boundary),
         cmocka_unit_test(linear_fields_are_exact_amid_walls),
     };

@@ -113,7 +113,7 @@ static insitu_session *open_with(MPI_Comm comm, const char *scene, const plate *
 {
     insitu_session *session = open_session(comm, scene);
     const insitu_mesh mesh = describe(p, with_z);
-    forget_pictures();
+    discard_pictures();
     assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_OK);
     set_field(session, "f", INSITU_VERTEX, MAX_VERTICES, 1, p->f);
     set_field(session, "c", INSITU_CELL, p->cell_count, 1, p->c);
@@ -128,7 +128,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const plate *p, boo
 {
     insitu_session *session = open_with(comm, scene, p, with_z);
     if (insitu_last_report(session)->warnings[0]) fail_msg("warnings: %s", insitu_last_report(session)->warnings);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -230,7 +230,7 @@ static void what_the_scene_says_comes_first(void **state)
     free_caught(&plain);
 }
 
-static void layers_that_show_nothing_are_told(void **state)
+static void layers_that_show_nothing_are_reported(void **state)
 {
     (void)state;
     static const struct {
@@ -310,7 +310,7 @@ static void isosurfaces_are_contour_lines(void **state)
         }
 }
 
-static void lines_beyond_the_field_are_told(void **state)
+static void lines_beyond_the_field_are_reported(void **state)
 {
     (void)state;
     plate part;
@@ -491,9 +491,9 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_the_colour_map_of_the_field),
                                        cmocka_unit_test(what_the_scene_says_comes_first),
-                                       cmocka_unit_test(layers_that_show_nothing_are_told),
+                                       cmocka_unit_test(layers_that_show_nothing_are_reported),
                                        cmocka_unit_test(isosurfaces_are_contour_lines),
-                                       cmocka_unit_test(lines_beyond_the_field_are_told),
+                                       cmocka_unit_test(lines_beyond_the_field_are_reported),
                                        cmocka_unit_test(bars_say_what_they_show),
                                        cmocka_unit_test(solids_need_z),
                                        cmocka_unit_test(statistics_weigh_shells_by_area),

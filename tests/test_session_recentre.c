@@ -140,7 +140,7 @@ static bool are_means_right(const insitu_session *session, const part_input *in)
 
 static insitu_status draw(insitu_session *session, const part_input *in, int cycle)
 {
-    forget_pictures();
+    discard_pictures();
     insitu_status status = INSITU_OK;
     if (in) status = insitu_set_mesh(session, "m", &in->mesh);
     if (in && !status) status = insitu_set_field(session, "m", &in->field);
@@ -156,8 +156,8 @@ static void means_equal_a_search_over_all_cells(void **context)
 {
     (void)context;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(surface_scene));
-    for (int dealt = 0; dealt < TEST_PARTITION_COUNT; dealt++) {
-        test_partition(&whole, (test_partition_kind)dealt, SIDE, rank_count, owners);
+    for (int distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
+        test_partition(&whole, (test_partition_kind)distributed, SIDE, rank_count, owners);
         for (int v = 0; v < VARIANT_COUNT; v++) {
             part_input in;
             part_create(&in, own_rank, v == WITH_GHOSTS);
@@ -271,7 +271,7 @@ static void means_follow_values_that_changed_on_one_rank(void **context)
  * behind transparent surfaces, pictures agree within the rounding of "over" (1e-6, as everywhere). */
 static void compare_with_alone(const char *scene, double bound)
 {
-    for (int dealt = 0; dealt < TEST_PARTITION_COUNT; dealt++) {
+    for (int distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
         part_input in, all;
         caught_picture alone = {0};
         const char *name = write_scene(scene);
@@ -284,7 +284,7 @@ static void compare_with_alone(const char *scene, double bound)
             caught_count = 0;
             insitu_destroy(&session);
         }
-        test_partition(&whole, (test_partition_kind)dealt, SIDE, rank_count, owners);
+        test_partition(&whole, (test_partition_kind)distributed, SIDE, rank_count, owners);
         part_create(&in, own_rank, false);
         insitu_session *session = open_session(MPI_COMM_WORLD, name);
         everywhere(draw(session, in.part.cell_count ? &in : NULL, 0) == INSITU_OK);
@@ -308,19 +308,19 @@ static void compare_with_alone(const char *scene, double bound)
     }
 }
 
-static void surfaces_of_dealt_cells_are_those_of_one_rank(void **context)
+static void surfaces_of_distributed_cells_are_those_of_one_rank(void **context)
 {
     (void)context;
     compare_with_alone(surface_scene, 0);
 }
 
-static void volumes_of_dealt_cells_are_those_of_one_rank(void **context)
+static void volumes_of_distributed_cells_are_those_of_one_rank(void **context)
 {
     (void)context;
     compare_with_alone(mixed_scene, 1e-6);
 }
 
-static void smooth_volumes_of_dealt_cells_are_those_of_one_rank(void **context)
+static void smooth_volumes_of_distributed_cells_are_those_of_one_rank(void **context)
 {
     (void)context;
     compare_with_alone(SMOOTH("c", AT_VERTICES, "samples"), 1e-6);
@@ -340,7 +340,7 @@ static caught_picture draw_smooth(const char *scene, const part_input *in, const
     everywhere(insitu_set_field(session, "m", &in->field) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &v) == INSITU_OK);
     everywhere(draw(session, NULL, 0) == INSITU_OK);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -398,9 +398,9 @@ int main(int argc, char **argv)
         cmocka_unit_test(means_follow_cells_that_part),
         cmocka_unit_test(doubled_vertices_are_one),
         cmocka_unit_test(means_follow_values_that_changed_on_one_rank),
-        cmocka_unit_test(surfaces_of_dealt_cells_are_those_of_one_rank),
-        cmocka_unit_test(volumes_of_dealt_cells_are_those_of_one_rank),
-        cmocka_unit_test(smooth_volumes_of_dealt_cells_are_those_of_one_rank),
+        cmocka_unit_test(surfaces_of_distributed_cells_are_those_of_one_rank),
+        cmocka_unit_test(volumes_of_distributed_cells_are_those_of_one_rank),
+        cmocka_unit_test(smooth_volumes_of_distributed_cells_are_those_of_one_rank),
         cmocka_unit_test(smooth_layers_are_those_of_the_means),
     };
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);

@@ -64,7 +64,7 @@ static caught_picture draw(const char *scene, const char *warning)
     const char *warnings = insitu_last_report(session)->warnings;
     if (warning ? !strstr(warnings, warning) : *warnings) fprintf(stderr, "warnings: %s\n", warnings);
     everywhere(warning ? strstr(warnings, warning) != NULL : !*warnings);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -192,12 +192,12 @@ static void colours_that_are_not_numbers_are_grey(void **context)
     regions_create();
 }
 
-static void warning_of_grey_is_told_once(void **context)
+static void warning_of_grey_is_reported_once(void **context)
 {
     (void)context;
     insitu_session *session =
         open_regions(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}}\n"));
-    static const bool has_t[] = {false, false, true, false, false}, is_told[] = {true, false, false, true, false};
+    static const bool has_t[] = {false, false, true, false, false}, is_reported[] = {true, false, false, true, false};
     for (int cycle = 0; cycle < 5; cycle++) {
         if (has_sea())
             everywhere(insitu_set_mesh(session, "sea/0", &sea.mesh) == INSITU_OK);
@@ -206,12 +206,12 @@ static void warning_of_grey_is_told_once(void **context)
         everywhere(!has_sea() || set_named(session, "sea/0", &sea, "f") == INSITU_OK);
         everywhere(!has_sea() || !has_t[cycle] || set_named(session, "sea/0", &sea, "t") == INSITU_OK);
         step_is_good(session, cycle);
-        everywhere((strstr(insitu_last_report(session)->warnings, "is grey") != NULL) == is_told[cycle]);
+        everywhere((strstr(insitu_last_report(session)->warnings, "is grey") != NULL) == is_reported[cycle]);
     }
     insitu_destroy(&session);
 }
 
-static void what_no_rank_has_is_refused(void **context)
+static void fields_that_no_rank_has_are_refused(void **context)
 {
     (void)context;
     static const struct {
@@ -239,8 +239,8 @@ static void what_no_rank_has_is_refused(void **context)
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         insitu_session *session = open_regions(cases[i].scene);
         const insitu_status status = insitu_step(session, 0, 0);
-        told_everywhere(session, status, cases[i].status, cases[i].words[0],
-                        cases[i].words[1] ? cases[i].words[1] : "");
+        reported_everywhere(session, status, cases[i].status, cases[i].words[0],
+                            cases[i].words[1] ? cases[i].words[1] : "");
         insitu_destroy(&session);
     }
 }
@@ -266,8 +266,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(regions_apart_are_regions_together),
         cmocka_unit_test(surfaces_without_the_colour_field_are_grey),
         cmocka_unit_test(colours_that_are_not_numbers_are_grey),
-        cmocka_unit_test(warning_of_grey_is_told_once),
-        cmocka_unit_test(what_no_rank_has_is_refused),
+        cmocka_unit_test(warning_of_grey_is_reported_once),
+        cmocka_unit_test(fields_that_no_rank_has_are_refused),
     };
     return run_session_tests(argc, argv, tests, begin_tests, end_tests);
 }

@@ -110,7 +110,7 @@ static void make_block(bool with_shells, shell_mesh *out)
 }
 
 /* The rank's cells: every so many one, or all of them with the others' as ghosts. */
-static void take_part(const shell_mesh *whole, bool with_ghosts, shell_mesh *out)
+static void extract_rank_cells(const shell_mesh *whole, bool with_ghosts, shell_mesh *out)
 {
     *out = *whole;
     out->cell_count = out->entry_count = 0;
@@ -159,7 +159,7 @@ static insitu_session *open_with(MPI_Comm comm, const char *scene, const shell_m
 {
     insitu_session *session = open_session(comm, scene);
     const insitu_mesh mesh = describe(m);
-    forget_pictures();
+    discard_pictures();
     assert_int_equal(insitu_set_mesh(session, "m", &mesh), INSITU_OK);
     assert_int_equal(set_field(session, "f", INSITU_VERTEX, m->vertex_count, m->values), INSITU_OK);
     assert_int_equal(set_field(session, "c", INSITU_CELL, m->cell_count, m->cell_values), INSITU_OK);
@@ -173,7 +173,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shell_mesh *m
 {
     insitu_session *session = open_with(comm, scene, m);
     if (insitu_last_report(session)->warnings[0]) fail_msg("warnings: %s", insitu_last_report(session)->warnings);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -181,7 +181,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shell_mesh *m
 /* ---- what is to be seen -------------------------------------------------------------------------------------- */
 
 /* Finds where the pixel's ray meets the plane 0.3 x + 0.2 y = z. */
-static double meet_sheet(int pixel, double place[3])
+static double intersect_sheet(int pixel, double place[3])
 {
     static const double normal[3] = {0.3, 0.2, -1};
     const ray r = ray_of(pixel);
@@ -200,7 +200,7 @@ static bool is_sheet(const caught_picture *picture)
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         double place[3];
-        const double depth = meet_sheet(pixel, place), reach = fmax(fabs(place[0]), fabs(place[1]));
+        const double depth = intersect_sheet(pixel, place), reach = fmax(fabs(place[0]), fabs(place[1]));
         const float *own = picture->rgba + 4 * (ptrdiff_t)pixel;
         if (fabs(reach - 1) < 1e-4) continue;
         const double grey = (double)colour_linear_from_srgb((float)((test_linear(place) + 2) / 4));
@@ -225,7 +225,7 @@ static void sheets_are_planes_on_any_ranks(void **state)
         for (int with_ghosts = 0; with_ghosts < 2; with_ghosts++) {
             shell_mesh whole, part;
             make_sheet(kind, &whole);
-            take_part(&whole, with_ghosts, &part);
+            extract_rank_cells(&whole, with_ghosts, &part);
             caught_picture ours = draw(MPI_COMM_WORLD, scene, &part), alone = {0};
             bool is_well = true;
             if (own_rank == 0) {
@@ -244,7 +244,7 @@ static void shells_take_the_place_of_faces(void **state)
     (void)state;
     shell_mesh whole, part;
     make_block(true, &whole);
-    take_part(&whole, false, &part);
+    extract_rank_cells(&whole, false, &part);
     insitu_session *session =
         open_with(MPI_COMM_WORLD, write_scene(IMAGE("      - surface: {colour_by: {field: c}}\n")), &part);
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
@@ -269,7 +269,7 @@ static void other_layers_pass_shells_over(void **state)
         const char *scene = write_scene(scenes[i]);
         make_block(true, &whole);
         make_block(false, &without);
-        take_part(&whole, false, &part);
+        extract_rank_cells(&whole, false, &part);
         caught_picture ours = draw(MPI_COMM_WORLD, scene, &part), alone = {0}, bare = {0};
         bool is_well = true;
         if (own_rank == 0) {
@@ -290,37 +290,37 @@ static void other_layers_pass_shells_over(void **state)
 
 /* ---- what is wrong ------------------------------------------------------------------------------------------- */
 
-static void is_told(const shell_mesh *m, const char *const words[2])
+static void is_reported(const shell_mesh *m, const char *const words[2])
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(IMAGE(SURFACE)));
     const insitu_mesh mesh = describe(m);
     insitu_set_mesh(session, "m", &mesh);
     set_field(session, "f", INSITU_VERTEX, m->vertex_count, m->values);
     const insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_MESH, words[0], words[1]);
+    reported_everywhere(session, status, INSITU_ERROR_MESH, words[0], words[1]);
     insitu_destroy(&session);
 }
 
-static void bad_shells_are_told(void **state)
+static void bad_shells_are_reported(void **state)
 {
     (void)state;
     shell_mesh m;
     const bool is_last = own_rank == rank_count - 1; /* it alone gets things wrong */
     make_sheet(MIXED, &m);
     if (is_last) m.connectivity[1] = 999;
-    is_told(&m, (const char *const[]){"cell 0 (quad)", "vertex index 999 is outside 0..48"});
+    is_reported(&m, (const char *const[]){"cell 0 (quad)", "vertex index 999 is outside 0..48"});
     make_sheet(POLYGONS, &m);
     if (is_last) m.connectivity[7] = -1;
-    is_told(&m, (const char *const[]){"cell 1 (polygon)", "vertex index -1 is outside 0..48"});
+    is_reported(&m, (const char *const[]){"cell 1 (polygon)", "vertex index -1 is outside 0..48"});
     make_sheet(POLYGONS, &m);
     if (is_last) m.offsets[1] = 2;
-    is_told(&m, (const char *const[]){"cell 0 (polygon)", "at least 3 vertices"});
+    is_reported(&m, (const char *const[]){"cell 0 (polygon)", "at least 3 vertices"});
     make_sheet(TRIANGLES, &m);
     if (is_last) m.coordinates[4] = NAN;
-    is_told(&m, (const char *const[]){"(triangle)", "not finite"});
+    is_reported(&m, (const char *const[]){"(triangle)", "not finite"});
     make_sheet(MIXED, &m);
     if (is_last) m.types[0] = 6;
-    is_told(&m, (const char *const[]){"cell 0", "unknown cell type 6"});
+    is_reported(&m, (const char *const[]){"cell 0", "unknown cell type 6"});
 }
 
 int main(int argc, char **argv)
@@ -329,7 +329,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(sheets_are_planes_on_any_ranks),
         cmocka_unit_test(shells_take_the_place_of_faces),
         cmocka_unit_test(other_layers_pass_shells_over),
-        cmocka_unit_test(bad_shells_are_told),
+        cmocka_unit_test(bad_shells_are_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -58,7 +58,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     insitu_session *session = open_drawn(comm, scene, in);
     const char *warnings = insitu_last_report(session)->warnings;
     if (warning ? !strstr(warnings, warning) : *warnings) fail_msg("warnings: %s", warnings);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -112,9 +112,10 @@ static void make_whole(test_mesh_kind kind, double jitter, session_input *out)
 }
 
 /* The rank's cells; with ghosts: all cells, of which the others' are ghosts. */
-static void take_part(const session_input *whole, test_partition_kind dealt, bool with_ghosts, session_input *out)
+static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts,
+                               session_input *out)
 {
-    take_own_cells(&whole->part, dealt, SIDE, with_ghosts, &out->part);
+    extract_own_cells(&whole->part, distributed, SIDE, with_ghosts, &out->part);
     test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);
     input_describe(out);
 }
@@ -150,7 +151,7 @@ static void planes_in_numbers_are_true(void **state)
     input_free(&whole);
 }
 
-static void planes_are_one_picture_of(test_mesh_kind kind)
+static void planes_give_the_picture_of(test_mesh_kind kind)
 {
     session_input whole = {0};
     caught_picture alone = {0};
@@ -164,7 +165,7 @@ static void planes_are_one_picture_of(test_mesh_kind kind)
     everywhere(is_well);
     for (int way = 0; way < 3; way++) {
         session_input part = {0};
-        take_part(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
+        extract_rank_cells(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
         everywhere(own_rank != 0 || same_pictures(&picture, &alone));
         free_caught(&picture);
@@ -174,10 +175,10 @@ static void planes_are_one_picture_of(test_mesh_kind kind)
     input_free(&whole);
 }
 
-static void planes_are_true_and_one_picture_on_any_ranks(void **state)
+static void planes_are_true_and_the_same_on_any_ranks(void **state)
 {
     (void)state;
-    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) planes_are_one_picture_of(kind);
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) planes_give_the_picture_of(kind);
 }
 
 /* ---- many ---------------------------------------------------------------------------------------------------- */
@@ -249,7 +250,7 @@ static void many_isovalues_and_planes_are_all_drawn(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         session_input whole = {0}, part = {0};
         make_whole(kind, 0.2, &whole);
-        take_part(&whole, TEST_RANDOM, false, &part);
+        extract_rank_cells(&whole, TEST_RANDOM, false, &part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
         everywhere(own_rank != 0 || has_many(&picture));
         free_caught(&picture);
@@ -284,7 +285,7 @@ static void draw_in_faces(test_mesh_kind kind, const char *scene, const plane *p
 {
     session_input whole = {0}, part = {0};
     make_whole(kind, 0, &whole);
-    take_part(&whole, TEST_RANDOM, false, &part);
+    extract_rank_cells(&whole, TEST_RANDOM, false, &part);
     caught_picture picture = draw(MPI_COMM_WORLD, write_scene(scene), &part, NULL);
     everywhere(own_rank != 0 || is_once(&picture, p));
     free_caught(&picture);
@@ -357,7 +358,7 @@ static void cells_have_their_values_and_no_number_is_grey(void **state)
     (void)state;
     session_input whole = {0}, part = {0};
     make_whole(TEST_HEXES, 0, &whole);
-    take_part(&whole, TEST_RANDOM, false, &part);
+    extract_rank_cells(&whole, TEST_RANDOM, false, &part);
     double *values = test_calloc((size_t)part.part.cell_count + 1, sizeof *values);
     for (int64_t cell = 0; cell < part.part.cell_count; cell++) {
         double at[3] = {0};
@@ -399,7 +400,7 @@ static void distances_go_with_the_geometry(void **state)
     insitu_session *session = open_session(
         MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 1]}") SLICE("", "{normal: [0, 0, 1]}"))));
     part.mesh.changed = 0;
-    everywhere(hand_over(session, &part) == INSITU_OK);
+    everywhere(submit(session, &part) == INSITU_OK);
     step_is_good(session, 0);
     const bool has_cells = part.part.cell_count > 0;
     const int64_t bytes = insitu_last_report(session)->bytes_copied;
@@ -424,7 +425,7 @@ static void distances_go_with_the_geometry(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(planes_are_true_and_one_picture_on_any_ranks),
+        cmocka_unit_test(planes_are_true_and_the_same_on_any_ranks),
         cmocka_unit_test(planes_in_numbers_are_true),
         cmocka_unit_test(many_isovalues_and_planes_are_all_drawn),
         cmocka_unit_test(planes_in_faces_are_drawn_once),

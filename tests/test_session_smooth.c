@@ -159,9 +159,9 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
 {
     static const char *const names[] = {"gx", "gy", "gz"};
     insitu_session *session = NULL;
-    forget_pictures();
+    discard_pictures();
     insitu_status status = insitu_create_from_text(comm, scene, &session);
-    if (!status) status = hand_over(session, in);
+    if (!status) status = submit(session, in);
     for (int k = 0; k < 3 && g && !status; k++) {
         insitu_field field;
         insitu_field_defaults(&field);
@@ -173,7 +173,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     if (!status) status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -356,16 +356,16 @@ static void normals_come_nearer_to_the_truth(void **state)
 /* ---- on any partition ------------------------------------------------------------------------------------------ */
 
 /* Makes this rank's part, with its cells listed in its own way; with_ghosts: all cells, those of others flagged. */
-static void part_create(const test_mesh *whole, test_partition_kind dealt, bool with_ghosts, session_input *out)
+static void part_create(const test_mesh *whole, test_partition_kind distributed, bool with_ghosts, session_input *out)
 {
     int *owners = zeros(whole->cell_count, sizeof *owners);
     int *all = zeros(whole->cell_count, sizeof *all);
     *out = (session_input){0};
-    test_partition(whole, dealt, SIDE, rank_count, owners);
+    test_partition(whole, distributed, SIDE, rank_count, owners);
     test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, &out->part);
     for (int64_t cell = 0; cell < out->part.cell_count && with_ghosts; cell++)
         out->part.ghosts[cell] = owners[cell] != own_rank;
-    if (!with_ghosts) test_mesh_turn(&out->part, 77 + (uint64_t)own_rank);
+    if (!with_ghosts) test_mesh_reorder_vertices(&out->part, 77 + (uint64_t)own_rank);
     free(owners);
     free(all);
     describe(out);
@@ -390,14 +390,14 @@ static void any_partition_has_the_same_bits(void **state)
 {
     (void)state;
     for (int c = 0; c < CASES; c++)
-        for (test_partition_kind dealt = 0; dealt < TEST_PARTITION_COUNT; dealt++) {
+        for (test_partition_kind distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
             session_input whole, part;
             whole_create(&cases[c], swirl, &whole);
-            part_create(&whole.part, dealt, false, &part);
+            part_create(&whole.part, distributed, false, &part);
             same_as_alone(cases[c].name, SCENE(SMOOTH("")), &whole, &part);
             same_as_alone(cases[c].name, SCENE(SMOOTH(", opacity: 0.4")), &whole, &part);
             input_free(&part);
-            part_create(&whole.part, dealt, true, &part);
+            part_create(&whole.part, distributed, true, &part);
             same_as_alone(cases[c].name, SCENE(SMOOTH("")), &whole, &part);
             input_free(&part);
             input_free(&whole);

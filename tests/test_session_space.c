@@ -80,8 +80,8 @@ static void draw(const space_case *c, double scale, const double offset[3], caug
     scene_text(c, scale, offset, text, sizeof text);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
     create_input(c, scale, offset, &in);
-    everywhere(hand_over(session, &in) == INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    everywhere(submit(session, &in) == INSITU_OK);
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(caught_count == (own_rank == 0));
     if (own_rank == 0) *out = caught[0];
     caught_count = 0;
@@ -227,7 +227,7 @@ static void depth_is_of_the_nearest_surface(void **context)
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
         input_create(&in, TEST_MIXED, 4, TEST_RANDOM, own_rank, rank_count);
         test_mesh_set_values(&in.part, height);
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         step_is_good(session, 0);
         int wrong = 0, finite = 0;
         for (int p = 0; own_rank == 0 && p < WIDTH * HEIGHT; p++) {
@@ -239,7 +239,7 @@ static void depth_is_of_the_nearest_surface(void **context)
         insitu_destroy(&session);
         input_free(&in);
     }
-    forget_pictures();
+    discard_pictures();
 }
 
 int main(int argc, char **argv)

@@ -114,33 +114,33 @@ static void steps_take_less_than_they_are_checked_for(void **context)
     assert_true(4 * most[1] <= 3 * SESSION_WORKER_STACK);
 }
 
-static void small_stacks_are_told(void **context)
+static void small_stacks_are_reported(void **context)
 {
     (void)context;
     session_input in;
     input_create(&in, TEST_MIXED, 5, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(layers[0]));
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) {
         const insitu_status status = insitu_step(session, cycle, 0);
-        told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: OpenMP's threads have ",
-                        "of stack left, a step needs 256 kB: expected stacks of ", "(OMP_STACKSIZE=");
+        reported_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: OpenMP's threads have ",
+                            "of stack left, a step needs 256 kB: expected stacks of ", "(OMP_STACKSIZE=");
         const char *figure = strstr(insitu_error(session), "OMP_STACKSIZE=");
-        const long told = figure ? strtol(figure + strlen("OMP_STACKSIZE="), NULL, 10) : 0;
-        everywhere(told > SESSION_WORKER_STACK >> 10 && told <= MOST_TOLD);
+        const long reported = figure ? strtol(figure + strlen("OMP_STACKSIZE="), NULL, 10) : 0;
+        everywhere(reported > SESSION_WORKER_STACK >> 10 && reported <= MOST_TOLD);
     }
     insitu_destroy(&session);
     input_free(&in);
 }
 
 /* With OMP_STACKSIZE=MOST_TOLD in the environment. */
-static void told_stacks_suffice(void **context)
+static void suggested_stacks_suffice(void **context)
 {
     (void)context;
     session_input in;
     input_create(&in, TEST_MIXED, 5, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(layers[0]));
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     step_is_good(session, 0);
     insitu_destroy(&session);
     input_free(&in);
@@ -149,9 +149,9 @@ static void told_stacks_suffice(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest usual[] = {cmocka_unit_test(steps_take_less_than_they_are_checked_for)};
-    const struct CMUnitTest small[] = {cmocka_unit_test(small_stacks_are_told)};
-    const struct CMUnitTest told[] = {cmocka_unit_test(told_stacks_suffice)};
-    if (getenv("TOLD_STACKS")) return run_session_tests(argc, argv, told, NULL, NULL);
+    const struct CMUnitTest small[] = {cmocka_unit_test(small_stacks_are_reported)};
+    const struct CMUnitTest reported[] = {cmocka_unit_test(suggested_stacks_suffice)};
+    if (getenv("TOLD_STACKS")) return run_session_tests(argc, argv, reported, NULL, NULL);
     if (getenv("SMALL_STACKS")) return run_session_tests(argc, argv, small, NULL, NULL);
     return run_session_tests(argc, argv, usual, NULL, NULL);
 }

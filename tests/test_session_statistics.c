@@ -58,9 +58,9 @@ enum { CELLS = 2, VOLUME, LEAST, MOST_VALUE, MEAN, DEVIATION, LOW, HIGH, FIRST_B
 static void run_steps(const char *scene, const session_input *in, int first, int end)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    forget_pictures();
+    discard_pictures();
     for (int cycle = first; cycle < end; cycle++) {
-        assert_int_equal(hand_over(session, in), INSITU_OK);
+        assert_int_equal(submit(session, in), INSITU_OK);
         const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
         everywhere(status == INSITU_OK);
@@ -109,7 +109,7 @@ static void bent_and_concave_cells_fill_their_cube(void **state)
         for (int way = 0; way < 2; way++) {
             session_input in = {0};
             make_part(kind, 0.15, false, &in); /* no tet is turned inside out */
-            if (way == 1 && kind == TEST_POLYHEDRA) test_mesh_turn(&in.part, 9);
+            if (way == 1 && kind == TEST_POLYHEDRA) test_mesh_reorder_vertices(&in.part, 9);
             if (way == 1 && kind != TEST_POLYHEDRA) test_mesh_to_polyhedra(&in.part, 0.5);
             input_describe(&in);
             in.mesh.keep_polyhedra = way;
@@ -169,7 +169,7 @@ static void files_do_not_depend_on_the_partition(void **state)
                 rank_count = 1;
                 make_part(kind, 0.2, way == 1, &whole);
                 insitu_session *session = open_session(MPI_COMM_SELF, scene);
-                assert_int_equal(hand_over(session, &whole), INSITU_OK);
+                assert_int_equal(submit(session, &whole), INSITU_OK);
                 assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
                 insitu_destroy(&session);
                 input_free(&whole);
@@ -207,7 +207,7 @@ static void runs_that_begin_again_go_on_with_the_file(void **state)
 }
 
 /* The error is told on all ranks, and the picture is drawn. */
-static void files_that_cannot_be_written_are_told(void **state)
+static void files_that_cannot_be_written_are_reported(void **state)
 {
     (void)state;
     static char text[MOST];
@@ -216,16 +216,17 @@ static void files_that_cannot_be_written_are_told(void **state)
     put_file("other.csv", "a,b\n1,2\n");
     insitu_session *session =
         open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: f, path: other.csv}]\n"));
-    forget_pictures();
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns", "cycle,time");
+    discard_pictures();
+    assert_int_equal(submit(session, &in), INSITU_OK);
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns",
+                        "cycle,time");
     everywhere(caught_count == (own_rank == 0));
     read_file("other.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(text, "a,b\n1,2\n") == 0);
     insitu_destroy(&session);
     session = open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: g, path: g.csv}]\n"));
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
+    assert_int_equal(submit(session, &in), INSITU_OK);
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
     everywhere(caught_count == 2 * (own_rank == 0));
     insitu_destroy(&session);
     input_free(&in);
@@ -247,14 +248,14 @@ static void others_of_a_missing_field_are_found(void **state)
                                                                    "[0.1]}}]\n    outputs: [{path: b.png}]\n"
                                                                    "statistics: [{field: g, path: g.csv}, {field: f, "
                                                                    "path: there.csv}]\n"));
-    forget_pictures();
-    assert_int_equal(hand_over(session, &in), INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
+    discard_pictures();
+    assert_int_equal(submit(session, &in), INSITU_OK);
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
     everywhere(caught_count == (own_rank == 0) && insitu_last_report(session)->images == 1);
     insitu_destroy(&session);
     read_file("there.csv", MOST, text);
     everywhere(own_rank != 0 || strstr(text, "\n0,0,"));
-    forget_pictures();
+    discard_pictures();
     input_free(&in);
 }
 
@@ -270,8 +271,8 @@ static unsigned cycles_drawn(const char *scene)
     for (int cycle = 0; cycle < 10; cycle++) {
         for (int64_t v = 0; v < in.part.vertex_count; v++)
             in.part.values[v] = cycle / 1.6 * test_linear(in.part.coordinates + 3 * v);
-        forget_pictures();
-        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        discard_pictures();
+        assert_int_equal(submit(session, &in), INSITU_OK);
         const insitu_status status = insitu_step(session, cycle, cycle);
         if (status) fprintf(stderr, "%s\n", insitu_error(session));
         everywhere(status == INSITU_OK);
@@ -308,7 +309,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(numbers_of_cells_are_sums),
                                        cmocka_unit_test(files_do_not_depend_on_the_partition),
                                        cmocka_unit_test(runs_that_begin_again_go_on_with_the_file),
-                                       cmocka_unit_test(files_that_cannot_be_written_are_told),
+                                       cmocka_unit_test(files_that_cannot_be_written_are_reported),
                                        cmocka_unit_test(others_of_a_missing_field_are_found),
                                        cmocka_unit_test(conditions_hold_images_back)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);

@@ -93,20 +93,20 @@ static void refuse(insitu_session *session, formed_mesh *m, const strided *s, bo
         const int64_t right = *s->stride;
         snprintf(words[0], sizeof words[0], "%s have a stride of %lld bytes", s->name, (long long)wild[i]);
         snprintf(words[1], sizeof words[1], ": %lld of them lie outside of memory", (long long)s->count);
-        forget_pictures();
+        discard_pictures();
         if (is_last) *s->stride = wild[i];
-        const insitu_status at_once = formed_hand_over(session, m, formed_has_corners(m->form));
+        const insitu_status at_once = formed_submit(session, m, formed_has_corners(m->form));
         *s->stride = right;
-        char told[1024];
+        char reported[1024];
         const insitu_status status = insitu_step(session, 1, 0);
         const bool is_well = is_last == (at_once != INSITU_OK) && status;
         if (!is_well) fprintf(stderr, "%s: %s: %lld\n", mesh_form_name(m->form), s->name, (long long)wild[i]);
         assert_true(is_well);
-        snprintf(told, sizeof told, "%s", insitu_error(session));
-        const bool has_words = strstr(told, words[0]) && strstr(told, words[1]);
-        if (is_last && !has_words) fprintf(stderr, "%s; %s%s\n", told, words[0], words[1]);
+        snprintf(reported, sizeof reported, "%s", insitu_error(session));
+        const bool has_words = strstr(reported, words[0]) && strstr(reported, words[1]);
+        if (is_last && !has_words) fprintf(stderr, "%s; %s%s\n", reported, words[0], words[1]);
         assert_true(!is_last || has_words);
-        assert_true(strstr(told, "have a stride of "));
+        assert_true(strstr(reported, "have a stride of "));
     }
 }
 
@@ -127,13 +127,14 @@ static void strides_beyond_memory_are_refused(void **state)
         formed_mesh m;
         formed_create(form, SIDE, own_rank, rank_count, &m);
         const bool is_torn = formed_has_corners(form);
-        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_torn_scene : formed_scene));
+        insitu_session *session =
+            open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_corner_scene : formed_scene));
         refuse_all(session, &m, list, list_of_mesh(&m.mesh, list));
         refuse_all(session, &m, list, list_of_fields(&m, list, 0));
         refuse_all(session, &m, list, list_of_patch(&m, list));
-        everywhere(formed_hand_over(session, &m, is_torn) == INSITU_OK);
+        everywhere(formed_submit(session, &m, is_torn) == INSITU_OK);
         const insitu_status status = insitu_step(session, 2, 0);
-        told_everywhere(session, status, INSITU_OK, "");
+        reported_everywhere(session, status, INSITU_OK, "");
         insitu_destroy(&session);
         formed_free(&m);
     }
@@ -146,26 +147,26 @@ static void rows_beyond_memory_are_refused(void **state)
     (void)state;
     formed_mesh m;
     formed_create(MESH_ROWS, SIDE, own_rank, rank_count, &m);
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(formed_torn_scene));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(formed_corner_scene));
     for (size_t i = 0; i < sizeof wild / sizeof wild[0]; i++) {
         char words[64];
         insitu_field *d = &m.fields[FORMED_D];
         snprintf(words, sizeof words, "connectivity_row is %lld", (long long)wild[i]);
         m.mesh.connectivity_row = wild[i];
-        everywhere(formed_hand_over(session, &m, false) == INSITU_ERROR_MESH);
+        everywhere(formed_submit(session, &m, false) == INSITU_ERROR_MESH);
         everywhere(insitu_set_mesh(session, "m", &m.mesh) == INSITU_ERROR_MESH);
         everywhere(strstr(insitu_error(session), wild[i] < 0 ? words : "too few for") != NULL);
         m.mesh.connectivity_row = 9;
-        everywhere(formed_hand_over(session, &m, true) == INSITU_OK);
+        everywhere(formed_submit(session, &m, true) == INSITU_OK);
         snprintf(words, sizeof words, "corner_row is %lld", (long long)wild[i]);
         d->corner_row = wild[i];
         everywhere(insitu_set_field(session, "m", d) == INSITU_ERROR_FIELD);
         everywhere(strstr(insitu_error(session), wild[i] == (int64_t)1 << 49 ? "has " : words) != NULL);
         d->corner_row = 0;
     }
-    everywhere(formed_hand_over(session, &m, true) == INSITU_OK);
+    everywhere(formed_submit(session, &m, true) == INSITU_OK);
     const insitu_status status = insitu_step(session, 2, 0);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     insitu_destroy(&session);
     formed_free(&m);
 }
@@ -196,10 +197,10 @@ static void *reverse(const strided *s, int64_t bytes)
 static int draw(const char *scene, const formed_mesh *m, caught_picture *out)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    forget_pictures();
-    everywhere(formed_hand_over(session, m, formed_has_corners(m->form)) == INSITU_OK);
+    discard_pictures();
+    everywhere(formed_submit(session, m, formed_has_corners(m->form)) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     const int count = caught_count;
     for (int i = 0; i < count; i++) out[i] = caught[i];
     caught_count = 0;
@@ -241,7 +242,7 @@ static void arrays_are_read_backwards_as_forwards(void **state)
     (void)state;
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++) {
         draw_backwards(form, write_scene(formed_scene));
-        if (formed_has_corners(form)) draw_backwards(form, write_scene(formed_torn_scene));
+        if (formed_has_corners(form)) draw_backwards(form, write_scene(formed_corner_scene));
     }
 }
 

@@ -25,10 +25,11 @@ static void make_whole(test_mesh_kind kind, session_input *out)
 }
 
 /* The rank's cells, listed its own way; with ghosts: all cells, of which the others' are ghosts. */
-static void take_part(const session_input *whole, test_partition_kind dealt, bool with_ghosts, session_input *out)
+static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts,
+                               session_input *out)
 {
-    take_own_cells(&whole->part, dealt, SIDE, with_ghosts, &out->part);
-    if (!with_ghosts) test_mesh_turn(&out->part, 3 + (uint64_t)own_rank);
+    extract_own_cells(&whole->part, distributed, SIDE, with_ghosts, &out->part);
+    if (!with_ghosts) test_mesh_reorder_vertices(&out->part, 3 + (uint64_t)own_rank);
     test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);
     input_describe(out);
 }
@@ -44,7 +45,7 @@ static insitu_session *open_with(MPI_Comm comm, const char *scene, const session
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
 {
     insitu_session *session = open_with(comm, scene, in);
-    const caught_picture picture = take_caught();
+    const caught_picture picture = pop_caught_picture();
     insitu_destroy(&session);
     return picture;
 }
@@ -102,7 +103,7 @@ static void outer_faces_are_the_cube_s(void **state)
         for (int way = 0; way < 4; way++) {
             session_input whole = {0}, part = {0};
             make_whole(kind, &whole);
-            take_part(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
+            extract_rank_cells(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
             if (way == 3 && kind != TEST_POLYHEDRA)
                 test_mesh_to_polyhedra(&part.part, 0.5); /* some of them, beside the others */
             input_describe(&part);
@@ -131,7 +132,7 @@ static void faces_are_one_by_ids(void **state)
     (void)state;
     session_input whole = {0}, part = {0};
     make_whole(TEST_HEXES, &whole);
-    take_part(&whole, TEST_BLOCK, false, &part);
+    extract_rank_cells(&whole, TEST_BLOCK, false, &part);
     int64_t *shared = make_ids(&whole, &part, 7, -100), *own = make_ids(&whole, &part, rank_count, own_rank);
     part.mesh.vertex_ids = (insitu_array){shared, INSITU_INT64, 0};
     everywhere(fabs(whole_area(&part) - 24) < 1e-12);
@@ -226,7 +227,7 @@ static void cube_is_one_picture_of(test_mesh_kind kind)
     everywhere(is_well);
     for (int way = 0; way < 3; way++) {
         session_input part = {0};
-        take_part(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
+        extract_rank_cells(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part);
         everywhere(own_rank != 0 || are_same(&picture, &clear));
         free_caught(&picture);
@@ -237,7 +238,7 @@ static void cube_is_one_picture_of(test_mesh_kind kind)
     input_free(&whole);
 }
 
-static void cubes_are_true_and_one_picture_on_any_ranks(void **state)
+static void cubes_are_true_and_the_same_on_any_ranks(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) cube_is_one_picture_of(kind);
@@ -265,7 +266,7 @@ static void patch_point(const double *const p[4], double u, double v, double out
         out[a] = (1 - v) * ((1 - u) * p[0][a] + u * p[1][a]) + v * ((1 - u) * p[3][a] + u * p[2][a]);
 }
 
-static bool meets_triangle(const ray *r, const double *a, const double *b, const double *c)
+static bool intersects_triangle(const ray *r, const double *a, const double *b, const double *c)
 {
     double u[3], v[3], w[3], p[3], q[3];
     for (int i = 0; i < 3; i++) u[i] = b[i] - a[i], v[i] = c[i] - a[i], w[i] = r->base[i] - a[i];
@@ -303,14 +304,14 @@ static patch_hit polish(const ray *r, const double *const p[4], double u, double
     return out;
 }
 
-static void meet_patch(const ray *r, const double *const p[4], patch_hit *nearest)
+static void intersect_patch(const ray *r, const double *const p[4], patch_hit *nearest)
 {
     for (int i = 0; i < FINE; i++)
         for (int j = 0; j < FINE; j++) {
             double q[4][3];
             for (int k = 0; k < 4; k++)
                 patch_point(p, (double)(i + (k == 1 || k == 2)) / FINE, (double)(j + k / 2) / FINE, q[k]);
-            if (!meets_triangle(r, q[0], q[1], q[2]) && !meets_triangle(r, q[0], q[2], q[3])) continue;
+            if (!intersects_triangle(r, q[0], q[1], q[2]) && !intersects_triangle(r, q[0], q[2], q[3])) continue;
             const patch_hit hit = polish(r, p, (i + 0.5) / FINE, (j + 0.5) / FINE);
             if (hit.depth < nearest->depth) *nearest = hit;
         }
@@ -329,7 +330,7 @@ static bool is_hex(const caught_picture *picture, const double *places)
         for (int face = 0; face < 6; face++) {
             const double *p[4];
             for (int i = 0; i < 4; i++) p[i] = places + 3 * faces[face][i];
-            meet_patch(&r, p, &truth[pixel]);
+            intersect_patch(&r, p, &truth[pixel]);
         }
     }
     for (int pixel = WIDTH; pixel < PIXELS - WIDTH; pixel++) {
@@ -385,7 +386,7 @@ static void faces_are_found_once_for_the_cells(void **state)
     (void)state;
     session_input whole = {0}, part = {0};
     make_whole(TEST_MIXED, &whole);
-    take_part(&whole, TEST_BLOCK, false, &part);
+    extract_rank_cells(&whole, TEST_BLOCK, false, &part);
     insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(IMAGE(COLOURED(""))), &part);
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     const session_face *faces = mesh->outers[0]->faces;
@@ -401,7 +402,7 @@ static void faces_are_found_once_for_the_cells(void **state)
     MPI_Allreduce(MPI_IN_PLACE, &highest, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
     everywhere(highest == 2);
     part.mesh.changed = INSITU_CHANGED_ALL;
-    everywhere(hand_over(session, &part) == INSITU_OK);
+    everywhere(submit(session, &part) == INSITU_OK);
     everywhere(mesh->outer_count == 0);
     step_is_good(session, 2);
     everywhere(mesh->outers[0]->are_faces_known);
@@ -439,7 +440,7 @@ static void rays_along_the_diagonals_of_polygons_hit(void **state)
     mesh.face_offsets = (insitu_array){faces, INSITU_INT64, 0};
     mesh.face_connectivity_count = 26;
     mesh.face_connectivity = (insitu_array){vertices, INSITU_INT64, 0};
-    forget_pictures();
+    discard_pictures();
     everywhere(own_rank != 0 || insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     bool is_right = own_rank != 0 || caught_count == 1;
@@ -459,7 +460,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(outer_faces_are_the_cube_s),
         cmocka_unit_test(faces_are_one_by_ids),
-        cmocka_unit_test(cubes_are_true_and_one_picture_on_any_ranks),
+        cmocka_unit_test(cubes_are_true_and_the_same_on_any_ranks),
         cmocka_unit_test(warped_faces_are_bilinear_patches),
         cmocka_unit_test(faces_are_found_once_for_the_cells),
         cmocka_unit_test(rays_along_the_diagonals_of_polygons_hit),

@@ -161,7 +161,7 @@ static void check(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
     insitu_session *session = NULL;
     const char *scene = write_scene(IMAGE("field: f, from: -0.6, to: 0.9"));
     test_mesh_lattice(kind, SIDE, 0.2, test_linear, &whole.part);
-    take_own_cells(&whole.part, TEST_RANDOM, SIDE, with_ghosts, &part.part);
+    extract_own_cells(&whole.part, TEST_RANDOM, SIDE, with_ghosts, &part.part);
     for (int step = 0; step < 2; step++) {
         caught_picture alone = {0}, picture;
         set_values(&whole, is_cell_centred, step);
@@ -170,8 +170,8 @@ static void check(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
         set_values(&part, is_cell_centred, step);
         part.mesh.changed = step ? 0 : INSITU_CHANGED_ALL;
         if (step == 0) session = open_session(MPI_COMM_WORLD, scene);
-        forget_pictures();
-        assert_int_equal(hand_over(session, &part), INSITU_OK);
+        discard_pictures();
+        assert_int_equal(submit(session, &part), INSITU_OK);
         everywhere(insitu_step(session, step, step) == INSITU_OK);
         const face_set drawn = find_drawn(session);
         if ((!truth.count || drawn.sum != truth.sum) && own_rank == 0)
@@ -212,8 +212,8 @@ static void bounds_may_show_all_or_nothing(void **state)
         insitu_destroy(&session);
     }
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scenes[2]));
-    assert_int_equal(hand_over(session, &part), INSITU_OK);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"");
+    assert_int_equal(submit(session, &part), INSITU_OK);
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"");
     insitu_destroy(&session);
     input_free(&part);
 }

@@ -27,10 +27,10 @@ static void draw(const char *text, int side)
     totals.bytes_peak = most[2];
     insitu_destroy(&session);
     input_free(&in);
-    forget_pictures();
+    discard_pictures();
 }
 
-static void one_volume_needs_no_turns(void **context)
+static void one_volume_needs_no_further_pass(void **context)
 {
     (void)context;
     draw(IMAGE(64, 48, THIN), 4);
@@ -38,7 +38,7 @@ static void one_volume_needs_no_turns(void **context)
 }
 
 /* A few fragments a ray: all at once. */
-static void two_volumes_take_a_turn(void **context)
+static void two_volumes_take_a_further_pass(void **context)
 {
     (void)context;
     draw(IMAGE(40, 30, THIN DENSE), 4);
@@ -47,7 +47,7 @@ static void two_volumes_take_a_turn(void **context)
 
 /* A picture that took 124 turns when they were of 4 million fragments of all ranks, by an estimate. A rank may hold
  * 2 million fragments at once, 64 MiB, and as much again packed and unpacked. */
-static void many_fragments_take_few_turns(void **context)
+static void many_fragments_take_few_passes(void **context)
 {
     (void)context;
     enum { LEAST_FRAGMENTS = 58900000, MOST_TURNS = 8 };
@@ -62,9 +62,9 @@ static void many_fragments_take_few_turns(void **context)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(one_volume_needs_no_turns),
-        cmocka_unit_test(two_volumes_take_a_turn),
-        cmocka_unit_test(many_fragments_take_few_turns),
+        cmocka_unit_test(one_volume_needs_no_further_pass),
+        cmocka_unit_test(two_volumes_take_a_further_pass),
+        cmocka_unit_test(many_fragments_take_few_passes),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

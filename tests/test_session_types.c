@@ -138,12 +138,12 @@ static void create(session_input *in, test_mesh_kind kind)
 /* What the step copied, and its picture. */
 static caught_picture draw(const char *path, const session_input *in, int64_t *copied)
 {
-    forget_pictures();
+    discard_pictures();
     insitu_session *session = open_drawn(MPI_COMM_WORLD, path, in);
     *copied = insitu_last_report(session)->bytes_copied;
     everywhere(in->part.cell_count == 0 || insitu_last_report(session)->bytes_borrowed > 0);
     insitu_destroy(&session);
-    return take_caught();
+    return pop_caught_picture();
 }
 
 /* Draws the input and compares; is_in_place: no more is copied than of the truth. */
@@ -365,17 +365,17 @@ static void components_may_be_set_again(void **state)
     create(&in, TEST_MIXED);
     make_field(APART, INSITU_CELL, &in);
     insitu_session *session = open_drawn(MPI_COMM_WORLD, write_scene(recentred), &in);
-    caught_picture first = take_caught();
+    caught_picture first = pop_caught_picture();
     for (int step = 1; step < 4; step++) {
         insitu_array again[COMPONENTS];
         memcpy(again, components, sizeof again);
         in.mesh.changed = INSITU_CHANGED_NOTHING;
         in.field.changed = step == 2 ? INSITU_CHANGED_VALUES : INSITU_CHANGED_NOTHING;
         in.field.components = again;
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         memset(again, 0, sizeof again);
         step_is_good(session, step);
-        caught_picture picture = take_caught();
+        caught_picture picture = pop_caught_picture();
         const bool is_same = own_rank || same_pictures(&picture, &first);
         everywhere(is_same);
         free_caught(&picture);
@@ -407,9 +407,9 @@ static void forms_may_change_from_step_to_step(void **state)
             in.mesh.changed = INSITU_CHANGED_GEOMETRY;
             if (k) lay_out_places(&in, &forms[step % 5]);
             if (k) everywhere(lay_out(&in.field.values, in.field.count, &forms[step % 5]));
-            everywhere(hand_over(k ? session : plain, &in) == INSITU_OK);
+            everywhere(submit(k ? session : plain, &in) == INSITU_OK);
             step_is_good(k ? session : plain, step);
-            pictures[k] = take_caught();
+            pictures[k] = pop_caught_picture();
         }
         const bool is_same = own_rank || same_pictures(&pictures[0], &pictures[1]);
         everywhere(is_same);
@@ -471,7 +471,7 @@ static void component_of_no_type(session_input *in)
     components[1].type = (insitu_type)77;
 }
 
-static const spoilt_case faults[] = {
+static const corrupted_case faults[] = {
     {"no type", numbers_without_type, INSITU_ERROR_MESH, false, {"cell 3", "type 7"}},
     {"no map", no_map, INSITU_ERROR_ARGUMENT, true, {"cell_type_map_count is 3, and cell_type_map is not given"}},
     {"open", offsets_half_open, INSITU_ERROR_ARGUMENT, true, {"open_offsets is 2, expected 0 or 1"}},
@@ -481,12 +481,12 @@ static const spoilt_case faults[] = {
     {"no type", component_of_no_type, INSITU_ERROR_ARGUMENT, true, {"component 1: values are of element type 77"}},
 };
 
-static void faults_are_told_to_all(void **state)
+static void faults_are_reported_on_all_ranks(void **state)
 {
     (void)state;
     session_input in;
     input_create(&in, TEST_HEXES, 4, TEST_BLOCK, own_rank, rank_count);
-    all_are_told(&in, faults, sizeof faults / sizeof faults[0]);
+    all_are_reported(&in, faults, sizeof faults / sizeof faults[0]);
     input_free(&in);
 }
 
@@ -500,7 +500,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(components_apart_are_the_same),
         cmocka_unit_test(components_may_be_set_again),
         cmocka_unit_test(forms_may_change_from_step_to_step),
-        cmocka_unit_test(faults_are_told_to_all),
+        cmocka_unit_test(faults_are_reported_on_all_ranks),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

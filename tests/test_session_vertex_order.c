@@ -46,7 +46,7 @@ static bool differ(test_mesh_kind kind, int a, int b)
 /* Warns of the order (NULL: does not), and of hands at most. */
 static void expect(insitu_session *session, const session_input *in, const char *words, const char *what)
 {
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     step_is_good(session, 0);
     const char *text = insitu_last_report(session)->warnings;
     const bool is_well = words ? strstr(text, words) && !strchr(text, '\n') : !strstr(text, "vertex_order");
@@ -64,7 +64,7 @@ static void check(test_mesh_kind kind, insitu_vertex_order stand, insitu_vertex_
     test_mesh_lattice(kind, SIDE, jitter, test_wave, &whole);
     if (mirrored) test_mesh_mirror(&whole, false);
     bring_into(&whole, stand);
-    take_own_cells(&whole, TEST_RANDOM, SIDE, false, &in.part);
+    extract_own_cells(&whole, TEST_RANDOM, SIDE, false, &in.part);
     test_mesh_free(&whole);
     input_describe(&in);
     in.mesh.vertex_order = said;
@@ -92,7 +92,7 @@ static void order_that_fits_is_named(void **state)
 }
 
 /* Two opposite vertices of each hex change places: cells that no order mends. */
-static void twisted_cells_are_told(void **state)
+static void twisted_cells_are_reported(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -110,7 +110,7 @@ static void twisted_cells_are_told(void **state)
 }
 
 /* A few cells in another order are no majority. */
-static void few_cells_are_not_told(void **state)
+static void few_cells_are_not_reported(void **state)
 {
     (void)state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -130,8 +130,8 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(order_that_fits_is_named),
-        cmocka_unit_test(twisted_cells_are_told),
-        cmocka_unit_test(few_cells_are_not_told),
+        cmocka_unit_test(twisted_cells_are_reported),
+        cmocka_unit_test(few_cells_are_not_reported),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

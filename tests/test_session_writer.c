@@ -50,13 +50,13 @@ static insitu_session *open_behind(const char *scene, const session_input *in, v
     before_writing = gate;
     session_writes_behind = true;
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    everywhere(hand_over(session, in) == INSITU_OK);
+    everywhere(submit(session, in) == INSITU_OK);
     return session;
 }
 
 static void make_input(session_input *in)
 {
-    forget_pictures();
+    discard_pictures();
     session_writes_behind = false;
     before_writing = NULL;
     unwritable = NULL;
@@ -115,8 +115,8 @@ static void simulation_goes_on_while_pictures_wait(void **state)
     everywhere(caught_count == 0);
     unwritable = "b";
     set_gate(false);
-    told_everywhere(NULL, insitu_destroy(&session), INSITU_ERROR_IO, "cycle 0: image \"b\": b0.exr",
-                    "(and 3 more like it)");
+    reported_everywhere(NULL, insitu_destroy(&session), INSITU_ERROR_IO, "cycle 0: image \"b\": b0.exr",
+                        "(and 3 more like it)");
     everywhere(caught_count == (own_rank ? 0 : 4));
     input_free(&in);
 }
@@ -129,7 +129,7 @@ static void *open_gate_later(void *unused)
 }
 
 /* Four pictures of 32 MiB wait; the fifth is not drawn before the gate is open. */
-static void what_waits_is_bounded(void **state)
+static void pending_pictures_are_bounded(void **state)
 {
     (void)state;
     static const char scene[] = "images:\n  - name: a\n    size: [2048, 1024]\n    layers: [{isosurface: {field: f, "
@@ -168,7 +168,7 @@ static void wait_for_passed(int count)
     pthread_mutex_unlock(&mutex);
 }
 
-static void failure_is_told_by_a_later_step_or_the_end(void **state)
+static void failure_is_reported_by_a_later_step_or_the_end(void **state)
 {
     (void)state;
     session_input in;
@@ -183,14 +183,14 @@ static void failure_is_told_by_a_later_step_or_the_end(void **state)
     for (int cycle = 3; cycle < 1000 && !status; cycle += 2) {
         status = insitu_step(session, cycle, 0.5);
         usleep(status ? 0 : 1000);
-        forget_pictures();
+        discard_pictures();
     }
-    told_everywhere(session, status, INSITU_ERROR_IO, "cycle 2: image \"a\": a2.png: cannot be written");
+    reported_everywhere(session, status, INSITU_ERROR_IO, "cycle 2: image \"a\": a2.png: cannot be written");
     everywhere(insitu_last_report(session)->images == 1); /* what is due is drawn all the same */
     everywhere(insitu_step(session, 1001, 0.5) == INSITU_OK);
     everywhere(insitu_step(session, 1002, 0.5) == INSITU_OK);
     status = insitu_destroy(&session);
-    told_everywhere(NULL, status, INSITU_ERROR_IO, "cycle 1002: image \"a\": a1002.png");
+    reported_everywhere(NULL, status, INSITU_ERROR_IO, "cycle 1002: image \"a\": a1002.png");
     everywhere(!session);
     input_free(&in);
 }
@@ -208,10 +208,10 @@ static void failure_waits_for_an_error_of_the_step(void **state)
     bad.vertex_count = -1;
     for (int cycle = 1; cycle < 4; cycle++) {
         (void)insitu_set_mesh(session, "m", &bad);
-        told_everywhere(session, insitu_step(session, cycle, 0.5), INSITU_ERROR_ARGUMENT, "vertex_count");
+        reported_everywhere(session, insitu_step(session, cycle, 0.5), INSITU_ERROR_ARGUMENT, "vertex_count");
         usleep(10000);
     }
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     const insitu_status status = insitu_step(session, 4, 0.5);
     const insitu_status last = insitu_destroy(&session);
     everywhere((status == INSITU_ERROR_IO) != (last == INSITU_ERROR_IO));
@@ -294,8 +294,8 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pictures_are_those_written_in_the_step),
         cmocka_unit_test(simulation_goes_on_while_pictures_wait),
-        cmocka_unit_test(what_waits_is_bounded),
-        cmocka_unit_test(failure_is_told_by_a_later_step_or_the_end),
+        cmocka_unit_test(pending_pictures_are_bounded),
+        cmocka_unit_test(failure_is_reported_by_a_later_step_or_the_end),
         cmocka_unit_test(failure_waits_for_an_error_of_the_step),
         cmocka_unit_test(scene_is_kept_until_its_pictures_are_written),
         cmocka_unit_test(tables_follow_their_pictures),

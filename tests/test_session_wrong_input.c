@@ -97,7 +97,7 @@ static void put_number(const input_array *a, int64_t i, double value)
 }
 
 /* Other contents of one to three elements. */
-static void spoil_elements(const input_array *a, dice *d)
+static void corrupt_elements(const input_array *a, dice *d)
 {
     const int64_t indices[] = {-1, 0, 1, -7, INT32_MIN, INT32_MAX, INT64_MIN, INT64_MAX, (int64_t)1 << 40, a->count};
     const double numbers[] = {NAN, INFINITY, -INFINITY, 1e200, -1e300, 1e30, 0, -0.0, 1e-310, 7};
@@ -111,7 +111,7 @@ static void spoil_elements(const input_array *a, dice *d)
     }
 }
 
-static void spoil_stride(const input_array *a, dice *d)
+static void corrupt_stride(const input_array *a, dice *d)
 {
     static const int64_t wild[] = {
         (int64_t)1 << 60, (int64_t)1 << 62, INT64_MIN, INT64_MAX, -((int64_t)1 << 50), 1, 3, 0};
@@ -119,7 +119,7 @@ static void spoil_stride(const input_array *a, dice *d)
 }
 
 /* Types of no more bytes, right ones and wrong ones, and numbers that are no type. */
-static void spoil_type(const input_array *a, dice *d)
+static void corrupt_type(const input_array *a, dice *d)
 {
     static const int types[] = {INSITU_FLOAT32, INSITU_FLOAT64, INSITU_INT32, INSITU_INT64, INSITU_UINT8, 0, -1, 77};
     const int type = PICK(d, types);
@@ -127,7 +127,7 @@ static void spoil_type(const input_array *a, dice *d)
     a->array->type = (insitu_type)type;
 }
 
-static void spoil_array(formed_mesh *m, const formed_mesh *right, dice *d)
+static void corrupt_array(formed_mesh *m, const formed_mesh *right, dice *d)
 {
     input_array arrays[ARRAYS];
     const int count = list_arrays(m, right, arrays);
@@ -135,12 +135,12 @@ static void spoil_array(formed_mesh *m, const formed_mesh *right, dice *d)
     const input_array *a = &arrays[roll(d, count)];
     switch (roll(d, 6)) {
     case 0: a->array->data = NULL; return;
-    case 1: spoil_stride(a, d); return;
-    case 2: spoil_type(a, d); return;
+    case 1: corrupt_stride(a, d); return;
+    case 2: corrupt_type(a, d); return;
     case 3:
         if (size_of(a->truth.type) > 1) a->array->data = (const char *)a->truth.data + 1;
         return;
-    default: spoil_elements(a, d);
+    default: corrupt_elements(a, d);
     }
 }
 
@@ -152,7 +152,7 @@ static int64_t other_count(int64_t count, dice *d)
     return roll(d, 2) ? PICK(d, huge) : roll(d, count > 0 ? count : 1);
 }
 
-static void spoil_count(formed_mesh *m, dice *d)
+static void corrupt_count(formed_mesh *m, dice *d)
 {
     insitu_mesh *a = &m->mesh;
     int64_t *const counts[] = {&a->vertex_count,
@@ -172,7 +172,7 @@ static void spoil_count(formed_mesh *m, dice *d)
     if (roll(d, 2)) formed_fit_fields(m);
 }
 
-static void spoil_choice(formed_mesh *m, dice *d)
+static void corrupt_choice(formed_mesh *m, dice *d)
 {
     static const int types[] = {0, 5, 7, 9, 10, 11, 12, 13, 14, 41, 42, -1};
     static const int64_t rows[] = {-1, 0, 3, 6, 9, 12, (int64_t)1 << 60, INT64_MIN, INT64_MAX};
@@ -211,14 +211,14 @@ static void leave_out(formed_mesh *m, dice *d)
 }
 
 /* The fault's own numbers do not depend on what the rank has. */
-static void spoil(formed_mesh *m, const formed_mesh *right, uint64_t number, int fault, bool is_mine)
+static void corrupt(formed_mesh *m, const formed_mesh *right, uint64_t number, int fault, bool is_mine)
 {
     dice d = {number, 1000 * (uint64_t)(fault + 1)};
     const int64_t kind = roll(&d, 8);
     if (!is_mine) return;
-    if (kind < 4) spoil_array(m, right, &d);
-    if (kind == 4 || kind == 5) spoil_count(m, &d);
-    if (kind == 6) spoil_choice(m, &d);
+    if (kind < 4) corrupt_array(m, right, &d);
+    if (kind == 4 || kind == 5) corrupt_count(m, &d);
+    if (kind == 6) corrupt_choice(m, &d);
     if (kind == 7) leave_out(m, &d);
 }
 
@@ -227,7 +227,7 @@ static void spoil(formed_mesh *m, const formed_mesh *right, uint64_t number, int
 typedef struct bench {
     insitu_session *session;
     formed_mesh mesh;
-    bool is_torn;
+    bool has_corner_fields;
     int pictures, cycle;
     float truth[FORMED_PICTURES][MOST_PIXELS * 4];
 } bench;
@@ -248,8 +248,8 @@ static int count_differing(const bench *b)
 
 static void draw_right(bench *b, bool is_first, int number)
 {
-    forget_pictures();
-    const insitu_status set = formed_hand_over(b->session, &b->mesh, b->is_torn);
+    discard_pictures();
+    const insitu_status set = formed_submit(b->session, &b->mesh, b->has_corner_fields);
     const insitu_status status = insitu_step(b->session, b->cycle++, 0);
     if (set || status) fprintf(stderr, "case %d: not healed: %s\n", number, insitu_error(b->session));
     everywhere(set == INSITU_OK && status == INSITU_OK);
@@ -260,11 +260,11 @@ static void draw_right(bench *b, bool is_first, int number)
     everywhere(differing <= 4);
 }
 
-static void open_bench(bench *b, mesh_form form, bool is_torn)
+static void open_bench(bench *b, mesh_form form, bool has_corner_fields)
 {
-    *b = (bench){.is_torn = is_torn && formed_has_corners(form)};
-    b->session = open_session(MPI_COMM_WORLD, write_scene(b->is_torn ? formed_torn_scene : formed_scene));
-    b->pictures = b->is_torn ? FORMED_TORN_PICTURES : FORMED_PICTURES;
+    *b = (bench){.has_corner_fields = has_corner_fields && formed_has_corners(form)};
+    b->session = open_session(MPI_COMM_WORLD, write_scene(b->has_corner_fields ? formed_corner_scene : formed_scene));
+    b->pictures = b->has_corner_fields ? FORMED_CORNER_PICTURES : FORMED_PICTURES;
     formed_create(form, SIDE, own_rank, rank_count, &b->mesh);
     draw_right(b, true, -1);
 }
@@ -282,9 +282,9 @@ static bool draw_wrong(bench *b, int number)
     const int64_t faults = 1 + roll(&d, FAULTS), where = roll(&d, rank_count + 2);
     const bool is_mine = where >= rank_count || where == own_rank;
     const formed_mesh right = b->mesh;
-    for (int fault = 0; fault < faults; fault++) spoil(&b->mesh, &right, (uint64_t)number, fault, is_mine);
-    forget_pictures();
-    const insitu_status set = formed_hand_over(b->session, &b->mesh, b->is_torn);
+    for (int fault = 0; fault < faults; fault++) corrupt(&b->mesh, &right, (uint64_t)number, fault, is_mine);
+    discard_pictures();
+    const insitu_status set = formed_submit(b->session, &b->mesh, b->has_corner_fields);
     const insitu_status status = insitu_step(b->session, b->cycle++, 0);
     const int images = insitu_last_report(b->session)->images;
     const bool is_well = status ? *insitu_error(b->session) != '\0' : !set && images == b->pictures;
@@ -292,17 +292,17 @@ static bool draw_wrong(bench *b, int number)
         fprintf(stderr, "case %d: set %d, step %d, %d images: %s\n", number, (int)set, (int)status, images,
                 insitu_error(b->session));
     everywhere(is_well);
-    told_everywhere(b->session, status, status, "");
+    reported_everywhere(b->session, status, status, "");
     return status != INSITU_OK;
 }
 
 /* INSITU_TEST_CASE: the number of the only case to do. Returns how many steps failed. */
-static int run_cases(mesh_form form, bool is_torn, int first, int end)
+static int run_cases(mesh_form form, bool has_corner_fields, int first, int end)
 {
     const char *only = getenv("INSITU_TEST_CASE");
     bench b;
     int failed = 0;
-    open_bench(&b, form, is_torn);
+    open_bench(&b, form, has_corner_fields);
     for (int number = first; number < end; number++) {
         if (only && number != atoi(only)) continue;
         failed += draw_wrong(&b, number);

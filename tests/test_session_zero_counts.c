@@ -55,8 +55,8 @@ static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_tor
     if (is_mine && !with_arrays) drop_arrays(&m->mesh, mask);
     formed_fit_fields(m);
     const bool is_right = !is_mine || is_empty_and_right(&m->mesh);
-    forget_pictures();
-    const insitu_status set = formed_hand_over(session, m, is_torn);
+    discard_pictures();
+    const insitu_status set = formed_submit(session, m, is_torn);
     const insitu_status status = insitu_step(session, 1, 0);
     if ((set && !status) || (is_right && status))
         fprintf(stderr, "%s mask %u %s: %s\n", mesh_form_name(m->form), mask, with_arrays ? "arrays" : "none",
@@ -65,7 +65,7 @@ static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_tor
     MPI_Allreduce(MPI_IN_PLACE, &all_right, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     everywhere(!all_right || status == INSITU_OK);
     everywhere(!set || status);
-    told_everywhere(session, status, status, status ? "mesh \"m\"" : "");
+    reported_everywhere(session, status, status, status ? "mesh \"m\"" : "");
     m->mesh = right;
     memcpy(m->fields, right_fields, sizeof right_fields);
 }
@@ -74,7 +74,7 @@ static void check_form(mesh_form form, bool is_torn)
 {
     formed_mesh m;
     formed_create(form, SIDE, own_rank, rank_count, &m);
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_torn_scene : formed_scene));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_corner_scene : formed_scene));
     int64_t *counts[COUNTS];
     counts_of(&m.mesh, counts);
     unsigned given = 0;
@@ -85,11 +85,11 @@ static void check_form(mesh_form form, bool is_torn)
         for (int way = 0; way < 4; way++)
             draw_with_zeros(session, &m, is_torn, mask, way & 1, way & 2 || own_rank == rank_count - 1);
     }
-    forget_pictures();
-    everywhere(formed_hand_over(session, &m, is_torn) == INSITU_OK);
+    discard_pictures();
+    everywhere(formed_submit(session, &m, is_torn) == INSITU_OK);
     const insitu_status status = insitu_step(session, 2, 0);
-    told_everywhere(session, status, INSITU_OK, "");
-    everywhere(insitu_last_report(session)->images == (is_torn ? FORMED_TORN_PICTURES : FORMED_PICTURES));
+    reported_everywhere(session, status, INSITU_OK, "");
+    everywhere(insitu_last_report(session)->images == (is_torn ? FORMED_CORNER_PICTURES : FORMED_PICTURES));
     insitu_destroy(&session);
     formed_free(&m);
 }
@@ -100,7 +100,7 @@ static void any_counts_are_an_error_or_a_picture(void **state)
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++) check_form(form, false);
 }
 
-static void and_for_torn_meshes(void **state)
+static void and_for_meshes_with_corner_fields(void **state)
 {
     (void)state;
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++)
@@ -111,7 +111,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_counts_are_an_error_or_a_picture),
-        cmocka_unit_test(and_for_torn_meshes),
+        cmocka_unit_test(and_for_meshes_with_corner_fields),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -48,7 +48,7 @@ static void check_kind(test_mesh_kind kind)
     test_mesh_lattice(kind, SIDE, JITTER, test_wave, &mesh);
     test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
     fixture_create_lattice(&f, kind, SIDE, JITTER, distance);
-    fixture_look(&f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
+    fixture_set_camera(&f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
     fixture_set_volume(&f, 0.3); /* its colours serve the surface */
     f.job.volume_count = 0;
     fixture_add_surface(&f, &through, 1, 1);
@@ -64,7 +64,7 @@ static void check_kind(test_mesh_kind kind)
     fixture_free(&f);
 }
 
-static void slices_of_warped_cells_are_the_reference_s(void **state)
+static void slices_of_warped_cells_match_the_reference_s(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) check_kind(kind);
@@ -73,7 +73,7 @@ static void slices_of_warped_cells_are_the_reference_s(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(slices_of_warped_cells_are_the_reference_s),
+        cmocka_unit_test(slices_of_warped_cells_match_the_reference_s),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -32,7 +32,7 @@ void step_begin(render_fixture *f, const test_mesh *mesh, fixture_camera camera,
 {
     fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                    (const double[]){0, 0, 0});
-    fixture_look(f, camera, side, side);
+    fixture_set_camera(f, camera, side, side);
     fixture_set_volume(f, 1);
     f->job.integration = RENDER_SEGMENTS;
 }
@@ -71,7 +71,7 @@ double step_worst_of_sets(const render_fixture *f, const double *truth, int ever
     return worst;
 }
 
-void step_judge(render_fixture *f, int every, double tolerance, double worst[3])
+void step_verify(render_fixture *f, int every, double tolerance, double worst[3])
 {
     double *truth = step_truth(f, every, tolerance);
     for (int i = 0; i < 3; i++) {

@@ -24,7 +24,7 @@ double *step_truth(const render_fixture *f, int every, double tolerance);
 double step_worst_of_sets(const render_fixture *f, const double *truth, int every);
 
 /* The worst of each error asked for, 1e-2 to 1e-4, and of every instruction set. */
-void step_judge(render_fixture *f, int every, double tolerance, double worst[3]);
+void step_verify(render_fixture *f, int every, double tolerance, double worst[3]);
 void step_assert_kept(const double worst[3], const char *what);
 
 /* A hex whose field barely reaches 0.6. */

@@ -106,7 +106,7 @@ static void scenery_free(scenery *s)
 }
 
 /* The first status that is not OK; the rest is handed over all the same. */
-static insitu_status hand_over_scenery(insitu_session *session, const scenery *s)
+static insitu_status submit_scenery(insitu_session *session, const scenery *s)
 {
     insitu_status first = INSITU_OK;
     for (int i = 0; i < s->of->mesh_count; i++) {
@@ -135,7 +135,7 @@ typedef struct picture_set {
 } picture_set;
 
 /* Rank 0's pictures, which are forgotten. */
-static picture_set take_pictures(void)
+static picture_set pop_pictures(void)
 {
     picture_set set = {.count = caught_count};
     memcpy(set.pictures, caught, (size_t)caught_count * sizeof *caught);
@@ -172,20 +172,20 @@ static bool name_allocation(bool is_well)
 
 static void step_draws(insitu_session *session, const picture_set *expected)
 {
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
-    told_everywhere(session, status, INSITU_OK, "");
+    reported_everywhere(session, status, INSITU_OK, "");
     at_allocation(own_rank != 0 || (are_of(expected) && caught_count == expected->count));
 }
 
 static insitu_session *open_and_draw(const char *scene, const scenery *s, picture_set *out)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
-    everywhere(hand_over_scenery(session, s) == INSITU_OK);
-    forget_pictures();
+    everywhere(submit_scenery(session, s) == INSITU_OK);
+    discard_pictures();
     const insitu_status status = insitu_step(session, 1, 0);
-    told_everywhere(session, status, INSITU_OK, "");
-    *out = take_pictures();
+    reported_everywhere(session, status, INSITU_OK, "");
+    *out = pop_pictures();
     return session;
 }
 
@@ -196,36 +196,36 @@ typedef struct failure {
     bool is_armed; /* on this rank */
 } failure;
 
-static void arm(const failure *f)
+static void start_failing(const failure *f)
 {
-    if (f->is_armed) heap_arm(f->n, false);
+    if (f->is_armed) heap_start_failing(f->n, false);
 }
 
 /* Tells whether the allocation was beyond the last one on every rank. */
-static bool disarm(const failure *f)
+static bool stop_failing(const failure *f)
 {
-    int is_over = !f->is_armed || heap_disarm() < f->n;
+    int is_over = !f->is_armed || heap_stop_failing() < f->n;
     MPI_Allreduce(MPI_IN_PLACE, &is_over, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     return is_over;
 }
 
 /* An error is one of memory, or of the field that a refused mesh could not be given, and the same for all. */
-static void check_told(const insitu_session *session, insitu_status status)
+static void check_reported(const insitu_session *session, insitu_status status)
 {
     if (status == INSITU_OK || status == INSITU_ERROR_FIELD) {
-        told_everywhere(session, status, status, "");
+        reported_everywhere(session, status, status, "");
         return;
     }
     if (status != INSITU_ERROR_MEMORY) fprintf(stderr, "allocation %lld: ", (long long)allocation);
-    told_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
+    reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
 }
 
-static void run_failures(bool (*fails_well)(const scenery *s, const failure *f, void *state), const scenery *s,
+static void run_failures(bool (*fails_cleanly)(const scenery *s, const failure *f, void *state), const scenery *s,
                          int first, void *state)
 {
     for (int with_all = 0; with_all < (rank_count > 1 ? 2 : 1); with_all++) {
         failure f = {.n = first, .is_armed = with_all || own_rank == rank_count - 1};
-        for (allocation = f.n; !fails_well(s, &f, state); allocation = f.n) f.n += stride();
+        for (allocation = f.n; !fails_cleanly(s, &f, state); allocation = f.n) f.n += stride();
         if (own_rank == 0) fprintf(stderr, "%s: to allocation %lld\n", s->of->name, (long long)f.n);
     }
 }
@@ -238,21 +238,21 @@ typedef struct step_state {
 } step_state;
 
 /* Returns whether there are no more to fail. */
-static bool set_and_step_fail_well(const scenery *s, const failure *f, void *state)
+static bool set_and_step_fail_cleanly(const scenery *s, const failure *f, void *state)
 {
     step_state *t = state;
-    forget_pictures();
-    arm(f);
-    const insitu_status set = hand_over_scenery(t->session, s);
+    discard_pictures();
+    start_failing(f);
+    const insitu_status set = submit_scenery(t->session, s);
     const insitu_status status = insitu_step(t->session, 1, 0);
-    const bool is_over = disarm(f);
-    check_told(t->session, status);
+    const bool is_over = stop_failing(f);
+    check_reported(t->session, status);
     at_allocation(own_rank != 0 || are_of(&t->expected));
     at_allocation(own_rank != 0 || status != INSITU_OK || caught_count == t->expected.count);
     int is_set = set == INSITU_OK;
     MPI_Allreduce(MPI_IN_PLACE, &is_set, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     if (is_set) step_draws(t->session, &t->expected); /* what was taken is not lost */
-    everywhere(hand_over_scenery(t->session, s) == INSITU_OK);
+    everywhere(submit_scenery(t->session, s) == INSITU_OK);
     step_draws(t->session, &t->expected);
     return is_over;
 }
@@ -266,7 +266,7 @@ static void failing_step_is_the_same_picture_or_an_error(void **context)
         step_state t;
         scenery_create(&s, &cases[i]);
         t.session = open_and_draw(full_scene, &s, &t.expected);
-        run_failures(set_and_step_fail_well, &s, 1 + i % stride(), &t);
+        run_failures(set_and_step_fail_cleanly, &s, 1 + i % stride(), &t);
         insitu_destroy(&t.session);
         free_pictures(&t.expected);
         scenery_free(&s);
@@ -275,11 +275,11 @@ static void failing_step_is_the_same_picture_or_an_error(void **context)
 
 /* ---- first steps: a new session each --------------------------------------------------------------------------- */
 
-static bool first_step_fails_well(const scenery *s, const failure *f, void *state)
+static bool first_step_fails_cleanly(const scenery *s, const failure *f, void *state)
 {
     step_state *t = state;
     t->session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
-    const bool is_over = set_and_step_fail_well(s, f, t);
+    const bool is_over = set_and_step_fail_cleanly(s, f, t);
     insitu_destroy(&t->session);
     return is_over;
 }
@@ -294,7 +294,7 @@ static void failing_first_step_is_the_same_picture_or_an_error(void **context)
         scenery_create(&s, &cases[i]);
         t.session = open_and_draw(full_scene, &s, &t.expected);
         insitu_destroy(&t.session);
-        run_failures(first_step_fails_well, &s, 1 + i % stride(), &t);
+        run_failures(first_step_fails_cleanly, &s, 1 + i % stride(), &t);
         free_pictures(&t.expected);
         scenery_free(&s);
     }
@@ -302,19 +302,19 @@ static void failing_first_step_is_the_same_picture_or_an_error(void **context)
 
 /* ---- sessions --------------------------------------------------------------------------------------------------- */
 
-static bool creation_fails_well(const scenery *s, const failure *f, void *state)
+static bool creation_fails_cleanly(const scenery *s, const failure *f, void *state)
 {
     step_state *t = state;
     const int64_t held = base_memory_held();
     const char *scene = write_scene(full_scene);
     insitu_session *session = NULL;
-    arm(f);
+    start_failing(f);
     const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &session);
-    const bool is_over = disarm(f);
+    const bool is_over = stop_failing(f);
     everywhere((status == INSITU_OK) == (session != NULL));
-    check_told(NULL, status);
+    check_reported(NULL, status);
     if (session) {
-        everywhere(hand_over_scenery(session, s) == INSITU_OK);
+        everywhere(submit_scenery(session, s) == INSITU_OK);
         step_draws(session, &t->expected);
     }
     insitu_destroy(&session);
@@ -331,7 +331,7 @@ static void failing_creation_opens_the_session_or_none(void **context)
     scenery_create(&s, &cases[0]);
     t.session = open_and_draw(full_scene, &s, &t.expected);
     insitu_destroy(&t.session);
-    run_failures(creation_fails_well, &s, 1, &t);
+    run_failures(creation_fails_cleanly, &s, 1, &t);
     free_pictures(&t.expected);
     scenery_free(&s);
 }
@@ -343,17 +343,17 @@ typedef struct edit_state {
 } edit_state;
 
 /* A step in which the edit is not taken says so, and the next one takes it. */
-static bool edit_fails_well(const scenery *s, const failure *f, void *state)
+static bool edit_fails_cleanly(const scenery *s, const failure *f, void *state)
 {
     edit_state *t = state;
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
-    everywhere(hand_over_scenery(session, s) == INSITU_OK);
+    everywhere(submit_scenery(session, s) == INSITU_OK);
     write_scene(edited_scene);
-    forget_pictures();
-    arm(f);
+    discard_pictures();
+    start_failing(f);
     const insitu_status status = insitu_step(session, 1, 0);
-    const bool is_over = disarm(f);
-    check_told(session, status);
+    const bool is_over = stop_failing(f);
+    check_reported(session, status);
     const bool is_taken = are_of(&t->after);
     at_allocation(own_rank != 0 || is_taken || are_of(&t->before));
     at_allocation(own_rank != 0 || is_taken || status != INSITU_OK || *insitu_last_report(session)->warnings);
@@ -362,7 +362,7 @@ static bool edit_fails_well(const scenery *s, const failure *f, void *state)
     return is_over;
 }
 
-static void failing_edit_is_told_and_taken_later(void **context)
+static void failing_edit_is_reported_and_taken_later(void **context)
 {
     (void)context;
     if (!heap_can_fail()) skip();
@@ -373,7 +373,7 @@ static void failing_edit_is_told_and_taken_later(void **context)
     insitu_destroy(&session);
     session = open_and_draw(edited_scene, &s, &t.after);
     insitu_destroy(&session);
-    run_failures(edit_fails_well, &s, 1, &t);
+    run_failures(edit_fails_cleanly, &s, 1, &t);
     free_pictures(&t.before);
     free_pictures(&t.after);
     scenery_free(&s);
@@ -386,7 +386,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(failing_step_is_the_same_picture_or_an_error),
         cmocka_unit_test(failing_first_step_is_the_same_picture_or_an_error),
         cmocka_unit_test(failing_creation_opens_the_session_or_none),
-        cmocka_unit_test(failing_edit_is_told_and_taken_later),
+        cmocka_unit_test(failing_edit_is_reported_and_taken_later),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

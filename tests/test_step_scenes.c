@@ -16,7 +16,7 @@
 enum { POINTS = 6, CELLS = 4, LATTICE_SIDE = 15, MIXED_SIDE = 7 };
 
 /* Dense as it is at 0.02, rays end in the first cells whose field is beyond a step; at 0.3 they come through. */
-static void judge_lattice(test_mesh_kind kind, fixture_camera camera, double unit)
+static void verify_lattice(test_mesh_kind kind, fixture_camera camera, double unit)
 {
     static const double values[POINTS] = {-0.7, -0.15, -0.15, 0.3, 0.3, 0.7};
     static const float opacities[POINTS] = {0.2f, 0.05f, 0.6f, 0.3f, 0, 0.1f};
@@ -30,7 +30,7 @@ static void judge_lattice(test_mesh_kind kind, fixture_camera camera, double uni
     f.transfer.opacity_values = values;
     f.transfer.opacities = opacities;
     f.transfer.unit_distance = unit;
-    step_judge(&f, 1, 1e-7, worst);
+    step_verify(&f, 1, 1e-7, worst);
     snprintf(what, sizeof what, "steps in a lattice of %s, unit distance %g, %s", test_mesh_kind_name(kind), unit,
              fixture_camera_name(camera));
     step_assert_kept(worst, what);
@@ -46,7 +46,7 @@ static void lattices_of_curved_cells(void **state)
     for (int k = 0; k < 4; k++)
         for (fixture_camera camera = 0; camera <= CAMERA_INSIDE; camera++)
             if (test_is_whole() || (int)camera == (k + 1) % 3)
-                judge_lattice(kinds[k], camera, (k + (int)camera) % 2 ? 0.3 : 0.02);
+                verify_lattice(kinds[k], camera, (k + (int)camera) % 2 ? 0.3 : 0.02);
 }
 
 /* ---- volumes that are mixed ---- */
@@ -55,7 +55,7 @@ static void lattices_of_curved_cells(void **state)
  * one's constant. A field off its chord matters only at the step, whose stretches are halved: its error is a share of
  * the mixing's 0.4 RENDER_MIXING_ERROR by length and another by absorption (kernel_cell_segments.h), beside the error
  * of mixing itself. */
-static double judge_mixed(const test_mesh *mesh, fixture_camera camera, double unit)
+static double verify_mixed(const test_mesh *mesh, fixture_camera camera, double unit)
 {
     static const float colours[12] = {0.9f, 0.2f, 0.1f, 0.9f, 0.2f, 0.1f, 0.1f, 0.4f, 0.9f, 0.1f, 0.4f, 0.9f};
     static const double level_value = 0;
@@ -96,7 +96,7 @@ static void mixed_volumes_by_step(void **state)
             else
                 step_make_cell(step_shapes[kind], 16 * seed + (uint64_t)kind, &mesh);
             worst = test_worse(
-                worst, judge_mixed(&mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, seed / 2 % 2 ? 0.2 : 0.02));
+                worst, verify_mixed(&mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, seed / 2 % 2 ? 0.2 : 0.02));
             test_mesh_free(&mesh);
         }
         fprintf(stderr, "a step in %s, mixed by step: %.2g\n", test_cell_shape_name(step_shapes[kind]), worst);

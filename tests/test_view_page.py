@@ -82,7 +82,7 @@ def a_run_that_begins_is_followed(page, run):
     wait("warnings are told", lambda: "image \"fronts\": the isosurface of \"pressure\" at 0.1 is empty" in page.text("warnings"))
 
 
-def a_broken_edit_is_told_with_its_line(page):
+def a_broken_edit_is_reported_with_its_line(page):
     page.save(SCENE.replace("period: 0.8", "period: fast"))
     wait("the error", lambda: "Line 1: parameters.period: \"fast\" is not allowed, expected a number" == page.text("scene_message"))
     assert "goes on with the last one" in page.text("scene_state") and page.at("lines").find_element(By.TAG_NAME, "b").text == "1"
@@ -148,7 +148,7 @@ def main():
             try:
                 page = Page(driver, view)
                 a_run_that_begins_is_followed(page, run)
-                for test in (a_broken_edit_is_told_with_its_line, an_edit_steers_the_run, edits_of_others_are_kept, no_script_failed):
+                for test in (a_broken_edit_is_reported_with_its_line, an_edit_steers_the_run, edits_of_others_are_kept, no_script_failed):
                     test(page)
                     print(test.__name__, "is so", flush=True)
             finally:

@@ -93,7 +93,7 @@ def the_database_is_served(view):
     assert ask(view, root, Host="127.0.0.1:8000")[0] == 200  # by ssh -L from another port
 
 
-def the_state_is_told(view):
+def the_state_is_reported(view):
     state = json.loads(ask(view, view.root + "state")[2])
     assert state["database"] == "run.cdb" and state["has_page"] and state["report"] is None
     assert state["scene"]["path"] == "scene.yaml"
@@ -248,7 +248,7 @@ def wait_for(holds, seconds=10):
         time.sleep(0.05)
 
 
-def wrong_options_are_told():
+def wrong_options_are_reported():
     environment = {**{k: v for k, v in os.environ.items() if "TERM" not in k}, "TERM": "dumb"}
     for arguments, words in [(["run.cdb", "--terminal"], "not known to show pictures (TERM is dumb)"), ([], "DATABASE"),
                              (["scene.yaml"], "scene.yaml is no folder"), (["run.cdb", "--port", "70000"], "is 70000"),
@@ -265,12 +265,12 @@ def main():
     make_files()
     (folder / "link.yaml").symlink_to("scene.yaml")
     with View(program, "run.cdb", "--scene", "scene.yaml", folder=folder) as view:
-        for test in (the_database_is_served, the_state_is_told, others_are_refused, what_is_outside_is_refused,
+        for test in (the_database_is_served, the_state_is_reported, others_are_refused, what_is_outside_is_refused,
                      only_get_head_and_post_of_the_scene_are_taken, the_scene_is_saved_whole, a_link_to_the_scene_stays,
                      connections_are_bounded):
             test(view)
             print(test.__name__, "is so", flush=True)
-    for test in (terminals_get_each_new_picture, wrong_options_are_told):
+    for test in (terminals_get_each_new_picture, wrong_options_are_reported):
         test()
         print(test.__name__, "is so", flush=True)
 

@@ -392,7 +392,7 @@ void bezier_cells_are_their_corners_with_a_warning(void **)
 
 /* One type of one order needs neither types nor offsets; those whose last points libinsitu does not know are copied
  * without them. */
-void cells_of_higher_order_are_handed_over(void **)
+void cells_of_higher_order_are_submitted(void **)
 {
     const struct {
         int type, points, known, nodes;
@@ -465,7 +465,7 @@ void lines_are_left_out_and_fields_follow(void **)
 
 /* Triangles, quads and polygons are borrowed as they are, pixels turned; quadratic ones beside polygons are drawn by
  * their corners. */
-void shells_are_handed_over(void **)
+void shells_are_submitted(void **)
 {
     const std::vector<std::array<double, 3>> square = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
     for (const bool has_pixel : {false, true}) {
@@ -545,7 +545,7 @@ void polyhedra_without_faces_are_warned_about(void **)
     assert_non_null(strstr(f.report.cells_why, "1 cells of type 42"));
 }
 
-void ghost_flags_that_hide_are_handed_over(void **)
+void ghost_flags_that_hide_are_submitted(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     for (int i = 0; i < 4; i++) add_cell(grid, VTK_TETRA, corner);
@@ -901,13 +901,13 @@ int main()
         cmocka_unit_test(voxel_becomes_a_right_handed_hexahedron),
         cmocka_unit_test(prisms_are_polyhedra_of_their_faces),
         cmocka_unit_test(bezier_cells_are_their_corners_with_a_warning),
-        cmocka_unit_test(cells_of_higher_order_are_handed_over),
+        cmocka_unit_test(cells_of_higher_order_are_submitted),
         cmocka_unit_test(other_cells_of_higher_order_are_their_corners),
         cmocka_unit_test(lines_are_left_out_and_fields_follow),
-        cmocka_unit_test(shells_are_handed_over),
+        cmocka_unit_test(shells_are_submitted),
         cmocka_unit_test(polyhedra_share_their_faces),
         cmocka_unit_test(polyhedra_without_faces_are_warned_about),
-        cmocka_unit_test(ghost_flags_that_hide_are_handed_over),
+        cmocka_unit_test(ghost_flags_that_hide_are_submitted),
         cmocka_unit_test(ghost_flags_of_other_types_and_names_hide_cells_too),
         cmocka_unit_test(ghost_flags_follow_cells_left_out),
         cmocka_unit_test(flat_hidden_and_turned_images_are_lattices),

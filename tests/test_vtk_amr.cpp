@@ -203,7 +203,7 @@ void flat_amr_is_quads(void **)
     assert_true(check(f, true) == 9 * 6);
 }
 
-void boxes_that_do_not_fit_are_told(void **)
+void boxes_that_do_not_fit_are_reported(void **)
 {
     const auto amr = make_amr(given::spacings);
     const int low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
@@ -240,7 +240,7 @@ int main()
         cmocka_unit_test(finer_grids_of_other_ranks_hide_cells_too),
         cmocka_unit_test(hidden_cells_stay_hidden),
         cmocka_unit_test(flat_amr_is_quads),
-        cmocka_unit_test(boxes_that_do_not_fit_are_told),
+        cmocka_unit_test(boxes_that_do_not_fit_are_reported),
         cmocka_unit_test(levels_that_do_not_overlap_are_drawn_whole),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);

@@ -112,12 +112,12 @@ void expect_each_cell_once(vtkDataObject *data)
         }
 }
 
-void grid_is_dealt_each_cell_once(void **)
+void grid_is_distributed_each_cell_once(void **)
 {
     expect_each_cell_once(lattice(4, 0, 0));
 }
 
-void composite_is_dealt_each_cell_once(void **)
+void composite_is_distributed_each_cell_once(void **)
 {
     vtkNew<vtkMultiBlockDataSet> blocks;
     blocks->SetBlock(0, lattice(3, 0, 0));
@@ -153,8 +153,8 @@ void leaves_keep_their_numbers(void **)
     vtkNew<vtkMultiBlockDataSet> blocks;
     blocks->SetBlock(0, lattice(2, 0, 0));
     blocks->SetBlock(1, lattice(2, 100, 5));
-    const auto dealt = distribute_cells(blocks, partition::block, 1, 2);
-    auto *last = vtkMultiBlockDataSet::SafeDownCast(dealt);
+    const auto distributed = distribute_cells(blocks, partition::block, 1, 2);
+    auto *last = vtkMultiBlockDataSet::SafeDownCast(distributed);
     assert_int_equal(last->GetNumberOfBlocks(), 2);
     assert_null(last->GetBlock(0));
     assert_ptr_equal(last->GetBlock(1), blocks->GetBlock(1));
@@ -173,8 +173,8 @@ void names_of_partitions_are_known(void **)
 int main()
 {
     const CMUnitTest tests[] = {
-        cmocka_unit_test(grid_is_dealt_each_cell_once),
-        cmocka_unit_test(composite_is_dealt_each_cell_once),
+        cmocka_unit_test(grid_is_distributed_each_cell_once),
+        cmocka_unit_test(composite_is_distributed_each_cell_once),
         cmocka_unit_test(more_ranks_than_cells_leaves_some_without),
         cmocka_unit_test(parts_are_balanced),
         cmocka_unit_test(leaves_keep_their_numbers),

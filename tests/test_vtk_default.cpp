@@ -164,7 +164,7 @@ void flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map(void **)
 }
 
 /* The only step of a run tells what is wrong with its words, and a missing letter does not hide a lack of room. */
-void faults_of_words_are_told_in_a_run_of_one_step(void **)
+void faults_of_words_are_reported_in_a_run_of_one_step(void **)
 {
     write_lattice("words.vtu", 2, [](auto &at) { return at[0]; });
     write_file(folder + "/words.yaml", "images:\n  - {name: w, size: [120, 80], layers: [{surface: {}}], decorations: "
@@ -195,7 +195,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_solid_with_a_dark_outside_is_cut_open),
         cmocka_unit_test(a_solid_whose_outside_shows_the_field_is_drawn_whole),
         cmocka_unit_test(flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map),
-        cmocka_unit_test(faults_of_words_are_told_in_a_run_of_one_step),
+        cmocka_unit_test(faults_of_words_are_reported_in_a_run_of_one_step),
     };
     return cmocka_run_group_tests(tests, begin, nullptr);
 }

@@ -389,13 +389,13 @@ void files_of_meshes_that_change_are_read(void **)
     assert_true(why_refused(folder + "/changing.e-t002").find("No such file") != std::string::npos);
 }
 
-void a_displacement_that_is_applied_is_told(void **)
+void a_displacement_that_is_applied_is_reported(void **)
 {
     const std::string path = folder + "/moved.e";
     write_exodus(path, {{"HEX8", divide(hexes, 8, 0)}}, true);
-    const std::string told = open_data_file(path)->take_warnings();
-    if (told.find("moved.e: points are moved by the displacement \"disp_\"") == std::string::npos) {
-        print_error("%s\n", told.c_str());
+    const std::string reported = open_data_file(path)->take_warnings();
+    if (reported.find("moved.e: points are moved by the displacement \"disp_\"") == std::string::npos) {
+        print_error("%s\n", reported.c_str());
         assert_true(false);
     }
     write_exodus(path, {{"HEX8", divide(hexes, 8, 0)}});
@@ -421,7 +421,7 @@ int main()
         cmocka_unit_test(elements_that_cannot_be_read_are_refused_by_name),
         cmocka_unit_test(files_of_a_parallel_run_are_pieces),
         cmocka_unit_test(files_of_meshes_that_change_are_read),
-        cmocka_unit_test(a_displacement_that_is_applied_is_told),
+        cmocka_unit_test(a_displacement_that_is_applied_is_reported),
     };
     return cmocka_run_group_tests(tests, begin, nullptr);
 }

@@ -291,10 +291,10 @@ std::string why_refused(const std::string &name)
     return "";
 }
 
-void expect_told(const std::string &told, const std::string &what)
+void expect_reported(const std::string &reported, const std::string &what)
 {
-    if (told.find(what) != std::string::npos) return;
-    print_error("expected '%s' in:\n%s\n", what.c_str(), told.c_str());
+    if (reported.find(what) != std::string::npos) return;
+    print_error("expected '%s' in:\n%s\n", what.c_str(), reported.c_str());
     assert_true(false);
 }
 
@@ -318,7 +318,7 @@ void foam_cases_of_parallel_runs_are_read_by_processors(void **)
     fs::rename(second + "/0.5", folder + "/kept");
     auto file = open_data_file(parallel + "/dec.foam");
     assert_int_equal(file->times().size(), 1);
-    expect_told(file->take_warnings(), "dec.foam: processor1/ has no step 0.5: left out");
+    expect_reported(file->take_warnings(), "dec.foam: processor1/ has no step 0.5: left out");
     fs::rename(folder + "/kept", second + "/0.5");
     file = open_data_file(parallel + "/dec.foam");
     assert_int_equal(file->times().size(), 2);
@@ -337,7 +337,7 @@ void foam_cases_of_parallel_runs_are_read_by_processors(void **)
     fs::remove_all(parallel + "/0.5");
     file = open_data_file(parallel + "/dec.foam");
     assert_int_equal(file->pieces(0), 2);
-    expect_told(file->take_warnings(), "the folders of its processors are read, which go on to 0.5");
+    expect_reported(file->take_warnings(), "the folders of its processors are read, which go on to 0.5");
 }
 
 void foam_cases_that_lack_folders_are_refused_by_their_names(void **)
@@ -346,12 +346,12 @@ void foam_cases_that_lack_folders_are_refused_by_their_names(void **)
     const std::string parallel = folder + "/lacking";
     for (const int p : {0, 2}) write_foam(parallel + "/processor" + std::to_string(p), 2 * p);
     write_file(parallel + "/dec.foam", "");
-    expect_told(why_refused("lacking/dec.foam"), "dec.foam: processor1/ is missing, as there is processor2/");
+    expect_reported(why_refused("lacking/dec.foam"), "dec.foam: processor1/ is missing, as there is processor2/");
     fs::create_directories(parallel + "/processor1");
-    expect_told(why_refused("lacking/dec.foam"), "dec.foam: processor1/constant/polyMesh/ is missing");
+    expect_reported(why_refused("lacking/dec.foam"), "dec.foam: processor1/constant/polyMesh/ is missing");
     for (const char *name : {"/processor0", "/processor1", "/processor2"}) fs::remove_all(parallel + name);
     fs::create_directories(parallel + "/processors4");
-    expect_told(why_refused("lacking/dec.foam"), "processors4/ is of OpenFOAM's collated format");
+    expect_reported(why_refused("lacking/dec.foam"), "processors4/ is of OpenFOAM's collated format");
 }
 
 /* A cell's value is the one of its place among the hexes, wherever the quads are numbered. */
@@ -384,13 +384,14 @@ void cgns_cells_are_read_wherever_the_boundary_is_numbered(void **)
 void cgns_zones_with_wrong_numbers_are_refused(void **)
 {
     write_cgns_elements(folder + "/wrong.cgns", hexes(lattice::curved), cgns_order::gap);
-    expect_told(why_refused("wrong.cgns"), "wrong.cgns: cannot be read: zone Base/Zone: its section \"Fluid\" has the "
-                                           "elements 22 to 81, expected them to begin with 21");
+    expect_reported(why_refused("wrong.cgns"),
+                    "wrong.cgns: cannot be read: zone Base/Zone: its section \"Fluid\" has the "
+                    "elements 22 to 81, expected them to begin with 21");
     write_cgns_elements(folder + "/wrong.cgns", hexes(lattice::curved), cgns_order::wall_first, 50);
     const std::string many = "zone Base/Zone: its sections of dimension 3 have 60 elements, expected its 50 cells";
-    expect_told(why_refused("wrong.cgns"), many);
+    expect_reported(why_refused("wrong.cgns"), many);
     write_cgns_elements(folder + "/wrong.cgns", hexes(lattice::curved), cgns_order::mixed);
-    expect_told(why_refused("wrong.cgns"), "sections that mix cells and boundary are not read");
+    expect_reported(why_refused("wrong.cgns"), "sections that mix cells and boundary are not read");
 }
 
 /* The .vtm of a run that writes a table of its residuals beside the grid. */
@@ -627,18 +628,18 @@ void ensight_values_that_are_undefined_are_nan(void **)
             assert_true(i == 3 || i == 5 ? std::isnan(value) : value == static_cast<double>(i));
         }
     write_ensight_cube("coordinates partial", bytes_of(std::vector<int32_t>{9}));
-    expect_told(why_refused("cube.case"), "cube.f: has 9 values for 8 nodes or elements");
+    expect_reported(why_refused("cube.case"), "cube.f: has 9 values for 8 nodes or elements");
     write_ensight_cube("coordinates partial", bytes_of(std::vector<int32_t>{2, 1}));
-    expect_told(why_refused("cube.case"), "cube.f: is cut short");
+    expect_reported(why_refused("cube.case"), "cube.f: is cut short");
     write_ensight_cube("coordinates some", bytes_of(all));
-    expect_told(why_refused("cube.case"), "cube.f: \"coordinates some\" is not understood");
+    expect_reported(why_refused("cube.case"), "cube.f: \"coordinates some\" is not understood");
 }
 
 void ensight_names_in_quotes_are_refused_with_their_line(void **)
 {
     write_ensight_cube("coordinates", bytes_of(std::vector<float>(8)));
     write_file(folder + "/cube.case", "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: \"my cube.geo\"\n");
-    expect_told(why_refused("cube.case"), "cube.case: line 4: names in quotes are not read, found \"my cube.geo\"");
+    expect_reported(why_refused("cube.case"), "cube.case: line 4: names in quotes are not read, found \"my cube.geo\"");
 }
 
 } // namespace

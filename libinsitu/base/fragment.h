@@ -50,6 +50,6 @@ typedef struct pixel_area {
 /* Callback that receives all fragments of a rank in an area as soon as they are complete: `count` fragments in any
  * order. It may reorder them; they are invalid after the call. thread: the number (0, 1 ...) of the calling thread.
  * Returns false if memory ran out. */
-typedef bool fragment_taker(void *state, int thread, const pixel_area *area, fragment *items, int64_t count);
+typedef bool fragment_callback(void *state, int thread, const pixel_area *area, fragment *items, int64_t count);
 
 #endif

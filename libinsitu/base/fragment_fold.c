@@ -53,7 +53,7 @@ typedef struct fold_part {
 /* Returns the t at which a leaf begins. The result is exact, because it is a product with a power of two. */
 static double find_leaf_begin(int32_t leaf)
 {
-    return (double)leaf / (FRAGMENT_STRETCHES << FRAGMENT_HALVINGS);
+    return (double)leaf / (FRAGMENT_INTERVALS << FRAGMENT_HALVINGS);
 }
 
 static bool has_all_of(const fold_part *part, int32_t first_leaf, int height)
@@ -84,7 +84,7 @@ static void fold_node(fold_part *part, const fragment *sorted, int64_t count, in
 int64_t fragment_fold_between(const fragment *sorted, int64_t count, float begin, float end, fragment *out)
 {
     fold_part part = {begin, end, out, 0};
-    const int32_t stretch = fragment_stretch(sorted[0].t_in);
-    fold_node(&part, sorted, count, stretch * (1 << FRAGMENT_HALVINGS), FRAGMENT_HALVINGS);
+    const int32_t interval_number = fragment_interval_number(sorted[0].t_in);
+    fold_node(&part, sorted, count, interval_number * (1 << FRAGMENT_HALVINGS), FRAGMENT_HALVINGS);
     return part.count;
 }

@@ -21,7 +21,7 @@
 /* The number of intervals per unit of t, and of halvings per interval. t is near 1 in the scene (render.h), so that a
  * ray has about ten intervals and a leaf is 4e-6 of the scene. Fragments that begin in the same leaf are folded front
  * to back. */
-enum { FRAGMENT_STRETCHES = 8, FRAGMENT_HALVINGS = 15 };
+enum { FRAGMENT_INTERVALS = 8, FRAGMENT_HALVINGS = 15 };
 
 /* A rank may omit the intervals behind one at whose end its own fragments leave less light than FRAGMENT_DARK_OF_RANK.
  * The pixel omits the intervals behind FRAGMENT_DARK, which is larger by more than the sum of possible rounding
@@ -34,10 +34,10 @@ enum { FRAGMENT_STRETCHES = 8, FRAGMENT_HALVINGS = 15 };
 static inline int32_t fragment_leaf(float t)
 {
     const float most = 1024, at = t < -most ? -most : t < most ? t : most; /* also replaces NaN */
-    return (int32_t)floorf(at * (float)(FRAGMENT_STRETCHES << FRAGMENT_HALVINGS));
+    return (int32_t)floorf(at * (float)(FRAGMENT_INTERVALS << FRAGMENT_HALVINGS));
 }
 
-static inline int32_t fragment_stretch(float t)
+static inline int32_t fragment_interval_number(float t)
 {
     return fragment_leaf(t) >> FRAGMENT_HALVINGS;
 }

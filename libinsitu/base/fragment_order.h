@@ -9,7 +9,7 @@
 #include "fragment.h"
 
 /* Returns bits of the float that, as an unsigned integer, increase with its value, for all floats including NaN. */
-static inline uint32_t fragment_rising_bits(float value)
+static inline uint32_t fragment_sortable_bits(float value)
 {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
@@ -27,7 +27,7 @@ static inline int fragment_compare_rest(const fragment *a, const fragment *b)
     const float of_b[] = {b->t_in, b->t_out, b->transmittance, b->colour[0], b->colour[1], b->colour[2]};
     int order = fragment_compare_numbers(a->kind, b->kind);
     for (int i = 0; !order && i < 6; i++)
-        order = fragment_compare_numbers(fragment_rising_bits(of_a[i]), fragment_rising_bits(of_b[i]));
+        order = fragment_compare_numbers(fragment_sortable_bits(of_a[i]), fragment_sortable_bits(of_b[i]));
     return order;
 }
 
@@ -37,7 +37,7 @@ static inline int fragment_compare(const fragment *a, const fragment *b)
     if (a->t_in < b->t_in) return -1;
     if (a->t_in > b->t_in) return 1;
     if (a->t_in != b->t_in) {
-        const int order = fragment_compare_numbers(fragment_rising_bits(a->t_in), fragment_rising_bits(b->t_in));
+        const int order = fragment_compare_numbers(fragment_sortable_bits(a->t_in), fragment_sortable_bits(b->t_in));
         if (order) return order;
     }
     const int order = (b->kind >= FRAGMENT_SURFACE) - (a->kind >= FRAGMENT_SURFACE);

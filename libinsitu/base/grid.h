@@ -46,46 +46,46 @@ static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64
 
 /* Coordinates along one axis of a uniform or rectilinear lattice. */
 typedef struct grid_axis {
-    const double *places; /* coordinates, by index along the axis */
-    int64_t count;        /* number of coordinates */
+    const double *axis_coordinates; /* coordinates, by index along the axis */
+    int64_t count;                  /* number of coordinates */
     const grid_numbering *vertices;
     int axis;
 } grid_axis;
 
 /* Returns the coordinate of vertex n. Numbers that are only padding, which loops over all numbers include, get the last
  * coordinate. */
-static inline double grid_axis_place(const grid_axis *axis, int64_t n)
+static inline double grid_axis_coordinate(const grid_axis *axis, int64_t n)
 {
     const int64_t index = grid_index_along(axis->vertices, axis->axis, n);
-    return axis->places[index < axis->count ? index : axis->count - 1];
+    return axis->axis_coordinates[index < axis->count ? index : axis->count - 1];
 }
 
 /* Element types that are read one by one, at any address. Only values of fields and axes may have them; other arrays of
  * such elements are copied before a grid is made. */
-typedef enum grid_odd {
-    GRID_NOT_ODD = 0, /* the array is aligned, and of type double, float, int64 or int32 */
-    GRID_ODD_FLOAT32,
-    GRID_ODD_FLOAT64,
-    GRID_ODD_INT32,
-    GRID_ODD_INT64,
-    GRID_ODD_UINT8,
-    GRID_ODD_INT8,
-    GRID_ODD_INT16,
-    GRID_ODD_UINT16,
-    GRID_ODD_UINT32,
-    GRID_ODD_UINT64
-} grid_odd;
+typedef enum grid_unusual_type {
+    GRID_USUAL_TYPE = 0, /* the array is aligned, and of type double, float, int64 or int32 */
+    GRID_UNUSUAL_FLOAT32,
+    GRID_UNUSUAL_FLOAT64,
+    GRID_UNUSUAL_INT32,
+    GRID_UNUSUAL_INT64,
+    GRID_UNUSUAL_UINT8,
+    GRID_UNUSUAL_INT8,
+    GRID_UNUSUAL_INT16,
+    GRID_UNUSUAL_UINT16,
+    GRID_UNUSUAL_UINT32,
+    GRID_UNUSUAL_UINT64
+} grid_unusual_type;
 
 /* A strided array. is_wide: its elements have 8 bytes (double or int64), else 4 bytes (float or int32). */
 typedef struct grid_array {
     const char *data;
     int64_t stride; /* distance between elements in bytes; 0: all elements are the same one */
     bool is_wide;
-    bool is_integer;    /* elements must not be read as float or double: they are integers or odd */
-    unsigned char odd;  /* one of the values of grid_odd */
-    int64_t base;       /* for indices and offsets: the entry that means 0 */
-    int64_t open_count; /* for offsets without the last entry: their number; else 0 */
-    int64_t open_end;   /* the omitted last offset, counted from 0 */
+    bool is_integer;            /* elements must not be read as float or double: they are integers or odd */
+    unsigned char unusual_type; /* one of the values of grid_unusual_type */
+    int64_t base;               /* for indices and offsets: the entry that means 0 */
+    int64_t implied_end_count;  /* for offsets without the last entry: their number; else 0 */
+    int64_t implied_end;        /* the omitted last offset, counted from 0 */
     /* if not NULL, coordinates are computed from this axis by vertex number, and there is no data */
     const grid_axis *axis;
 } grid_array;
@@ -93,8 +93,8 @@ typedef struct grid_array {
 /* A lattice, whose cells are given by three indices instead of connectivity. */
 typedef struct grid_lattice {
     int64_t cells[3]; /* number of cells along each axis; if it is 0 along one axis, the cells are quads */
-    grid_numbering by_vertex, by_cell;
-    int64_t corner[8]; /* number of each vertex of a cell minus that of its first vertex, in VTK's order */
+    grid_numbering vertex_numbering, cell_numbering;
+    int64_t corner_offsets[8]; /* number of each vertex of a cell minus that of its first vertex, in VTK's order */
     int64_t drawn_first[3], drawn_end[3]; /* index range of the cells that are not in ghost layers */
     int64_t cell_count;                   /* number of cells, without padding */
     bool has_ghosts;                      /* set if some cell numbers are padding or belong to ghost layers */
@@ -131,56 +131,56 @@ typedef struct grid_field {
     grid_array values; /* tuples of components; the stride is that between tuples */
     int64_t component_stride;
     /* the components, each in an array of its own, for a magnitude; NULL if they are in `values` */
-    const grid_array *apart;
+    const grid_array *component_arrays;
     int component_count;
     int component; /* number of the component, from 0, or -1 for the magnitude */
     bool is_cell_centred;
     /* the cell values from which the values at vertices were computed: a cell whose own value is not finite then has no
      * value; NULL if there are none */
-    const struct grid_field *own;
+    const struct grid_field *source_cells;
 } grid_field;
 
-#define GRID_READ_ODD(type)                                                                                            \
+#define GRID_READ_UNUSUAL(type)                                                                                        \
     {                                                                                                                  \
         type value;                                                                                                    \
         memcpy(&value, p, sizeof value);                                                                               \
         return (double)value;                                                                                          \
     }
 
-static inline double grid_odd_number(int odd, const char *p)
+static inline double grid_unusual_number(int unusual_type, const char *p)
 {
-    switch (odd) {
-    case GRID_ODD_FLOAT32: GRID_READ_ODD(float)
-    case GRID_ODD_FLOAT64: GRID_READ_ODD(double)
-    case GRID_ODD_INT32: GRID_READ_ODD(int32_t)
-    case GRID_ODD_INT64: GRID_READ_ODD(int64_t)
-    case GRID_ODD_UINT8: GRID_READ_ODD(uint8_t)
-    case GRID_ODD_INT8: GRID_READ_ODD(int8_t)
-    case GRID_ODD_INT16: GRID_READ_ODD(int16_t)
-    case GRID_ODD_UINT16: GRID_READ_ODD(uint16_t)
-    case GRID_ODD_UINT32: GRID_READ_ODD(uint32_t)
-    case GRID_ODD_UINT64: GRID_READ_ODD(uint64_t)
+    switch (unusual_type) {
+    case GRID_UNUSUAL_FLOAT32: GRID_READ_UNUSUAL(float)
+    case GRID_UNUSUAL_FLOAT64: GRID_READ_UNUSUAL(double)
+    case GRID_UNUSUAL_INT32: GRID_READ_UNUSUAL(int32_t)
+    case GRID_UNUSUAL_INT64: GRID_READ_UNUSUAL(int64_t)
+    case GRID_UNUSUAL_UINT8: GRID_READ_UNUSUAL(uint8_t)
+    case GRID_UNUSUAL_INT8: GRID_READ_UNUSUAL(int8_t)
+    case GRID_UNUSUAL_INT16: GRID_READ_UNUSUAL(int16_t)
+    case GRID_UNUSUAL_UINT16: GRID_READ_UNUSUAL(uint16_t)
+    case GRID_UNUSUAL_UINT32: GRID_READ_UNUSUAL(uint32_t)
+    case GRID_UNUSUAL_UINT64: GRID_READ_UNUSUAL(uint64_t)
     default: return 0;
     }
 }
 
 static inline int64_t grid_element_bytes(const grid_array *a)
 {
-    switch (a->odd) {
-    case GRID_ODD_UINT8:
-    case GRID_ODD_INT8: return 1;
-    case GRID_ODD_INT16:
-    case GRID_ODD_UINT16: return 2;
+    switch (a->unusual_type) {
+    case GRID_UNUSUAL_UINT8:
+    case GRID_UNUSUAL_INT8: return 1;
+    case GRID_UNUSUAL_INT16:
+    case GRID_UNUSUAL_UINT16: return 2;
     default: return a->is_wide ? 8 : 4;
     }
 }
 
 static inline double grid_array_number(const grid_array *a, int64_t i)
 {
-    if (a->axis) return grid_axis_place(a->axis, i);
+    if (a->axis) return grid_axis_coordinate(a->axis, i);
     const char *p = a->data + i * a->stride;
     if (!a->is_integer) return a->is_wide ? *(const double *)(const void *)p : (double)*(const float *)(const void *)p;
-    if (a->odd) return grid_odd_number(a->odd, p);
+    if (a->unusual_type) return grid_unusual_number(a->unusual_type, p);
     return a->is_wide ? (double)*(const int64_t *)(const void *)p : (double)*(const int32_t *)(const void *)p;
 }
 
@@ -194,7 +194,7 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
 /* Returns the end of the i-th cell or face, by an array of offsets. */
 static inline int64_t grid_offset_end(const grid_array *offsets, int64_t i)
 {
-    return i + 1 == offsets->open_count ? offsets->open_end : grid_array_index(offsets, i + 1);
+    return i + 1 == offsets->implied_end_count ? offsets->implied_end : grid_array_index(offsets, i + 1);
 }
 
 /* Returns the number of vertices of a cell type; 0 for polyhedra and polygons, whose cells differ in it, and for
@@ -233,7 +233,7 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
 static inline int grid_lattice_row_axis(const grid_lattice *l)
 {
     for (int axis = 0; axis < 3; axis++)
-        if (l->by_cell.stride[axis] == 1) return axis;
+        if (l->cell_numbering.stride[axis] == 1) return axis;
     return -1;
 }
 
@@ -241,30 +241,31 @@ static inline int grid_lattice_row_axis(const grid_lattice *l)
 static inline int64_t grid_lattice_first(const grid_lattice *l, int64_t cell)
 {
     int64_t first = 0;
-    for (int axis = 0; axis < 3; axis++) first += grid_index_along(&l->by_cell, axis, cell) * l->by_vertex.stride[axis];
+    for (int axis = 0; axis < 3; axis++)
+        first += grid_index_along(&l->cell_numbering, axis, cell) * l->vertex_numbering.stride[axis];
     return first;
 }
 
 /* Returns whether the number is that of a cell; otherwise it is padding. */
-static inline bool grid_lattice_has(const grid_lattice *l, int64_t cell)
+static inline bool grid_lattice_is_cell(const grid_lattice *l, int64_t cell)
 {
     int64_t number = 0;
     for (int axis = 0; axis < 3; axis++) {
-        const int64_t index = grid_index_along(&l->by_cell, axis, cell);
+        const int64_t index = grid_index_along(&l->cell_numbering, axis, cell);
         if (index >= (l->cells[axis] ? l->cells[axis] : 1)) return false;
-        number += index * l->by_cell.stride[axis];
+        number += index * l->cell_numbering.stride[axis];
     }
     return number == cell;
 }
 
 /* Returns whether the number is that of a cell outside the ghost layers. */
-static inline bool grid_lattice_draws(const grid_lattice *l, int64_t cell)
+static inline bool grid_lattice_is_drawn(const grid_lattice *l, int64_t cell)
 {
     for (int axis = 0; axis < 3; axis++) {
-        const int64_t index = grid_index_along(&l->by_cell, axis, cell);
+        const int64_t index = grid_index_along(&l->cell_numbering, axis, cell);
         if (index < l->drawn_first[axis] || index >= l->drawn_end[axis]) return false;
     }
-    return grid_lattice_has(l, cell);
+    return grid_lattice_is_cell(l, cell);
 }
 
 /* Stores the cell's vertex indices in VTK's order and returns their number, which is 0 for polyhedra and polygons: use
@@ -274,7 +275,7 @@ static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertic
     const int count = grid_type_vertices(grid_cell_type(g, cell));
     if (g->lattice) {
         const int64_t base = grid_lattice_first(g->lattice, cell);
-        for (int i = 0; i < count; i++) vertices[i] = base + g->lattice->corner[i];
+        for (int i = 0; i < count; i++) vertices[i] = base + g->lattice->corner_offsets[i];
         return count;
     }
     const int64_t first = g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
@@ -308,7 +309,7 @@ typedef struct grid_walk {
     const grid *cells;
     bool is_polyhedron;
     /* for a lattice: differences between the numbers of the cell's vertices and that of its first one; else NULL */
-    const int64_t *corner;
+    const int64_t *corner_offsets;
     int64_t base;                /* for a lattice: the number of the cell's first vertex */
     int64_t next, end;           /* next and last entry of connectivity, or of `corner` */
     int64_t face_next, face_end; /* next and last entry of face_connectivity */
@@ -324,7 +325,7 @@ static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
         return w;
     }
     if (g->lattice) {
-        w.corner = g->lattice->corner;
+        w.corner_offsets = g->lattice->corner_offsets;
         w.base = grid_lattice_first(g->lattice, cell);
         w.end = count;
         return w;
@@ -339,7 +340,8 @@ static inline bool grid_walk_next(grid_walk *w, int64_t *vertex)
 {
     if (!w->is_polyhedron) {
         if (w->next == w->end) return false;
-        *vertex = w->corner ? w->base + w->corner[w->next] : grid_array_index(&w->cells->connectivity, w->next);
+        *vertex = w->corner_offsets ? w->base + w->corner_offsets[w->next]
+                                    : grid_array_index(&w->cells->connectivity, w->next);
         w->next++;
         return true;
     }
@@ -368,7 +370,7 @@ static inline bool grid_is_flagged(const grid *g, int64_t cell)
 static inline bool grid_is_ghost(const grid *g, int64_t cell)
 {
     if (g->ghosts && grid_is_flagged(g, cell)) return true;
-    return g->lattice && g->lattice->has_ghosts && !grid_lattice_draws(g->lattice, cell);
+    return g->lattice && g->lattice->has_ghosts && !grid_lattice_is_drawn(g->lattice, cell);
 }
 
 /* Returns whether some cells may be ghosts. */
@@ -402,8 +404,8 @@ static inline bool grid_is_seen(const grid *g, int64_t cell)
 /* Returns one component of the field as an array over all tuples. */
 static inline grid_array grid_field_component(const grid_field *f, int component)
 {
-    grid_array a = f->apart ? f->apart[component] : f->values;
-    if (!f->apart) a.data += component * f->component_stride;
+    grid_array a = f->component_arrays ? f->component_arrays[component] : f->values;
+    if (!f->component_arrays) a.data += component * f->component_stride;
     return a;
 }
 
@@ -426,7 +428,7 @@ static inline double grid_field_value(const grid_field *f, int64_t i)
  * returns true. */
 static inline bool grid_has_own_value(const grid_field *f, int64_t cell)
 {
-    return !f->own || isfinite(grid_field_value(f->own, cell));
+    return !f->source_cells || isfinite(grid_field_value(f->source_cells, cell));
 }
 
 /* Reads the values at the cell's vertices, or stores the cell's own value `count` times. Returns false if a value is

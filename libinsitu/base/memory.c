@@ -65,7 +65,7 @@ static size_t block_bytes(const void *block)
     return bytes;
 }
 
-void base_use(void *block, size_t bytes)
+void base_set_used_bytes(void *block, size_t bytes)
 {
     count_bytes((long long)bytes - (long long)block_bytes(block));
     memcpy((char *)block - header_bytes, &bytes, sizeof bytes);
@@ -88,7 +88,7 @@ void base_free(void *block)
     free((char *)block - header_bytes);
 }
 
-void *base_carve(base_carving *from, size_t bytes)
+void *base_arena_alloc(base_arena *from, size_t bytes)
 {
     void *p = from->begin ? from->begin + from->used : NULL;
     from->used += (bytes + 63) & ~(size_t)63;

@@ -14,10 +14,10 @@ void *base_alloc(size_t bytes);
 void *base_calloc(size_t count, size_t size);
 
 /* base_reserve() reserves address space for bytes that are not counted yet, because memory that has not been written to
- * is not used. base_use() sets the number of bytes in use and counts them. base_realloc() before base_use() does not
- * keep the contents. */
+ * is not used. base_set_used_bytes() sets the number of bytes in use and counts them. base_realloc() before
+ * base_set_used_bytes() does not keep the contents. */
 void *base_reserve(size_t bytes);
-void base_use(void *block, size_t bytes);
+void base_set_used_bytes(void *block, size_t bytes);
 
 /* Grows or shrinks a block and keeps its contents. Returns NULL on failure, and the old block remains valid. A NULL
  * block is allocated as by base_alloc(). */
@@ -28,12 +28,12 @@ void base_free(void *block);
 
 /* A block that is divided into pieces aligned to 64 bytes. If begin is NULL, the sizes of the pieces are only added
  * up. */
-typedef struct base_carving {
+typedef struct base_arena {
     char *begin; /* begin of the block; NULL: sizes are only added up */
     size_t used; /* number of bytes of all pieces so far */
-} base_carving;
+} base_arena;
 
-void *base_carve(base_carving *from, size_t bytes);
+void *base_arena_alloc(base_arena *from, size_t bytes);
 
 /* Returns a copy of a C string, or NULL on failure. */
 char *base_strdup(const char *text);

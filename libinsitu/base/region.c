@@ -22,7 +22,7 @@ static _Thread_local fenv_t environment;
 static atomic_int first_core = -1;
 static atomic_llong regions;
 
-static void leave_core(int core)
+static void migrate_off_core(int core)
 {
     cpu_set_t own, others;
     if (core < 0 || core >= CPU_SETSIZE || sched_getaffinity(0, sizeof own, &own)) return;
@@ -43,7 +43,7 @@ void region_enter(void)
     }
     fegetenv(&environment);
     fesetenv(FE_DFL_ENV);
-    if (core == atomic_load_explicit(&first_core, memory_order_relaxed)) leave_core(core);
+    if (core == atomic_load_explicit(&first_core, memory_order_relaxed)) migrate_off_core(core);
 }
 
 void region_leave(void)

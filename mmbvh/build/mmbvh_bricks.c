@@ -45,7 +45,7 @@ static double edge_length(const grid *g, int64_t vertex, int axis)
 {
     double from[3], to[3], sum = 0;
     grid_vertex(g, vertex, from);
-    grid_vertex(g, vertex + g->lattice->by_vertex.stride[axis], to);
+    grid_vertex(g, vertex + g->lattice->vertex_numbering.stride[axis], to);
     for (int a = 0; a < 3; a++) sum += (to[a] - from[a]) * (to[a] - from[a]);
     return sqrt(sum);
 }
@@ -61,7 +61,7 @@ static void measure_edges(const grid *g, double out[3])
             const int part[3] = {sample % SAMPLES, sample / SAMPLES % SAMPLES, sample / SAMPLES / SAMPLES};
             int64_t vertex = 0;
             for (int a = 0; a < 3; a++)
-                vertex += (all.first[a] + all.count[a] * part[a] / SAMPLES) * g->lattice->by_vertex.stride[a];
+                vertex += (all.first[a] + all.count[a] * part[a] / SAMPLES) * g->lattice->vertex_numbering.stride[a];
             out[axis] += edge_length(g, vertex, axis);
         }
     }
@@ -83,7 +83,7 @@ static void split_brick(const bricks *s, const brick *b, brick halves[2])
 
 static void list_cells(const grid_lattice *l, const brick *b, uint32_t *out)
 {
-    const int64_t *stride = l->by_cell.stride;
+    const int64_t *stride = l->cell_numbering.stride;
     for (int64_t k = b->first[2]; k < b->first[2] + b->count[2]; k++)
         for (int64_t j = b->first[1]; j < b->first[1] + b->count[1]; j++)
             for (int64_t i = b->first[0]; i < b->first[0] + b->count[0]; i++)

@@ -156,7 +156,7 @@ static bool is_too_large(const fetch_box *guess, const fetch_box *exact)
 
 static void quantize_tightly(build *b)
 {
-    const fetch_box guess = bounds_guess(&b->source, b->threads);
+    const fetch_box guess = bounds_estimate(&b->source, b->threads);
     quantize_cells(b, &guess);
     fetch_box exact = b->exact;
     bounds_transform(&b->source, &exact);

@@ -30,19 +30,19 @@ SIMD_INLINE bool kernel_numbers_are_narrow(const kernel_numbers *c)
 }
 
 typedef struct kernel_arrays {
-    bool has_lanes;         /* set if indices fit in 32 bits, so that cells can be processed in lanes */
-    bool is_narrow;         /* set if all numbers are float32 and can be gathered */
-    bool has_narrow_places; /* set if the coordinates are float32 and can be gathered */
-    const grid *cells;      /* the mesh */
-    int type;               /* type of all cells, or GRID_NO_TYPE if the mesh has several types */
+    bool has_lanes;            /* set if indices fit in 32 bits, so that cells can be processed in lanes */
+    bool is_narrow;            /* set if all numbers are float32 and can be gathered */
+    bool has_narrow_positions; /* set if the coordinates are float32 and can be gathered */
+    const grid *cells;         /* the mesh */
+    int type;                  /* type of all cells, or GRID_NO_TYPE if the mesh has several types */
     /* field that is not finite for cells without a value of their own; NULL if all cells have one */
-    const grid_field *own;
+    const grid_field *source_cells;
     bool is_by_cell; /* set if values belong to cells, not to vertices */
     kernel_numbers coordinates[3], values;
     struct { /* the arrays that are prefetched by vertex index: coordinates and values */
         const char *data;
         int64_t stride;
-    } asked[4];
+    } prefetched[4];
 } kernel_arrays;
 
 static inline kernel_numbers kernel_numbers_of(const grid_array *a, int64_t count)
@@ -69,23 +69,23 @@ static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const gr
     p->cells = g;
     p->type = g->cell_types ? GRID_NO_TYPE : g->cell_type;
     p->has_lanes = kernel_arrays_fit(g);
-    p->own = field->own;
+    p->source_cells = field->source_cells;
     p->is_by_cell = field->is_cell_centred;
     if (field->component >= 0) values.data += field->component * field->component_stride;
     p->values = kernel_numbers_of(&values, count);
     if (field->component < 0) p->values.data = NULL;
     p->values.field = field;
-    p->has_narrow_places = true;
+    p->has_narrow_positions = true;
     for (int a = 0; a < 3; a++) {
         const grid_array *c = &g->coordinates[a];
         p->coordinates[a] = kernel_numbers_of(c, g->vertex_count);
-        p->has_narrow_places = p->has_narrow_places && kernel_numbers_are_narrow(&p->coordinates[a]);
-        p->asked[a].data = c->data;
-        p->asked[a].stride = c->stride;
+        p->has_narrow_positions = p->has_narrow_positions && kernel_numbers_are_narrow(&p->coordinates[a]);
+        p->prefetched[a].data = c->data;
+        p->prefetched[a].stride = c->stride;
     }
-    p->is_narrow = p->has_narrow_places && kernel_numbers_are_narrow(&p->values);
-    p->asked[3].data = p->is_by_cell ? p->asked[0].data : values.data;
-    p->asked[3].stride = p->is_by_cell ? p->asked[0].stride : values.stride;
+    p->is_narrow = p->has_narrow_positions && kernel_numbers_are_narrow(&p->values);
+    p->prefetched[3].data = p->is_by_cell ? p->prefetched[0].data : values.data;
+    p->prefetched[3].stride = p->is_by_cell ? p->prefetched[0].stride : values.stride;
 }
 
 /* ---- cells ---- */
@@ -107,7 +107,7 @@ SIMD_INLINE int64_t kernel_arrays_first(const grid *g, uint32_t cell, int vertic
 static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, int vertices, int32_t *out, int room)
 {
     const int64_t first = grid_lattice_first(l, cell);
-    for (int i = 0; i < vertices; i++) out[i * room] = (int32_t)(first + l->corner[i]);
+    for (int i = 0; i < vertices; i++) out[i * room] = (int32_t)(first + l->corner_offsets[i]);
 }
 
 /* Reads the vertex indices of `count` cells into lanes lane, lane + 1, ... of `out`. vertices: number of vertices of
@@ -138,7 +138,8 @@ SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int v
 {
     for (int n = lane; n < lane + count; n++)
         for (int i = 0; i < vertices; i++)
-            for (int k = 0; k < 4; k++) __builtin_prefetch(p->asked[k].data + vertex[i][n] * p->asked[k].stride);
+            for (int k = 0; k < 4; k++)
+                __builtin_prefetch(p->prefetched[k].data + vertex[i][n] * p->prefetched[k].stride);
 }
 
 /* Stores a cell's vertex indices, that of vertex i in out[i * room], and prefetches the coordinates and values of these
@@ -154,7 +155,7 @@ SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, i
     for (int i = 0; i < vertices; i++, at += c.stride) {
         const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
         const int32_t vertex = (int32_t)(index - c.base);
-        for (int k = 0; k < 4; k++) __builtin_prefetch(p->asked[k].data + vertex * p->asked[k].stride);
+        for (int k = 0; k < 4; k++) __builtin_prefetch(p->prefetched[k].data + vertex * p->prefetched[k].stride);
         out[i * room] = vertex;
     }
 }
@@ -179,8 +180,8 @@ SIMD_INLINE void kernel_arrays_cells(const kernel_arrays *p, const uint32_t *cel
 /* Returns those of the given lanes (a bit mask) whose cells have a finite value of their own. */
 SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t *cells, unsigned lanes)
 {
-    for (unsigned left = p->own ? lanes : 0; left; left &= left - 1)
-        if (!isfinite(grid_field_value(p->own, cells[__builtin_ctz(left)]))) lanes &= ~(left & -left);
+    for (unsigned left = p->source_cells ? lanes : 0; left; left &= left - 1)
+        if (!isfinite(grid_field_value(p->source_cells, cells[__builtin_ctz(left)]))) lanes &= ~(left & -left);
     return lanes;
 }
 
@@ -188,7 +189,7 @@ SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t 
 
 /* Computes the vertices' coordinates along one axis of a rectilinear lattice from the position of each vertex on that
  * axis. It does for one vertex per lane what grid_index_along() does for one vertex. */
-static void kernel_axis_take(const grid_axis *axis, vi vertex, kernel_whole *out)
+static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_wide_doubles *out)
 {
     const grid_numbering *of = axis->vertices;
     const double outer = of->outer[axis->axis], inverse_outer = of->inverse_outer[axis->axis];
@@ -201,16 +202,16 @@ static void kernel_axis_take(const grid_axis *axis, vi vertex, kernel_whole *out
         const double above = (double)(int32_t)((number + 0.5) * inverse_outer);
         at[n] = (int32_t)((number - above * outer + 0.5) * inverse_stride);
     }
-    for (int n = 0; n < SIMD_WIDTH; n++) places[n] = axis->places[at[n]];
+    for (int n = 0; n < SIMD_WIDTH; n++) places[n] = axis->axis_coordinates[at[n]];
     memcpy(out, places, sizeof places);
 }
 
-static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers *c, vi index, kernel_whole *out)
+static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers *c, vi index, kernel_wide_doubles *out)
 {
     double v[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
     if (c->array.axis) {
-        kernel_axis_take(c->array.axis, index, out);
+        kernel_axis_coordinates(c->array.axis, index, out);
         return;
     }
     memcpy(at, &index, sizeof index);
@@ -220,12 +221,12 @@ static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers
 }
 
 /* Numbers as they were read: in `narrow` if the array is float32, which saves operations, else in `wide`. */
-typedef struct kernel_taken {
+typedef struct kernel_raw_numbers {
     vf narrow;
-    kernel_whole wide;
-} kernel_taken;
+    kernel_wide_doubles wide;
+} kernel_raw_numbers;
 
-SIMD_INLINE void kernel_numbers_take_raw(const kernel_numbers *c, vi index, kernel_taken *out)
+SIMD_INLINE void kernel_numbers_gather_raw(const kernel_numbers *c, vi index, kernel_raw_numbers *out)
 {
     if (kernel_numbers_are_narrow(c)) {
         out->narrow = vf_gather(c->data, index * c->stride);
@@ -236,61 +237,61 @@ SIMD_INLINE void kernel_numbers_take_raw(const kernel_numbers *c, vi index, kern
     }
 }
 
-SIMD_INLINE kernel_whole kernel_numbers_take(const kernel_numbers *c, vi index)
+SIMD_INLINE kernel_wide_doubles kernel_numbers_gather(const kernel_numbers *c, vi index)
 {
-    kernel_taken out;
-    kernel_numbers_take_raw(c, index, &out);
-    return kernel_numbers_are_narrow(c) ? kernel_whole_widen(out.narrow) : out.wide;
+    kernel_raw_numbers out;
+    kernel_numbers_gather_raw(c, index, &out);
+    return kernel_numbers_are_narrow(c) ? kernel_wide_doubles_widen(out.narrow) : out.wide;
 }
 
 /* Returns a < b per lane. is_narrow: whether both are stored as float32. */
-SIMD_INLINE vm kernel_taken_lt(bool is_narrow, const kernel_taken *a, const kernel_taken *b)
+SIMD_INLINE vm kernel_raw_lt(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
-    return is_narrow ? vf_lt(a->narrow, b->narrow) : kernel_whole_lt(&a->wide, &b->wide);
+    return is_narrow ? vf_lt(a->narrow, b->narrow) : kernel_wide_doubles_lt(&a->wide, &b->wide);
 }
 
-SIMD_INLINE vm kernel_taken_eq(bool is_narrow, const kernel_taken *a, const kernel_taken *b)
+SIMD_INLINE vm kernel_raw_eq(bool is_narrow, const kernel_raw_numbers *a, const kernel_raw_numbers *b)
 {
-    return is_narrow ? vf_eq(a->narrow, b->narrow) : kernel_whole_eq(&a->wide, &b->wide);
+    return is_narrow ? vf_eq(a->narrow, b->narrow) : kernel_wide_doubles_eq(&a->wide, &b->wide);
 }
 
-SIMD_INLINE void kernel_taken_swap(bool is_narrow, vm lanes, kernel_taken *a, kernel_taken *b)
+SIMD_INLINE void kernel_raw_swap(bool is_narrow, vm lanes, kernel_raw_numbers *a, kernel_raw_numbers *b)
 {
-    const kernel_taken was = *a;
+    const kernel_raw_numbers was = *a;
     if (is_narrow) {
         a->narrow = vf_select(lanes, b->narrow, was.narrow);
         b->narrow = vf_select(lanes, was.narrow, b->narrow);
     } else {
-        a->wide = kernel_whole_select(lanes, &b->wide, &was.wide);
-        b->wide = kernel_whole_select(lanes, &was.wide, &b->wide);
+        a->wide = kernel_wide_doubles_select(lanes, &b->wide, &was.wide);
+        b->wide = kernel_wide_doubles_select(lanes, &was.wide, &b->wide);
     }
 }
 
 /* Returns the lanes in which position a is before b in the lexicographic order of coordinates. */
-SIMD_INLINE vm kernel_taken_before(bool is_narrow, const kernel_taken a[3], const kernel_taken b[3])
+SIMD_INLINE vm kernel_raw_before(bool is_narrow, const kernel_raw_numbers a[3], const kernel_raw_numbers b[3])
 {
-    vm before = kernel_taken_lt(is_narrow, &a[2], &b[2]);
+    vm before = kernel_raw_lt(is_narrow, &a[2], &b[2]);
     for (int axis = 1; axis >= 0; axis--)
-        before = vm_or(kernel_taken_lt(is_narrow, &a[axis], &b[axis]),
-                       vm_and(kernel_taken_eq(is_narrow, &a[axis], &b[axis]), before));
+        before = vm_or(kernel_raw_lt(is_narrow, &a[axis], &b[axis]),
+                       vm_and(kernel_raw_eq(is_narrow, &a[axis], &b[axis]), before));
     return before;
 }
 
 /* Reads the coordinates of one vertex per lane. is_narrow: whether all three arrays are float32 that can be
  * gathered. */
-SIMD_INLINE void kernel_arrays_place(const kernel_arrays *p, bool is_narrow, vi vertex, kernel_taken out[3])
+SIMD_INLINE void kernel_arrays_positions(const kernel_arrays *p, bool is_narrow, vi vertex, kernel_raw_numbers out[3])
 {
     for (int a = 0; a < 3; a++) {
         if (is_narrow)
             out[a].narrow = vf_gather(p->coordinates[a].data, vertex * p->coordinates[a].stride);
         else
-            out[a].wide = kernel_numbers_take(&p->coordinates[a], vertex);
+            out[a].wide = kernel_numbers_gather(&p->coordinates[a], vertex);
     }
 }
 
-SIMD_INLINE kernel_whole kernel_taken_whole(bool is_narrow, const kernel_taken *v)
+SIMD_INLINE kernel_wide_doubles kernel_raw_to_double(bool is_narrow, const kernel_raw_numbers *v)
 {
-    return is_narrow ? kernel_whole_widen(v->narrow) : v->wide;
+    return is_narrow ? kernel_wide_doubles_widen(v->narrow) : v->wide;
 }
 
 /* A value to compare with: in double, as a sum of two float32 (middle + rest), and the least float32 that is not below
@@ -320,26 +321,27 @@ SIMD_INLINE kernel_level kernel_level_of(double value)
 }
 
 /* Returns the lanes in which the number v is below the level. The comparison is exact. */
-SIMD_INLINE vm kernel_taken_below(const kernel_numbers *c, const kernel_taken *v, const kernel_level *level)
+SIMD_INLINE vm kernel_raw_below(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
 {
-    const kernel_whole value = kernel_whole_set(level->value);
-    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : kernel_whole_lt(&v->wide, &value);
+    const kernel_wide_doubles value = kernel_wide_doubles_set(level->value);
+    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least))
+                                        : kernel_wide_doubles_lt(&v->wide, &value);
 }
 
 /* Returns the number v minus the level, rounded to float32. */
-SIMD_INLINE vf kernel_taken_less(const kernel_numbers *c, const kernel_taken *v, const kernel_level *level)
+SIMD_INLINE vf kernel_raw_minus(const kernel_numbers *c, const kernel_raw_numbers *v, const kernel_level *level)
 {
     vf out;
     if (kernel_numbers_are_narrow(c)) return (v->narrow - level->middle) - level->rest;
-    for (int half = 0; half < 2; half++) kernel_half_put(&out, half, v->wide.half[half] - level->value);
+    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v->wide.half[half] - level->value);
     return out;
 }
 
 /* Reads the field for one vertex per lane; a cell-centred field is read by the lanes' cells instead. */
-SIMD_INLINE void kernel_arrays_values(const kernel_arrays *p, vi vertex, const uint32_t *cells, kernel_taken *out)
+SIMD_INLINE void kernel_arrays_values(const kernel_arrays *p, vi vertex, const uint32_t *cells, kernel_raw_numbers *out)
 {
     if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, cells, sizeof vertex);
-    kernel_numbers_take_raw(&p->values, vertex, out);
+    kernel_numbers_gather_raw(&p->values, vertex, out);
 }
 
 #endif

@@ -26,11 +26,11 @@
  * the coefficients of N. The field is L + middle + the terms `field`, which multiply the same products of
  * coordinates. */
 typedef struct kernel_contractions {
-    float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], bent[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
+    float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], nonlinear_part[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
     /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
      * iteration is not a contraction */
     float grow[SIMD_WIDTH];
-    float blur[SIMD_WIDTH], rim[SIMD_WIDTH];
+    float error_bound[SIMD_WIDTH], domain_margin[SIMD_WIDTH];
 } kernel_contractions;
 
 /* Bounds for one cell and isovalue per lane. */
@@ -44,7 +44,7 @@ typedef struct kernel_bounds {
     /* Inverse of the map's Jacobian at the cell's centre. The cell lies between pairs of planes: low <= normal . (X -
      * vertex 0) <= high. */
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
-    float bent[3][4][SIMD_WIDTH]; /* coefficients 4 to 7 of the nonlinear part N of the map */
+    float nonlinear_part[3][4][SIMD_WIDTH]; /* coefficients 4 to 7 of the nonlinear part N of the map */
     /* upper bounds from kernel_roots.h: L, by which reference coordinates are stretched, and G, of the field's
      * gradient */
     float stretch[SIMD_WIDTH], slope[SIMD_WIDTH];
@@ -57,9 +57,9 @@ typedef struct kernel_bounds {
 /* Intermediate results in double for SIMD_WIDTH / 2 cells. */
 typedef struct kernel_bounds_lanes {
     /* polynomial coefficients of positions and field, and positions relative to vertex 0 */
-    kernel_half exact[4][8], apart[3][8];
-    kernel_half bent[3][4], inverse[3][3], reach[3];
-    kernel_half_mask is_solid;
+    kernel_f64 exact[4][8], apart[3][8];
+    kernel_f64 nonlinear_part[3][4], inverse[3][3], reach[3];
+    kernel_f64_mask is_solid;
 } kernel_bounds_lanes;
 
 /* Lists which derivatives of a map are different at the corners of a reference domain (kernel_domain_of()), for each of
@@ -85,30 +85,30 @@ static const kernel_slope_table kernel_slope_tables[3] = {
 
 /* Derivatives at corners, indexed by the number of the derivative in kernel_slope_table. */
 typedef struct kernel_lanes_slopes {
-    kernel_half bend[3][3][4], df[3][4], de[3][4];
+    kernel_f64 bend[3][3][4], df[3][4], de[3][4];
 } kernel_lanes_slopes;
 
-SIMD_INLINE kernel_half kernel_half_all(double x)
+SIMD_INLINE kernel_f64 kernel_f64_set(double x)
 {
-    return (kernel_half){0} + x;
+    return (kernel_f64){0} + x;
 }
 
 /* Returns v rounded to float32, as a double. */
-SIMD_INLINE kernel_half kernel_half_rounded(kernel_half v)
+SIMD_INLINE kernel_f64 kernel_f64_rounded(kernel_f64 v)
 {
-    return kernel_half_widen(kernel_half_narrow(v));
+    return kernel_f64_widen(kernel_f64_narrow(v));
 }
 
-SIMD_INLINE kernel_half kernel_half_more(kernel_half v, kernel_half most)
+SIMD_INLINE kernel_f64 kernel_f64_more(kernel_f64 v, kernel_f64 most)
 {
-    return kernel_half_select((kernel_half_mask)(v > most), v, most);
+    return kernel_f64_select((kernel_f64_mask)(v > most), v, most);
 }
 
 /* Returns the derivative along axis a, at the reference point r, of a polynomial with coefficients c. */
-SIMD_INLINE kernel_half kernel_half_slope(int type, const kernel_half c[8], int a, const double r[3])
+SIMD_INLINE kernel_f64 kernel_f64_slope(int type, const kernel_f64 c[8], int a, const double r[3])
 {
     if (kernel_has_apex(type)) return c[1 + a] + c[4] * (a == 2 ? -r[2] : r[a]);
-    kernel_half out = c[1 + a];
+    kernel_f64 out = c[1 + a];
     for (int j = kernel_is_box(type) ? 0 : 1; j < 3; j++)
         if (a != 2 - j) out += c[4 + j] * r[3 - a - (2 - j)];
     return kernel_is_box(type) ? out + c[7] * (r[(a + 1) % 3] * r[(a + 2) % 3]) : out;
@@ -116,15 +116,15 @@ SIMD_INLINE kernel_half kernel_half_slope(int type, const kernel_half c[8], int 
 
 /* Returns the difference between the derivative along axis a at the reference coordinates r and that at the domain's
  * centre, for a polynomial whose coefficients 4 to 7 are `bent`. */
-SIMD_INLINE kernel_half kernel_half_bend(int type, const kernel_half bent[4], int a, const double r[3])
+SIMD_INLINE kernel_f64 kernel_f64_bend(int type, const kernel_f64 nonlinear_part[4], int a, const double r[3])
 {
     const double *centre = kernel_domain_of(type)->centre;
     const int next = (a + 1) % 3, last = (a + 2) % 3;
-    kernel_half out = {0};
-    if (kernel_has_apex(type)) return bent[0] * (a == 2 ? centre[2] - r[2] : r[a] - centre[a]);
+    kernel_f64 out = {0};
+    if (kernel_has_apex(type)) return nonlinear_part[0] * (a == 2 ? centre[2] - r[2] : r[a] - centre[a]);
     for (int j = kernel_is_box(type) ? 0 : 1; j < 3; j++)
-        if (a != 2 - j) out += bent[j] * (r[3 - a - (2 - j)] - centre[3 - a - (2 - j)]);
-    return kernel_is_box(type) ? out + bent[3] * (r[next] * r[last] - centre[next] * centre[last]) : out;
+        if (a != 2 - j) out += nonlinear_part[j] * (r[3 - a - (2 - j)] - centre[3 - a - (2 - j)]);
+    return kernel_is_box(type) ? out + nonlinear_part[3] * (r[next] * r[last] - centre[next] * centre[last]) : out;
 }
 
 /* Computes the polynomial coefficients of the map and of the field from the vertices' positions and values. */
@@ -132,19 +132,19 @@ SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const
 {
     const int count = grid_type_vertices(type);
     for (int n = 0; n < 4; n++) {
-        kernel_half d[8];
+        kernel_f64 d[8];
         vf v[8];
         for (int i = 0; i < count; i++) {
             v[i] = vf_load(at[n][i]);
-            d[i] = kernel_half_of(&v[i], half);
+            d[i] = kernel_f64_of(&v[i], half);
         }
         if (n < 3) {
-            b->reach[n] = kernel_half_abs(d[0]);
-            for (int i = 1; i < count; i++) b->reach[n] = kernel_half_more(kernel_half_abs(d[i]), b->reach[n]);
+            b->reach[n] = kernel_f64_abs(d[0]);
+            for (int i = 1; i < count; i++) b->reach[n] = kernel_f64_more(kernel_f64_abs(d[i]), b->reach[n]);
             for (int i = count - 1; i >= 0; i--) d[i] -= d[0];
             for (int i = 0; i < count; i++) b->apart[n][i] = d[i];
         }
-        kernel_half_fit(type, b->exact[n], d);
+        kernel_f64_fit(type, b->exact[n], d);
     }
 }
 
@@ -153,49 +153,49 @@ SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const
 SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
-    const kernel_half zero = {0};
-    kernel_half m[3][3], cofactor[3][3], position[3][8];
+    const kernel_f64 zero = {0};
+    kernel_f64 m[3][3], cofactor[3][3], position[3][8];
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 8; j++) position[i][j] = kernel_half_rounded(b->exact[i][j]);
-        for (int a = 0; a < 3; a++) m[i][a] = kernel_half_slope(type, position[i], a, centre);
+        for (int j = 0; j < 8; j++) position[i][j] = kernel_f64_rounded(b->exact[i][j]);
+        for (int a = 0; a < 3; a++) m[i][a] = kernel_f64_slope(type, position[i], a, centre);
     }
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) {
             const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, k1 = (k + 1) % 3, k2 = (k + 2) % 3;
             cofactor[i][k] = m[i1][k1] * m[i2][k2] - m[i1][k2] * m[i2][k1];
         }
-    const kernel_half det = m[0][0] * cofactor[0][0] + m[0][1] * cofactor[0][1] + m[0][2] * cofactor[0][2];
-    const kernel_half_mask some = (kernel_half_mask)(det != 0);
-    const kernel_half over = kernel_half_select(some, 1 / kernel_half_select(some, det, zero + 1), zero);
-    b->is_solid = some & (kernel_half_mask)(kernel_half_abs(over) < kernel_half_all((double)INFINITY));
+    const kernel_f64 det = m[0][0] * cofactor[0][0] + m[0][1] * cofactor[0][1] + m[0][2] * cofactor[0][2];
+    const kernel_f64_mask some = (kernel_f64_mask)(det != 0);
+    const kernel_f64 over = kernel_f64_select(some, 1 / kernel_f64_select(some, det, zero + 1), zero);
+    b->is_solid = some & (kernel_f64_mask)(kernel_f64_abs(over) < kernel_f64_set((double)INFINITY));
     for (int i = 0; i < 3; i++) {
-        kernel_half inverse[3];
+        kernel_f64 inverse[3];
         for (int a = 0; a < 3; a++) {
             inverse[a] = cofactor[a][i] * over;
-            b->inverse[i][a] = kernel_half_select(b->is_solid, kernel_half_rounded(inverse[a]), zero);
+            b->inverse[i][a] = kernel_f64_select(b->is_solid, kernel_f64_rounded(inverse[a]), zero);
         }
         for (int j = 0; j < 4; j++) {
-            b->bent[i][j] = zero;
+            b->nonlinear_part[i][j] = zero;
             for (int a = 0; a < 3; a++)
-                b->bent[i][j] += kernel_half_select(b->is_solid, inverse[a] * position[a][4 + j], zero);
+                b->nonlinear_part[i][j] += kernel_f64_select(b->is_solid, inverse[a] * position[a][4 + j], zero);
         }
     }
 }
 
 /* Computes the gradient of the linear function L that approximates the field, rounded to float32, and the coefficients
  * of the difference E = field - L. *size is a scale for the rounding of L at positions in the cell. */
-SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int type, kernel_half gradient[3],
-                                            kernel_half e[8], kernel_half *size)
+SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int type, kernel_f64 gradient[3],
+                                            kernel_f64 e[8], kernel_f64 *size)
 {
     const double *centre = kernel_domain_of(type)->centre;
-    kernel_half df[3];
-    *size = (kernel_half){0};
-    for (int a = 0; a < 3; a++) df[a] = kernel_half_slope(type, b->exact[3], a, centre);
+    kernel_f64 df[3];
+    *size = (kernel_f64){0};
+    for (int a = 0; a < 3; a++) df[a] = kernel_f64_slope(type, b->exact[3], a, centre);
     for (int i = 0; i < 3; i++) {
-        kernel_half g = {0};
+        kernel_f64 g = {0};
         for (int a = 0; a < 3; a++) g += df[a] * b->inverse[a][i];
-        gradient[i] = kernel_half_rounded(g);
-        *size += kernel_half_abs(g) * b->reach[i];
+        gradient[i] = kernel_f64_rounded(g);
+        *size += kernel_f64_abs(g) * b->reach[i];
     }
     for (int j = 0; j < 8; j++) {
         e[j] = b->exact[3][j];
@@ -204,48 +204,48 @@ SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int ty
 }
 
 /* Returns the maximum over the domain's corners of |E|, where e has the coefficients of E. */
-SIMD_INLINE kernel_half kernel_half_error(int type, const kernel_half e[8])
+SIMD_INLINE kernel_f64 kernel_f64_error(int type, const kernel_f64 e[8])
 {
     const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
-    kernel_half most = {0};
+    kernel_f64 most = {0};
     for (int n = 0; n < table->corner_count; n++) {
         const double *corner = kernel_domain_of(type)->corners[n], k = kernel_has_apex(type) ? corner[2] : 1;
         const double r[3] = {corner[0] * k, corner[1] * k, corner[2]}, m = r[0] * r[1] / k;
-        kernel_half at = (e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3]);
+        kernel_f64 at = (e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3]);
         if (!kernel_is_prism(type)) at += m * e[4];
         if (kernel_is_prism(type)) at += r[2] * (r[0] * e[5] + r[1] * e[6]);
         if (kernel_is_box(type)) at += r[2] * ((r[0] * e[5] + r[1] * e[6]) + m * e[7]);
-        most = n ? kernel_half_more(at * at, most) : at * at;
+        most = n ? kernel_f64_more(at * at, most) : at * at;
     }
-    return kernel_half_sqrt(most);
+    return kernel_f64_sqrt(most);
 }
 
 /* Computes, at all corners, the gradients of the field and of E = field - L, and the difference between the derivative
  * of the map's nonlinear part N and that at the centre. */
-SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int type, const kernel_half e[8],
+SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int type, const kernel_f64 e[8],
                                             kernel_lanes_slopes *out)
 {
     const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
-    kernel_half field[8];
-    for (int j = 0; j < 8; j++) field[j] = kernel_half_rounded(b->exact[3][j]);
+    kernel_f64 field[8];
+    for (int j = 0; j < 8; j++) field[j] = kernel_f64_rounded(b->exact[3][j]);
     for (int a = 0; a < 3; a++)
         for (int n = 0; n < table->slope_count[a]; n++) {
             const double *r = kernel_domain_of(type)->corners[(int)table->first[a][n]];
-            out->df[a][n] = kernel_half_slope(type, field, a, r);
-            out->de[a][n] = kernel_half_slope(type, e, a, r);
-            for (int i = 0; i < 3; i++) out->bend[i][a][n] = kernel_half_bend(type, b->bent[i], a, r);
+            out->df[a][n] = kernel_f64_slope(type, field, a, r);
+            out->de[a][n] = kernel_f64_slope(type, e, a, r);
+            for (int i = 0; i < 3; i++) out->bend[i][a][n] = kernel_f64_bend(type, b->nonlinear_part[i], a, r);
         }
 }
 
 /* Maxima of several norms over the corners of the domain. */
 typedef struct kernel_lanes_most {
-    kernel_half bend; /* upper bound of the 8th power of the matrix norm of N's derivative */
+    kernel_f64 bend; /* upper bound of the 8th power of the matrix norm of N's derivative */
     /* squares of maxima over the corners: of |grad F|, of grad E . w, of |grad E|, and of |N' w|, where F is the field,
      * E = F - L, N the map's nonlinear part and w a ray's direction in reference coordinates */
-    kernel_half df, along, steep, bent;
+    kernel_f64 df, along, steep, nonlinear_part;
 } kernel_lanes_most;
 
-SIMD_INLINE kernel_half kernel_half_length(const kernel_half v[3])
+SIMD_INLINE kernel_f64 kernel_f64_length(const kernel_f64 v[3])
 {
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
@@ -253,9 +253,9 @@ SIMD_INLINE kernel_half kernel_half_length(const kernel_half v[3])
 /* Returns an upper bound of the 8th power of the matrix norm |m|, at most 1.15^8 times that. It is the sum of the 8th
  * powers of the singular values, whose 8th root is a norm; so the maximum over the corners bounds it in the whole
  * domain. */
-SIMD_INLINE kernel_half kernel_half_eighth(const kernel_half m[3][3])
+SIMD_INLINE kernel_f64 kernel_f64_eighth(const kernel_f64 m[3][3])
 {
-    kernel_half square[3][3], fourth[3][3], sum = {0};
+    kernel_f64 square[3][3], fourth[3][3], sum = {0};
     for (int i = 0; i < 3; i++)
         for (int k = 0; k <= i; k++)
             square[i][k] = square[k][i] = m[0][i] * m[0][k] + m[1][i] * m[1][k] + m[2][i] * m[2][k];
@@ -268,12 +268,12 @@ SIMD_INLINE kernel_half kernel_half_eighth(const kernel_half m[3][3])
     return sum;
 }
 
-SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, int type, const kernel_half w[3],
+SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, int type, const kernel_f64 w[3],
                                       kernel_lanes_most *out)
 {
     const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
     for (int n = 0; n < table->corner_count; n++) {
-        kernel_half bend[3][3], df[3], de[3], along = {0}, steep = {0}, bent = {0};
+        kernel_f64 bend[3][3], df[3], de[3], along = {0}, steep = {0}, nonlinear_part = {0};
         for (int a = 0; a < 3; a++) {
             const int at = table->at[a][n];
             df[a] = s->df[a][at];
@@ -281,110 +281,110 @@ SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, int type, co
             for (int i = 0; i < 3; i++) bend[i][a] = s->bend[i][a][at];
         }
         for (int i = 0; i < 3; i++) {
-            const kernel_half term = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
+            const kernel_f64 term = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
             along += de[i] * w[i];
             steep += de[i] * de[i];
-            bent += term * term;
+            nonlinear_part += term * term;
         }
-        const kernel_half eighth = kernel_half_eighth((const kernel_half(*)[3])bend), slope = kernel_half_length(df);
-        if (!n) *out = (kernel_lanes_most){eighth, slope, along * along, steep, bent};
-        out->bend = kernel_half_more(eighth, out->bend);
-        out->df = kernel_half_more(slope, out->df);
-        out->along = kernel_half_more(along * along, out->along);
-        out->steep = kernel_half_more(steep, out->steep);
-        out->bent = kernel_half_more(bent, out->bent);
+        const kernel_f64 eighth = kernel_f64_eighth((const kernel_f64(*)[3])bend), slope = kernel_f64_length(df);
+        if (!n) *out = (kernel_lanes_most){eighth, slope, along * along, steep, nonlinear_part};
+        out->bend = kernel_f64_more(eighth, out->bend);
+        out->df = kernel_f64_more(slope, out->df);
+        out->along = kernel_f64_more(along * along, out->along);
+        out->steep = kernel_f64_more(steep, out->steep);
+        out->nonlinear_part = kernel_f64_more(nonlinear_part, out->nonlinear_part);
     }
 }
 
-SIMD_INLINE void kernel_half_store(float lanes[SIMD_WIDTH], int half, kernel_half v)
+SIMD_INLINE void kernel_f64_store(float lanes[SIMD_WIDTH], int half, kernel_f64 v)
 {
-    const kernel_half_floats floats = kernel_half_narrow(v);
+    const kernel_f64_floats floats = kernel_f64_narrow(v);
     memcpy(lanes + half * KERNEL_HALF, &floats, sizeof floats);
 }
 
 /* Computes the two planes, perpendicular to row i of the inverse Jacobian at the centre, between which all vertices
  * lie. They are moved outward by `pad`, the error of a ray's positions. */
-SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int type, int i, kernel_half pad, int half,
-                                    kernel_bounds *out)
+SIMD_INLINE void kernel_f64_planes(const kernel_bounds_lanes *b, int type, int i, kernel_f64 pad, int half,
+                                   kernel_bounds *out)
 {
-    kernel_half low = {0}, high = {0};
+    kernel_f64 low = {0}, high = {0};
     for (int n = 1; n < grid_type_vertices(type); n++) {
-        const kernel_half at =
+        const kernel_f64 at =
             b->inverse[i][0] * b->apart[0][n] + b->inverse[i][1] * b->apart[1][n] + b->inverse[i][2] * b->apart[2][n];
-        low = -kernel_half_more(-at, -low);
-        high = kernel_half_more(at, high);
+        low = -kernel_f64_more(-at, -low);
+        high = kernel_f64_more(at, high);
     }
-    for (int a = 0; a < 3; a++) kernel_half_store(out->normal[i][a], half, b->inverse[i][a]);
-    kernel_half_store(out->low[i], half, low - pad);
-    kernel_half_store(out->high[i], half, high + pad);
+    for (int a = 0; a < 3; a++) kernel_f64_store(out->normal[i][a], half, b->inverse[i][a]);
+    kernel_f64_store(out->low[i], half, low - pad);
+    kernel_f64_store(out->high[i], half, high + pad);
 }
 
 /* Converts the nonlinear coefficients of a polynomial to coordinates about the domain's middle. They multiply the
  * products of two coordinates, and for a hex also of all three. */
-SIMD_INLINE void kernel_half_terms(int type, const kernel_half bent[4], kernel_half out[4])
+SIMD_INLINE void kernel_f64_terms(int type, const kernel_f64 nonlinear_part[4], kernel_f64 out[4])
 {
     const int first = kernel_is_prism(type) ? 1 : 0;
-    for (int j = 0; j < 4; j++) out[j] = (kernel_half){0};
-    for (int j = 0; j < kernel_bent_terms(type); j++) out[j] = bent[first + j];
+    for (int j = 0; j < 4; j++) out[j] = (kernel_f64){0};
+    for (int j = 0; j < kernel_nonlinear_count(type); j++) out[j] = nonlinear_part[first + j];
     if (kernel_has_triangles(type)) return;
-    for (int j = 0; j < 3; j++) out[j] += 0.5 * bent[3];
+    for (int j = 0; j < 3; j++) out[j] += 0.5 * nonlinear_part[3];
 }
 
-/* Results of kernel_half_bounds() that kernel_half_rate() and the contraction need. */
-typedef struct kernel_half_rates {
+/* Results of kernel_f64_bounds() that kernel_f64_rate() and the contraction need. */
+typedef struct kernel_f64_rates {
     /* rounding error of positions across the rays; gradient of the linear function L; coefficients of E = F - L */
-    kernel_half across, gradient[3], e[8];
-    /* bounds that kernel_half_bounds() explains; w is the maximum of |J0^-1 d| over the rays' directions d */
-    kernel_half gap, slope, theta, slant, rise, w;
-    kernel_half_mask is_regular;
-} kernel_half_rates;
+    kernel_f64 across, gradient[3], e[8];
+    /* bounds that kernel_f64_bounds() explains; w is the maximum of |J0^-1 d| over the rays' directions d */
+    kernel_f64 gap, slope, theta, slant, rise, w;
+    kernel_f64_mask is_regular;
+} kernel_f64_rates;
 
 /* Computes the contraction's constant K and the bounds of rounding, in reference coordinates r. With u = 6e-8, e the
  * vertices' largest distance from vertex 0 along an axis, and `wide` the maximum |x| and |y| of rays and vertices:
  * - y and w err by about 4 u |inverse| times `wide` across and times e, including the rounding of the inverse itself:
- *   an eighth of the 2e-6 that kernel_half_bounds() uses for the positions of faces, and 3e-7 e.
+ *   an eighth of the 2e-6 that kernel_f64_bounds() uses for the positions of faces, and 3e-7 e.
  * - L and E err by 4 u times 2, the bound of values (rim has a factor 2 for this), times the gradient times `wide`
  *   across and e along the ray, and by as much for the gradient's own rounding: 5e-7. Divided by the field's
  *   derivative, and times |w|, that is an error of r.
  * - An iteration adds a few units in the last place of r, and near a pyramid's apex k is at least 1e-6: 1e-6.
  * The faces' crossings lie within `gap` of the ray, and the values there differ from the field by at most
  * KERNEL_FACE_BAND. Each error moves the root by itself / (1 - K). rim is twice the sum. */
-SIMD_INLINE void kernel_half_rate(const kernel_bounds_lanes *b, int type, const kernel_half_rates *r, int half,
-                                  kernel_contractions *out)
+SIMD_INLINE void kernel_f64_rate(const kernel_bounds_lanes *b, int type, const kernel_f64_rates *r, int half,
+                                 kernel_contractions *out)
 {
-    const kernel_half zero = {0}, one = zero + 1, speed = r->w / r->rise, wide = r->across * 5e5;
-    const kernel_half rate = r->theta + r->slant * speed * 1.0001, rest = one - rate;
-    kernel_half extent[3], own = zero,
-                           value = one + (kernel_half_abs(r->gradient[0]) + kernel_half_abs(r->gradient[1])) * wide;
+    const kernel_f64 zero = {0}, one = zero + 1, speed = r->w / r->rise, wide = r->across * 5e5;
+    const kernel_f64 rate = r->theta + r->slant * speed * 1.0001, rest = one - rate;
+    kernel_f64 extent[3], own = zero,
+                          value = one + (kernel_f64_abs(r->gradient[0]) + kernel_f64_abs(r->gradient[1])) * wide;
     for (int a = 0; a < 3; a++) {
-        extent[a] = kernel_half_abs(b->apart[a][1]);
+        extent[a] = kernel_f64_abs(b->apart[a][1]);
         for (int n = 2; n < grid_type_vertices(type); n++)
-            extent[a] = kernel_half_more(kernel_half_abs(b->apart[a][n]), extent[a]);
+            extent[a] = kernel_f64_more(kernel_f64_abs(b->apart[a][n]), extent[a]);
     }
     for (int i = 0; i < 3; i++) {
-        kernel_half term = 0.125 * r->across * (kernel_half_abs(b->inverse[i][0]) + kernel_half_abs(b->inverse[i][1]));
-        for (int a = 0; a < 3; a++) term += 3e-7 * kernel_half_abs(b->inverse[i][a]) * extent[a];
+        kernel_f64 term = 0.125 * r->across * (kernel_f64_abs(b->inverse[i][0]) + kernel_f64_abs(b->inverse[i][1]));
+        for (int a = 0; a < 3; a++) term += 3e-7 * kernel_f64_abs(b->inverse[i][a]) * extent[a];
         own += term * term;
     }
-    value += kernel_half_abs(r->gradient[2]) * extent[2];
-    const kernel_half face = r->gap + speed * (r->slope * r->gap + 1e-6);
-    const kernel_half blur = kernel_half_sqrt(own) + speed * value * 5e-7 + 1e-6;
-    const kernel_half rim = 2 * ((face + blur) / rest) + 4e-6;
-    const kernel_half_mask contracts = r->is_regular & (kernel_half_mask)(r->rise > 0) &
-                                       (kernel_half_mask)(rate < 0.9) & (kernel_half_mask)(rim < 0.015625);
-    kernel_half_store(out->grow, half,
-                      kernel_half_select(contracts, 1.0001 * rate / rest, kernel_half_all((double)INFINITY)));
-    kernel_half_store(out->blur, half, blur);
-    kernel_half_store(out->rim, half, rim);
+    value += kernel_f64_abs(r->gradient[2]) * extent[2];
+    const kernel_f64 face = r->gap + speed * (r->slope * r->gap + 1e-6);
+    const kernel_f64 error_bound = kernel_f64_sqrt(own) + speed * value * 5e-7 + 1e-6;
+    const kernel_f64 domain_margin = 2 * ((face + error_bound) / rest) + 4e-6;
+    const kernel_f64_mask contracts = r->is_regular & (kernel_f64_mask)(r->rise > 0) & (kernel_f64_mask)(rate < 0.9) &
+                                      (kernel_f64_mask)(domain_margin < 0.015625);
+    kernel_f64_store(out->grow, half,
+                     kernel_f64_select(contracts, 1.0001 * rate / rest, kernel_f64_set((double)INFINITY)));
+    kernel_f64_store(out->error_bound, half, error_bound);
+    kernel_f64_store(out->domain_margin, half, domain_margin);
 }
 
-SIMD_INLINE void kernel_half_contraction_of(const kernel_bounds_lanes *b, const kernel_half_rates *r, int half,
-                                            kernel_contractions *out, int type)
+SIMD_INLINE void kernel_f64_contraction_of(const kernel_bounds_lanes *b, const kernel_f64_rates *r, int half,
+                                           kernel_contractions *out, int type)
 {
     const double *centre = kernel_domain_of(type)->centre;
-    kernel_half middle[4], terms[4];
+    kernel_f64 middle[4], terms[4];
     for (int n = 0; n < 4; n++) {
-        const kernel_half *c = n < 3 ? b->exact[n] : r->e;
+        const kernel_f64 *c = n < 3 ? b->exact[n] : r->e;
         middle[n] = c[0];
         if (kernel_has_apex(type)) continue;
         middle[n] += (centre[0] * c[1] + centre[1] * c[2]) + centre[2] * c[3];
@@ -392,53 +392,54 @@ SIMD_INLINE void kernel_half_contraction_of(const kernel_bounds_lanes *b, const 
         if (kernel_is_prism(type)) middle[n] += (1.0 / 6) * (c[5] + c[6]);
     }
     for (int i = 0; i < 3; i++) {
-        const kernel_half offset =
+        const kernel_f64 offset =
             -(b->inverse[i][0] * middle[0] + b->inverse[i][1] * middle[1] + b->inverse[i][2] * middle[2]);
-        kernel_half_store(out->offset[i], half, offset);
-        kernel_half_terms(type, b->bent[i], terms);
-        for (int j = 0; j < kernel_bent_terms(type); j++) kernel_half_store(out->bent[j][i], half, terms[j]);
+        kernel_f64_store(out->offset[i], half, offset);
+        kernel_f64_terms(type, b->nonlinear_part[i], terms);
+        for (int j = 0; j < kernel_nonlinear_count(type); j++)
+            kernel_f64_store(out->nonlinear_part[j][i], half, terms[j]);
     }
-    kernel_half_store(out->middle, half, middle[3]);
-    kernel_half_terms(type, r->e + 4, terms);
-    for (int j = 0; j < kernel_bent_terms(type); j++) kernel_half_store(out->field[j], half, terms[j]);
-    kernel_half_rate(b, type, r, half, out);
+    kernel_f64_store(out->middle, half, middle[3]);
+    kernel_f64_terms(type, r->e + 4, terms);
+    for (int j = 0; j < kernel_nonlinear_count(type); j++) kernel_f64_store(out->field[j], half, terms[j]);
+    kernel_f64_rate(b, type, r, half, out);
 }
 
 /* Returns the square of the Frobenius norm of a polynomial's second derivatives over the extended domain. For a pyramid
  * it is multiplied by k^2: for a b / k, with a / k and b / k in [-1/32, 33/32], the second derivatives are at most 1,
  * 33/32, 33/32 and 2.13 over k, so their norm is 3.29 / k. */
-SIMD_INLINE kernel_half kernel_half_hessian(int type, const kernel_half c[4])
+SIMD_INLINE kernel_f64 kernel_f64_hessian(int type, const kernel_f64 c[4])
 {
-    kernel_half sum = {0};
+    kernel_f64 sum = {0};
     if (kernel_has_apex(type)) return c[0] * c[0] * (3.29 * 3.29);
     for (int j = 0; j < 3; j++) {
-        const kernel_half largest = kernel_half_more(kernel_half_abs(c[j] - KERNEL_DOMAIN_RIM * c[3]),
-                                                     kernel_half_abs(c[j] + (1 + 2 * KERNEL_DOMAIN_RIM) * c[3]));
+        const kernel_f64 largest = kernel_f64_more(kernel_f64_abs(c[j] - KERNEL_DOMAIN_RIM * c[3]),
+                                                   kernel_f64_abs(c[j] + (1 + 2 * KERNEL_DOMAIN_RIM) * c[3]));
         sum += 2 * largest * largest;
     }
     return sum;
 }
 
 /* Stores the coefficients and bounds of the map and the field that the search for roots needs (kernel_roots.h). */
-SIMD_INLINE void kernel_half_limits(const kernel_bounds_lanes *b, int type, kernel_half stretch, kernel_half slope,
-                                    int half, kernel_bounds *out)
+SIMD_INLINE void kernel_f64_limits(const kernel_bounds_lanes *b, int type, kernel_f64 stretch, kernel_f64 slope,
+                                   int half, kernel_bounds *out)
 {
-    kernel_half twist = {0}, field[4];
+    kernel_f64 twist = {0}, field[4];
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 4; j++) kernel_half_store(out->bent[i][j], half, b->bent[i][j]);
-        twist += kernel_half_hessian(type, b->bent[i]);
+        for (int j = 0; j < 4; j++) kernel_f64_store(out->nonlinear_part[i][j], half, b->nonlinear_part[i][j]);
+        twist += kernel_f64_hessian(type, b->nonlinear_part[i]);
     }
-    for (int j = 0; j < 4; j++) field[j] = kernel_half_rounded(b->exact[3][4 + j]);
-    kernel_half_store(out->stretch, half, stretch);
-    kernel_half_store(out->slope, half, slope);
-    kernel_half_store(out->curve, half, kernel_half_sqrt(kernel_half_hessian(type, field)));
-    kernel_half_store(out->twist, half, kernel_half_sqrt(twist));
+    for (int j = 0; j < 4; j++) field[j] = kernel_f64_rounded(b->exact[3][4 + j]);
+    kernel_f64_store(out->stretch, half, stretch);
+    kernel_f64_store(out->slope, half, slope);
+    kernel_f64_store(out->curve, half, kernel_f64_sqrt(kernel_f64_hessian(type, field)));
+    kernel_f64_store(out->twist, half, kernel_f64_sqrt(twist));
 }
 
-static __attribute__((noinline)) void kernel_half_contraction(const kernel_bounds_lanes *b, const kernel_half_rates *r,
-                                                              int half, kernel_contractions *out, int type)
+static __attribute__((noinline)) void kernel_f64_contraction(const kernel_bounds_lanes *b, const kernel_f64_rates *r,
+                                                             int half, kernel_contractions *out, int type)
 {
-    KERNEL_OF_TYPE(type, kernel_half_contraction_of, b, r, half, out);
+    KERNEL_OF_TYPE(type, kernel_f64_contraction_of, b, r, half, out);
 }
 
 /* Computes, for rays close to the direction (0, 0, 1), how far the field differs from L, how fast L rises along the
@@ -448,64 +449,63 @@ static __attribute__((noinline)) void kernel_half_contraction(const kernel_bound
  * To prove that F is monotone along the rays: with M = J0^-1 J - I, whose norm is at most theta, and w = J0^-1 d, E
  * changes the derivative of L by grad E . (I + M)^-1 w = grad E . (w - M w + M M (I + M)^-1 w). Each of the three terms
  * is bounded separately, by its maximum at the corners for the middle ray and by how far another ray's w may differ. */
-SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
-                                    kernel_bounds *out, int type)
+SIMD_INLINE void kernel_f64_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
+                                   kernel_bounds *out, int type)
 {
-    const kernel_half zero = {0}, one = zero + 1, spread = zero + (double)beam->spread;
+    const kernel_f64 zero = {0}, one = zero + 1, spread = zero + (double)beam->spread;
     kernel_bounds_lanes b;
     kernel_lanes_slopes slopes;
     kernel_lanes_most most;
-    kernel_half g[3], e[8], w[3], size, length = zero, off = zero, gap = zero;
+    kernel_f64 g[3], e[8], w[3], size, length = zero, off = zero, gap = zero;
     kernel_bounds_lanes_fit(&b, type, at, half);
     kernel_bounds_lanes_bend(&b, type);
     kernel_bounds_lanes_linear(&b, type, g, e, &size);
     kernel_bounds_lanes_slopes(&b, type, e, &slopes);
-    const kernel_half across =
+    const kernel_f64 across =
         2e-6 * (b.reach[0] + b.reach[1] + (double)beam->offset + (double)beam->spread * b.reach[2]);
     for (int i = 0; i < 3; i++) {
-        const kernel_half side = kernel_half_abs(b.inverse[i][0]) + kernel_half_abs(b.inverse[i][1]);
-        const kernel_half term = spread * side;
-        const kernel_half blur = across * side + 1e-6 * b.reach[2] * kernel_half_abs(b.inverse[i][2]);
+        const kernel_f64 side = kernel_f64_abs(b.inverse[i][0]) + kernel_f64_abs(b.inverse[i][1]);
+        const kernel_f64 term = spread * side;
+        const kernel_f64 error_bound = across * side + 1e-6 * b.reach[2] * kernel_f64_abs(b.inverse[i][2]);
         w[i] = b.inverse[i][2];
         length += w[i] * w[i];
         off += term * term;
-        gap += blur * blur;
-        kernel_half_planes(&b, type, i, blur + 1e-5, half, out);
+        gap += error_bound * error_bound;
+        kernel_f64_planes(&b, type, i, error_bound + 1e-5, half, out);
     }
     kernel_lanes_corners(&slopes, type, w, &most);
-    const kernel_half theta = kernel_half_sqrt(kernel_half_sqrt(kernel_half_sqrt(most.bend)));
-    const kernel_half_mask bends_little = (kernel_half_mask)(theta < 0.9), is_regular = b.is_solid & bends_little;
-    const kernel_half stretch =
-        kernel_half_select(bends_little, kernel_half_rounded(1 / (1 - theta)), kernel_half_all(10));
-    const kernel_half slope = kernel_half_rounded(kernel_half_sqrt(most.df)), slant = kernel_half_sqrt(most.steep);
-    kernel_half_limits(&b, type, stretch, slope, half, out);
-    length = kernel_half_sqrt(length), off = kernel_half_sqrt(off);
-    const kernel_half whole = slant * stretch * (length + off);
-    const kernel_half apart =
-        kernel_half_sqrt(most.along) +
-        slant * (kernel_half_sqrt(most.bent) + theta * theta * stretch * (length + off) + (one + theta) * off);
-    const kernel_half rise = kernel_half_abs(g[2]) - spread * (kernel_half_abs(g[0]) + kernel_half_abs(g[1]));
-    const kernel_half least = kernel_half_select((kernel_half_mask)(whole < apart), whole, apart);
-    const kernel_half_mask rises = is_regular & (kernel_half_mask)(rise * 0.9999 > least);
-    const kernel_half_floats jump = kernel_half_narrow(slope * stretch * kernel_half_sqrt(gap)) + KERNEL_FACE_BAND;
-    kernel_half_store(out->jump, half, kernel_half_select(rises, kernel_half_widen(jump), -one));
-    const kernel_half level = kernel_half_rounded(e[0]), endless = kernel_half_all((double)INFINITY);
+    const kernel_f64 theta = kernel_f64_sqrt(kernel_f64_sqrt(kernel_f64_sqrt(most.bend)));
+    const kernel_f64_mask bends_little = (kernel_f64_mask)(theta < 0.9), is_regular = b.is_solid & bends_little;
+    const kernel_f64 stretch = kernel_f64_select(bends_little, kernel_f64_rounded(1 / (1 - theta)), kernel_f64_set(10));
+    const kernel_f64 slope = kernel_f64_rounded(kernel_f64_sqrt(most.df)), slant = kernel_f64_sqrt(most.steep);
+    kernel_f64_limits(&b, type, stretch, slope, half, out);
+    length = kernel_f64_sqrt(length), off = kernel_f64_sqrt(off);
+    const kernel_f64 whole = slant * stretch * (length + off);
+    const kernel_f64 apart =
+        kernel_f64_sqrt(most.along) +
+        slant * (kernel_f64_sqrt(most.nonlinear_part) + theta * theta * stretch * (length + off) + (one + theta) * off);
+    const kernel_f64 rise = kernel_f64_abs(g[2]) - spread * (kernel_f64_abs(g[0]) + kernel_f64_abs(g[1]));
+    const kernel_f64 least = kernel_f64_select((kernel_f64_mask)(whole < apart), whole, apart);
+    const kernel_f64_mask rises = is_regular & (kernel_f64_mask)(rise * 0.9999 > least);
+    const kernel_f64_floats jump = kernel_f64_narrow(slope * stretch * kernel_f64_sqrt(gap)) + KERNEL_FACE_BAND;
+    kernel_f64_store(out->jump, half, kernel_f64_select(rises, kernel_f64_widen(jump), -one));
+    const kernel_f64 level = kernel_f64_rounded(e[0]), endless = kernel_f64_set((double)INFINITY);
     e[0] -= level;
-    const kernel_half thickness = kernel_half_error(type, e) + 1e-5 + 16 * 6e-8 * size;
-    kernel_half_store(out->level, half, level);
-    for (int a = 0; a < 3; a++) kernel_half_store(out->gradient[a], half, g[a]);
-    kernel_half_store(out->thickness, half, kernel_half_select(is_regular, thickness, endless));
-    kernel_half_rates rates = {.across = across,
-                               .gap = kernel_half_sqrt(gap),
-                               .slope = slope,
-                               .theta = theta,
-                               .slant = slant,
-                               .rise = rise,
-                               .w = length + off,
-                               .is_regular = is_regular};
+    const kernel_f64 thickness = kernel_f64_error(type, e) + 1e-5 + 16 * 6e-8 * size;
+    kernel_f64_store(out->level, half, level);
+    for (int a = 0; a < 3; a++) kernel_f64_store(out->gradient[a], half, g[a]);
+    kernel_f64_store(out->thickness, half, kernel_f64_select(is_regular, thickness, endless));
+    kernel_f64_rates rates = {.across = across,
+                              .gap = kernel_f64_sqrt(gap),
+                              .slope = slope,
+                              .theta = theta,
+                              .slant = slant,
+                              .rise = rise,
+                              .w = length + off,
+                              .is_regular = is_regular};
     memcpy(rates.gradient, g, sizeof g);
     memcpy(rates.e, e, sizeof e);
-    kernel_half_contraction(&b, &rates, half, &out->contractions, type);
+    kernel_f64_contraction(&b, &rates, half, &out->contractions, type);
 }
 
 /* Computes the bounds for one cell of this type per lane, from vertex positions in tile space and vertex values
@@ -513,7 +513,7 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
 static __attribute__((noinline)) void kernel_bounds_of(int type, const float at[4][8][SIMD_WIDTH],
                                                        const kernel_beam *beam, kernel_bounds *out)
 {
-    for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_half_bounds, at, half, beam, out);
+    for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_f64_bounds, at, half, beam, out);
 }
 
 /* Hexes, wedges or pyramids of one type, one per lane, in the form in which the search for roots reads them. */
@@ -524,14 +524,14 @@ typedef struct kernel_curved {
     const float (*at)[8][SIMD_WIDTH];
     const float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
     const kernel_bounds *bounds;        /* NULL if the bounds of a single cell have not been computed yet */
-    struct kernel_curved_room *room;    /* memory for the data and bounds of a single cell */
+    struct kernel_curved_storage *room; /* memory for the data and bounds of a single cell */
 } kernel_curved;
 
 /* Memory for a single cell, whose data are copied to all lanes. */
-typedef struct kernel_curved_room {
+typedef struct kernel_curved_storage {
     float at[4][8][SIMD_WIDTH], colours[8][SIMD_WIDTH];
     kernel_bounds bounds;
-} kernel_curved_room;
+} kernel_curved_storage;
 
 /* Returns the range of directions and origins of the tile's rays. */
 SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
@@ -542,10 +542,10 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
 }
 
 /* Computes the bounds of one cell that is traced on its own, with its data in all lanes. */
-static __attribute__((noinline, unused)) void kernel_curved_alone(const kernel_cell *c, const kernel_beam *beam,
-                                                                  kernel_curved *out)
+static __attribute__((noinline, unused)) void kernel_curved_single_bounds(const kernel_cell *c, const kernel_beam *beam,
+                                                                          kernel_curved *out)
 {
-    kernel_curved_room *room = out->room;
+    kernel_curved_storage *room = out->room;
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
     for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, room->at[n]);
     kernel_map_spread(c->g, c->count, room->colours);

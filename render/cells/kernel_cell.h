@@ -66,13 +66,13 @@ typedef struct kernel_line {
 } kernel_line;
 
 /* The position of a vertex in tile space. */
-typedef struct kernel_spot {
+typedef struct kernel_tile_position {
     float x, y, z;
-} kernel_spot;
+} kernel_tile_position;
 
 /* Returns the measure N of a vertex's size in the tile's projection, from which the error bounds of edge functions are
  * computed. */
-SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *tile, kernel_spot a)
+SIMD_INLINE float kernel_position_size(const kernel_frame *f, const kernel_tile *tile, kernel_tile_position a)
 {
     const float depth = f->job->camera.is_orthographic ? 1 : fabsf(a.z) + fabsf((float)f->depth_shift);
     const float x = fabsf(a.x), y = fabsf(a.y);
@@ -80,9 +80,9 @@ SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *til
 }
 
 /* Computes the edge function of the edge from a to b, where a is before b in the order of coordinates. size_a, size_b:
- * kernel_spot_size() of the vertices. */
-SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a, kernel_spot b, float size_a,
-                                            float size_b)
+ * kernel_position_size() of the vertices. */
+SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_tile_position a, kernel_tile_position b,
+                                            float size_a, float size_b)
 {
     const bool flat = f->job->camera.is_orthographic;
     const double da = flat ? 1 : (double)a.z + f->depth_shift, db = flat ? 1 : (double)b.z + f->depth_shift;
@@ -99,15 +99,16 @@ SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a
 
 /* The largest error d of an edge's function (see above), and the edge's extent, in which distances across the ray count
  * for a quarter. */
-typedef struct kernel_blur {
+typedef struct kernel_edge_error {
     float error, extent;
-} kernel_blur;
+} kernel_edge_error;
 
-SIMD_INLINE kernel_blur kernel_line_blur(const kernel_line *l, float radius, kernel_spot a, kernel_spot b)
+SIMD_INLINE kernel_edge_error kernel_line_error(const kernel_line *l, float radius, kernel_tile_position a,
+                                                kernel_tile_position b)
 {
     const float x = fabsf(a.x - b.x), y = fabsf(a.y - b.y), z = fabsf(a.z - b.z);
-    return (kernel_blur){6e-8f * (3 * fabsf(l->c) + radius * (4 * fabsf(l->cu) + 3 * fabsf(l->cv))),
-                         z + 0.25f * (x + y)};
+    return (kernel_edge_error){6e-8f * (3 * fabsf(l->c) + radius * (4 * fabsf(l->cu) + 3 * fabsf(l->cv))),
+                               z + 0.25f * (x + y)};
 }
 
 /* Returns the least sum of weights that is accurate enough for a triangle, computed from the sums of its edges' errors
@@ -118,14 +119,14 @@ SIMD_INLINE float kernel_least_weight(float errors, float extents)
 }
 
 /* Returns the larger error and the larger extent of two edges. */
-SIMD_INLINE kernel_blur kernel_blur_more(kernel_blur a, kernel_blur b)
+SIMD_INLINE kernel_edge_error kernel_edge_error_max(kernel_edge_error a, kernel_edge_error b)
 {
-    return (kernel_blur){a.error < b.error ? b.error : a.error, a.extent < b.extent ? b.extent : a.extent};
+    return (kernel_edge_error){a.error < b.error ? b.error : a.error, a.extent < b.extent ? b.extent : a.extent};
 }
 
 /* Returns an upper bound of kernel_least_weight() for all triangles whose edges have errors and extents of at most
  * `most`. */
-SIMD_INLINE float kernel_blur_least(kernel_blur most)
+SIMD_INLINE float kernel_least_weight_bound(kernel_edge_error most)
 {
     return 1.0001f * kernel_least_weight(3 * most.error, 3 * most.extent);
 }
@@ -135,7 +136,7 @@ enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSIN
 typedef struct kernel_cell {
     uint32_t serial, index; /* key of the cell cache: number of the tile, index of the cell */
     int part, layer;        /* key of the cell cache: mesh part, and the layer whose field the cell has */
-    bool is_finite, is_placed, is_constant, has_lines, has_normal;
+    bool is_finite, is_transformed, is_constant, has_lines, has_normal;
     int type, count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];
@@ -240,7 +241,7 @@ static __attribute__((noinline, unused)) void kernel_cell_fetch(kernel_cell *c, 
                                                                 uint32_t index)
 {
     c->index = index;
-    c->is_placed = false;
+    c->is_transformed = false;
     c->type = grid_cell_type(g, index);
     if (kernel_has_own_faces(c->type) && kernel_is_tet(g, index, c->vertices))
         c->type = GRID_TET, c->count = 4;
@@ -257,7 +258,7 @@ SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
 /* Computes the canonical order of a cell's vertices: it begins at the vertex of least rank and continues along its
  * edges in the order of ranks. from[i] is the vertex at position i. The order may mirror the cell, because orientation
  * does not matter here. */
-SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
+SIMD_INLINE void kernel_cell_canonical_order(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
 {
     /* maps a hex's vertex number to the bits of its reference coordinates x, y, z, and back */
     static const signed char corner[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -328,8 +329,8 @@ SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int 
 }
 
 /* Puts a cell's vertices in their canonical order. The vertices of a tet, which is symmetric, are sorted by
- * coordinates. Other cells get ranks, and their vertices are permuted by kernel_cell_turn(). Then nothing depends on
- * how the simulation numbers a cell's vertices, not even if its map is folded and has several solutions. */
+ * coordinates. Other cells get ranks, and their vertices are permuted by kernel_cell_canonical_order(). Then nothing
+ * depends on how the simulation numbers a cell's vertices, not even if its map is folded and has several solutions. */
 static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
 {
     int from[GRID_MAX_CELL_VERTICES], rank[GRID_MAX_CELL_VERTICES];
@@ -340,15 +341,15 @@ static __attribute__((noinline, unused)) void kernel_cell_order(kernel_cell *c)
         return;
     }
     kernel_rank_positions(c->world, c->count, c->rank);
-    kernel_cell_turn(c, from);
+    kernel_cell_canonical_order(c, from);
     kernel_cell_permute(c, from, c->count);
     for (int i = 0; i < c->count; i++) rank[i] = c->rank[from[i]];
     for (int i = 0; i < c->count; i++) c->rank[i] = rank[i];
 }
 
 /* Transforms a position into tile space (kernel_packet.h). */
-SIMD_INLINE void kernel_place_in(const kernel_frame *f, const kernel_tile *tile, const double *world, float *out_x,
-                                 float *out_y, float *out_z)
+SIMD_INLINE void kernel_transform_in_tile(const kernel_frame *f, const kernel_tile *tile, const double *world,
+                                          float *out_x, float *out_y, float *out_z)
 {
     const double *eye = f->job->camera.eye;
     const double d0 = world[0] - eye[0], d1 = world[1] - eye[1], d2 = world[2] - eye[2];
@@ -366,20 +367,21 @@ static __attribute__((noinline, unused)) void kernel_cell_move(kernel_cell *c, c
                                                                const kernel_tile *tile, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
-    for (int i = 0; i < c->count; i++) kernel_place_in(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
-    c->is_placed = true;
+    for (int i = 0; i < c->count; i++) kernel_transform_in_tile(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    c->is_transformed = true;
     c->has_lines = c->has_normal = false;
 }
 
-SIMD_INLINE void kernel_cell_place_in(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)
+SIMD_INLINE void kernel_cell_transform_in_tile(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile,
+                                               const grid *g)
 {
     kernel_cell_move(c, f, tile, g);
     kernel_cell_order(c);
 }
 
-SIMD_INLINE kernel_spot kernel_cell_spot(const kernel_cell *c, int i)
+SIMD_INLINE kernel_tile_position kernel_cell_position(const kernel_cell *c, int i)
 {
-    return (kernel_spot){c->x[i], c->y[i], c->z[i]};
+    return (kernel_tile_position){c->x[i], c->y[i], c->z[i]};
 }
 
 /* Computes a quad's corners in cyclic order, from the smallest vertex towards its smaller neighbour. */
@@ -407,20 +409,21 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
 
 SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
-    kernel_blur blur[KERNEL_TET_EDGES];
+    kernel_edge_error error_bound[KERNEL_TET_EDGES];
     float size[4];
-    for (int i = 0; i < 4; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    for (int i = 0; i < 4; i++) size[i] = kernel_position_size(f, tile, kernel_cell_position(c, i));
     c->doubt = 0;
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        const kernel_spot from = kernel_cell_spot(c, i), to = kernel_cell_spot(c, j);
+        const kernel_tile_position from = kernel_cell_position(c, i), to = kernel_cell_position(c, j);
         c->lines[n] = kernel_line_between(f, from, to, size[i], size[j]);
-        blur[n] = kernel_line_blur(&c->lines[n], tile->radius, from, to);
+        error_bound[n] = kernel_line_error(&c->lines[n], tile->radius, from, to);
         c->doubt = c->doubt < c->lines[n].bound ? c->lines[n].bound : c->doubt;
     }
     for (int n = 0; n < 4; n++) {
-        const kernel_blur *ij = &blur[(int)kernel_tet_face[n][3]], *jk = &blur[(int)kernel_tet_face[n][4]];
-        const kernel_blur *ik = &blur[(int)kernel_tet_face[n][5]];
+        const kernel_edge_error *ij = &error_bound[(int)kernel_tet_face[n][3]],
+                                *jk = &error_bound[(int)kernel_tet_face[n][4]];
+        const kernel_edge_error *ik = &error_bound[(int)kernel_tet_face[n][5]];
         c->least[n] = kernel_least_weight((ij->error + jk->error) + ik->error, (ij->extent + jk->extent) + ik->extent);
     }
 }
@@ -440,17 +443,17 @@ SIMD_INLINE void kernel_curved_lines(kernel_cell *c, const kernel_frame *f, cons
         ends[shape->edge_count + face][0] = (signed char)corner[0];
         ends[shape->edge_count + face][1] = (signed char)corner[2];
     }
-    for (int i = 0; i < c->count; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
-    kernel_blur most = {0, 0};
+    for (int i = 0; i < c->count; i++) size[i] = kernel_position_size(f, tile, kernel_cell_position(c, i));
+    kernel_edge_error most = {0, 0};
     for (int n = 0; n < count; n++) {
         const int i = ends[n][0], j = ends[n][1], a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
-        const kernel_spot from = kernel_cell_spot(c, a), to = kernel_cell_spot(c, b);
+        const kernel_tile_position from = kernel_cell_position(c, a), to = kernel_cell_position(c, b);
         c->lines[n] = kernel_line_between(f, from, to, size[a], size[b]);
         if (kernel_has_triangles(c->type))
-            most = kernel_blur_more(most, kernel_line_blur(&c->lines[n], tile->radius, from, to));
+            most = kernel_edge_error_max(most, kernel_line_error(&c->lines[n], tile->radius, from, to));
     }
     /* hexes have triangles only if a quad has collapsed, so their weights are always checked exactly */
-    c->least[0] = kernel_is_box(c->type) ? (float)INFINITY : kernel_blur_least(most);
+    c->least[0] = kernel_is_box(c->type) ? (float)INFINITY : kernel_least_weight_bound(most);
 }
 
 static __attribute__((unused)) void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)

@@ -7,7 +7,7 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_types.h"
 #include "simd.h"
 
@@ -70,25 +70,25 @@ SIMD_INLINE double kernel_values_colours(const kernel_surface *s, int part, uint
 }
 
 /* Returns v clamped to the interval [-limit, limit] and rounded to float32. */
-SIMD_INLINE float kernel_hold(double v, double limit)
+SIMD_INLINE float kernel_clamp(double v, double limit)
 {
     return (float)(v < -limit ? -limit : v > limit ? limit : v);
 }
 
 /* Returns whether some value between the smallest and the largest of these is visible with the transfer function. */
-SIMD_INLINE bool kernel_values_show(const double *values, int count, const kernel_transfer *t)
+SIMD_INLINE bool kernel_values_are_visible(const double *values, int count, const kernel_transfer *t)
 {
     double low = values[0], high = low;
     for (int i = 1; i < count; i++) {
         low = values[i] < low ? values[i] : low;
         high = values[i] > high ? values[i] : high;
     }
-    return kernel_interest_meets(&t->interest, kernel_hold(low, 3e38), kernel_hold(high, 3e38));
+    return kernel_visible_values_overlap(&t->visible_values, kernel_clamp(low, 3e38), kernel_clamp(high, 3e38));
 }
 
-SIMD_INLINE bool kernel_cell_shows(const kernel_cell *c, const kernel_transfer *t)
+SIMD_INLINE bool kernel_cell_is_visible(const kernel_cell *c, const kernel_transfer *t)
 {
-    return kernel_values_show(c->values, c->count, t);
+    return kernel_values_are_visible(c->values, c->count, t);
 }
 
 /* Sets f to the values in the transfer function's domain, clamped to +-1e18 so that interpolation cannot overflow. */
@@ -96,7 +96,7 @@ SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
 {
     c->is_constant = true;
     for (int i = 0; i < c->count; i++) {
-        c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
+        c->f[i] = kernel_clamp((c->values[i] - t->low) * t->inverse_width, 1e18);
         c->is_constant = c->is_constant && c->values[i] == c->values[0];
     }
 }

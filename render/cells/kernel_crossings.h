@@ -13,18 +13,18 @@
 #include "kernel_shapes.h"
 #include "simd.h"
 
-SIMD_INLINE kernel_line kernel_line_of(const kernel_packet *p, kernel_spot a, kernel_spot b)
+SIMD_INLINE kernel_line kernel_line_of(const kernel_packet *p, kernel_tile_position a, kernel_tile_position b)
 {
-    return kernel_line_between(p->frame, a, b, kernel_spot_size(p->frame, p->tile, a),
-                               kernel_spot_size(p->frame, p->tile, b));
+    return kernel_line_between(p->frame, a, b, kernel_position_size(p->frame, p->tile, a),
+                               kernel_position_size(p->frame, p->tile, b));
 }
 
-SIMD_INLINE vf kernel_project_x(const kernel_packet *p, kernel_spot a)
+SIMD_INLINE vf kernel_project_x(const kernel_packet *p, kernel_tile_position a)
 {
     return (vf_set(a.x) - p->origin_x) - p->slope_x * a.z;
 }
 
-SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_spot a)
+SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_tile_position a)
 {
     return (vf_set(a.y) - p->origin_y) - p->slope_y * a.z;
 }
@@ -65,14 +65,14 @@ SIMD_INLINE vf kernel_edge_between(vf ax, vf ay, vf bx, vf by)
     return __builtin_expect(vm_any(tie), 0) ? kernel_edge_tied(ax, ay, bx, by, e) : e;
 }
 
-SIMD_INLINE vf kernel_edge_projected(const kernel_packet *p, kernel_spot a, kernel_spot b)
+SIMD_INLINE vf kernel_edge_projected(const kernel_packet *p, kernel_tile_position a, kernel_tile_position b)
 {
     return kernel_edge_between(kernel_project_x(p, a), kernel_project_y(p, a), kernel_project_x(p, b),
                                kernel_project_y(p, b));
 }
 
-static __attribute__((noinline, cold)) vf kernel_edge_doubted(const kernel_packet *p, kernel_spot a, kernel_spot b,
-                                                              vm doubt, vf e)
+static __attribute__((noinline, cold)) vf kernel_edge_recomputed(const kernel_packet *p, kernel_tile_position a,
+                                                                 kernel_tile_position b, vm doubt, vf e)
 {
     return vf_select(doubt, kernel_edge_projected(p, a, b), e);
 }
@@ -84,12 +84,12 @@ SIMD_INLINE vf kernel_line_at(const kernel_packet *p, const kernel_line *l)
 
 /* Returns the edge function of the edge from a to b on the packet's rays. a must be before b in the order of
  * coordinates; l is the edge's line. The sign bit is clear on the positive side, and ties are decided. */
-SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_spot a, kernel_spot b)
+SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_tile_position a, kernel_tile_position b)
 {
     if (!p->is_pencil) return kernel_edge_projected(p, a, b);
     const vf e = kernel_line_at(p, l);
     const vm doubt = vm_not(vf_lt(vf_set(l->bound), vf_abs(e)));
-    return __builtin_expect(vm_any(doubt), 0) ? kernel_edge_doubted(p, a, b, doubt, e) : e;
+    return __builtin_expect(vm_any(doubt), 0) ? kernel_edge_recomputed(p, a, b, doubt, e) : e;
 }
 
 /* Returns the rays that cross the triangle i, j, k, by its edge functions. i, j and k are in the order of
@@ -102,7 +102,7 @@ SIMD_INLINE vm kernel_inside(vm rays, vf ij, vf jk, vf ik)
 
 /* Returns the sum of a value (depth or field) over a crossed triangle's vertices, weighted by the edge functions of the
  * opposite edges. It must still be divided by the sum of the weights. All terms of the sum have the same sign. */
-SIMD_INLINE vf kernel_weigh_value(vf ij, vf jk, vf ik, float i, float j, float k)
+SIMD_INLINE vf kernel_weighted_value(vf ij, vf jk, vf ik, float i, float j, float k)
 {
     return vf_muladd(ij, vf_set(k), vf_muladd(-ik, vf_set(j), jk * i));
 }
@@ -112,30 +112,32 @@ SIMD_INLINE vf kernel_weight(vf ij, vf jk, vf ik)
     return (jk - ik) + ij;
 }
 
-SIMD_INLINE kernel_blur kernel_edge_blur(const kernel_packet *p, kernel_spot a, kernel_spot b)
+SIMD_INLINE kernel_edge_error kernel_edge_error_between(const kernel_packet *p, kernel_tile_position a,
+                                                        kernel_tile_position b)
 {
     const kernel_line l = kernel_line_of(p, a, b);
-    return kernel_line_blur(&l, p->tile->radius, a, b);
+    return kernel_line_error(&l, p->tile->radius, a, b);
 }
 
 /* Returns the least sum of weights that is accurate enough for the triangle i, j, k, whose vertices are in the order of
  * coordinates (kernel_least_weight()). */
-static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_packet *p, kernel_spot i, kernel_spot j,
-                                                                   kernel_spot k)
+static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_packet *p, kernel_tile_position i,
+                                                                   kernel_tile_position j, kernel_tile_position k)
 {
-    const kernel_blur ij = kernel_edge_blur(p, i, j), jk = kernel_edge_blur(p, j, k), ik = kernel_edge_blur(p, i, k);
+    const kernel_edge_error ij = kernel_edge_error_between(p, i, j), jk = kernel_edge_error_between(p, j, k),
+                            ik = kernel_edge_error_between(p, i, k);
     return kernel_least_weight((ij.error + jk.error) + ik.error, (ij.extent + jk.extent) + ik.extent);
 }
 
 /* Returns the rays that cross a triangle but whose sum of weights is too small to be accurate. */
-SIMD_INLINE vm kernel_weak(vm hit, vf weight, float least)
+SIMD_INLINE vm kernel_is_inaccurate(vm hit, vf weight, float least)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), vf_set(least)));
 }
 
 /* Computes the triangle's edge functions again on the given rays, from its projected vertices. */
-static __attribute__((noinline, cold)) void kernel_triangle_mend(const kernel_packet *p, const kernel_spot ijk[3],
-                                                                 vm weak, vf *ij, vf *jk, vf *ik)
+static __attribute__((noinline, cold)) void
+kernel_triangle_recompute(const kernel_packet *p, const kernel_tile_position ijk[3], vm weak, vf *ij, vf *jk, vf *ik)
 {
     const vf ax = kernel_project_x(p, ijk[0]), ay = kernel_project_y(p, ijk[0]);
     const vf bx = kernel_project_x(p, ijk[1]), by = kernel_project_y(p, ijk[1]);
@@ -145,9 +147,9 @@ static __attribute__((noinline, cold)) void kernel_triangle_mend(const kernel_pa
     *ik = vf_select(weak, kernel_edge_between(ax, ay, cx, cy), *ik);
 }
 
-SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
+SIMD_INLINE void kernel_transform(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
 {
-    kernel_place_in(p->frame, p->tile, world, out_x, out_y, out_z);
+    kernel_transform_in_tile(p->frame, p->tile, world, out_x, out_y, out_z);
 }
 
 /* The following functions intersect rays with hexes, wedges and pyramids, which have quadrilateral faces and may be
@@ -164,12 +166,12 @@ SIMD_INLINE void kernel_curved_edge(const kernel_packet *p, const kernel_cell *c
                                     kernel_edges *out)
 {
     const int a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
-    out->e[a][b] = kernel_edge(p, &c->lines[n], kernel_cell_spot(c, a), kernel_cell_spot(c, b));
+    out->e[a][b] = kernel_edge(p, &c->lines[n], kernel_cell_position(c, a), kernel_cell_position(c, b));
 }
 
-SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const grid *g)
+SIMD_INLINE void kernel_cell_transform(kernel_cell *c, const kernel_packet *p, const grid *g)
 {
-    kernel_cell_place_in(c, p->frame, p->tile, g);
+    kernel_cell_transform_in_tile(c, p->frame, p->tile, g);
     if (p->is_pencil) kernel_cell_lines(c, p->frame, p->tile);
 }
 
@@ -187,27 +189,27 @@ SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, 
 
 /* Computes the weights of the triangle i, j, k again on rays for which they are not accurate enough. least: an upper
  * bound of kernel_triangle_least() for the triangle, tested first. */
-SIMD_INLINE void kernel_weights_mend(const kernel_packet *p, float least, vm hit, kernel_spot i, kernel_spot j,
-                                     kernel_spot k, kernel_weights *w)
+SIMD_INLINE void kernel_weights_recompute(const kernel_packet *p, float least, vm hit, kernel_tile_position i,
+                                          kernel_tile_position j, kernel_tile_position k, kernel_weights *w)
 {
     if (!p->is_pencil) return;
     const vf weight = kernel_weight(w->ij, w->jk, w->ik);
-    if (__builtin_expect(!vm_any(kernel_weak(hit, weight, least)), 1)) return;
-    const vm weak = kernel_weak(hit, weight, kernel_triangle_least(p, i, j, k));
+    if (__builtin_expect(!vm_any(kernel_is_inaccurate(hit, weight, least)), 1)) return;
+    const vm weak = kernel_is_inaccurate(hit, weight, kernel_triangle_least(p, i, j, k));
     vf ij = w->ij, jk = w->jk, ik = w->ik;
     if (!vm_any(weak)) return;
-    kernel_triangle_mend(p, (const kernel_spot[3]){i, j, k}, weak, &ij, &jk, &ik);
+    kernel_triangle_recompute(p, (const kernel_tile_position[3]){i, j, k}, weak, &ij, &jk, &ik);
     *w = kernel_weights_of(w->i, w->j, w->k, ij, jk, ik);
 }
 
-SIMD_INLINE vf kernel_weigh(const kernel_weights *w, float fi, float fj, float fk)
+SIMD_INLINE vf kernel_weighted_sum(const kernel_weights *w, float fi, float fj, float fk)
 {
-    return kernel_weigh_value(w->ij, w->jk, w->ik, fi, fj, fk) * w->inverse;
+    return kernel_weighted_value(w->ij, w->jk, w->ik, fi, fj, fk) * w->inverse;
 }
 
-SIMD_INLINE vf kernel_weigh_depth(const kernel_weights *w, const float *z)
+SIMD_INLINE vf kernel_weighted_depth(const kernel_weights *w, const float *z)
 {
-    return kernel_weigh(w, z[w->i], z[w->j], z[w->k]);
+    return kernel_weighted_sum(w, z[w->i], z[w->j], z[w->k]);
 }
 
 /* Parameters of a search for crossings that are common to all faces of the cell: the packet and its rays, the cell, its
@@ -225,9 +227,9 @@ SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kerne
 {
     const kernel_cell *c = s->cell;
     const kernel_shape *shape = s->shape;
-    out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
+    out->v = kernel_weighted_sum(w, c->f[w->i], c->f[w->j], c->f[w->k]);
     for (int a = 0; a < 3; a++)
-        out->r[a] = kernel_weigh(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
+        out->r[a] = kernel_weighted_sum(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
 }
 
 /* Returns the edge function from one corner to another, negated if they are not in the order of coordinates. */
@@ -236,7 +238,7 @@ SIMD_INLINE vf kernel_corner_edge(const kernel_cell *c, const kernel_edges *edge
     return c->rank[from] < c->rank[to] ? edges->e[from][to] : -edges->e[to][from];
 }
 
-SIMD_INLINE void kernel_quad_take(const kernel_projected *q, const float *z, const int corner[4], kernel_quad *out)
+SIMD_INLINE void kernel_quad_set(const kernel_projected *q, const float *z, const int corner[4], kernel_quad *out)
 {
     for (int i = 0; i < 4; i++) {
         out->x[i] = q->x[corner[i]];
@@ -247,7 +249,7 @@ SIMD_INLINE void kernel_quad_take(const kernel_projected *q, const float *z, con
 
 /* Computes values and reference coordinates at a crossing of a quad's bilinear patch. The isoparametric maps of both
  * cells contain this patch, so the field is continuous across the face. */
-SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_quad_place *at,
+SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_quad_point *at,
                                     kernel_crossing *out)
 {
     const kernel_cell *c = s->cell;
@@ -294,10 +296,10 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int
     if (!vm_any(hit)) return false;
     kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]],
                                          edges->e[ijk[0]][ijk[2]]);
-    kernel_weights_mend(s->packet, c->least[0], hit, kernel_cell_spot(c, w.i), kernel_cell_spot(c, w.j),
-                        kernel_cell_spot(c, w.k), &w);
+    kernel_weights_recompute(s->packet, c->least[0], hit, kernel_cell_position(c, w.i), kernel_cell_position(c, w.j),
+                             kernel_cell_position(c, w.k), &w);
     out->mask = hit;
-    out->t = kernel_weigh_depth(&w, c->z);
+    out->t = kernel_weighted_depth(&w, c->z);
     kernel_triangle_values(s, &w, out);
     return true;
 }
@@ -323,7 +325,7 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
     const kernel_edges *edges = s->edges;
     const vm rays = s->rays;
     kernel_quad quad;
-    kernel_quad_place places[2];
+    kernel_quad_point places[2];
     vm once = vm_none();
     for (int half = 0; half < 2; half++) {
         const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};
@@ -338,8 +340,8 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
     const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
     if (!vm_any(vm_or(once, twice))) return 0;
     if (kernel_quad_collapses(c, corner)) return kernel_collapsed_crossings(s, corner, out);
-    kernel_quad_take(s->projected, c->z, corner, &quad);
-    const int n = kernel_quad_places(&quad, once, twice, places);
+    kernel_quad_set(s->projected, c->z, corner, &quad);
+    const int n = kernel_quad_points(&quad, once, twice, places);
     for (int i = 0; i < n; i++) kernel_quad_values(s, corner, &places[i], &out[i]);
     return n;
 }
@@ -354,8 +356,8 @@ SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cel
     kernel_edges edges;
     const kernel_face_search s = {p, c, shape, &q, &edges, rays};
     for (int i = 0; i < c->count; i++) {
-        q.x[i] = kernel_project_x(p, kernel_cell_spot(c, i));
-        q.y[i] = kernel_project_y(p, kernel_cell_spot(c, i));
+        q.x[i] = kernel_project_x(p, kernel_cell_position(c, i));
+        q.y[i] = kernel_project_y(p, kernel_cell_position(c, i));
     }
     for (int n = 0; n < shape->edge_count; n++)
         kernel_curved_edge(p, c, n, shape->edges[n][0], shape->edges[n][1], &edges);

@@ -9,7 +9,7 @@
 
 #include "kernel_crossings.h"
 #include "kernel_packet.h"
-#include "kernel_placed_curved.h"
+#include "kernel_transformed_curved.h"
 #include "kernel_quad.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_trace.h"
@@ -34,9 +34,9 @@ SIMD_INLINE void kernel_curved_project(const float (*at)[8][SIMD_WIDTH], const k
                                        kernel_projected *out)
 {
     for (int i = 0; i < grid_type_vertices(type); i++) {
-        const vf z = kernel_take(at[2][i], r->lane);
-        out->x[i] = (kernel_take(at[0][i], r->lane) - r->rays.origin_x) - r->rays.slope_x * z;
-        out->y[i] = (kernel_take(at[1][i], r->lane) - r->rays.origin_y) - r->rays.slope_y * z;
+        const vf z = kernel_gather_lane(at[2][i], r->lane);
+        out->x[i] = (kernel_gather_lane(at[0][i], r->lane) - r->rays.origin_x) - r->rays.slope_x * z;
+        out->y[i] = (kernel_gather_lane(at[1][i], r->lane) - r->rays.origin_y) - r->rays.slope_y * z;
     }
 }
 
@@ -77,19 +77,19 @@ SIMD_INLINE vi kernel_curved_around(const kernel_curved_sides *sides, int type)
 
 /* Returns the rays that cross just one half of a quad, even if it does not look convex; the result does not depend on
  * which diagonal halves it. Adds the rays that may cross its patch twice to *alone. */
-SIMD_INLINE vm kernel_curved_once(const kernel_projected *s, const kernel_curved_sides *sides,
-                                  const kernel_shape *shape, int face, vm rays, vm *alone)
+SIMD_INLINE vm kernel_curved_cross_one_triangle(const kernel_projected *s, const kernel_curved_sides *sides,
+                                                const kernel_shape *shape, int face, vm rays, vm *alone)
 {
     vm side[4];
     kernel_quad_around(shape, face, sides, side);
-    *alone = vm_or(*alone, kernel_curved_bends(s->x, s->y, shape->faces[face].vertices, rays, side));
-    return kernel_halves_once(side, vm_sign(sides->side[shape->edge_count + face]));
+    *alone = vm_or(*alone, kernel_curved_may_cross_twice(s->x, s->y, shape->faces[face].vertices, rays, side));
+    return kernel_cross_one_triangle(side, vm_sign(sides->side[shape->edge_count + face]));
 }
 
 /* Finds the two faces that each ray crosses once. Any other ray is marked to be traced in its cell alone (out->alone).
  * at: the cells' vertices, per lane. dents: per ray, bits of the quads that may not look convex; NULL: there are none.
  */
-SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *dents,
+SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *nonconvex,
                                     vm rays, kernel_curved_crossed *out, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -99,15 +99,15 @@ SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kern
     kernel_curved_sides_of(&seen, type, &sides);
     vm alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides.least));
     vi faces = kernel_curved_around(&sides, type);
-    for (int face = 0; dents && face < shape->face_count; face++) {
-        if (shape->faces[face].count == 3 || !vm_any(vm_and(rays, vm_sign(*dents << (31 - face))))) continue;
-        const vm once = kernel_curved_once(&seen, &sides, shape, face, rays, &alone);
+    for (int face = 0; nonconvex && face < shape->face_count; face++) {
+        if (shape->faces[face].count == 3 || !vm_any(vm_and(rays, vm_sign(*nonconvex << (31 - face))))) continue;
+        const vm once = kernel_curved_cross_one_triangle(&seen, &sides, shape, face, rays, &alone);
         faces = (faces & ~vi_set(1 << face)) | vi_select(once, vi_set(1 << face), vi_set(0));
     }
     kernel_curved_count(faces, rays, alone, out);
 }
 
-SIMD_INLINE void kernel_curved_faces(const kernel_placed_curved *h, const kernel_lane_rays *p, int type,
+SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
                                      kernel_curved_crossed *out)
 {
     const vi all = vi_set((1 << KERNEL_CURVED_FACES) - 1);
@@ -122,35 +122,38 @@ typedef struct kernel_curved_quad {
     vf f[4];
 } kernel_curved_quad;
 
-SIMD_INLINE vi kernel_face_word(const kernel_placed_curved *h, vi lane, vi face)
+SIMD_INLINE vi kernel_face_word(const kernel_transformed_curved *h, vi lane, vi face)
 {
     return vi_from_bits(vf_gather((const float *)(const void *)h->corners, face * SIMD_WIDTH + lane));
 }
 
-SIMD_INLINE void kernel_curved_quad_take(const kernel_placed_curved *h, const kernel_lane_rays *p, int type, vi face,
-                                         kernel_quad *q, kernel_curved_quad *out)
+SIMD_INLINE void kernel_curved_quad_gather(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
+                                           vi face, kernel_quad *q, kernel_curved_quad *out)
 {
     const int count = grid_type_vertices(type);
     const vi word = kernel_face_word(h, p->lane, face);
     for (int i = 0; i < 4; i++) {
         const vi corner = word >> (4 * i) & 7;
         out->corner[i] = corner;
-        q->z[i] = kernel_curved_pick(h->at[2], count, p->lane, corner);
-        q->x[i] = (kernel_curved_pick(h->at[0], count, p->lane, corner) - p->rays.origin_x) - p->rays.slope_x * q->z[i];
-        q->y[i] = (kernel_curved_pick(h->at[1], count, p->lane, corner) - p->rays.origin_y) - p->rays.slope_y * q->z[i];
-        out->f[i] = kernel_curved_pick(h->at[3], count, p->lane, corner);
+        q->z[i] = kernel_curved_gather_vertex(h->at[2], count, p->lane, corner);
+        q->x[i] = (kernel_curved_gather_vertex(h->at[0], count, p->lane, corner) - p->rays.origin_x) -
+                  p->rays.slope_x * q->z[i];
+        q->y[i] = (kernel_curved_gather_vertex(h->at[1], count, p->lane, corner) - p->rays.origin_y) -
+                  p->rays.slope_y * q->z[i];
+        out->f[i] = kernel_curved_gather_vertex(h->at[3], count, p->lane, corner);
     }
 }
 
-SIMD_INLINE void kernel_curved_quad_place(int type, const kernel_curved_quad *own, const kernel_quad_place *place,
-                                          kernel_point *out)
+SIMD_INLINE void kernel_curved_quad_reference(int type, const kernel_curved_quad *own, const kernel_quad_point *place,
+                                              kernel_point *out)
 {
     out->t = place->t;
     out->value = kernel_bilinear(own->f, place->s, place->r);
     for (int a = 0; a < 3; a++) {
         vf at[4];
         for (int i = 0; i < 4; i++)
-            at[i] = kernel_curved_own(kernel_cell_shape(type), grid_type_vertices(type), a, own->corner[i]);
+            at[i] =
+                kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, own->corner[i]);
         out->r[a] = (at[0] + place->s * (at[1] - at[0])) + place->r * (at[3] - at[0]);
     }
 }
@@ -162,17 +165,18 @@ typedef struct kernel_curved_triangle {
 } kernel_curved_triangle;
 
 /* Returns the rays on which the triangle's weights are not good enough. number: the triangle's, per ray. */
-SIMD_INLINE vm kernel_curved_triangle_weak(const kernel_placed_curved *h, vi lane, vm rays, vi number,
-                                           const kernel_curved_triangle *own)
+SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
+                                                 const kernel_curved_triangle *own)
 {
     const vf weight = kernel_weight(own->e[0], own->e[1], own->e[2]);
     return vm_and(rays, vf_lt(vf_abs(weight), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
 }
 
 /* Computes edge functions in doubt, and those of weak weights, again from projected vertices. */
-static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const kernel_placed_curved *h,
-                                                                        const kernel_lane_rays *p, vm rays, vi number,
-                                                                        const vm doubt[3], kernel_curved_triangle *own)
+static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(const kernel_transformed_curved *h,
+                                                                             const kernel_lane_rays *p, vm rays,
+                                                                             vi number, const vm doubt[3],
+                                                                             kernel_curved_triangle *own)
 {
     vf x[3], y[3], e[3];
     for (int i = 0; i < 3; i++) {
@@ -185,14 +189,14 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_mend(const ke
     e[1] = kernel_edge_between(x[1], y[1], x[2], y[2]);
     e[2] = kernel_edge_between(x[0], y[0], x[2], y[2]);
     for (int i = 0; i < 3; i++) own->e[i] = vf_select(doubt[i], e[i], own->e[i]);
-    const vm weak = kernel_curved_triangle_weak(h, p->lane, rays, number, own);
+    const vm weak = kernel_curved_triangle_inaccurate(h, p->lane, rays, number, own);
     for (int i = 0; i < 3; i++) own->e[i] = vf_select(weak, e[i], own->e[i]);
 }
 
 /* Gathers the corners and edge functions of the triangle `face` for the given rays. Other lanes get valid but
  * meaningless numbers. */
-SIMD_INLINE void kernel_curved_triangle_take(const kernel_placed_curved *h, const kernel_lane_rays *p, int type,
-                                             vm rays, vi face, kernel_curved_triangle *own)
+SIMD_INLINE void kernel_curved_triangle_gather(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
+                                               vm rays, vi face, kernel_curved_triangle *own)
 {
     const int size = (int)(sizeof(kernel_triangle_lines) / sizeof(float));
     const vi number = vi_select(rays, face - kernel_first_triangle(type), vi_set(0)), at = number * size + p->lane;
@@ -206,33 +210,34 @@ SIMD_INLINE void kernel_curved_triangle_take(const kernel_placed_curved *h, cons
         doubt[i] = vm_andnot(rays, vf_lt(vf_gather(lines->bound[i], at), vf_abs(own->e[i])));
         any = vm_or(any, doubt[i]);
     }
-    any = vm_or(any, kernel_curved_triangle_weak(h, p->lane, rays, number, own));
-    if (__builtin_expect(vm_any(any), 0)) kernel_curved_triangle_mend(h, p, rays, number, doubt, own);
+    any = vm_or(any, kernel_curved_triangle_inaccurate(h, p->lane, rays, number, own));
+    if (__builtin_expect(vm_any(any), 0)) kernel_curved_triangle_recompute(h, p, rays, number, doubt, own);
 }
 
 /* Returns the mean of the corners' values v, weighted by the edge functions. */
-SIMD_INLINE vf kernel_curved_weigh(const kernel_curved_triangle *own, const vf v[3], vf inverse)
+SIMD_INLINE vf kernel_curved_weighted_mean(const kernel_curved_triangle *own, const vf v[3], vf inverse)
 {
     return vf_muladd(own->e[0], v[2], vf_muladd(-own->e[2], v[1], own->e[1] * v[0])) * inverse;
 }
 
-SIMD_INLINE void kernel_curved_triangle_place(const kernel_placed_curved *h, int type, vi lane,
-                                              const kernel_curved_triangle *own, kernel_point *out)
+SIMD_INLINE void kernel_curved_triangle_reference(const kernel_transformed_curved *h, int type, vi lane,
+                                                  const kernel_curved_triangle *own, kernel_point *out)
 {
     const int count = grid_type_vertices(type);
     const vf inverse = 1.0f / kernel_weight(own->e[0], own->e[1], own->e[2]);
     vf v[3];
-    for (int i = 0; i < 3; i++) v[i] = kernel_curved_pick(h->at[2], count, lane, own->corner[i]);
-    out->t = kernel_curved_weigh(own, v, inverse);
-    for (int i = 0; i < 3; i++) v[i] = kernel_curved_pick(h->at[3], count, lane, own->corner[i]);
-    out->value = kernel_curved_weigh(own, v, inverse);
+    for (int i = 0; i < 3; i++) v[i] = kernel_curved_gather_vertex(h->at[2], count, lane, own->corner[i]);
+    out->t = kernel_curved_weighted_mean(own, v, inverse);
+    for (int i = 0; i < 3; i++) v[i] = kernel_curved_gather_vertex(h->at[3], count, lane, own->corner[i]);
+    out->value = kernel_curved_weighted_mean(own, v, inverse);
     for (int a = 0; a < 3; a++) {
-        for (int i = 0; i < 3; i++) v[i] = kernel_curved_own(kernel_cell_shape(type), count, a, own->corner[i]);
-        out->r[a] = kernel_curved_weigh(own, v, inverse);
+        for (int i = 0; i < 3; i++)
+            v[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), count, a, own->corner[i]);
+        out->r[a] = kernel_curved_weighted_mean(own, v, inverse);
     }
 }
 
-SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel_lane_rays *p, int type, vi faces,
+SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type, vi faces,
                                      kernel_point out[2])
 {
     const vi face[2] = {faces & 7, faces >> 3 & 7};
@@ -243,19 +248,19 @@ SIMD_INLINE void kernel_curved_cross(const kernel_placed_curved *h, const kernel
     if (kernel_is_box(type) || vm_any(vm_or(once[0], once[1]))) {
         kernel_quad own[2];
         kernel_curved_quad corners[2];
-        kernel_quad_place places[2];
-        for (int n = 0; n < quads; n++) kernel_curved_quad_take(h, p, type, face[n], &own[n], &corners[n]);
+        kernel_quad_point places[2];
+        for (int n = 0; n < quads; n++) kernel_curved_quad_gather(h, p, type, face[n], &own[n], &corners[n]);
         /* these rays' edge functions have certain signs, so no ray meets an edge */
         kernel_quads_cross(own, quads, once, true, places);
-        for (int n = 0; n < quads; n++) kernel_curved_quad_place(type, &corners[n], &places[n], &out[n]);
+        for (int n = 0; n < quads; n++) kernel_curved_quad_reference(type, &corners[n], &places[n], &out[n]);
     }
     for (int n = 0; n < 2 && kernel_has_triangles(type); n++) {
         const vm on_triangle = vm_andnot(p->active, on_quad[n]);
         kernel_curved_triangle own;
         kernel_point place;
         if (!vm_any(on_triangle)) continue;
-        kernel_curved_triangle_take(h, p, type, on_triangle, face[n], &own);
-        kernel_curved_triangle_place(h, type, p->lane, &own, &place);
+        kernel_curved_triangle_gather(h, p, type, on_triangle, face[n], &own);
+        kernel_curved_triangle_reference(h, type, p->lane, &own, &place);
         kernel_point_move(on_triangle, &place, &out[n]);
     }
     kernel_points_order(out);

@@ -31,9 +31,9 @@
 #define KERNEL_DOUBLE_EDGE 1e-3
 
 /* What float32 loses of an interval: its exact length in t, and the rounding errors of its two values. */
-typedef struct kernel_double {
+typedef struct kernel_precise_interval {
     vf length, rest_in, rest_out;
-} kernel_double;
+} kernel_precise_interval;
 
 /* An affine function of the ray: c[0] + c[1] u + c[2] v. */
 typedef struct kernel_affine {
@@ -52,12 +52,12 @@ typedef struct kernel_double_cell {
 
 /* The (u, v) of a packet's rays in double, relative to the tile's centre. */
 typedef struct kernel_double_rays {
-    kernel_half u[2], v[2];
+    kernel_f64 u[2], v[2];
 } kernel_double_rays;
 
-SIMD_INLINE kernel_double kernel_double_of(const kernel_interval *i)
+SIMD_INLINE kernel_precise_interval kernel_precise_interval_of(const kernel_interval *i)
 {
-    return (kernel_double){i->t_out - i->t_in, vf_set(0), vf_set(0)};
+    return (kernel_precise_interval){i->t_out - i->t_in, vf_set(0), vf_set(0)};
 }
 
 SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_double_rays *out)
@@ -76,20 +76,21 @@ SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_double_ray
 
 /* A vertex in tile space before it is rounded to float32. `depth` is the factor of u and v in the vertex's projection;
  * t and value are the depth and the field. */
-typedef struct kernel_double_spot {
+typedef struct kernel_double_vertex {
     double x, y, depth, t, value;
-} kernel_double_spot;
+} kernel_double_vertex;
 
-SIMD_INLINE kernel_double_spot kernel_double_place(const kernel_frame *f, const kernel_tile *tile, const double *world)
+SIMD_INLINE kernel_double_vertex kernel_double_transform(const kernel_frame *f, const kernel_tile *tile,
+                                                         const double *world)
 {
     double place[3] = {0, 0, 0};
     for (int a = 0; a < 3; a++)
         for (int b = 0; b < 3; b++) place[a] += f->scaled_axes[a][b] * (world[b] - f->job->camera.eye[b]);
     const double depth = f->job->camera.is_orthographic ? f->job->space.scale : place[2];
-    return (kernel_double_spot){.x = place[0] - tile->centre_x * depth,
-                                .y = place[1] - tile->centre_y * depth,
-                                .depth = depth,
-                                .t = place[2] - tile->depth_shift};
+    return (kernel_double_vertex){.x = place[0] - tile->centre_x * depth,
+                                  .y = place[1] - tile->centre_y * depth,
+                                  .depth = depth,
+                                  .t = place[2] - tile->depth_shift};
 }
 
 /* Returns the value in the transfer function's domain, clamped to +-1e18. */

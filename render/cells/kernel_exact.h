@@ -19,7 +19,7 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-SIMD_INLINE kernel_affine kernel_double_edge(const kernel_double_spot *a, const kernel_double_spot *b)
+SIMD_INLINE kernel_affine kernel_double_edge(const kernel_double_vertex *a, const kernel_double_vertex *b)
 {
     return (kernel_affine){
         {a->x * b->y - b->x * a->y, b->depth * a->y - a->depth * b->y, a->depth * b->x - b->depth * a->x}};
@@ -27,10 +27,10 @@ SIMD_INLINE kernel_affine kernel_double_edge(const kernel_double_spot *a, const 
 
 /* Computes the affine sums of one face (a row of kernel_tet_face) from the tet's vertices and edge functions. radius:
  * upper bound of the rays' |u| and |v|. */
-SIMD_INLINE void kernel_double_sums(const kernel_double_spot *spots, const kernel_affine *edges,
+SIMD_INLINE void kernel_double_sums(const kernel_double_vertex *spots, const kernel_affine *edges,
                                     const signed char *face, double radius, kernel_double_face *out)
 {
-    const kernel_double_spot *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
+    const kernel_double_vertex *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
     const kernel_affine *ij = &edges[face[3]], *jk = &edges[face[4]], *ik = &edges[face[5]];
     for (int n = 0; n < 3; n++) {
         out->depth.c[n] = (jk->c[n] * i->t - ik->c[n] * j->t) + ij->c[n] * k->t;
@@ -47,10 +47,10 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
                                                           const kernel_cell *c, const kernel_transfer *transfer,
                                                           kernel_double_cell *out)
 {
-    kernel_double_spot spots[4];
+    kernel_double_vertex spots[4];
     kernel_affine edges[KERNEL_TET_EDGES];
     for (int i = 0; i < 4; i++) {
-        spots[i] = kernel_double_place(f, tile, c->world[i]);
+        spots[i] = kernel_double_transform(f, tile, c->world[i]);
         spots[i].value = kernel_double_domain(transfer, c->values[i]);
     }
     for (int n = 0; n < KERNEL_TET_EDGES; n++)
@@ -63,27 +63,27 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
 
 /* Points at which rays meet a face's plane. is_sound: the face is not seen edge on. */
 typedef struct kernel_double_end {
-    kernel_half t, v;
-    kernel_half_mask is_sound;
+    kernel_f64 t, v;
+    kernel_f64_mask is_sound;
 } kernel_double_end;
 
-SIMD_INLINE kernel_half kernel_affine_at(const kernel_affine *a, kernel_half u, kernel_half v)
+SIMD_INLINE kernel_f64 kernel_affine_at(const kernel_affine *a, kernel_f64 u, kernel_f64 v)
 {
     return (a->c[0] + a->c[1] * u) + a->c[2] * v;
 }
 
-SIMD_INLINE kernel_double_end kernel_double_meet(const kernel_double_face *face, kernel_half u, kernel_half v)
+SIMD_INLINE kernel_double_end kernel_double_intersect(const kernel_double_face *face, kernel_f64 u, kernel_f64 v)
 {
-    const kernel_half weight = kernel_affine_at(&face->weight, u, v), inverse = 1.0 / weight;
+    const kernel_f64 weight = kernel_affine_at(&face->weight, u, v), inverse = 1.0 / weight;
     return (kernel_double_end){kernel_affine_at(&face->depth, u, v) * inverse,
                                kernel_affine_at(&face->value, u, v) * inverse,
-                               (kernel_half_mask)(weight * weight > face->least * face->least)};
+                               (kernel_f64_mask)(weight * weight > face->least * face->least)};
 }
 
-SIMD_INLINE void kernel_double_take(kernel_half_mask m, const kernel_double_end *from, kernel_double_end *to)
+SIMD_INLINE void kernel_double_select(kernel_f64_mask m, const kernel_double_end *from, kernel_double_end *to)
 {
-    to->t = kernel_half_select(m, from->t, to->t);
-    to->v = kernel_half_select(m, from->v, to->v);
+    to->t = kernel_f64_select(m, from->t, to->t);
+    to->v = kernel_f64_select(m, from->v, to->v);
     to->is_sound = (from->is_sound & m) | (to->is_sound & ~m);
 }
 
@@ -93,10 +93,10 @@ typedef struct kernel_double_lanes {
         rest_out[SIMD_WIDTH];
 } kernel_double_lanes;
 
-SIMD_INLINE void kernel_double_value(kernel_half value, float *v, float *rest)
+SIMD_INLINE void kernel_double_value(kernel_f64 value, float *v, float *rest)
 {
-    const kernel_half_floats rounded = kernel_half_narrow(value);
-    const kernel_half_floats lost = kernel_half_narrow(value - kernel_half_widen(rounded));
+    const kernel_f64_floats rounded = kernel_f64_narrow(value);
+    const kernel_f64_floats lost = kernel_f64_narrow(value - kernel_f64_widen(rounded));
     memcpy(v, &rounded, sizeof rounded);
     memcpy(rest, &lost, sizeof lost);
 }
@@ -105,21 +105,21 @@ SIMD_INLINE void kernel_double_half(const kernel_double_cell *cell, const kernel
                                     int half, kernel_double_lanes *out)
 {
     kernel_double_end first = {0}, last = {0};
-    kernel_half_mask met = {0};
+    kernel_f64_mask met = {0};
     const int lane = half * KERNEL_HALF;
     for (int n = 0; n < 4; n++) {
-        const kernel_half_mask m = kernel_half_of_mask(hit[n], half);
-        const kernel_double_end end = kernel_double_meet(&cell->faces[n], rays->u[half], rays->v[half]);
-        kernel_double_take(m & ~met, &end, &first);
-        kernel_double_take(m & met, &end, &last);
+        const kernel_f64_mask m = kernel_f64_of_mask(hit[n], half);
+        const kernel_double_end end = kernel_double_intersect(&cell->faces[n], rays->u[half], rays->v[half]);
+        kernel_double_select(m & ~met, &end, &first);
+        kernel_double_select(m & met, &end, &last);
         met |= m;
     }
-    const kernel_half_mask swap = (kernel_half_mask)(last.t < first.t);
+    const kernel_f64_mask swap = (kernel_f64_mask)(last.t < first.t);
     const kernel_double_end nearer = first;
-    kernel_double_take(swap, &last, &first);
-    kernel_double_take(swap, &nearer, &last);
-    const kernel_half_floats length = kernel_half_narrow(last.t - first.t);
-    const kernel_half_floats sound = __builtin_convertvector(first.is_sound & last.is_sound, kernel_half_floats);
+    kernel_double_select(swap, &last, &first);
+    kernel_double_select(swap, &nearer, &last);
+    const kernel_f64_floats length = kernel_f64_narrow(last.t - first.t);
+    const kernel_f64_floats sound = __builtin_convertvector(first.is_sound & last.is_sound, kernel_f64_floats);
     memcpy(out->length + lane, &length, sizeof length);
     memcpy(out->is_sound + lane, &sound, sizeof sound);
     kernel_double_value(first.v, out->v_in + lane, out->rest_in + lane);
@@ -128,12 +128,13 @@ SIMD_INLINE void kernel_double_half(const kernel_double_cell *cell, const kernel
 
 /* Computes the exact length and the rounding errors of interval *i, which kernel_tet_interval() has computed. The
  * interval's values are replaced by the doubles rounded to float32. */
-static __attribute__((noinline)) kernel_double kernel_tet_double(const kernel_packet *p, const kernel_cell *c,
-                                                                 const kernel_double_cell *cell,
-                                                                 const kernel_double_rays *rays, kernel_interval *i)
+static __attribute__((noinline)) kernel_precise_interval kernel_tet_double(const kernel_packet *p, const kernel_cell *c,
+                                                                           const kernel_double_cell *cell,
+                                                                           const kernel_double_rays *rays,
+                                                                           kernel_interval *i)
 {
     kernel_double_lanes lanes;
-    kernel_double out = kernel_double_of(i);
+    kernel_precise_interval out = kernel_precise_interval_of(i);
     vm hit[4];
     kernel_tet_faces(p, c, i->mask, hit);
     for (int half = 0; half < 2; half++) kernel_double_half(cell, rays, hit, half, &lanes);
@@ -160,7 +161,7 @@ static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, cons
 {
     double d[4][GRID_MAX_CELL_VERTICES];
     for (int i = 0; i < c->count; i++) {
-        const kernel_double_spot spot = kernel_double_place(p->frame, p->tile, c->world[i]);
+        const kernel_double_vertex spot = kernel_double_transform(p->frame, p->tile, c->world[i]);
         d[0][i] = spot.x;
         d[1][i] = spot.y;
         d[2][i] = spot.t;

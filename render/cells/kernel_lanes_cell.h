@@ -13,41 +13,41 @@
 #include "simd.h"
 
 /* Transforms one vertex per lane into tile space. */
-SIMD_INLINE void kernel_lanes_place(const kernel_frame *f, const kernel_tile *tile, const kernel_whole *const world[3],
-                                    vf out[3])
+SIMD_INLINE void kernel_lanes_transform(const kernel_frame *f, const kernel_tile *tile,
+                                        const kernel_wide_doubles *const world[3], vf out[3])
 {
     const double *eye = f->job->camera.eye;
     for (int half = 0; half < 2; half++) {
-        kernel_half d[3], at[3];
+        kernel_f64 d[3], at[3];
         for (int a = 0; a < 3; a++) d[a] = world[a]->half[half] - eye[a];
         for (int a = 0; a < 3; a++)
             at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
-        const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
-        kernel_half_put(&out[0], half, at[0] - tile->centre_x * depth);
-        kernel_half_put(&out[1], half, at[1] - tile->centre_y * depth);
-        kernel_half_put(&out[2], half, at[2] - tile->depth_shift);
+        const kernel_f64 depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
+        kernel_f64_store_lanes(&out[0], half, at[0] - tile->centre_x * depth);
+        kernel_f64_store_lanes(&out[1], half, at[1] - tile->centre_y * depth);
+        kernel_f64_store_lanes(&out[2], half, at[2] - tile->depth_shift);
     }
 }
 
 /* Subtracts each lane's isovalue from `count` values in double, and scales the differences of each lane by a power of
  * two that brings the largest near 1. */
-SIMD_INLINE void kernel_lanes_relative(const kernel_whole *values, int count, const double isovalues[SIMD_WIDTH],
+SIMD_INLINE void kernel_lanes_relative(const kernel_wide_doubles *values, int count, const double isovalues[SIMD_WIDTH],
                                        vf *out)
 {
     for (int half = 0; half < 2; half++) {
-        kernel_half isovalue, v[8], largest = {0};
+        kernel_f64 isovalue, v[8], largest = {0};
         memcpy(&isovalue, isovalues + half * KERNEL_HALF, sizeof isovalue);
         for (int i = 0; i < count; i++) {
             v[i] = values[i].half[half] - isovalue;
-            largest = kernel_half_max(kernel_half_abs(v[i]), largest);
+            largest = kernel_f64_max(kernel_f64_abs(v[i]), largest);
         }
         /* The exponent of the largest value, limited so that its negation gives a normal number. */
-        kernel_half_mask exponent = (kernel_half_mask)largest >> 52;
-        const kernel_half_mask low = exponent < 23;
-        const kernel_half_mask high = exponent > 2023;
+        kernel_f64_mask exponent = (kernel_f64_mask)largest >> 52;
+        const kernel_f64_mask low = exponent < 23;
+        const kernel_f64_mask high = exponent > 2023;
         exponent = (low & 23) | (high & 2023) | (exponent & ~(low | high));
-        const kernel_half scale = (kernel_half)((2046 - exponent) << 52);
-        for (int i = 0; i < count; i++) kernel_half_put(&out[i], half, v[i] * scale);
+        const kernel_f64 scale = (kernel_f64)((2046 - exponent) << 52);
+        for (int i = 0; i < count; i++) kernel_f64_store_lanes(&out[i], half, v[i] * scale);
     }
 }
 
@@ -61,7 +61,7 @@ SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile,
 }
 
 /* Returns the error bound of the edge function between two vertices whose sizes are given (kernel_lanes_size()). */
-SIMD_INLINE vf kernel_lanes_doubt(vf size_a, vf size_b)
+SIMD_INLINE vf kernel_lanes_edge_error(vf size_a, vf size_b)
 {
     return 6 * 6e-8f * (size_a * size_b);
 }
@@ -71,20 +71,20 @@ SIMD_INLINE void kernel_lanes_line(const kernel_frame *f, const vf a[3], const v
 {
     const bool flat = f->job->camera.is_orthographic;
     for (int half = 0; half < 2; half++) {
-        const kernel_half ax = kernel_half_of(&a[0], half), ay = kernel_half_of(&a[1], half);
-        const kernel_half bx = kernel_half_of(&b[0], half), by = kernel_half_of(&b[1], half);
-        kernel_half da = kernel_half_of(&a[2], half) + f->depth_shift;
-        kernel_half db = kernel_half_of(&b[2], half) + f->depth_shift;
-        if (flat) da = db = (kernel_half){0} + 1;
-        kernel_half_put(&line[0], half, ax * by - bx * ay);
-        kernel_half_put(&line[1], half, db * ay - da * by);
-        kernel_half_put(&line[2], half, da * bx - db * ax);
+        const kernel_f64 ax = kernel_f64_of(&a[0], half), ay = kernel_f64_of(&a[1], half);
+        const kernel_f64 bx = kernel_f64_of(&b[0], half), by = kernel_f64_of(&b[1], half);
+        kernel_f64 da = kernel_f64_of(&a[2], half) + f->depth_shift;
+        kernel_f64 db = kernel_f64_of(&b[2], half) + f->depth_shift;
+        if (flat) da = db = (kernel_f64){0} + 1;
+        kernel_f64_store_lanes(&line[0], half, ax * by - bx * ay);
+        kernel_f64_store_lanes(&line[1], half, db * ay - da * by);
+        kernel_f64_store_lanes(&line[2], half, da * bx - db * ax);
     }
 }
 
-/* Computes the error that the edge function may have, and the edge's extent (kernel_blur). */
-SIMD_INLINE void kernel_lanes_line_blur(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
-                                        vf *extent)
+/* Computes the error that the edge function may have, and the edge's extent (kernel_edge_error). */
+SIMD_INLINE void kernel_lanes_line_error(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
+                                         vf *extent)
 {
     vf apart[3];
     for (int i = 0; i < 3; i++) apart[i] = vf_abs(a[i] - b[i]);

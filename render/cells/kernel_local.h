@@ -28,7 +28,7 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
+enum { KERNEL_NONLINEAR_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
 
 /* Squares of the largest norm of the derivative of the map's nonlinear part: 0.78, and 0.89 for callers that bound the
  * error of the reference coordinates themselves. */
@@ -40,17 +40,17 @@ enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
 typedef struct kernel_local_cells {
     /* affine approximation y of the reference coordinates of a position X: y = inverse (X - origin) + offset */
     float origin[3][SIMD_WIDTH], inverse[3][3][SIMD_WIDTH], offset[3][SIMD_WIDTH];
-    float bent[KERNEL_BENT_TERMS][3][SIMD_WIDTH];
-    float field[4 + KERNEL_BENT_TERMS][SIMD_WIDTH];
+    float nonlinear_part[KERNEL_NONLINEAR_TERMS][3][SIMD_WIDTH];
+    float field[4 + KERNEL_NONLINEAR_TERMS][SIMD_WIDTH];
     /* bounds, over all points inside the cell, of the affine approximation y of the reference coordinates */
     float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
     /* square of an upper bound of the Frobenius norm of n's derivative */
     float bend[SIMD_WIDTH];
     /* error bound of the reference coordinates: a point closer to the cell's border may be on either side of it */
-    float blur[SIMD_WIDTH];
+    float error_bound[SIMD_WIDTH];
 } kernel_local_cells;
 
-SIMD_INLINE int kernel_bent_terms(int type)
+SIMD_INLINE int kernel_nonlinear_count(int type)
 {
     return kernel_is_box(type) ? 4 : kernel_is_prism(type) ? 2 : kernel_has_apex(type) ? 1 : 0;
 }
@@ -87,12 +87,12 @@ SIMD_INLINE void kernel_wedge_terms(const vf v[6], vf out[8])
 
 SIMD_INLINE void kernel_pyramid_terms(const vf v[5], vf out[8])
 {
-    const vf along = v[1] - v[0], across = v[3] - v[0], bent = (v[0] - v[1]) + (v[2] - v[3]);
+    const vf along = v[1] - v[0], across = v[3] - v[0], nonlinear_part = (v[0] - v[1]) + (v[2] - v[3]);
     out[0] = v[4];
-    out[1] = along + 0.5f * bent;
-    out[2] = across + 0.5f * bent;
+    out[1] = along + 0.5f * nonlinear_part;
+    out[2] = across + 0.5f * nonlinear_part;
     out[3] = 0.25f * ((v[0] + v[1]) + (v[2] + v[3])) - v[4];
-    out[4] = bent;
+    out[4] = nonlinear_part;
 }
 
 SIMD_INLINE void kernel_tet_terms(const vf v[4], vf out[8])
@@ -114,11 +114,11 @@ SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
 }
 
 /* The nonlinear terms of a cell's map at given reference coordinates, and their derivatives along each of these. */
-typedef struct kernel_bend {
-    vf term[KERNEL_BENT_TERMS], along[KERNEL_BENT_TERMS][3];
-} kernel_bend;
+typedef struct kernel_nonlinear_terms {
+    vf term[KERNEL_NONLINEAR_TERMS], along[KERNEL_NONLINEAR_TERMS][3];
+} kernel_nonlinear_terms;
 
-SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
+SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], kernel_nonlinear_terms *b)
 {
     const vf zero = vf_set(0);
     if (kernel_is_box(type)) {
@@ -147,9 +147,9 @@ SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
 /* ---- the order of vertices ----
  * The rounding of terms depends on the order of a cell's vertices, which differs between simulation codes and ranks. So
  * vertices are permuted into a canonical order: first the vertex with the smallest position, then along its edges in
- * the order of positions. kernel_cell_turn() does the same by the caller's coordinates. Positions in tile space are the
- * same on all ranks. Vertices with the same position keep their order; cells with such vertices are not processed in
- * lanes. */
+ * the order of positions. kernel_cell_canonical_order() does the same by the caller's coordinates. Positions in tile
+ * space are the same on all ranks. Vertices with the same position keep their order; cells with such vertices are not
+ * processed in lanes. */
 
 SIMD_INLINE vm kernel_local_before(const vf a[3], const vf b[3])
 {
@@ -189,7 +189,7 @@ SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertic
     }
 }
 
-SIMD_INLINE void kernel_hex_turn(vf (*at)[8], int lists)
+SIMD_INLINE void kernel_hex_sort_vertices(vf (*at)[8], int lists)
 {
     /* vertex number for the bits of its reference coordinates x, y, z */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -211,7 +211,7 @@ SIMD_INLINE void kernel_hex_turn(vf (*at)[8], int lists)
     }
 }
 
-SIMD_INLINE void kernel_wedge_turn(vf (*at)[8], int lists)
+SIMD_INLINE void kernel_wedge_sort_vertices(vf (*at)[8], int lists)
 {
     static const signed char vertex[6] = {0, 1, 2, 3, 4, 5};
     vm is_least[8];
@@ -228,7 +228,7 @@ SIMD_INLINE void kernel_wedge_turn(vf (*at)[8], int lists)
     kernel_local_swap(at, lists, swap, 4, 5);
 }
 
-SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], int lists)
+SIMD_INLINE void kernel_pyramid_sort_vertices(vf (*at)[8], int lists)
 {
     static const signed char vertex[4] = {0, 1, 2, 3};
     vm is_least[8];
@@ -243,14 +243,14 @@ SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], int lists)
 
 /* Permutes the vertices of a hex, wedge or pyramid in each lane into the canonical order of their positions. at[0] to
  * at[2] are the positions; all lists are permuted with them. */
-SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], int lists)
+SIMD_INLINE void kernel_local_sort_vertices(int type, vf (*at)[8], int lists)
 {
     if (kernel_is_box(type))
-        kernel_hex_turn(at, lists);
+        kernel_hex_sort_vertices(at, lists);
     else if (kernel_is_prism(type))
-        kernel_wedge_turn(at, lists);
+        kernel_wedge_sort_vertices(at, lists);
     else
-        kernel_pyramid_turn(at, lists);
+        kernel_pyramid_sort_vertices(at, lists);
 }
 
 /* Returns the distance of r from the cell's border, in reference coordinates; it is negative outside. */
@@ -268,7 +268,7 @@ SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
 /* ---- cells ---- */
 
 /* Returns the square of the largest Frobenius norm of n's derivative over the cell's corners. */
-SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
+SIMD_INLINE vf kernel_local_bent(int type, const vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3])
 {
     static const float corners[2][8][3] = {{{-0.5f, -0.5f, -0.5f},
                                             {0.5f, -0.5f, -0.5f},
@@ -284,20 +284,20 @@ SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
                                             {-1.0f / 3, -1.0f / 3, 0.5f},
                                             {2.0f / 3, -1.0f / 3, 0.5f},
                                             {-1.0f / 3, 2.0f / 3, 0.5f}}};
-    const vf *b0 = bent[0];
+    const vf *b0 = nonlinear_part[0];
     vf most = vf_set(0);
     /* The derivatives of αβ / k along k, α and β are at most 1/4, 1/2 and 1/2. */
     if (kernel_has_apex(type)) return 0.5625f * ((b0[0] * b0[0] + b0[1] * b0[1]) + b0[2] * b0[2]);
     for (int n = 0; n < (kernel_is_box(type) ? 8 : kernel_is_prism(type) ? 6 : 0); n++) {
         const float *corner = corners[kernel_is_box(type) ? 0 : 1][n];
         const vf r[3] = {vf_set(corner[0]), vf_set(corner[1]), vf_set(corner[2])};
-        kernel_bend b;
+        kernel_nonlinear_terms b;
         vf sum = vf_set(0);
-        kernel_bend_at(type, r, &b);
+        kernel_nonlinear_terms_at(type, r, &b);
         for (int i = 0; i < 3; i++)
             for (int a = 0; a < 3; a++) {
                 vf slope = vf_set(0);
-                for (int k = 0; k < kernel_bent_terms(type); k++) slope += bent[k][a] * b.along[k][i];
+                for (int k = 0; k < kernel_nonlinear_count(type); k++) slope += nonlinear_part[k][a] * b.along[k][i];
                 sum += slope * slope;
             }
         most = vf_max(sum, most);
@@ -321,12 +321,12 @@ SIMD_INLINE void kernel_local_invert(const vf m[3][8], vf inverse[3][3])
 }
 
 /* Computes bounds of the affine approximation y of the reference coordinates: its range over all vertices, widened by
- * the error bound of kernel_local_blur(). No point of the cell is outside of these bounds, because each is a mean of
- * the vertices with non-negative weights. */
+ * the error bound of kernel_local_error_bound(). No point of the cell is outside of these bounds, because each is a
+ * mean of the vertices with non-negative weights. */
 SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inverse[3][3], const vf offset[3],
                                     kernel_local_cells *out)
 {
-    const vf pad = 1e-3f + vf_load(out->blur);
+    const vf pad = 1e-3f + vf_load(out->error_bound);
     for (int i = 0; i < 3; i++) {
         vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
         for (int n = 0; n < count; n++) {
@@ -343,7 +343,8 @@ SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inver
  * (kernel_quad.h) err by 3e-7 of the cell's size and by half a unit in the last place of their depth; projected
  * vertices err by a few units of their positions across the ray; and r errs by the 2e-6 that Newton's method leaves,
  * and by as many units of a position. */
-SIMD_INLINE void kernel_local_blur(int count, const vf places[3][8], const vf inverse[3][3], kernel_local_cells *out)
+SIMD_INLINE void kernel_local_error_bound(int count, const vf places[3][8], const vf inverse[3][3],
+                                          kernel_local_cells *out)
 {
     vf size[3], most = vf_set(0);
     for (int a = 0; a < 3; a++) {
@@ -354,7 +355,7 @@ SIMD_INLINE void kernel_local_blur(int count, const vf places[3][8], const vf in
         most = vf_max((vf_abs(inverse[i][0]) * size[0] + vf_abs(inverse[i][1]) * size[1]) * 4.0f +
                           vf_abs(inverse[i][2]) * size[2],
                       most);
-    vf_store(out->blur, 4e-6f + 1.2e-7f * most);
+    vf_store(out->error_bound, 4e-6f + 1.2e-7f * most);
 }
 
 /* Computes the coefficients of one cell of this type per lane, from vertices in tile space and the field at them.
@@ -363,8 +364,8 @@ SIMD_INLINE void kernel_local_blur(int count, const vf places[3][8], const vf in
 SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf values[8], float most_bent,
                                   kernel_local_cells *out)
 {
-    const int count = grid_type_vertices(type), bends = kernel_bent_terms(type);
-    vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], bent[KERNEL_BENT_TERMS][3];
+    const int count = grid_type_vertices(type), bends = kernel_nonlinear_count(type);
+    vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
     for (int a = 0; a < 3; a++) {
         for (int n = 0; n < count; n++) at[a][n] = places[a][n] - places[a][0];
         kernel_local_terms(type, at[a], terms[a]);
@@ -378,16 +379,16 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
         offset[i] = -((inverse[i][0] * terms[0][0] + inverse[i][1] * terms[1][0]) + inverse[i][2] * terms[2][0]);
         vf_store(out->offset[i], offset[i]);
         for (int k = 0; k < bends; k++) {
-            bent[k][i] = inverse[i][0] * terms[0][4 + k] + inverse[i][1] * terms[1][4 + k];
-            bent[k][i] += inverse[i][2] * terms[2][4 + k];
-            vf_store(out->bent[k][i], bent[k][i]);
+            nonlinear_part[k][i] = inverse[i][0] * terms[0][4 + k] + inverse[i][1] * terms[1][4 + k];
+            nonlinear_part[k][i] += inverse[i][2] * terms[2][4 + k];
+            vf_store(out->nonlinear_part[k][i], nonlinear_part[k][i]);
         }
     }
-    kernel_local_blur(count, places, (const vf(*)[3])inverse, out);
+    kernel_local_error_bound(count, places, (const vf(*)[3])inverse, out);
     kernel_local_reach(count, (const vf(*)[8])at, (const vf(*)[3])inverse, offset, out);
-    const vm sharp = vf_lt(vf_load(out->blur), vf_set(0.05f));
+    const vm sharp = vf_lt(vf_load(out->error_bound), vf_set(0.05f));
     if (!bends) return sharp;
-    const vf bend = kernel_local_bent(type, (const vf(*)[3])bent);
+    const vf bend = kernel_local_bent(type, (const vf(*)[3])nonlinear_part);
     vf_store(out->bend, bend);
     return vm_and(sharp, vf_lt(bend, vf_set(most_bent)));
 }
@@ -396,8 +397,9 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
 
 /* Points, one per lane, each in the cell of its lane. */
 typedef struct kernel_local_points {
-    vf y[3], r[3], bent[KERNEL_BENT_TERMS][3];
-    kernel_bend bend;     /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
+    vf y[3], r[3], nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
+    kernel_nonlinear_terms
+        bend;             /* nonlinear terms of the map at the current reference coordinates r, and their derivatives */
     vf column[3][3], det; /* columns of the adjugate of the derivatives' matrix, and 1 / its determinant in det */
 } kernel_local_points;
 
@@ -407,7 +409,8 @@ SIMD_INLINE void kernel_local_left(int type, const kernel_local_points *p, vf ou
 {
     for (int a = 0; a < 3; a++) {
         out[a] = p->y[a] - p->r[a];
-        for (int k = 0; k < kernel_bent_terms(type); k++) out[a] = vf_muladd(-p->bent[k][a], p->bend.term[k], out[a]);
+        for (int k = 0; k < kernel_nonlinear_count(type); k++)
+            out[a] = vf_muladd(-p->nonlinear_part[k][a], p->bend.term[k], out[a]);
     }
 }
 
@@ -419,8 +422,8 @@ SIMD_INLINE void kernel_local_derive(int type, kernel_local_points *p)
     for (int i = 0; i < 3; i++)
         for (int a = 0; a < 3; a++) {
             j[i][a] = vf_set(i == a);
-            for (int k = 0; k < kernel_bent_terms(type); k++)
-                j[i][a] = vf_muladd(p->bent[k][a], p->bend.along[k][i], j[i][a]);
+            for (int k = 0; k < kernel_nonlinear_count(type); k++)
+                j[i][a] = vf_muladd(p->nonlinear_part[k][a], p->bend.along[k][i], j[i][a]);
         }
     for (int i = 0; i < 3; i++) {
         const vf *u = j[(i + 1) % 3], *v = j[(i + 2) % 3];
@@ -447,7 +450,7 @@ SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
         largest = vf_max(largest, vf_abs(move));
         p->r[i] = vf_select(lanes, vf_clamp(p->r[i] + move, -far, far), p->r[i]);
     }
-    kernel_bend_at(type, p->r, &p->bend);
+    kernel_nonlinear_terms_at(type, p->r, &p->bend);
     return largest;
 }
 
@@ -458,20 +461,20 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
                                  kernel_local_points *p)
 {
     vf d[3];
-    for (int a = 0; a < 3; a++) d[a] = at[a] - kernel_take(cells->origin[a], lane);
+    for (int a = 0; a < 3; a++) d[a] = at[a] - kernel_gather_lane(cells->origin[a], lane);
     for (int i = 0; i < 3; i++) {
-        p->y[i] = kernel_take(cells->offset[i], lane);
-        for (int a = 0; a < 3; a++) p->y[i] = vf_muladd(kernel_take(cells->inverse[i][a], lane), d[a], p->y[i]);
+        p->y[i] = kernel_gather_lane(cells->offset[i], lane);
+        for (int a = 0; a < 3; a++) p->y[i] = vf_muladd(kernel_gather_lane(cells->inverse[i][a], lane), d[a], p->y[i]);
         p->r[i] = p->y[i];
     }
     if (kernel_is_linear(type)) return vm_all_lanes();
-    for (int k = 0; k < kernel_bent_terms(type); k++)
-        for (int a = 0; a < 3; a++) p->bent[k][a] = kernel_take(cells->bent[k][a], lane);
+    for (int k = 0; k < kernel_nonlinear_count(type); k++)
+        for (int a = 0; a < 3; a++) p->nonlinear_part[k][a] = kernel_gather_lane(cells->nonlinear_part[k][a], lane);
     vf left[3];
-    kernel_bend_at(type, p->r, &p->bend);
+    kernel_nonlinear_terms_at(type, p->r, &p->bend);
     kernel_local_left(type, p, left);
     for (int i = 0; i < 3; i++) p->r[i] += left[i];
-    kernel_bend_at(type, p->r, &p->bend);
+    kernel_nonlinear_terms_at(type, p->r, &p->bend);
     kernel_local_derive(type, p);
     const vf first = kernel_local_step(type, p, vm_all_lanes()), second = kernel_local_step(type, p, vm_all_lanes());
     vm open = vm_not(vf_le(first * second, vf_set(5e-7f)));
@@ -485,10 +488,10 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
 /* Returns the field at the reference coordinates r in each lane's cell. */
 SIMD_INLINE vf kernel_local_value(int type, const kernel_local_cells *cells, vi lane, const kernel_local_points *p)
 {
-    vf v = kernel_take(cells->field[0], lane);
-    for (int i = 0; i < 3; i++) v = vf_muladd(kernel_take(cells->field[1 + i], lane), p->r[i], v);
-    for (int k = 0; k < kernel_bent_terms(type); k++)
-        v = vf_muladd(kernel_take(cells->field[4 + k], lane), p->bend.term[k], v);
+    vf v = kernel_gather_lane(cells->field[0], lane);
+    for (int i = 0; i < 3; i++) v = vf_muladd(kernel_gather_lane(cells->field[1 + i], lane), p->r[i], v);
+    for (int k = 0; k < kernel_nonlinear_count(type); k++)
+        v = vf_muladd(kernel_gather_lane(cells->field[4 + k], lane), p->bend.term[k], v);
     return v;
 }
 

@@ -76,7 +76,7 @@ SIMD_INLINE void kernel_polynomial_fit(double out[8], int type, const double v[G
 }
 
 /* Computes the polynomials of SIMD_WIDTH / 2 cells from the numbers v at their vertices. */
-SIMD_INLINE void kernel_half_fit(int type, kernel_half c[8], const kernel_half v[8])
+SIMD_INLINE void kernel_f64_fit(int type, kernel_f64 c[8], const kernel_f64 v[8])
 {
     KERNEL_FIT(type, c, v);
 }
@@ -156,7 +156,7 @@ typedef struct kernel_map {
     float tolerance; /* a Newton step smaller than it is the last */
     vf origin[3];    /* vertex 0 in tile space */
     vf position[3][8], field[8];
-    kernel_half exact[2][4][8]; /* the coefficients of positions and field in double, by halves of the lanes */
+    kernel_f64 exact[2][4][8]; /* the coefficients of positions and field in double, by halves of the lanes */
 } kernel_map;
 
 /* Computes the map of each ray's own cell. at: x, y, z and the field by vertex, in vectors whose lanes are cells; lane:
@@ -168,15 +168,15 @@ SIMD_INLINE void kernel_maps_of(const float (*at)[8][SIMD_WIDTH], vi lane, kerne
     out->tolerance = KERNEL_MAP_TOLERANCE;
     for (int n = 0; n < 4; n++) {
         vf v[8], *const c = n < 3 ? out->position[n] : out->field;
-        for (int i = 0; i < count; i++) v[i] = kernel_take(at[n][i], lane);
+        for (int i = 0; i < count; i++) v[i] = kernel_gather_lane(at[n][i], lane);
         if (n < 3) out->origin[n] = v[0];
         for (int half = 0; half < 2; half++) {
-            kernel_half d[8], *const e = out->exact[half][n];
-            for (int i = 0; i < count; i++) d[i] = kernel_half_of(&v[i], half);
+            kernel_f64 d[8], *const e = out->exact[half][n];
+            for (int i = 0; i < count; i++) d[i] = kernel_f64_of(&v[i], half);
             if (n < 3)
                 for (int i = count - 1; i >= 0; i--) d[i] -= d[0];
-            kernel_half_fit(type, e, d);
-            for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
+            kernel_f64_fit(type, e, d);
+            for (int i = 0; i < 8; i++) kernel_f64_store_lanes(&c[i], half, e[i]);
         }
     }
 }
@@ -207,12 +207,12 @@ SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi la
 {
     const int count = grid_type_vertices(type);
     vf v[8];
-    for (int i = 0; i < count; i++) v[i] = kernel_take(values[i], lane);
+    for (int i = 0; i < count; i++) v[i] = kernel_gather_lane(values[i], lane);
     for (int half = 0; half < 2; half++) {
-        kernel_half d[8], e[8];
-        for (int i = 0; i < count; i++) d[i] = kernel_half_of(&v[i], half);
-        kernel_half_fit(type, e, d);
-        for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
+        kernel_f64 d[8], e[8];
+        for (int i = 0; i < count; i++) d[i] = kernel_f64_of(&v[i], half);
+        kernel_f64_fit(type, e, d);
+        for (int i = 0; i < 8; i++) kernel_f64_store_lanes(&c[i], half, e[i]);
     }
 }
 
@@ -314,7 +314,7 @@ SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
 }
 
 /* Returns the fraction of the interval that lies before t, in [0, 1]. */
-SIMD_INLINE vf kernel_share(const kernel_interval *i, vf t)
+SIMD_INLINE vf kernel_interval_fraction(const kernel_interval *i, vf t)
 {
     const vf length = i->t_out - i->t_in;
     return vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
@@ -324,12 +324,12 @@ SIMD_INLINE vf kernel_share(const kernel_interval *i, vf t)
  * reference coordinates. */
 SIMD_INLINE vf kernel_line_value(const kernel_interval *i, vf t)
 {
-    return i->v_in + kernel_share(i, t) * (i->v_out - i->v_in);
+    return i->v_in + kernel_interval_fraction(i, t) * (i->v_out - i->v_in);
 }
 
-SIMD_INLINE void kernel_guess(const kernel_interval *i, vf t, vf r[3])
+SIMD_INLINE void kernel_reference_on_chord(const kernel_interval *i, vf t, vf r[3])
 {
-    const vf along = kernel_share(i, t);
+    const vf along = kernel_interval_fraction(i, t);
     for (int a = 0; a < 3; a++) r[a] = i->r_in[a] + along * (i->r_out[a] - i->r_in[a]);
 }
 
@@ -342,7 +342,7 @@ SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map *map
     const bool has_failed = vm_any(failed);
     if (has_failed) {
         vf line[3];
-        kernel_guess(i, t, line);
+        kernel_reference_on_chord(i, t, line);
         for (int a = 0; a < 3; a++) r[a] = vf_select(failed, line[a], r[a]);
         *failures += __builtin_popcount(vm_bits(failed));
     }
@@ -361,7 +361,7 @@ SIMD_INLINE vf kernel_solve(kernel_packet *p, const kernel_map *map, const kerne
 SIMD_INLINE vf kernel_value_at(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t)
 {
     vf r[3];
-    kernel_guess(i, t, r);
+    kernel_reference_on_chord(i, t, r);
     return kernel_solve(p, map, i, rays, t, r);
 }
 
@@ -376,7 +376,7 @@ SIMD_INLINE void kernel_point_ends(const kernel_interval *i, kernel_point *in, k
 }
 
 /* Interpolates the reference coordinates between two points of each ray, at depth t. */
-SIMD_INLINE void kernel_place_between(const kernel_point *low, const kernel_point *high, vf t, vf r[3])
+SIMD_INLINE void kernel_reference_between(const kernel_point *low, const kernel_point *high, vf t, vf r[3])
 {
     const vf length = high->t - low->t;
     const vf along = vf_select(vf_lt(vf_set(0), length), (t - low->t) / length, vf_set(0));

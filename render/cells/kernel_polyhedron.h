@@ -41,57 +41,58 @@
 /* Crossings of rays with a triangle, at depth t with value v and colour value w, both linear on the triangle. For a
  * surface triangle t_face, v_face and w_face are those of its face, which differ for quads, because these are bilinear.
  * For a sheet v_face and w_face are the field's values there. */
-typedef struct kernel_meeting {
+typedef struct kernel_triangle_crossings {
     vm mask;
     vf t, v, w;
     vf t_face, v_face, w_face;
-} kernel_meeting;
+} kernel_triangle_crossings;
 
 /* The intervals of rays in the tet of surface triangle number `facet`: the value at t is v0 + (t - t0) (v1 - v0) / (t1
  * - t0). sign is the tet's sign. */
-typedef struct kernel_tet_span {
+typedef struct kernel_subtet_interval {
     vm mask;
     vf t0, t1, v0, v1, w0, w1;
     float sign;
     int facet;
-} kernel_tet_span;
+} kernel_subtet_interval;
 
 /* The crossings of a packet with one polyhedron. Its arrays are in the thread's scratch memory. */
-typedef struct kernel_passage {
+typedef struct kernel_poly_crossings {
     const kernel_packet *packet;
     const polyhedron *cell;
-    vm rays;                /* the rays to intersect */
-    bool has_colour;        /* whether colour values w are computed too */
-    vf *x, *y;              /* vertices and centre, projected along the rays */
-    vf *edge;               /* edge functions of the edges, then of the lines from each vertex to the centre */
-    kernel_meeting *facets; /* crossings of surface triangles by number; only those listed in `met` are set */
-    vm *left;               /* by surface triangle, the rays whose crossing has not been assigned to an interval yet */
+    vm rays;         /* the rays to intersect */
+    bool has_colour; /* whether colour values w are computed too */
+    vf *x, *y;       /* vertices and centre, projected along the rays */
+    vf *edge;        /* edge functions of the edges, then of the lines from each vertex to the centre */
+    kernel_triangle_crossings
+        *facets; /* crossings of surface triangles by number; only those listed in `met` are set */
+    vm *left;    /* by surface triangle, the rays whose crossing has not been assigned to an interval yet */
     /* rays that cross both triangles of a quad but not its bilinear patch, or the patch twice but no triangle */
     vm uneven;
     int *met;
     int met_count;
-    kernel_meeting *sheets; /* crossings of sheets by edge number; only those listed in met_sheets are set */
+    kernel_triangle_crossings *sheets; /* crossings of sheets by edge number; only those listed in met_sheets are set */
     int *met_sheets;
     int sheet_count;
-    kernel_tet_span *segments;
+    kernel_subtet_interval *segments;
     int segment_count;
     bool has_sheets;
-} kernel_passage;
+} kernel_poly_crossings;
 
 /* One interval of each ray inside the cell. `interval` has the faces' values; u_in and u_out are the field's values
  * just inside. */
-typedef struct kernel_stay {
+typedef struct kernel_polyhedron_interval {
     kernel_interval interval;
-    kernel_meeting in, out;
+    kernel_triangle_crossings in, out;
     vf u_in, u_out;
-} kernel_stay;
+} kernel_polyhedron_interval;
 
 /* A linear piece of the field's profile along each ray: depths, values and colour values at both ends. */
 typedef struct kernel_profile_piece {
     vf t0, t1, v0, v1, w0, w1;
 } kernel_profile_piece;
 
-SIMD_INLINE void *kernel_carve(char **at, size_t bytes)
+SIMD_INLINE void *kernel_scratch_alloc(char **at, size_t bytes)
 {
     void *p = *at;
     *at += (bytes + 63) & ~(size_t)63;
@@ -100,13 +101,14 @@ SIMD_INLINE void *kernel_carve(char **at, size_t bytes)
 
 /* Carves the arrays for the cell's crossings out of the thread's scratch memory. Returns false if there is no
  * memory. */
-static bool kernel_passage_open(const kernel_packet *p, const polyhedron *c, kernel_passage *out)
+static bool kernel_poly_open(const kernel_packet *p, const polyhedron *c, kernel_poly_crossings *out)
 {
     const size_t points = (size_t)c->vertex_count + 1, edges = (size_t)c->edge_count, facets = (size_t)c->facet_count;
     const size_t pieces = 11, spare = 64 * pieces;
-    const size_t bytes = points * 2 * sizeof(vf) + (edges + points) * (sizeof(vf) + sizeof(int)) +
-                         facets * (sizeof(kernel_meeting) + sizeof(vm) + sizeof(int) + sizeof(kernel_tet_span)) +
-                         edges * sizeof(kernel_meeting) + spare;
+    const size_t bytes =
+        points * 2 * sizeof(vf) + (edges + points) * (sizeof(vf) + sizeof(int)) +
+        facets * (sizeof(kernel_triangle_crossings) + sizeof(vm) + sizeof(int) + sizeof(kernel_subtet_interval)) +
+        edges * sizeof(kernel_triangle_crossings) + spare;
     char *at = p->thread->polyhedron_scratch(p->thread->polyhedra, bytes);
     if (!at) {
         p->thread->out_of_memory = true;
@@ -114,90 +116,92 @@ static bool kernel_passage_open(const kernel_packet *p, const polyhedron *c, ker
     }
     out->packet = p;
     out->cell = c;
-    out->x = kernel_carve(&at, points * sizeof(vf));
-    out->y = kernel_carve(&at, points * sizeof(vf));
-    out->edge = kernel_carve(&at, (edges + points) * sizeof(vf));
-    out->facets = kernel_carve(&at, facets * sizeof(kernel_meeting));
-    out->left = kernel_carve(&at, facets * sizeof(vm));
-    out->met = kernel_carve(&at, facets * sizeof(int));
-    out->sheets = kernel_carve(&at, edges * sizeof(kernel_meeting));
-    out->met_sheets = kernel_carve(&at, edges * sizeof(int));
-    out->segments = kernel_carve(&at, facets * sizeof(kernel_tet_span));
+    out->x = kernel_scratch_alloc(&at, points * sizeof(vf));
+    out->y = kernel_scratch_alloc(&at, points * sizeof(vf));
+    out->edge = kernel_scratch_alloc(&at, (edges + points) * sizeof(vf));
+    out->facets = kernel_scratch_alloc(&at, facets * sizeof(kernel_triangle_crossings));
+    out->left = kernel_scratch_alloc(&at, facets * sizeof(vm));
+    out->met = kernel_scratch_alloc(&at, facets * sizeof(int));
+    out->sheets = kernel_scratch_alloc(&at, edges * sizeof(kernel_triangle_crossings));
+    out->met_sheets = kernel_scratch_alloc(&at, edges * sizeof(int));
+    out->segments = kernel_scratch_alloc(&at, facets * sizeof(kernel_subtet_interval));
     out->met_count = out->sheet_count = out->segment_count = 0;
     out->has_sheets = false;
     out->uneven = vm_none();
     return true;
 }
 
-SIMD_INLINE kernel_spot kernel_polyhedron_spot(const polyhedron *c, int i)
+SIMD_INLINE kernel_tile_position kernel_polyhedron_position(const polyhedron *c, int i)
 {
-    return (kernel_spot){c->x[i], c->y[i], c->z[i]};
+    return (kernel_tile_position){c->x[i], c->y[i], c->z[i]};
 }
 
-SIMD_INLINE kernel_blur kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
+SIMD_INLINE kernel_edge_error kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
 {
-    const kernel_line line = kernel_line_of(p, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
+    const kernel_line line = kernel_line_of(p, kernel_polyhedron_position(c, a), kernel_polyhedron_position(c, b));
     memcpy(c->lines[n], &line, sizeof line);
-    return kernel_line_blur(&line, p->tile->radius, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
+    return kernel_line_error(&line, p->tile->radius, kernel_polyhedron_position(c, a),
+                             kernel_polyhedron_position(c, b));
 }
 
-SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
+SIMD_INLINE void kernel_polyhedron_transform(polyhedron *c, const kernel_packet *p)
 {
-    for (int i = 0; i <= c->vertex_count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
-    c->is_placed = true;
+    for (int i = 0; i <= c->vertex_count; i++) kernel_transform(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    c->is_transformed = true;
     if (!p->is_pencil) return;
-    kernel_blur most = {0, 0};
+    kernel_edge_error most = {0, 0};
     for (int i = 0; i < c->edge_count; i++)
-        most = kernel_blur_more(most, kernel_polyhedron_line(c, p, i, c->edges[i][0], c->edges[i][1]));
+        most = kernel_edge_error_max(most, kernel_polyhedron_line(c, p, i, c->edges[i][0], c->edges[i][1]));
     for (int i = 0; i < c->vertex_count; i++)
-        most = kernel_blur_more(most, kernel_polyhedron_line(c, p, c->edge_count + i, i, c->vertex_count));
-    c->least = kernel_blur_least(most);
+        most = kernel_edge_error_max(most, kernel_polyhedron_line(c, p, c->edge_count + i, i, c->vertex_count));
+    c->least = kernel_least_weight_bound(most);
 }
 
 /* ---- crossings of the surface ---- */
 
-SIMD_INLINE void kernel_meet(const polyhedron *c, const kernel_weights *w, bool has_colour, kernel_meeting *out)
+SIMD_INLINE void kernel_triangle_values_at(const polyhedron *c, const kernel_weights *w, bool has_colour,
+                                           kernel_triangle_crossings *out)
 {
-    out->t = kernel_weigh_depth(w, c->z);
-    out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
-    out->w = has_colour ? kernel_weigh(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
+    out->t = kernel_weighted_depth(w, c->z);
+    out->v = kernel_weighted_sum(w, c->f[w->i], c->f[w->j], c->f[w->k]);
+    out->w = has_colour ? kernel_weighted_sum(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
     out->t_face = out->t;
     out->v_face = out->v;
     out->w_face = out->w;
 }
 
-SIMD_INLINE void kernel_passage_edge(kernel_passage *r, int number, int a, int b)
+SIMD_INLINE void kernel_poly_edge(kernel_poly_crossings *r, int number, int a, int b)
 {
     const polyhedron *c = r->cell;
     kernel_line line;
     memcpy(&line, c->lines[number], sizeof line);
-    r->edge[number] = kernel_edge(r->packet, &line, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
+    r->edge[number] = kernel_edge(r->packet, &line, kernel_polyhedron_position(c, a), kernel_polyhedron_position(c, b));
 }
 
-SIMD_INLINE void kernel_passage_mend(const kernel_passage *r, vm hit, kernel_weights *w)
+SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, kernel_weights *w)
 {
     const polyhedron *c = r->cell;
-    kernel_weights_mend(r->packet, c->least, hit, kernel_polyhedron_spot(c, w->i), kernel_polyhedron_spot(c, w->j),
-                        kernel_polyhedron_spot(c, w->k), w);
+    kernel_weights_recompute(r->packet, c->least, hit, kernel_polyhedron_position(c, w->i),
+                             kernel_polyhedron_position(c, w->j), kernel_polyhedron_position(c, w->k), w);
 }
 
 /* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the unmended weights, which
  * serve as a guess for the quad's patch and are the same as in a hex that shares the face. */
-static vm kernel_passage_facet(const kernel_passage *r, const polyhedron_facet *t, kernel_weights *w,
-                               kernel_meeting *out)
+static vm kernel_poly_facet(const kernel_poly_crossings *r, const polyhedron_facet *t, kernel_weights *w,
+                            kernel_triangle_crossings *out)
 {
     const vf ij = r->edge[t->edge[0]], jk = r->edge[t->edge[1]], ik = r->edge[t->edge[2]];
     out->mask = kernel_inside(r->rays, ij, jk, ik);
     if (!vm_any(out->mask)) return out->mask;
     *w = kernel_weights_of(t->vertex[0], t->vertex[1], t->vertex[2], ij, jk, ik);
     kernel_weights mended = *w;
-    kernel_passage_mend(r, out->mask, &mended);
-    kernel_meet(r->cell, &mended, r->has_colour, out);
+    kernel_poly_recompute(r, out->mask, &mended);
+    kernel_triangle_values_at(r->cell, &mended, r->has_colour, out);
     return out->mask;
 }
 
 /* Returns the edge function from one of the triangle's vertices to another. */
-SIMD_INLINE vf kernel_facet_side(const polyhedron_facet *t, const kernel_passage *r, int from, int to)
+SIMD_INLINE vf kernel_facet_side(const polyhedron_facet *t, const kernel_poly_crossings *r, int from, int to)
 {
     const int low = from < to ? from : to, high = from < to ? to : from;
     const int n = low != t->vertex[0] ? 1 : high == t->vertex[1] ? 0 : 2;
@@ -209,8 +213,8 @@ SIMD_INLINE bool kernel_facet_has(const polyhedron_facet *t, int vertex)
     return t->vertex[0] == vertex || t->vertex[1] == vertex || t->vertex[2] == vertex;
 }
 
-SIMD_INLINE void kernel_quad_of_facets(const kernel_passage *r, const polyhedron_facet *const t[2], const int corner[4],
-                                       kernel_quad *out)
+SIMD_INLINE void kernel_quad_of_facets(const kernel_poly_crossings *r, const polyhedron_facet *const t[2],
+                                       const int corner[4], kernel_quad *out)
 {
     for (int i = 0; i < 4; i++) {
         out->x[i] = r->x[corner[i]];
@@ -225,8 +229,8 @@ SIMD_INLINE void kernel_quad_of_facets(const kernel_passage *r, const polyhedron
 
 /* Stores a point of the quad's patch as the face's point of a surface triangle's crossing, for the rays in `mine`. Rays
  * that do not cross the triangle itself use the patch's point for both. */
-SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_place *at, vm mine,
-                                   bool has_colour, kernel_meeting *m)
+SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_point *at, vm mine,
+                                   bool has_colour, kernel_triangle_crossings *m)
 {
     vf f[4], g[4];
     for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(has_colour ? c->g[corner[i]] : 0);
@@ -241,11 +245,12 @@ SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], con
 
 /* For rays that cross the patch twice and both triangles, exchanges the two points if necessary, so that the nearer
  * point belongs to the nearer triangle. */
-static __attribute__((noinline, cold)) void kernel_places_pair(kernel_meeting *const m[2], kernel_quad_place places[2])
+static __attribute__((noinline, cold)) void kernel_quad_points_pair(kernel_triangle_crossings *const m[2],
+                                                                    kernel_quad_point places[2])
 {
     const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
     const vm swap = vm_and(both, vm_xor(vf_lt(places[0].t, places[1].t), vf_lt(m[0]->t, m[1]->t)));
-    const kernel_quad_place own = places[0];
+    const kernel_quad_point own = places[0];
     places[0].s = vf_select(swap, places[1].s, own.s);
     places[0].r = vf_select(swap, places[1].r, own.r);
     places[0].t = vf_select(swap, places[1].t, own.t);
@@ -256,7 +261,7 @@ static __attribute__((noinline, cold)) void kernel_places_pair(kernel_meeting *c
 
 /* Computes the crossings of a quad's bilinear patch, which are the same bits as in a hex that shares it. first: number
  * of the first of its two triangles. */
-static void kernel_passage_quad(kernel_passage *r, int first)
+static void kernel_poly_quad(kernel_poly_crossings *r, int first)
 {
     static const signed char loop[4] = {0, 1, 2, 3};
     const polyhedron *c = r->cell;
@@ -264,21 +269,22 @@ static void kernel_passage_quad(kernel_passage *r, int first)
     kernel_cell ranks;
     kernel_weights w;
     kernel_quad quad;
-    kernel_quad_place places[2];
+    kernel_quad_point places[2];
     int corner[4];
     for (int i = 0; i < 4; i++) ranks.rank[i] = around[i]; /* vertex numbers are ranks, because vertices are sorted */
     kernel_quad_corners(&ranks, loop, corner);
     for (int i = 0; i < 4; i++) corner[i] = around[corner[i]];
     const bool has_corner = kernel_facet_has(&c->facets[first], corner[1]);
-    const int twin = c->facets[first].twin, half_of[2] = {has_corner ? first : twin, has_corner ? twin : first};
+    const int other_half = c->facets[first].other_half,
+              half_of[2] = {has_corner ? first : other_half, has_corner ? other_half : first};
     const polyhedron_facet *t[2] = {&c->facets[half_of[0]], &c->facets[half_of[1]]};
-    kernel_meeting *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
-    for (int half = 0; half < 2; half++) kernel_passage_facet(r, t[half], &w, m[half]);
+    kernel_triangle_crossings *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
+    for (int half = 0; half < 2; half++) kernel_poly_facet(r, t[half], &w, m[half]);
     kernel_quad_of_facets(r, t, corner, &quad);
     const vm once = vm_xor(m[0]->mask, m[1]->mask);
     const vm twice = kernel_quad_sides(r->rays, quad.e01, quad.e32, quad.e03, quad.e12);
-    const int count = kernel_quad_places(&quad, once, twice, places);
-    if (count == 2) kernel_places_pair(m, places);
+    const int count = kernel_quad_points(&quad, once, twice, places);
+    if (count == 2) kernel_quad_points_pair(m, places);
     r->uneven = vm_or(r->uneven, vm_xor(vm_and(m[0]->mask, m[1]->mask), count == 2 ? places[1].mask : vm_none()));
     for (int half = 0; half < 2; half++) {
         vm left = count ? vm_and(once, m[half]->mask) : vm_none();
@@ -293,23 +299,23 @@ static void kernel_passage_quad(kernel_passage *r, int first)
 }
 
 /* Computes all crossings of the rays with the polyhedron's surface. Returns false if there are none. */
-static bool kernel_passage_cross(kernel_passage *r, vm rays, bool has_colour)
+static bool kernel_poly_cross(kernel_poly_crossings *r, vm rays, bool has_colour)
 {
     const polyhedron *c = r->cell;
     r->rays = rays;
     r->has_colour = has_colour;
     for (int i = 0; i <= c->vertex_count; i++) {
-        r->x[i] = kernel_project_x(r->packet, kernel_polyhedron_spot(c, i));
-        r->y[i] = kernel_project_y(r->packet, kernel_polyhedron_spot(c, i));
+        r->x[i] = kernel_project_x(r->packet, kernel_polyhedron_position(c, i));
+        r->y[i] = kernel_project_y(r->packet, kernel_polyhedron_position(c, i));
     }
-    for (int i = 0; i < c->edge_count; i++) kernel_passage_edge(r, i, c->edges[i][0], c->edges[i][1]);
+    for (int i = 0; i < c->edge_count; i++) kernel_poly_edge(r, i, c->edges[i][0], c->edges[i][1]);
     for (int i = 0; i < c->facet_count; i++) {
         kernel_weights w;
         if (c->facets[i].quad >= 0) {
-            if (i < c->facets[i].twin) kernel_passage_quad(r, i);
+            if (i < c->facets[i].other_half) kernel_poly_quad(r, i);
             continue;
         }
-        r->left[i] = kernel_passage_facet(r, &c->facets[i], &w, &r->facets[i]);
+        r->left[i] = kernel_poly_facet(r, &c->facets[i], &w, &r->facets[i]);
         if (vm_any(r->left[i])) r->met[r->met_count++] = i;
     }
     return r->met_count > 0;
@@ -317,13 +323,13 @@ static bool kernel_passage_cross(kernel_passage *r, vm rays, bool has_colour)
 
 /* Removes each ray's nearest crossing, by the depth of its face, from the list and returns it in *out. Returns false if
  * no ray has one left. */
-SIMD_INLINE bool kernel_passage_take(kernel_passage *r, kernel_meeting *out)
+SIMD_INLINE bool kernel_poly_take_nearest(kernel_poly_crossings *r, kernel_triangle_crossings *out)
 {
     const vf zero = vf_set(0);
     vf taken = vf_set(-1);
-    *out = (kernel_meeting){vm_none(), zero, zero, zero, vf_set(INFINITY), zero, zero};
+    *out = (kernel_triangle_crossings){vm_none(), zero, zero, zero, vf_set(INFINITY), zero, zero};
     for (int n = 0; n < r->met_count; n++) {
-        const kernel_meeting *m = &r->facets[r->met[n]];
+        const kernel_triangle_crossings *m = &r->facets[r->met[n]];
         const vm nearer = vm_and(r->left[r->met[n]], vf_lt(m->t_face, out->t_face));
         out->mask = vm_or(out->mask, nearer);
         out->t = vf_select(nearer, m->t, out->t);
@@ -340,9 +346,9 @@ SIMD_INLINE bool kernel_passage_take(kernel_passage *r, kernel_meeting *out)
 }
 
 /* Computes the next interval of each ray inside the cell. Returns false after the last one. */
-static bool kernel_passage_next(kernel_passage *r, kernel_stay *out)
+static bool kernel_poly_next(kernel_poly_crossings *r, kernel_polyhedron_interval *out)
 {
-    if (!kernel_passage_take(r, &out->in) || !kernel_passage_take(r, &out->out)) return false;
+    if (!kernel_poly_take_nearest(r, &out->in) || !kernel_poly_take_nearest(r, &out->out)) return false;
     kernel_interval *i = &out->interval;
     i->mask = vm_and(out->in.mask, out->out.mask);
     i->t_in = out->in.t_face;
@@ -356,26 +362,26 @@ static bool kernel_passage_next(kernel_passage *r, kernel_stay *out)
 
 /* ---- the field inside ---- */
 
-static void kernel_passage_sheets(kernel_passage *r)
+static void kernel_poly_sheets(kernel_poly_crossings *r)
 {
     const polyhedron *c = r->cell;
     const int centre = c->vertex_count, spokes = c->edge_count;
     if (r->has_sheets) return;
     r->has_sheets = true;
-    for (int i = 0; i < centre; i++) kernel_passage_edge(r, spokes + i, i, centre);
+    for (int i = 0; i < centre; i++) kernel_poly_edge(r, spokes + i, i, centre);
     for (int i = 0; i < c->edge_count; i++) {
         const int a = c->edges[i][0], b = c->edges[i][1];
-        kernel_meeting *m = &r->sheets[i];
+        kernel_triangle_crossings *m = &r->sheets[i];
         m->mask = kernel_inside(r->rays, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
         if (!vm_any(m->mask)) continue;
         kernel_weights w = kernel_weights_of(a, b, centre, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
-        kernel_passage_mend(r, m->mask, &w);
-        kernel_meet(c, &w, r->has_colour, m);
+        kernel_poly_recompute(r, m->mask, &w);
+        kernel_triangle_values_at(c, &w, r->has_colour, m);
         r->met_sheets[r->sheet_count++] = i;
     }
 }
 
-SIMD_INLINE void kernel_segment_add(kernel_tet_span *s, const kernel_meeting *m, vm hit)
+SIMD_INLINE void kernel_segment_add(kernel_subtet_interval *s, const kernel_triangle_crossings *m, vm hit)
 {
     const vm first = vm_and(hit, vf_lt(m->t, s->t0)), last = vm_andnot(hit, vf_lt(m->t, s->t1));
     s->t0 = vf_select(first, m->t, s->t0);
@@ -388,13 +394,13 @@ SIMD_INLINE void kernel_segment_add(kernel_tet_span *s, const kernel_meeting *m,
 }
 
 /* Computes the intervals of the rays in all tets of the cell. Tets without volume are left out. */
-static void kernel_passage_segments(kernel_passage *r)
+static void kernel_poly_segments(kernel_poly_crossings *r)
 {
     const polyhedron *c = r->cell;
     if (r->segment_count) return;
     for (int i = 0; i < c->facet_count; i++) {
         const polyhedron_facet *t = &c->facets[i];
-        kernel_tet_span *s = &r->segments[r->segment_count];
+        kernel_subtet_interval *s = &r->segments[r->segment_count];
         if (t->sign == 0) continue;
         s->mask = vm_none();
         s->t0 = vf_set(INFINITY);
@@ -415,13 +421,13 @@ static void kernel_passage_segments(kernel_passage *r)
 }
 
 /* Returns the rays for which t is in the tet's interval: [t0, t1), or (t0, t1] if the field just before t is needed. */
-SIMD_INLINE vm kernel_tet_span_holds(const kernel_tet_span *s, vf t, bool before)
+SIMD_INLINE vm kernel_subtet_interval_contains(const kernel_subtet_interval *s, vf t, bool before)
 {
     if (before) return vm_and(s->mask, vm_and(vf_lt(s->t0, t), vf_le(t, s->t1)));
     return vm_and(s->mask, vm_and(vf_le(s->t0, t), vf_lt(t, s->t1)));
 }
 
-SIMD_INLINE vf kernel_segment_at(const kernel_tet_span *s, vf t, vf v0, vf v1)
+SIMD_INLINE vf kernel_segment_at(const kernel_subtet_interval *s, vf t, vf v0, vf v1)
 {
     return v0 + (t - s->t0) * ((v1 - v0) / (s->t1 - s->t0));
 }
@@ -429,7 +435,7 @@ SIMD_INLINE vf kernel_segment_at(const kernel_tet_span *s, vf t, vf v0, vf v1)
 /* Computes the signed sum of the tets' fields at t. Rounding may put the ends of neighbouring tets, which meet at one
  * point, in the wrong order. So if the signs at t do not sum to 1, the sum is computed slightly before and behind; if
  * that fails too, *v and *w keep their values. */
-static void kernel_passage_sum(const kernel_passage *r, vm rays, vf t, bool before, vf *v, vf *w)
+static void kernel_poly_sum(const kernel_poly_crossings *r, vm rays, vf t, bool before, vf *v, vf *w)
 {
     static const float shifts[7] = {0, 1, -1, 4, -4, 16, -16};
     vm open = rays;
@@ -437,8 +443,8 @@ static void kernel_passage_sum(const kernel_passage *r, vm rays, vf t, bool befo
         const vf at = t + (vf_abs(t) + 1.0f) * (shifts[k] * 2.4e-7f);
         vf cover = vf_set(0), sum = vf_set(0), colour = vf_set(0);
         for (int n = 0; n < r->segment_count; n++) {
-            const kernel_tet_span *s = &r->segments[n];
-            const vm in = vm_and(open, kernel_tet_span_holds(s, at, before));
+            const kernel_subtet_interval *s = &r->segments[n];
+            const vm in = vm_and(open, kernel_subtet_interval_contains(s, at, before));
             if (!vm_any(in)) continue;
             cover = vf_select(in, cover + s->sign, cover);
             sum = vf_select(in, sum + s->sign * kernel_segment_at(s, at, s->v0, s->v1), sum);
@@ -453,40 +459,42 @@ static void kernel_passage_sum(const kernel_passage *r, vm rays, vf t, bool befo
 
 /* Returns the rays for which the sheet lies in the interval: between the crossings of triangles, and between those of
  * faces. Sheets beyond the triangles belong to tets that extend out of the cell, and are not part of its field. */
-SIMD_INLINE vm kernel_stay_holds(const kernel_stay *stay, const kernel_meeting *sheet)
+SIMD_INLINE vm kernel_polyhedron_interval_contains(const kernel_polyhedron_interval *polyhedron_interval,
+                                                   const kernel_triangle_crossings *sheet)
 {
-    const vm inside = vm_and(vf_lt(stay->interval.t_in, sheet->t), vf_lt(sheet->t, stay->interval.t_out));
-    const vm within = vm_and(vf_lt(stay->in.t, sheet->t), vf_lt(sheet->t, stay->out.t));
-    return vm_and(vm_and(stay->interval.mask, sheet->mask), vm_and(inside, within));
+    const vm inside = vm_and(vf_lt(polyhedron_interval->interval.t_in, sheet->t),
+                             vf_lt(sheet->t, polyhedron_interval->interval.t_out));
+    const vm within = vm_and(vf_lt(polyhedron_interval->in.t, sheet->t), vf_lt(sheet->t, polyhedron_interval->out.t));
+    return vm_and(vm_and(polyhedron_interval->interval.mask, sheet->mask), vm_and(inside, within));
 }
 
 /* Computes the field just inside an end of the interval: the face's value, plus the fields of all tets other than the
  * one whose triangle is crossed. */
-SIMD_INLINE void kernel_passage_lift(const kernel_passage *r, vm rays, const kernel_meeting *end, bool before, vf *u,
-                                     vf *w)
+SIMD_INLINE void kernel_poly_inner_value(const kernel_poly_crossings *r, vm rays, const kernel_triangle_crossings *end,
+                                         bool before, vf *u, vf *w)
 {
     vf v_sum = end->v, w_sum = end->w;
-    kernel_passage_sum(r, rays, end->t, before, &v_sum, &w_sum);
+    kernel_poly_sum(r, rays, end->t, before, &v_sum, &w_sum);
     *u = end->v_face + (v_sum - end->v);
     *w = end->w_face + (w_sum - end->w);
 }
 
 /* Prepares the profile of the interval, which is the piecewise linear field along each ray: computes the field at the
  * crossed sheets and at both ends. */
-static void kernel_passage_profile(kernel_passage *r, kernel_stay *stay)
+static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_interval *polyhedron_interval)
 {
-    kernel_interval *i = &stay->interval;
-    kernel_passage_sheets(r);
+    kernel_interval *i = &polyhedron_interval->interval;
+    kernel_poly_sheets(r);
     if (r->cell->is_star) return;
-    kernel_passage_segments(r);
-    kernel_passage_lift(r, i->mask, &stay->in, false, &stay->u_in, &i->w_in);
-    kernel_passage_lift(r, i->mask, &stay->out, true, &stay->u_out, &i->w_out);
+    kernel_poly_segments(r);
+    kernel_poly_inner_value(r, i->mask, &polyhedron_interval->in, false, &polyhedron_interval->u_in, &i->w_in);
+    kernel_poly_inner_value(r, i->mask, &polyhedron_interval->out, true, &polyhedron_interval->u_out, &i->w_out);
     for (int n = 0; n < r->sheet_count; n++) {
-        kernel_meeting *sheet = &r->sheets[r->met_sheets[n]];
-        const vm held = kernel_stay_holds(stay, sheet);
+        kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
+        const vm held = kernel_polyhedron_interval_contains(polyhedron_interval, sheet);
         vf v = sheet->v, w = sheet->w;
         if (!vm_any(held)) continue;
-        kernel_passage_sum(r, held, sheet->t, false, &v, &w);
+        kernel_poly_sum(r, held, sheet->t, false, &v, &w);
         sheet->v_face = vf_select(held, v, sheet->v_face);
         sheet->w_face = vf_select(held, w, sheet->w_face);
     }
@@ -494,22 +502,23 @@ static void kernel_passage_profile(kernel_passage *r, kernel_stay *stay)
 
 /* Returns a piece of length zero at the begin of each ray's profile, which is the piecewise linear field along the
  * ray. */
-SIMD_INLINE kernel_profile_piece kernel_profile_begin(const kernel_stay *stay, vf v_in)
+SIMD_INLINE kernel_profile_piece kernel_profile_begin(const kernel_polyhedron_interval *polyhedron_interval, vf v_in)
 {
-    const kernel_interval *i = &stay->interval;
+    const kernel_interval *i = &polyhedron_interval->interval;
     return (kernel_profile_piece){i->t_in, i->t_in, v_in, v_in, i->w_in, i->w_in};
 }
 
 /* Replaces *piece by the next linear piece of the field along each ray. v_out is the value at the end of the ray's
  * interval. */
-SIMD_INLINE void kernel_profile_next(const kernel_passage *r, const kernel_stay *stay, vf v_out,
+SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r,
+                                     const kernel_polyhedron_interval *polyhedron_interval, vf v_out,
                                      kernel_profile_piece *piece)
 {
-    vf t = stay->interval.t_out, v = v_out, w = stay->interval.w_out;
+    vf t = polyhedron_interval->interval.t_out, v = v_out, w = polyhedron_interval->interval.w_out;
     for (int n = 0; n < r->sheet_count; n++) {
-        const kernel_meeting *sheet = &r->sheets[r->met_sheets[n]];
-        const vm nearer =
-            vm_and(kernel_stay_holds(stay, sheet), vm_and(vf_lt(piece->t1, sheet->t), vf_lt(sheet->t, t)));
+        const kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
+        const vm nearer = vm_and(kernel_polyhedron_interval_contains(polyhedron_interval, sheet),
+                                 vm_and(vf_lt(piece->t1, sheet->t), vf_lt(sheet->t, t)));
         t = vf_select(nearer, sheet->t, t);
         v = vf_select(nearer, sheet->v_face, v);
         w = vf_select(nearer, sheet->w_face, w);
@@ -518,9 +527,10 @@ SIMD_INLINE void kernel_profile_next(const kernel_passage *r, const kernel_stay 
 }
 
 /* Returns those of the given rays on which the field has further linear pieces behind the given one. */
-SIMD_INLINE vm kernel_profile_open(const kernel_stay *stay, const kernel_profile_piece *piece, vm mask)
+SIMD_INLINE vm kernel_profile_open(const kernel_polyhedron_interval *polyhedron_interval,
+                                   const kernel_profile_piece *piece, vm mask)
 {
-    return vm_and(mask, vf_lt(piece->t1, stay->interval.t_out));
+    return vm_and(mask, vf_lt(piece->t1, polyhedron_interval->interval.t_out));
 }
 
 #endif

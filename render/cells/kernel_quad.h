@@ -47,10 +47,10 @@ typedef struct kernel_quad {
 
 /* The points at which rays meet a quad's bilinear patch: parameter s from corner 0 to corner 1, parameter r from corner
  * 0 to corner 3, and depth t. */
-typedef struct kernel_quad_place {
+typedef struct kernel_quad_point {
     vm mask;
     vf s, r, t;
-} kernel_quad_place;
+} kernel_quad_point;
 
 SIMD_INLINE vf kernel_bilinear(const vf f[4], vf s, vf r)
 {
@@ -60,48 +60,48 @@ SIMD_INLINE vf kernel_bilinear(const vf f[4], vf s, vf r)
 
 /* ---- one ray, in double ---- */
 
-typedef struct kernel_flat_quad {
+typedef struct kernel_scalar_quad {
     double x[4], y[4], z[4];
     bool e01, e32, e03, e12; /* sign bits of the edge functions: true if negative */
-} kernel_flat_quad;
+} kernel_scalar_quad;
 
 /* The quadratic (1-x)² c0 + 2 x (1-x) c1 + x² c2, and the exact sign bits of c0 and c2. */
-typedef struct kernel_flat_quadratic {
+typedef struct kernel_scalar_quadratic {
     double c0, c1, c2;
     bool is_negative0, is_negative2;
-} kernel_flat_quadratic;
+} kernel_scalar_quadratic;
 
 /* Returns the cross product of corners i and j in double, which has a single rounding for float32 corners. */
-static inline double kernel_flat_cross(const kernel_flat_quad *q, int i, int j)
+static inline double kernel_scalar_cross(const kernel_scalar_quad *q, int i, int j)
 {
     return q->x[i] * q->y[j] - q->x[j] * q->y[i];
 }
 
-static inline kernel_flat_quadratic kernel_flat_b(const kernel_flat_quad *q)
+static inline kernel_scalar_quadratic kernel_scalar_b(const kernel_scalar_quad *q)
 {
-    return (kernel_flat_quadratic){kernel_flat_cross(q, 0, 1),
-                                   0.5 * (kernel_flat_cross(q, 0, 2) + kernel_flat_cross(q, 3, 1)),
-                                   kernel_flat_cross(q, 3, 2), q->e01, q->e32};
+    return (kernel_scalar_quadratic){kernel_scalar_cross(q, 0, 1),
+                                     0.5 * (kernel_scalar_cross(q, 0, 2) + kernel_scalar_cross(q, 3, 1)),
+                                     kernel_scalar_cross(q, 3, 2), q->e01, q->e32};
 }
 
-static inline kernel_flat_quadratic kernel_flat_a(const kernel_flat_quad *q)
+static inline kernel_scalar_quadratic kernel_scalar_a(const kernel_scalar_quad *q)
 {
-    return (kernel_flat_quadratic){kernel_flat_cross(q, 0, 3),
-                                   0.5 * (kernel_flat_cross(q, 0, 2) + kernel_flat_cross(q, 1, 3)),
-                                   kernel_flat_cross(q, 1, 2), q->e03, q->e12};
+    return (kernel_scalar_quadratic){kernel_scalar_cross(q, 0, 3),
+                                     0.5 * (kernel_scalar_cross(q, 0, 2) + kernel_scalar_cross(q, 1, 3)),
+                                     kernel_scalar_cross(q, 1, 2), q->e03, q->e12};
 }
 
-static inline bool kernel_flat_turns(const kernel_flat_quadratic *c)
+static inline bool kernel_scalar_turns(const kernel_scalar_quadratic *c)
 {
     return c->is_negative0 != c->is_negative2;
 }
 
-static inline bool kernel_flat_vanishes(const kernel_flat_quadratic *c)
+static inline bool kernel_scalar_vanishes(const kernel_scalar_quadratic *c)
 {
     return c->c0 == 0 && c->c1 == 0 && c->c2 == 0;
 }
 
-static inline double kernel_flat_discriminant(const kernel_flat_quadratic *c)
+static inline double kernel_scalar_discriminant(const kernel_scalar_quadratic *c)
 {
     const double d = c->c1 * c->c1 - c->c0 * c->c2;
     return d > 0 ? d : 0;
@@ -109,7 +109,7 @@ static inline double kernel_flat_discriminant(const kernel_flat_quadratic *c)
 
 /* Returns the root x in [0, 1] of the quadratic at which half of its derivative equals `turn`. There are two formulas
  * for the root; the one in which digits do not cancel is used. */
-static inline double kernel_flat_root(const kernel_flat_quadratic *c, double turn)
+static inline double kernel_scalar_root(const kernel_scalar_quadratic *c, double turn)
 {
     const bool is_sum = c->c1 * turn <= 0;
     const double n = is_sum ? turn - c->c1 : c->c0, d = is_sum ? n + c->c2 : c->c0 - c->c1 - turn;
@@ -118,7 +118,7 @@ static inline double kernel_flat_root(const kernel_flat_quadratic *c, double tur
 }
 
 /* Solves v0 + x (v1 - v0) = 0 for x, clamped to [0, 1]. v0 and v1 must not both be 0. */
-static inline double kernel_flat_zero(double v0, double v1)
+static inline double kernel_scalar_zero(double v0, double v1)
 {
     const double x = v0 / (v0 - v1);
     return x >= 0 ? fmin(x, 1) : 0;
@@ -126,50 +126,50 @@ static inline double kernel_flat_zero(double v0, double v1)
 
 /* Returns the limit of the root of the quadratic A or B (see the top of this file) if it vanishes for all parameters.
  * The two lines are from corner i to i2 and from corner j to j2. */
-static inline double kernel_flat_limit(const kernel_flat_quad *q, int i, int i2, int j, int j2)
+static inline double kernel_scalar_limit(const kernel_scalar_quad *q, int i, int i2, int j, int j2)
 {
     const double y0 = q->y[i2] - q->y[i], y1 = q->y[j2] - q->y[j];
-    return y0 != y1 ? kernel_flat_zero(y0, y1) : kernel_flat_zero(q->x[i2] - q->x[i], q->x[j2] - q->x[j]);
+    return y0 != y1 ? kernel_scalar_zero(y0, y1) : kernel_scalar_zero(q->x[i2] - q->x[i], q->x[j2] - q->x[j]);
 }
 
 /* Computes the point of the patch (parameters s and r, and depth) at which the patch's Jacobian has the sign of `root`.
  * The magnitude of root is the square root of the discriminant D. */
-static inline void kernel_flat_place(const kernel_flat_quad *q, const kernel_flat_quadratic *a,
-                                     const kernel_flat_quadratic *b, double root, double place[3])
+static inline void kernel_scalar_point(const kernel_scalar_quad *q, const kernel_scalar_quadratic *a,
+                                       const kernel_scalar_quadratic *b, double root, double place[3])
 {
-    const double s = kernel_flat_vanishes(a) ? kernel_flat_limit(q, 0, 3, 1, 2) : kernel_flat_root(a, root);
-    const double r = kernel_flat_vanishes(b) ? kernel_flat_limit(q, 0, 1, 3, 2) : kernel_flat_root(b, -root);
+    const double s = kernel_scalar_vanishes(a) ? kernel_scalar_limit(q, 0, 3, 1, 2) : kernel_scalar_root(a, root);
+    const double r = kernel_scalar_vanishes(b) ? kernel_scalar_limit(q, 0, 1, 3, 2) : kernel_scalar_root(b, -root);
     place[0] = s;
     place[1] = r;
     place[2] = (1 - r) * ((1 - s) * q->z[0] + s * q->z[1]) + r * ((1 - s) * q->z[3] + s * q->z[2]);
 }
 
 /* Computes the point of a ray that crosses exactly one of the two triangles. */
-static inline void kernel_flat_once(const kernel_flat_quad *q, double place[3])
+static inline void kernel_scalar_single_point(const kernel_scalar_quad *q, double place[3])
 {
-    const kernel_flat_quadratic a = kernel_flat_a(q), b = kernel_flat_b(q);
-    const bool by_b = kernel_flat_turns(&b);
-    const double root = __builtin_sqrt(kernel_flat_discriminant(by_b ? &b : &a));
+    const kernel_scalar_quadratic a = kernel_scalar_a(q), b = kernel_scalar_b(q);
+    const bool by_b = kernel_scalar_turns(&b);
+    const double root = __builtin_sqrt(kernel_scalar_discriminant(by_b ? &b : &a));
     const bool is_rising = by_b ? b.is_negative0 : a.is_negative0;
-    kernel_flat_place(q, &a, &b, by_b != is_rising ? root : -root, place);
+    kernel_scalar_point(q, &a, &b, by_b != is_rising ? root : -root, place);
 }
 
 /* Returns whether the quadratic may have two roots in (0, 1): its ends have one sign, and its middle coefficient has
  * the other. */
-static inline bool kernel_flat_bends(const kernel_flat_quadratic *c)
+static inline bool kernel_scalar_may_have_two_roots(const kernel_scalar_quadratic *c)
 {
-    return !kernel_flat_turns(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
+    return !kernel_scalar_turns(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
 }
 
 /* Computes the two points of a ray that crosses both triangles or none. Returns false if it does not meet the patch. */
-static inline bool kernel_flat_twice(const kernel_flat_quad *q, double places[2][3])
+static inline bool kernel_scalar_two_points(const kernel_scalar_quad *q, double places[2][3])
 {
-    const kernel_flat_quadratic a = kernel_flat_a(q), b = kernel_flat_b(q);
-    if (!kernel_flat_bends(&a) || !kernel_flat_bends(&b)) return false;
-    const double root = __builtin_sqrt(kernel_flat_discriminant(&b));
+    const kernel_scalar_quadratic a = kernel_scalar_a(q), b = kernel_scalar_b(q);
+    if (!kernel_scalar_may_have_two_roots(&a) || !kernel_scalar_may_have_two_roots(&b)) return false;
+    const double root = __builtin_sqrt(kernel_scalar_discriminant(&b));
     if (!(root > 0)) return false;
-    kernel_flat_place(q, &a, &b, root, places[0]);
-    kernel_flat_place(q, &a, &b, -root, places[1]);
+    kernel_scalar_point(q, &a, &b, root, places[0]);
+    kernel_scalar_point(q, &a, &b, -root, places[1]);
     return true;
 }
 
@@ -178,12 +178,12 @@ static inline bool kernel_is_negative(vf v, int lane)
     return __builtin_signbit(v[lane]) != 0;
 }
 
-static inline kernel_flat_quad kernel_flat_of(const kernel_quad *q, int lane)
+static inline kernel_scalar_quad kernel_scalar_of(const kernel_quad *q, int lane)
 {
-    kernel_flat_quad flat = {.e01 = kernel_is_negative(q->e01, lane),
-                             .e32 = kernel_is_negative(q->e32, lane),
-                             .e03 = kernel_is_negative(q->e03, lane),
-                             .e12 = kernel_is_negative(q->e12, lane)};
+    kernel_scalar_quad flat = {.e01 = kernel_is_negative(q->e01, lane),
+                               .e32 = kernel_is_negative(q->e32, lane),
+                               .e03 = kernel_is_negative(q->e03, lane),
+                               .e12 = kernel_is_negative(q->e12, lane)};
     for (int i = 0; i < 4; i++) {
         flat.x[i] = (double)q->x[i][lane];
         flat.y[i] = (double)q->y[i][lane];
@@ -192,7 +192,7 @@ static inline kernel_flat_quad kernel_flat_of(const kernel_quad *q, int lane)
     return flat;
 }
 
-static inline void kernel_quad_put(kernel_quad_place *out, int lane, const double place[3])
+static inline void kernel_quad_put(kernel_quad_point *out, int lane, const double place[3])
 {
     out->s[lane] = (float)place[0];
     out->r[lane] = (float)place[1];
@@ -201,94 +201,95 @@ static inline void kernel_quad_put(kernel_quad_place *out, int lane, const doubl
 
 /* ---- SIMD_WIDTH / 2 rays, in double ---- */
 
-typedef struct kernel_half_quad {
-    kernel_half x[4], y[4];
-} kernel_half_quad;
+typedef struct kernel_f64_quad {
+    kernel_f64 x[4], y[4];
+} kernel_f64_quad;
 
-typedef struct kernel_half_quadratic {
-    kernel_half c0, c1, c2;
-} kernel_half_quadratic;
+typedef struct kernel_f64_quadratic {
+    kernel_f64 c0, c1, c2;
+} kernel_f64_quadratic;
 
-SIMD_INLINE kernel_half kernel_half_cross(const kernel_half_quad *q, int i, int j)
+SIMD_INLINE kernel_f64 kernel_f64_cross(const kernel_f64_quad *q, int i, int j)
 {
     return q->x[i] * q->y[j] - q->x[j] * q->y[i];
 }
 
-SIMD_INLINE kernel_half_mask kernel_half_vanishes(const kernel_half_quadratic *c)
+SIMD_INLINE kernel_f64_mask kernel_f64_vanishes(const kernel_f64_quadratic *c)
 {
-    return (kernel_half_mask)(c->c0 == 0) & (kernel_half_mask)(c->c1 == 0) & (kernel_half_mask)(c->c2 == 0);
+    return (kernel_f64_mask)(c->c0 == 0) & (kernel_f64_mask)(c->c1 == 0) & (kernel_f64_mask)(c->c2 == 0);
 }
 
 /* Returns, per lane, the root in [0, 1] of the quadratic at which half of its derivative equals `turn`, by the same
- * formulas as kernel_flat_root(). */
-SIMD_INLINE kernel_half kernel_half_root(const kernel_half_quadratic *c, kernel_half turn)
+ * formulas as kernel_scalar_root(). */
+SIMD_INLINE kernel_f64 kernel_f64_root(const kernel_f64_quadratic *c, kernel_f64 turn)
 {
-    const kernel_half zero = {0}, one = zero + 1;
-    const kernel_half_mask is_sum = (kernel_half_mask)(c->c1 * turn <= 0);
-    const kernel_half n = kernel_half_select(is_sum, turn - c->c1, c->c0);
-    const kernel_half d = kernel_half_select(is_sum, n + c->c2, (c->c0 - c->c1) - turn);
-    const kernel_half whole = kernel_half_select(is_sum, one, zero);
-    const kernel_half x = kernel_half_select((kernel_half_mask)(d != 0), n / d, whole);
-    const kernel_half least = kernel_half_select((kernel_half_mask)(x < one), x, one);
-    return kernel_half_select((kernel_half_mask)(x >= 0), least, zero);
+    const kernel_f64 zero = {0}, one = zero + 1;
+    const kernel_f64_mask is_sum = (kernel_f64_mask)(c->c1 * turn <= 0);
+    const kernel_f64 n = kernel_f64_select(is_sum, turn - c->c1, c->c0);
+    const kernel_f64 d = kernel_f64_select(is_sum, n + c->c2, (c->c0 - c->c1) - turn);
+    const kernel_f64 whole = kernel_f64_select(is_sum, one, zero);
+    const kernel_f64 x = kernel_f64_select((kernel_f64_mask)(d != 0), n / d, whole);
+    const kernel_f64 least = kernel_f64_select((kernel_f64_mask)(x < one), x, one);
+    return kernel_f64_select((kernel_f64_mask)(x >= 0), least, zero);
 }
 
 /* Computes the patch's point for the wanted rays in one half of the lanes. Each of these rays crosses one triangle.
  * Returns the rays for which one of the quadratics A and B vanishes, whose points must be computed one by one. */
-SIMD_INLINE kernel_half_mask kernel_half_once(const kernel_quad *quad, vm wanted, int half, kernel_quad_place *out)
+SIMD_INLINE kernel_f64_mask kernel_f64_single_point(const kernel_quad *quad, vm wanted, int half,
+                                                    kernel_quad_point *out)
 {
-    const kernel_half zero = {0}, one = zero + 1;
-    kernel_half_quad q;
-    kernel_half z[4], old[3];
+    const kernel_f64 zero = {0}, one = zero + 1;
+    kernel_f64_quad q;
+    kernel_f64 z[4], old[3];
     const vi turns_b = vi_from_bits(quad->e01) ^ vi_from_bits(quad->e32);
-    const kernel_half_mask by_b = kernel_half_of_mask(vm_sign(turns_b), half);
-    const kernel_half_mask negative_a = kernel_half_of_mask(vm_sign(vi_from_bits(quad->e03)), half);
-    const kernel_half_mask negative_b = kernel_half_of_mask(vm_sign(vi_from_bits(quad->e01)), half);
+    const kernel_f64_mask by_b = kernel_f64_of_mask(vm_sign(turns_b), half);
+    const kernel_f64_mask negative_a = kernel_f64_of_mask(vm_sign(vi_from_bits(quad->e03)), half);
+    const kernel_f64_mask negative_b = kernel_f64_of_mask(vm_sign(vi_from_bits(quad->e01)), half);
     for (int i = 0; i < 4; i++) {
-        q.x[i] = kernel_half_of(&quad->x[i], half);
-        q.y[i] = kernel_half_of(&quad->y[i], half);
-        z[i] = kernel_half_of(&quad->z[i], half);
+        q.x[i] = kernel_f64_of(&quad->x[i], half);
+        q.y[i] = kernel_f64_of(&quad->y[i], half);
+        z[i] = kernel_f64_of(&quad->z[i], half);
     }
-    const kernel_half across = kernel_half_cross(&q, 0, 2);
-    const kernel_half_quadratic a = {kernel_half_cross(&q, 0, 3), 0.5 * (across + kernel_half_cross(&q, 1, 3)),
-                                     kernel_half_cross(&q, 1, 2)};
-    const kernel_half_quadratic b = {kernel_half_cross(&q, 0, 1), 0.5 * (across + kernel_half_cross(&q, 3, 1)),
-                                     kernel_half_cross(&q, 3, 2)};
-    const kernel_half square = kernel_half_select(by_b, b.c1 * b.c1 - b.c0 * b.c2, a.c1 * a.c1 - a.c0 * a.c2);
-    const kernel_half root = kernel_half_sqrt(kernel_half_select((kernel_half_mask)(square > 0), square, zero));
-    const kernel_half_mask is_rising = (by_b & negative_b) | (~by_b & negative_a);
-    const kernel_half turn = kernel_half_select(by_b ^ is_rising, root, -root);
-    const kernel_half s = kernel_half_root(&a, turn), r = kernel_half_root(&b, -turn);
-    const kernel_half t = (one - r) * ((one - s) * z[0] + s * z[1]) + r * ((one - s) * z[3] + s * z[2]);
-    const kernel_half_mask rays = kernel_half_of_mask(wanted, half);
+    const kernel_f64 across = kernel_f64_cross(&q, 0, 2);
+    const kernel_f64_quadratic a = {kernel_f64_cross(&q, 0, 3), 0.5 * (across + kernel_f64_cross(&q, 1, 3)),
+                                    kernel_f64_cross(&q, 1, 2)};
+    const kernel_f64_quadratic b = {kernel_f64_cross(&q, 0, 1), 0.5 * (across + kernel_f64_cross(&q, 3, 1)),
+                                    kernel_f64_cross(&q, 3, 2)};
+    const kernel_f64 square = kernel_f64_select(by_b, b.c1 * b.c1 - b.c0 * b.c2, a.c1 * a.c1 - a.c0 * a.c2);
+    const kernel_f64 root = kernel_f64_sqrt(kernel_f64_select((kernel_f64_mask)(square > 0), square, zero));
+    const kernel_f64_mask is_rising = (by_b & negative_b) | (~by_b & negative_a);
+    const kernel_f64 turn = kernel_f64_select(by_b ^ is_rising, root, -root);
+    const kernel_f64 s = kernel_f64_root(&a, turn), r = kernel_f64_root(&b, -turn);
+    const kernel_f64 t = (one - r) * ((one - s) * z[0] + s * z[1]) + r * ((one - s) * z[3] + s * z[2]);
+    const kernel_f64_mask rays = kernel_f64_of_mask(wanted, half);
     vf *const lists[3] = {&out->s, &out->r, &out->t};
-    const kernel_half places[3] = {s, r, t};
+    const kernel_f64 places[3] = {s, r, t};
     for (int n = 0; n < 3; n++) {
-        old[n] = kernel_half_of(lists[n], half);
-        kernel_half_put(lists[n], half, kernel_half_select(rays, places[n], old[n]));
+        old[n] = kernel_f64_of(lists[n], half);
+        kernel_f64_store_lanes(lists[n], half, kernel_f64_select(rays, places[n], old[n]));
     }
-    return rays & (kernel_half_vanishes(&a) | kernel_half_vanishes(&b));
+    return rays & (kernel_f64_vanishes(&a) | kernel_f64_vanishes(&b));
 }
 
-static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad *q, vm wanted, kernel_quad_place *out)
+static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad *q, vm wanted, kernel_quad_point *out)
 {
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        const kernel_flat_quad flat = kernel_flat_of(q, lane);
+        const kernel_scalar_quad flat = kernel_scalar_of(q, lane);
         double place[3];
-        kernel_flat_once(&flat, place);
+        kernel_scalar_single_point(&flat, place);
         kernel_quad_put(out, lane, place);
     }
 }
 
-static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm wanted, kernel_quad_place *out)
+static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_quad_point *out)
 {
     unsigned vanishing = 0;
     for (int half = 0; half < 2; half++) {
         const unsigned lanes = ((1u << KERNEL_HALF) - 1) << half * KERNEL_HALF;
         int64_t rays[KERNEL_HALF], any = 0;
         if (!(vm_bits(wanted) & lanes)) continue;
-        const kernel_half_mask vanish = kernel_half_once(q, wanted, half, out);
+        const kernel_f64_mask vanish = kernel_f64_single_point(q, wanted, half, out);
         memcpy(rays, &vanish, sizeof rays);
         for (int i = 0; i < KERNEL_HALF; i++) any |= rays[i];
         if (!any) continue;
@@ -299,14 +300,15 @@ static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm 
 
 /* Computes the points of the wanted rays that meet the patch twice: one in out[0], the other in out[1]. Returns these
  * rays. */
-static __attribute__((noinline, cold)) vm kernel_quad_twice(const kernel_quad *q, vm wanted, kernel_quad_place out[2])
+static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_quad *q, vm wanted,
+                                                                 kernel_quad_point out[2])
 {
     unsigned found = 0;
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        const kernel_flat_quad flat = kernel_flat_of(q, lane);
+        const kernel_scalar_quad flat = kernel_scalar_of(q, lane);
         double places[2][3];
-        if (!kernel_flat_twice(&flat, places)) continue;
+        if (!kernel_scalar_two_points(&flat, places)) continue;
         kernel_quad_put(&out[0], lane, places[0]);
         kernel_quad_put(&out[1], lane, places[1]);
         found |= 1u << lane;
@@ -339,7 +341,7 @@ typedef struct kernel_patch_at {
     vf sx, sy, rx, ry, det, dx, dy;
 } kernel_patch_at;
 
-SIMD_INLINE kernel_patch_at kernel_patch_look(const kernel_patch *p, vf s, vf r)
+SIMD_INLINE kernel_patch_at kernel_patch_evaluate(const kernel_patch *p, vf s, vf r)
 {
     kernel_patch_at at;
     at.rx = p->gx + s * p->hx, at.ry = p->gy + s * p->hy;
@@ -356,7 +358,7 @@ enum { KERNEL_PATCH_STEPS = 4 };
 SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    const kernel_patch_at at = kernel_patch_look(p, *s, *r);
+    const kernel_patch_at at = kernel_patch_evaluate(p, *s, *r);
     const vf inverse = vf_select(vf_eq(at.det, zero), zero, 1.0f / at.det);
     *s = vf_clamp(*s + (at.dx * at.ry - at.dy * at.rx) * inverse, zero, one);
     *r = vf_clamp(*r + (at.sx * at.dy - at.sy * at.dx) * inverse, zero, one);
@@ -369,11 +371,11 @@ SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
 SIMD_INLINE vm kernel_patch_arrived(const kernel_patch *p, vf s, vf r)
 {
     const vf one = vf_set(1);
-    const kernel_patch_at at = kernel_patch_look(p, s, r);
+    const kernel_patch_at at = kernel_patch_evaluate(p, s, r);
     const vf e = vf_abs(p->ex) + vf_abs(p->ey), g = vf_abs(p->gx) + vf_abs(p->gy);
-    const vf rim = vf_min(vf_min(s, one - s), vf_min(r, one - r));
+    const vf domain_margin = vf_min(vf_min(s, one - s), vf_min(r, one - r));
     const vm open = vf_lt(e * (p->gz + 0.5f * g) + g * p->ez, vf_abs(at.det) * 8.0f);
-    const vm inside = vm_and(open, vf_lt(vf_set(1.0f / 1024), rim));
+    const vm inside = vm_and(open, vf_lt(vf_set(1.0f / 1024), domain_margin));
     return vm_and(inside, vf_le(vf_abs(at.dx) + vf_abs(at.dy), (e + g) * 1.2e-7f));
 }
 
@@ -387,21 +389,22 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
 }
 
 /* Computes the points of rays that meet no edge. The edge functions are computed from the projected corners. */
-static __attribute__((noinline)) void kernel_quad_once_beside(const kernel_quad *q, vm wanted, kernel_quad_place *out)
+static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const kernel_quad *q, vm wanted,
+                                                                         kernel_quad_point *out)
 {
     kernel_quad own = *q;
     own.e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
     own.e03 = vf_diff_of_products(q->x[0], q->y[3], q->x[3], q->y[0]);
     own.e12 = vf_diff_of_products(q->x[1], q->y[2], q->x[2], q->y[1]);
     own.e32 = vf_diff_of_products(q->x[3], q->y[2], q->x[2], q->y[3]);
-    kernel_quad_once(&own, wanted, out);
+    kernel_quad_single_point(&own, wanted, out);
 }
 
 /* Computes the points at which rays meet the patches of `count` quads. once[n] has the rays that cross exactly one
  * triangle of quad n. Quads are processed together because each step of Newton's method depends on the one before.
  * are_beside: no ray meets an edge, and the quads' edge functions are not set. */
 SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], bool are_beside,
-                                    kernel_quad_place *out)
+                                    kernel_quad_point *out)
 {
     kernel_patch patch[2];
     vf s[2], r[2];
@@ -414,16 +417,16 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
         for (int n = 0; n < count; n++) kernel_patch_step(&patch[n], &s[n], &r[n]);
     for (int n = 0; n < count; n++) {
         const vm left = vm_andnot(once[n], kernel_patch_arrived(&patch[n], s[n], r[n]));
-        out[n] = (kernel_quad_place){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
+        out[n] = (kernel_quad_point){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
         if (__builtin_expect(!vm_any(left), 1)) continue;
         if (are_beside)
-            kernel_quad_once_beside(&q[n], left, &out[n]);
+            kernel_quad_single_point_off_edges(&q[n], left, &out[n]);
         else
-            kernel_quad_once(&q[n], left, &out[n]);
+            kernel_quad_single_point(&q[n], left, &out[n]);
     }
 }
 
-SIMD_INLINE void kernel_quads_meet(const kernel_quad *q, int count, vm once, kernel_quad_place *out)
+SIMD_INLINE void kernel_quads_intersect(const kernel_quad *q, int count, vm once, kernel_quad_point *out)
 {
     const vm all[2] = {once, once};
     kernel_quads_cross(q, count, all, false, out);
@@ -438,26 +441,26 @@ SIMD_INLINE vm kernel_quad_sides(vm rays, vf e01, vf e32, vf e03, vf e12)
 }
 
 /* Returns v, negated in lanes in which `other` is negative. */
-SIMD_INLINE vf kernel_turned(vf v, vf other)
+SIMD_INLINE vf kernel_flip_sign(vf v, vf other)
 {
     return vf_from_bits(vi_from_bits(v) ^ (vi_from_bits(other) & vi_set((int32_t)0x80000000u)));
 }
 
 /* Returns those of the rays given by kernel_quad_sides() that may still meet the patch twice when the middle
  * coefficients are tested, too. */
-SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
+SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
 {
     const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
     const vf other = vf_diff_of_products(q->x[3], q->y[1], q->x[1], q->y[3]);
     const vf slack = 1e-6f * (vf_abs(across) + vf_abs(other));
-    const vm b = vf_le(kernel_turned(across + other, q->e01), slack);
-    const vm a = vf_le(kernel_turned(across - other, q->e03), slack);
+    const vm b = vf_le(kernel_flip_sign(across + other, q->e01), slack);
+    const vm a = vf_le(kernel_flip_sign(across - other, q->e03), slack);
     return vm_and(rays, vm_and(a, b));
 }
 
 /* Returns the rays that cross exactly one of a quad's two triangles. around[i]: sides of the quad's edges in cyclic
  * order from the begin of its diagonal; side: the side of the diagonal. */
-SIMD_INLINE vm kernel_halves_once(const vm around[4], vm side)
+SIMD_INLINE vm kernel_cross_one_triangle(const vm around[4], vm side)
 {
     const vm half0 = vm_andnot(vm_xor(around[1], side), vm_xor(around[0], around[1]));
     const vm half1 = vm_not(vm_or(vm_xor(side, around[2]), vm_xor(around[2], around[3])));
@@ -467,8 +470,9 @@ SIMD_INLINE vm kernel_halves_once(const vm around[4], vm side)
 /* Returns the rays that may still meet a quad's patch twice when the discriminant is tested, too. A ray is excluded
  * only if the discriminant is negative by more than its rounding in float32, which is below a millionth of its
  * terms. */
-static __attribute__((noinline)) vm kernel_curved_bends_yet(const vf x[8], const vf y[8], const signed char *loop,
-                                                            vm rays, vf across, vf other)
+static __attribute__((noinline)) vm kernel_curved_may_cross_twice_by_discriminant(const vf x[8], const vf y[8],
+                                                                                  const signed char *loop, vm rays,
+                                                                                  vf across, vf other)
 {
     const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
     const vf b0 = vf_diff_of_products(x[a], y[b], x[b], y[a]), b2 = vf_diff_of_products(x[d], y[c], x[c], y[d]);
@@ -476,36 +480,39 @@ static __attribute__((noinline)) vm kernel_curved_bends_yet(const vf x[8], const
     return vm_andnot(rays, vf_lt(b1 * b1 - product, -1e-6f * (most * most + vf_abs(product))));
 }
 
-/* Returns the rays that may meet a quad's patch twice: those of kernel_quad_bends() and a few more. loop: corners 0 to
- * 3 in cyclic order; side[i]: side of the edge from corner i to the next. Only rays that are on different sides of
- * opposite edges are tested. */
-SIMD_INLINE vm kernel_curved_bends(const vf x[8], const vf y[8], const signed char *loop, vm rays, const vm side[4])
+/* Returns the rays that may meet a quad's patch twice: those of kernel_quad_may_cross_twice() and a few more. loop:
+ * corners 0 to 3 in cyclic order; side[i]: side of the edge from corner i to the next. Only rays that are on different
+ * sides of opposite edges are tested. */
+SIMD_INLINE vm kernel_curved_may_cross_twice(const vf x[8], const vf y[8], const signed char *loop, vm rays,
+                                             const vm side[4])
 {
     const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
     const vm outside = vm_and(rays, vm_and(vm_xor(side[0], side[2]), vm_xor(side[1], side[3])));
     const vf across = vf_diff_of_products(x[a], y[c], x[c], y[a]), other = vf_diff_of_products(x[d], y[b], x[b], y[d]);
     const vf slack = 2e-6f * (vf_abs(across) + vf_abs(other)), sum = across + other, difference = across - other;
-    const vm bent = vf_le(vf_select(side[0], -sum, sum), slack);
-    const vm bends = vm_and(outside, vm_and(bent, vf_le(vf_select(side[3], difference, -difference), slack)));
-    return __builtin_expect(vm_any(bends), 0) ? kernel_curved_bends_yet(x, y, loop, bends, across, other) : bends;
+    const vm nonlinear_part = vf_le(vf_select(side[0], -sum, sum), slack);
+    const vm bends = vm_and(outside, vm_and(nonlinear_part, vf_le(vf_select(side[3], difference, -difference), slack)));
+    return __builtin_expect(vm_any(bends), 0)
+               ? kernel_curved_may_cross_twice_by_discriminant(x, y, loop, bends, across, other)
+               : bends;
 }
 
 /* Computes the points at which rays meet the patch. Rays in `once` meet it once; rays in `twice` meet it twice or
  * never. Returns how many entries of out are set, 0 to 2. */
-SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, kernel_quad_place out[2])
+SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kernel_quad_point out[2])
 {
     const vf zero = vf_set(0);
     int count = 0;
     if (vm_any(once)) {
-        kernel_quads_meet(q, 1, once, &out[0]);
+        kernel_quads_intersect(q, 1, once, &out[0]);
         count = 1;
     }
     if (!vm_any(twice)) return count;
-    const vm bends = kernel_quad_bends(q, twice);
+    const vm bends = kernel_quad_may_cross_twice(q, twice);
     if (__builtin_expect(!vm_any(bends), 1)) return count;
-    if (!count) out[0] = (kernel_quad_place){vm_none(), zero, zero, zero};
-    out[1] = (kernel_quad_place){vm_none(), zero, zero, zero};
-    out[1].mask = kernel_quad_twice(q, bends, out);
+    if (!count) out[0] = (kernel_quad_point){vm_none(), zero, zero, zero};
+    out[1] = (kernel_quad_point){vm_none(), zero, zero, zero};
+    out[1].mask = kernel_quad_two_points(q, bends, out);
     out[0].mask = vm_or(out[0].mask, out[1].mask);
     return vm_any(out[1].mask) ? 2 : count;
 }
@@ -530,13 +537,14 @@ typedef struct kernel_ray_box {
 } kernel_ray_box;
 
 /* A cell's edges as seen by the middle ray of the box, and the squares of their lengths in space. */
-typedef struct kernel_seen_edges {
+typedef struct kernel_projected_edges {
     vf at[12][2], square[12];
     vf spread; /* half width plus half height of the range of the rays' slopes */
     vf margin; /* upper bound of the rounding error of a cross product of two edges */
-} kernel_seen_edges;
+} kernel_projected_edges;
 
-SIMD_INLINE void kernel_seen_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type, kernel_seen_edges *out)
+SIMD_INLINE void kernel_projected_edges_of(vf (*const at)[8], const kernel_ray_box *box, int type,
+                                           kernel_projected_edges *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf middle[2], steep[2], reach[2], longest = vf_set(0);
@@ -565,7 +573,7 @@ SIMD_INLINE void kernel_seen_edges_of(vf (*const at)[8], const kernel_ray_box *b
 
 /* Returns the lanes whose quad looks convex along all rays of the box. sides: the quad's edges in cyclic order, and
  * whether each is reversed. */
-SIMD_INLINE vm kernel_quad_is_convex(const kernel_seen_edges *e, const signed char (*sides)[2])
+SIMD_INLINE vm kernel_quad_is_convex(const kernel_projected_edges *e, const signed char (*sides)[2])
 {
     const int n[4] = {sides[0][0], sides[1][0], sides[2][0], sides[3][0]};
     const vf along = vf_max(e->square[n[0]], e->square[n[2]]), across = vf_max(e->square[n[1]], e->square[n[3]]);
@@ -582,18 +590,18 @@ SIMD_INLINE vm kernel_quad_is_convex(const kernel_seen_edges *e, const signed ch
 }
 
 /* Returns a mask of the quads that may look other than convex along some ray of the box. */
-SIMD_INLINE vi kernel_curved_dents(vf (*const at)[8], const kernel_ray_box *box, int type)
+SIMD_INLINE vi kernel_curved_nonconvex_quads(vf (*const at)[8], const kernel_ray_box *box, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
-    kernel_seen_edges edges;
-    vi dents = vi_set(0);
-    kernel_seen_edges_of(at, box, type, &edges);
+    kernel_projected_edges edges;
+    vi nonconvex = vi_set(0);
+    kernel_projected_edges_of(at, box, type, &edges);
     for (int face = 0; face < shape->face_count; face++) {
         if (shape->faces[face].count == 3) continue;
         const vm convex = kernel_quad_is_convex(&edges, shape->faces[face].sides);
-        dents |= vi_select(convex, vi_set(0), vi_set(1 << face));
+        nonconvex |= vi_select(convex, vi_set(0), vi_set(1 << face));
     }
-    return dents;
+    return nonconvex;
 }
 
 #endif

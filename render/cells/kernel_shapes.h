@@ -111,7 +111,7 @@ SIMD_INLINE vi kernel_face_bit(vi sign, int face)
 }
 
 /* Returns the reference coordinate on an axis, which is 0 or 1, of each ray's vertex number `corner`. */
-SIMD_INLINE vf kernel_curved_own(const kernel_shape *shape, int count, int axis, vi corner)
+SIMD_INLINE vf kernel_curved_vertex_coordinate(const kernel_shape *shape, int count, int axis, vi corner)
 {
     int bits = 0;
     for (int i = 0; i < count; i++) bits |= (shape->corners[i][axis] > 0) << i;

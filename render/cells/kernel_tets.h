@@ -9,7 +9,7 @@
 #include "kernel_cell.h"
 #include "kernel_crossings.h"
 #include "kernel_packet.h"
-#include "kernel_placed.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_trace.h"
 #include "simd.h"
@@ -19,27 +19,27 @@ typedef struct kernel_tets {
     bool is_one;
     const kernel_packet *packet;
     const kernel_cell *one;
-    const kernel_lane_rays *own;
-    const kernel_placed *placed;
+    const kernel_lane_rays *lane_rays;
+    const kernel_transformed_tets *transformed;
 } kernel_tets;
 
-/* Returns a number of each ray's tet: a member of kernel_cell, or one of kernel_placed. */
+/* Returns a number of each ray's tet: a member of kernel_cell, or one of kernel_transformed_tets. */
 #define KERNEL_TET_NUMBER(t, of_one, of_placed)                                                                        \
-    ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->placed->of_placed, (t)->own->lane))
+    ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->transformed->of_placed, (t)->lane_rays->lane))
 
 /* Returns a copy for a function that is not inlined, so that the original stays in registers. */
 SIMD_INLINE kernel_tets kernel_tets_copy(const kernel_tets *t, kernel_lane_rays *rays)
 {
     kernel_tets out = *t;
     if (t->is_one) return out;
-    *rays = *t->own;
-    out.own = rays;
+    *rays = *t->lane_rays;
+    out.lane_rays = rays;
     return out;
 }
 
 SIMD_INLINE void kernel_tets_project(const kernel_tets *t, vf x[4], vf y[4])
 {
-    const kernel_rays rays = t->is_one ? kernel_packet_rays(t->packet) : t->own->rays;
+    const kernel_rays rays = t->is_one ? kernel_packet_rays(t->packet) : t->lane_rays->rays;
     for (int i = 0; i < 4; i++) {
         const vf z = KERNEL_TET_NUMBER(t, z[i], at[2][i]);
         x[i] = (KERNEL_TET_NUMBER(t, x[i], at[0][i]) - rays.origin_x) - rays.slope_x * z;
@@ -58,7 +58,7 @@ SIMD_INLINE void kernel_tets_edges_projected(const kernel_tets *t, vf e[KERNEL_T
 }
 
 /* Computes the edge functions whose sign is in doubt again, from projected vertices, so that their sign is exact. */
-static __attribute__((noinline)) void kernel_tets_exactly(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
+static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
 {
     vf exact[KERNEL_TET_EDGES];
     kernel_tets_edges_projected(t, exact);
@@ -71,7 +71,7 @@ static __attribute__((noinline)) void kernel_tets_exactly(const kernel_tets *t, 
 /* Computes the edge functions on the rays. is_pencil: the edges have lines for these rays. */
 SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil, vf e[KERNEL_TET_EDGES])
 {
-    const vf u = t->is_one ? t->packet->u : t->own->u, v = t->is_one ? t->packet->v : t->own->v;
+    const vf u = t->is_one ? t->packet->u : t->lane_rays->u, v = t->is_one ? t->packet->v : t->lane_rays->v;
     vf least = vf_set(INFINITY);
     if (!is_pencil) {
         kernel_tets_edges_projected(t, e);
@@ -85,9 +85,9 @@ SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil
         least = vf_min(vf_abs(e[n]), least);
     }
     if (__builtin_expect(vm_any(vm_andnot(rays, vf_lt(KERNEL_TET_NUMBER(t, doubt, doubt), least))), 0)) {
-        kernel_lane_rays own;
-        const kernel_tets copy = kernel_tets_copy(t, &own);
-        kernel_tets_exactly(&copy, e);
+        kernel_lane_rays lane_rays;
+        const kernel_tets copy = kernel_tets_copy(t, &lane_rays);
+        kernel_tets_in_double(&copy, e);
     }
 }
 
@@ -157,14 +157,14 @@ SIMD_INLINE void kernel_ends_order(const kernel_ends *ends, bool has_colour, ker
 }
 
 /* Returns the rays that cross face n and whose weights are not good enough. */
-SIMD_INLINE vm kernel_tets_weak(const kernel_tets *t, int n, vm hit, vf weight)
+SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf weight)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n], least[n])));
 }
 
 /* Chooses as kernel_tets_choose() does, with edges projected again for rays whose weights are not good enough. */
-SIMD_INLINE kernel_ends kernel_tets_choose_exactly(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
-                                                   bool has_colour)
+SIMD_INLINE kernel_ends kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
+                                                     bool has_colour)
 {
     vf x[4], y[4];
     kernel_sums sums[4];
@@ -175,7 +175,7 @@ SIMD_INLINE kernel_ends kernel_tets_choose_exactly(const kernel_tets *t, vm rays
         const signed char *face = kernel_tet_face[n];
         const int i = face[0], j = face[1], k = face[2];
         vf ij = e[(int)face[3]], jk = e[(int)face[4]], ik = e[(int)face[5]];
-        const vm weak = kernel_tets_weak(t, n, hit[n], kernel_weight(ij, jk, ik));
+        const vm weak = kernel_tets_inaccurate(t, n, hit[n], kernel_weight(ij, jk, ik));
         if (vm_any(weak)) {
             ij = vf_select(weak, kernel_edge_between(x[i], y[i], x[j], y[j]), ij);
             jk = vf_select(weak, kernel_edge_between(x[j], y[j], x[k], y[k]), jk);
@@ -187,13 +187,13 @@ SIMD_INLINE kernel_ends kernel_tets_choose_exactly(const kernel_tets *t, vm rays
 }
 
 /* As above. is_one is made a constant, because one packet in some has such weights. */
-static __attribute__((noinline, cold)) kernel_ends kernel_tets_mend(const kernel_tets *t, vm rays,
-                                                                    const vf e[KERNEL_TET_EDGES], bool has_colour)
+static __attribute__((noinline, cold)) kernel_ends kernel_tets_recompute(const kernel_tets *t, vm rays,
+                                                                         const vf e[KERNEL_TET_EDGES], bool has_colour)
 {
     const kernel_tets one = {.is_one = true, .packet = t->packet, .one = t->one};
-    const kernel_tets several = {.own = t->own, .placed = t->placed};
-    return t->is_one ? kernel_tets_choose_exactly(&one, rays, e, has_colour)
-                     : kernel_tets_choose_exactly(&several, rays, e, false);
+    const kernel_tets several = {.lane_rays = t->lane_rays, .transformed = t->transformed};
+    return t->is_one ? kernel_tets_choose_in_double(&one, rays, e, has_colour)
+                     : kernel_tets_choose_in_double(&several, rays, e, false);
 }
 
 /* Computes where the rays enter and leave their tets, and the values there. It computes the sums of all four faces
@@ -215,11 +215,11 @@ SIMD_INLINE void kernel_tets_interval(const kernel_tets *t, vm rays, bool is_pen
     }
     kernel_ends ends = kernel_tets_choose(hit, sums);
     if (is_pencil) {
-        for (int n = 0; n < 4; n++) weak[n] = kernel_tets_weak(t, n, hit[n], sums[n].weight);
+        for (int n = 0; n < 4; n++) weak[n] = kernel_tets_inaccurate(t, n, hit[n], sums[n].weight);
         if (__builtin_expect(vm_any(vm_or(vm_or(weak[0], weak[1]), vm_or(weak[2], weak[3]))), 0)) {
-            kernel_lane_rays own;
-            const kernel_tets copy = kernel_tets_copy(t, &own);
-            ends = kernel_tets_mend(&copy, rays, e, has_colour);
+            kernel_lane_rays lane_rays;
+            const kernel_tets copy = kernel_tets_copy(t, &lane_rays);
+            ends = kernel_tets_recompute(&copy, rays, e, has_colour);
         }
     }
     kernel_ends_order(&ends, has_colour, out);
@@ -244,9 +244,10 @@ SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *
 
 /* ---- rays with a tet each ---- */
 
-SIMD_INLINE void kernel_tet_rays_interval(const kernel_placed *placed, const kernel_lane_rays *r, kernel_interval *out)
+SIMD_INLINE void kernel_tet_rays_interval(const kernel_transformed_tets *transformed, const kernel_lane_rays *r,
+                                          kernel_interval *out)
 {
-    const kernel_tets tets = {.own = r, .placed = placed};
+    const kernel_tets tets = {.lane_rays = r, .transformed = transformed};
     kernel_tets_interval(&tets, r->active, true, false, out);
 }
 

@@ -134,7 +134,7 @@ void *polyhedra_scratch(polyhedron_store *store, size_t bytes)
 typedef struct work_vertex {
     double position[3], value;
     int64_t vertex;
-    int as_met; /* number of the vertex before sorting */
+    int input_index; /* number of the vertex before sorting */
 } work_vertex;
 
 /* Temporary data of one cell while it is decomposed. */
@@ -181,10 +181,10 @@ DEFINE_SORT(sort_facets, closed_triangle, facet_compare)
 /* Lays out the temporary arrays in the buffer (NULL: only computes the size). Returns their size in bytes. */
 static size_t lay_out(work *w, char *buffer)
 {
-    base_carving at = {buffer, closed_faces_lay_out(&w->faces, buffer)};
-    w->rank = base_carve(&at, (size_t)w->faces.entry_count * sizeof(int));
-    w->positions = base_carve(&at, (size_t)w->faces.entry_count * sizeof *w->positions);
-    w->vertices = base_carve(&at, (size_t)w->faces.entry_count * sizeof *w->vertices);
+    base_arena at = {buffer, closed_faces_lay_out(&w->faces, buffer)};
+    w->rank = base_arena_alloc(&at, (size_t)w->faces.entry_count * sizeof(int));
+    w->positions = base_arena_alloc(&at, (size_t)w->faces.entry_count * sizeof *w->positions);
+    w->vertices = base_arena_alloc(&at, (size_t)w->faces.entry_count * sizeof *w->vertices);
     return at.used;
 }
 
@@ -198,11 +198,11 @@ static void read_faces(work *w, int64_t cell)
         grid_vertex(w->g, c->vertices[i], v->position);
         v->value = grid_field_value(w->field, w->field->is_cell_centred ? cell : c->vertices[i]);
         v->vertex = c->vertices[i];
-        v->as_met = i;
+        v->input_index = i;
     }
     sort_vertices(w->vertices, c->vertex_count);
     for (int i = 0; i < c->vertex_count; i++) {
-        w->rank[w->vertices[i].as_met] = i;
+        w->rank[w->vertices[i].input_index] = i;
         memcpy(w->positions[i], w->vertices[i].position, sizeof w->positions[i]);
     }
     for (int i = 0; i < c->entry_count; i++) c->entry_vertices[i] = w->rank[c->entry_vertices[i]];
@@ -212,22 +212,22 @@ static void read_faces(work *w, int64_t cell)
 
 static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
 {
-    base_carving at = {buffer, 0};
+    base_arena at = {buffer, 0};
     const size_t points = (size_t)c->vertex_count + 1;
-    c->world = base_carve(&at, points * sizeof *c->world);
-    c->values = base_carve(&at, points * sizeof *c->values);
-    c->vertices = base_carve(&at, points * sizeof *c->vertices);
+    c->world = base_arena_alloc(&at, points * sizeof *c->world);
+    c->values = base_arena_alloc(&at, points * sizeof *c->values);
+    c->vertices = base_arena_alloc(&at, points * sizeof *c->vertices);
     float **const floats[5] = {&c->x, &c->y, &c->z, &c->f, &c->g};
-    for (int i = 0; i < 5; i++) *floats[i] = base_carve(&at, points * sizeof(float));
-    c->facets = base_carve(&at, (size_t)c->facet_count * sizeof *c->facets);
-    c->edges = base_carve(&at, (size_t)c->facet_count * 3 * sizeof *c->edges);
-    c->lines = base_carve(&at, ((size_t)c->facet_count * 3 + points) * sizeof *c->lines);
-    c->quads = base_carve(&at, (size_t)quads * sizeof *c->quads);
+    for (int i = 0; i < 5; i++) *floats[i] = base_arena_alloc(&at, points * sizeof(float));
+    c->facets = base_arena_alloc(&at, (size_t)c->facet_count * sizeof *c->facets);
+    c->edges = base_arena_alloc(&at, (size_t)c->facet_count * 3 * sizeof *c->edges);
+    c->lines = base_arena_alloc(&at, ((size_t)c->facet_count * 3 + points) * sizeof *c->lines);
+    c->quads = base_arena_alloc(&at, (size_t)quads * sizeof *c->quads);
     return at.used;
 }
 
 /* Stores the vertices and values in their order, and the centre as their mean, summed in this order. */
-static void keep_vertices(const work *w, int64_t cell, polyhedron *c)
+static void store_vertices(const work *w, int64_t cell, polyhedron *c)
 {
     double sum[4] = {0, 0, 0, 0};
     c->is_finite = grid_has_own_value(w->field, cell);
@@ -254,7 +254,7 @@ static bool collapses(const work *w, const int *around)
     return quad_collapses(corners);
 }
 
-static void keep_quads(const work *w, polyhedron *c, int *quad_of)
+static void store_quads(const work *w, polyhedron *c, int *quad_of)
 {
     int count = 0;
     for (int face = 0; face < w->faces.face_count; face++) {
@@ -266,11 +266,11 @@ static void keep_quads(const work *w, polyhedron *c, int *quad_of)
     }
 }
 
-static void keep_facets(work *w, polyhedron *c)
+static void store_facets(work *w, polyhedron *c)
 {
     static const int ends[3][2] = {{0, 1}, {1, 2}, {0, 2}};
     int *quad_of = w->faces.stack;
-    keep_quads(w, c, quad_of);
+    store_quads(w, c, quad_of);
     closed_edges_empty(&w->faces);
     c->edge_count = 0;
     c->is_star = true;
@@ -278,7 +278,7 @@ static void keep_facets(work *w, polyhedron *c)
         const closed_triangle *from = &w->faces.triangles[i];
         polyhedron_facet *to = &c->facets[i];
         to->quad = quad_of[from->face];
-        to->twin = -1;
+        to->other_half = -1;
         to->sign = from->volume > 0 ? 1 : from->volume < 0 ? -1 : 0;
         c->is_star = c->is_star && to->sign >= 0;
         for (int k = 0; k < 3; k++) {
@@ -297,14 +297,14 @@ static void keep_facets(work *w, polyhedron *c)
 
 /* Links the two triangles of each quad. Both contain the quad's smallest vertex, so they are close to each other in the
  * sorted list. */
-static void keep_twins(polyhedron *c)
+static void link_quad_halves(polyhedron *c)
 {
     for (int i = 0; i < c->facet_count; i++)
-        for (int j = i + 1; c->facets[i].quad >= 0 && c->facets[i].twin < 0 && j < c->facet_count; j++)
-            if (c->facets[j].quad == c->facets[i].quad) c->facets[i].twin = j, c->facets[j].twin = i;
+        for (int j = i + 1; c->facets[i].quad >= 0 && c->facets[i].other_half < 0 && j < c->facet_count; j++)
+            if (c->facets[j].quad == c->facets[i].quad) c->facets[i].other_half = j, c->facets[j].other_half = i;
 }
 
-static polyhedron *keep(polyhedron_store *store, work *w, int64_t cell)
+static polyhedron *store_polyhedron(polyhedron_store *store, work *w, int64_t cell)
 {
     polyhedron shape = {.vertex_count = w->faces.vertex_count, .facet_count = w->faces.triangle_count};
     const size_t head = rounded(sizeof shape);
@@ -313,14 +313,14 @@ static polyhedron *keep(polyhedron_store *store, work *w, int64_t cell)
     polyhedron *c = (polyhedron *)(void *)block;
     *c = shape;
     lay_out_polyhedron(c, block + head, w->faces.face_count);
-    keep_vertices(w, cell, c);
-    closed_faces_turn_outward(&w->faces, (const double(*)[3])c->world, c->world[c->vertex_count]);
-    keep_facets(w, c);
-    keep_twins(c);
+    store_vertices(w, cell, c);
+    closed_faces_orient_outward(&w->faces, (const double(*)[3])c->world, c->world[c->vertex_count]);
+    store_facets(w, c);
+    link_quad_halves(c);
     return c;
 }
 
-static polyhedron *take_apart(polyhedron_store *store, const grid *g, const grid_field *field, uint32_t index)
+static polyhedron *decompose_polyhedron(polyhedron_store *store, const grid *g, const grid_field *field, uint32_t index)
 {
     work w = {.g = g, .field = field};
     if (!closed_faces_count(&w.faces, g, index)) return NULL;
@@ -328,10 +328,10 @@ static polyhedron *take_apart(polyhedron_store *store, const grid *g, const grid
     if (!buffer) return NULL;
     lay_out(&w, buffer);
     read_faces(&w, index);
-    closed_faces_turn(&w.faces);
-    closed_faces_cut(&w.faces, (const double(*)[3])w.positions);
+    closed_faces_orient(&w.faces);
+    closed_faces_triangulate(&w.faces, (const double(*)[3])w.positions);
     sort_facets(w.faces.triangles, w.faces.triangle_count);
-    return keep(store, &w, index);
+    return store_polyhedron(store, &w, index);
 }
 
 polyhedron *polyhedra_find(polyhedron_store *store, const grid *g, const grid_field *field, int part, int layer,
@@ -342,7 +342,7 @@ polyhedron *polyhedra_find(polyhedron_store *store, const grid *g, const grid_fi
     for (polyhedron *c = store->table[slot]; c; c = c->next)
         if (c->index == index && c->part == part && c->layer == layer) return c;
     if (store->bytes > STORE_LIMIT) polyhedra_reset(store);
-    polyhedron *c = take_apart(store, g, field, index);
+    polyhedron *c = decompose_polyhedron(store, g, field, index);
     if (!c) return NULL;
     c->index = index;
     c->part = part;

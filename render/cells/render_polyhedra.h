@@ -11,8 +11,8 @@
 typedef struct polyhedron_facet {
     int vertex[3];
     int edge[3];
-    int quad;   /* number of the quad of which it is one half, or -1 */
-    int twin;   /* number of the quad's other triangle, or -1 */
+    int quad;       /* number of the quad of which it is one half, or -1 */
+    int other_half; /* number of the quad's other triangle, or -1 */
     float sign; /* sign of the volume of the tet with the centre: 1; -1 if the tet is inverted; 0 if it has no volume */
 } polyhedron_facet;
 
@@ -23,7 +23,7 @@ typedef struct polyhedron {
     struct polyhedron *next; /* next polyhedron in the same slot of the store's hash table */
     uint32_t index;
     int part, layer;
-    bool is_finite, is_placed, is_constant;
+    bool is_finite, is_transformed, is_constant;
     bool is_star; /* true if no tet's sign is negative: the cell is star-shaped from its centre */
     bool has_slopes;
     int vertex_count, edge_count, facet_count;
@@ -38,7 +38,8 @@ typedef struct polyhedron {
     double fall, rise;
     /* edge functions (kernel_cell.h): of the edges, then of the lines from each vertex to the centre */
     float (*lines)[4];
-    float least;       /* least sum of weights that is accurate enough for all of its triangles (kernel_blur_least()) */
+    float
+        least; /* least sum of weights that is accurate enough for all of its triangles (kernel_least_weight_bound()) */
     int64_t *vertices; /* vertex indices in the mesh, vertex_count of them */
     int (*edges)[2];
     polyhedron_facet *facets;

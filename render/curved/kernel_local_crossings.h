@@ -12,7 +12,7 @@
 #include "kernel_crossings.h"
 #include "kernel_curved_rays.h"
 #include "kernel_local.h"
-#include "kernel_placed_curved.h"
+#include "kernel_transformed_curved.h"
 #include "kernel_quad.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_trace.h"
@@ -27,8 +27,9 @@ enum { KERNEL_LOCAL_ROW = 16, KERNEL_LOCAL_ROWS = 3 };
 typedef struct kernel_local_faces {
     float at[4][8][SIMD_WIDTH];
     float words[KERNEL_CURVED_FACES][SIMD_WIDTH];
-    /* per cell, a bit for each quad that may not look convex on some of the cell's pixels (kernel_curved_dents()) */
-    float dents[SIMD_WIDTH];
+    /* per cell, a bit for each quad that may not look convex on some of the cell's pixels
+     * (kernel_curved_nonconvex_quads()) */
+    float nonconvex[SIMD_WIDTH];
     float rows[SIMD_WIDTH < KERNEL_LOCAL_ROW ? 1 : SIMD_WIDTH][KERNEL_LOCAL_ROWS][KERNEL_LOCAL_ROW];
 } kernel_local_faces;
 
@@ -38,24 +39,23 @@ typedef struct kernel_local_faces {
  * their order. Coordinates are compared in double. */
 SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int count, vf rank[8])
 {
-    kernel_half sum[2][8] = {0};
+    kernel_f64 sum[2][8] = {0};
     for (int half = 0; half < 2; half++) {
-        kernel_half at[3][8];
+        kernel_f64 at[3][8];
         for (int a = 0; a < 3; a++)
             for (int i = 0; i < count; i++) memcpy(&at[a][i], world[a][i] + half * KERNEL_HALF, sizeof at[a][i]);
         for (int i = 0; i < count; i++)
             for (int j = i + 1; j < count; j++) {
-                kernel_half_mask after = (kernel_half_mask)(at[2][j] < at[2][i]);
+                kernel_f64_mask after = (kernel_f64_mask)(at[2][j] < at[2][i]);
                 for (int a = 1; a >= 0; a--)
-                    after =
-                        (kernel_half_mask)(at[a][j] < at[a][i]) | ((kernel_half_mask)(at[a][j] == at[a][i]) & after);
-                const kernel_half one = kernel_half_select(after, (kernel_half){0} + 1, (kernel_half){0});
+                    after = (kernel_f64_mask)(at[a][j] < at[a][i]) | ((kernel_f64_mask)(at[a][j] == at[a][i]) & after);
+                const kernel_f64 one = kernel_f64_select(after, (kernel_f64){0} + 1, (kernel_f64){0});
                 sum[half][i] += one;
                 sum[half][j] += 1 - one;
             }
     }
     for (int i = 0; i < count; i++)
-        for (int half = 0; half < 2; half++) kernel_half_put(&rank[i], half, sum[half][i]);
+        for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&rank[i], half, sum[half][i]);
 }
 
 /* Does one step of a transposition of 16 × 16 floats, after vf_transpose() has transposed the 4 × 4 blocks: exchanges
@@ -112,7 +112,7 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
     const kernel_shape *shape = kernel_cell_shape(type);
     kernel_ray_box box;
     kernel_local_ray_box(tile, ends, &box);
-    vf_store(out->dents, vf_from_bits(kernel_curved_dents(lists, &box, type)));
+    vf_store(out->nonconvex, vf_from_bits(kernel_curved_nonconvex_quads(lists, &box, type)));
     for (int n = 0; n < 4; n++)
         for (int i = 0; i < grid_type_vertices(type); i++) vf_store(out->at[n][i], lists[n][i]);
     for (int face = 0; face < shape->face_count; face++) {
@@ -132,19 +132,19 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
 /* ---- rays ---- */
 
 static __attribute__((noinline)) void kernel_local_find_dented(const kernel_local_faces *f, const kernel_lane_rays *own,
-                                                               const vi *dents, vm rays, int type,
+                                                               const vi *nonconvex, vm rays, int type,
                                                                kernel_curved_crossed *out)
 {
-    KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])f->at, own, dents, rays, out);
+    KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])f->at, own, nonconvex, rays, out);
 }
 
 /* Finds the two faces that each ray crosses once. All other rays are added to out->alone, to be traced one by one. */
 SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kernel_lane_rays *own, vm rays, int type,
                                          kernel_curved_crossed *out)
 {
-    const vi dents = vi_from_bits(kernel_take(f->dents, own->lane));
-    if (vm_any(vm_and(rays, vm_sign(-dents))))
-        kernel_local_find_dented(f, own, &dents, rays, type, out);
+    const vi nonconvex = vi_from_bits(kernel_gather_lane(f->nonconvex, own->lane));
+    if (vm_any(vm_and(rays, vm_sign(-nonconvex))))
+        kernel_local_find_dented(f, own, &nonconvex, rays, type, out);
     else
         kernel_curved_find((const float(*)[8][SIMD_WIDTH])f->at, own, NULL, rays, out, type);
 }
@@ -183,21 +183,23 @@ SIMD_INLINE bool kernel_local_pair_of(const kernel_local_faces *f, vm rays, vi l
 }
 
 /* Gathers the corners of each ray's face. pair: NULL if the rays have more than two different cells. */
-SIMD_INLINE void kernel_local_corners_take(const kernel_local_faces *f, const kernel_local_pair *pair, int type,
-                                           vi lane, vi face, kernel_local_corners *out)
+SIMD_INLINE void kernel_local_corners_gather(const kernel_local_faces *f, const kernel_local_pair *pair, int type,
+                                             vi lane, vi face, kernel_local_corners *out)
 {
     enum { WORDS = 2, HALF = KERNEL_LOCAL_ROW / 2 };
     const float *const first = pair ? pair->rows[0][0] : NULL, *const last = pair ? pair->rows[1][0] : NULL;
-    const vi word = pair ? vi_from_bits(vf_permute_pair(vf_load(first + WORDS * KERNEL_LOCAL_ROW),
-                                                        vf_load(last + WORDS * KERNEL_LOCAL_ROW), face | pair->second))
-                         : vi_from_bits(kernel_curved_pick(f->words, kernel_cell_shape(type)->face_count, lane, face));
+    const vi word =
+        pair ? vi_from_bits(vf_permute_pair(vf_load(first + WORDS * KERNEL_LOCAL_ROW),
+                                            vf_load(last + WORDS * KERNEL_LOCAL_ROW), face | pair->second))
+             : vi_from_bits(kernel_curved_gather_vertex(f->words, kernel_cell_shape(type)->face_count, lane, face));
     for (int i = 0; i < 4; i++) {
         out->vertex[i] = word >> (4 * i) & 7;
         for (int n = 0; n < 4; n++) {
             const int row = n / 2 * KERNEL_LOCAL_ROW;
-            out->at[i][n] = pair ? vf_permute_pair(vf_load(first + row), vf_load(last + row),
-                                                   (out->vertex[i] | pair->second) + n % 2 * HALF)
-                                 : kernel_curved_pick(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
+            out->at[i][n] = pair
+                                ? vf_permute_pair(vf_load(first + row), vf_load(last + row),
+                                                  (out->vertex[i] | pair->second) + n % 2 * HALF)
+                                : kernel_curved_gather_vertex(f->at[n], grid_type_vertices(type), lane, out->vertex[i]);
         }
     }
 }
@@ -207,9 +209,9 @@ SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kern
 {
     kernel_local_pair pair;
     if (__builtin_expect(kernel_local_pair_of(f, active, rays->lane, &pair), 1))
-        for (int n = 0; n < 2; n++) kernel_local_corners_take(f, &pair, type, rays->lane, face[n], &out[n]);
+        for (int n = 0; n < 2; n++) kernel_local_corners_gather(f, &pair, type, rays->lane, face[n], &out[n]);
     else
-        for (int n = 0; n < 2; n++) kernel_local_corners_take(f, NULL, type, rays->lane, face[n], &out[n]);
+        for (int n = 0; n < 2; n++) kernel_local_corners_gather(f, NULL, type, rays->lane, face[n], &out[n]);
     for (int n = 0; n < 2; n++)
         for (int i = 0; i < 4; i++) {
             vf *at = out[n].at[i];
@@ -219,7 +221,7 @@ SIMD_INLINE void kernel_local_corners_of(const kernel_local_faces *f, const kern
 }
 
 /* Returns a vertex's reference coordinate on an axis, relative to the middle of the cell. */
-SIMD_INLINE vf kernel_local_own(int type, int axis, vi vertex)
+SIMD_INLINE vf kernel_local_vertex_coordinate(int type, int axis, vi vertex)
 {
     static const float own[3][3][KERNEL_LOCAL_ROW] = {
         {{-0.5f, 0.5f, 0.5f, -0.5f, -0.5f, 0.5f, 0.5f, -0.5f},
@@ -244,21 +246,21 @@ SIMD_INLINE void kernel_local_quad_of(const kernel_local_corners *c, kernel_quad
     }
 }
 
-SIMD_INLINE void kernel_local_quad_end(const kernel_local_corners *c, int type, const kernel_quad_place *place,
+SIMD_INLINE void kernel_local_quad_end(const kernel_local_corners *c, int type, const kernel_quad_point *place,
                                        kernel_point *out)
 {
     const vf f[4] = {c->at[0][3], c->at[1][3], c->at[2][3], c->at[3][3]};
     out->t = place->t;
     out->value = kernel_bilinear(f, place->s, place->r);
     for (int a = 0; a < 3; a++) {
-        const vf base = kernel_local_own(type, a, c->vertex[0]);
-        const vf along = kernel_local_own(type, a, c->vertex[1]) - base;
-        const vf across = kernel_local_own(type, a, c->vertex[3]) - base;
+        const vf base = kernel_local_vertex_coordinate(type, a, c->vertex[0]);
+        const vf along = kernel_local_vertex_coordinate(type, a, c->vertex[1]) - base;
+        const vf across = kernel_local_vertex_coordinate(type, a, c->vertex[3]) - base;
         out->r[a] = (base + place->s * along) + place->r * across;
     }
 }
 
-SIMD_INLINE vf kernel_local_weigh(const vf e[3], vf inverse, vf i, vf j, vf k)
+SIMD_INLINE vf kernel_local_weighted_mean(const vf e[3], vf inverse, vf i, vf j, vf k)
 {
     return vf_muladd(e[0], k, vf_muladd(-e[2], j, e[1] * i)) * inverse;
 }
@@ -271,12 +273,12 @@ SIMD_INLINE void kernel_local_triangle_end(const kernel_local_corners *c, int ty
     const vf e[3] = {vf_diff_of_products(i[0], j[1], j[0], i[1]), vf_diff_of_products(j[0], k[1], k[0], j[1]),
                      vf_diff_of_products(i[0], k[1], k[0], i[1])};
     const vf inverse = 1.0f / kernel_weight(e[0], e[1], e[2]);
-    out->t = kernel_local_weigh(e, inverse, i[2], j[2], k[2]);
-    out->value = kernel_local_weigh(e, inverse, i[3], j[3], k[3]);
+    out->t = kernel_local_weighted_mean(e, inverse, i[2], j[2], k[2]);
+    out->value = kernel_local_weighted_mean(e, inverse, i[3], j[3], k[3]);
     for (int a = 0; a < 3; a++)
-        out->r[a] =
-            kernel_local_weigh(e, inverse, kernel_local_own(type, a, c->vertex[0]),
-                               kernel_local_own(type, a, c->vertex[1]), kernel_local_own(type, a, c->vertex[2]));
+        out->r[a] = kernel_local_weighted_mean(e, inverse, kernel_local_vertex_coordinate(type, a, c->vertex[0]),
+                                               kernel_local_vertex_coordinate(type, a, c->vertex[1]),
+                                               kernel_local_vertex_coordinate(type, a, c->vertex[2]));
 }
 
 /* Computes the crossings of the rays in on_quad[n] with quads; the points of other rays are undefined. */
@@ -285,7 +287,7 @@ SIMD_INLINE void kernel_local_cross_quads(const kernel_local_corners corners[2],
 {
     const int count = kernel_has_apex(type) ? 1 : 2;
     kernel_quad quads[2];
-    kernel_quad_place places[2];
+    kernel_quad_point places[2];
     for (int n = 0; n < count; n++) kernel_local_quad_of(&corners[n], &quads[n]);
     kernel_quads_cross(quads, count, on_quad, true, places);
     for (int n = 0; n < count; n++) kernel_local_quad_end(&corners[n], type, &places[n], &ends[n]);

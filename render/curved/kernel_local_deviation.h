@@ -39,7 +39,7 @@ enum { KERNEL_DEVIATION_STEPS = 8 };
 /* Coefficients and error bounds of the nonlinear terms of each lane's cell. */
 typedef struct kernel_local_nonlinear {
     /* h: coefficients of the field's deviation from linear (the file's opening comment) */
-    float terms[KERNEL_BENT_TERMS][SIMD_WIDTH];
+    float terms[KERNEL_NONLINEAR_TERMS][SIMD_WIDTH];
     /* square of the upper bound of the derivative of the map's nonlinear part */
     float bend[SIMD_WIDTH];
     /* lower bound of the part of the field's deviation that is not visible at the three sampled places (the error E of
@@ -77,9 +77,9 @@ SIMD_INLINE float kernel_local_bent_unseen(int type)
 SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type, kernel_local_nonlinear *out)
 {
     vf most = vf_set(0);
-    for (int k = 0; k < kernel_bent_terms(type); k++) {
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
         vf own = vf_load(c->field[4 + k]);
-        for (int a = 0; a < 3; a++) own = vf_muladd(-vf_load(c->field[1 + a]), vf_load(c->bent[k][a]), own);
+        for (int a = 0; a < 3; a++) own = vf_muladd(-vf_load(c->field[1 + a]), vf_load(c->nonlinear_part[k][a]), own);
         vf_store(out->terms[k], own);
         most += vf_abs(own) * kernel_local_bent_slope(type, k);
     }
@@ -98,8 +98,8 @@ typedef struct kernel_local_chord {
     /* reference coordinates at the line's middle, and their difference between the line's ends */
     vf middle[3], span[3];
     /* the nonlinear terms' chords: value at the middle, and difference between the ends */
-    vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS];
-    vf bent[KERNEL_BENT_TERMS][3], own[KERNEL_BENT_TERMS];
+    vf mean[KERNEL_NONLINEAR_TERMS], rise[KERNEL_NONLINEAR_TERMS];
+    vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3], own[KERNEL_NONLINEAR_TERMS];
     vf tolerance, residual_limit;
 } kernel_local_chord;
 
@@ -107,10 +107,10 @@ typedef struct kernel_local_iterate {
     vf r[3], residual[3], deviation;
 } kernel_local_iterate;
 
-SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_BENT_TERMS])
+SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_NONLINEAR_TERMS])
 {
-    kernel_bend b;
-    kernel_bend_at(type, r, &b);
+    kernel_nonlinear_terms b;
+    kernel_nonlinear_terms_at(type, r, &b);
     memcpy(out, b.term, sizeof b.term);
 }
 
@@ -126,36 +126,36 @@ SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
 SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const kernel_local_nonlinear *nonlinear,
                                        vi lane, const kernel_point ends[2], int type, kernel_local_chord *out)
 {
-    vf first[KERNEL_BENT_TERMS], last[KERNEL_BENT_TERMS];
+    vf first[KERNEL_NONLINEAR_TERMS], last[KERNEL_NONLINEAR_TERMS];
     kernel_local_bent_at(type, ends[0].r, first);
     kernel_local_bent_at(type, ends[1].r, last);
     for (int a = 0; a < 3; a++) {
         out->middle[a] = 0.5f * (ends[0].r[a] + ends[1].r[a]);
         out->span[a] = ends[1].r[a] - ends[0].r[a];
     }
-    for (int k = 0; k < kernel_bent_terms(type); k++) {
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
         out->mean[k] = 0.5f * (first[k] + last[k]);
         out->rise[k] = last[k] - first[k];
-        out->own[k] = kernel_take(nonlinear->terms[k], lane);
-        for (int a = 0; a < 3; a++) out->bent[k][a] = kernel_take(cells->bent[k][a], lane);
+        out->own[k] = kernel_gather_lane(nonlinear->terms[k], lane);
+        for (int a = 0; a < 3; a++) out->nonlinear_part[k][a] = kernel_gather_lane(cells->nonlinear_part[k][a], lane);
     }
-    out->tolerance = kernel_take(nonlinear->tolerance, lane);
-    out->residual_limit = kernel_take(nonlinear->residual_limit, lane);
+    out->tolerance = kernel_gather_lane(nonlinear->tolerance, lane);
+    out->residual_limit = kernel_gather_lane(nonlinear->residual_limit, lane);
 }
 
 /* Computes the residual of the reference coordinates r at position u on the ray, and the field's deviation from its
  * chord there. */
 SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, int type, kernel_local_iterate *p)
 {
-    vf term[KERNEL_BENT_TERMS];
+    vf term[KERNEL_NONLINEAR_TERMS];
     kernel_local_bent_at(type, p->r, term);
     for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(c->span[a], vf_set(u), c->middle[a]) - p->r[a];
-    for (int k = 0; k < kernel_bent_terms(type); k++) {
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
         term[k] -= vf_muladd(c->rise[k], vf_set(u), c->mean[k]);
-        for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(-c->bent[k][a], term[k], p->residual[a]);
+        for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(-c->nonlinear_part[k][a], term[k], p->residual[a]);
     }
     p->deviation = c->own[0] * term[0];
-    for (int k = 1; k < kernel_bent_terms(type); k++) p->deviation = vf_muladd(c->own[k], term[k], p->deviation);
+    for (int k = 1; k < kernel_nonlinear_count(type); k++) p->deviation = vf_muladd(c->own[k], term[k], p->deviation);
 }
 
 SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)

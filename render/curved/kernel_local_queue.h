@@ -10,10 +10,10 @@
 #include "grid.h"
 #include "kernel_arrays.h"
 #include "kernel_cell.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_lanes_cell.h"
 #include "kernel_local.h"
-#include "kernel_placed_curved.h"
+#include "kernel_transformed_curved.h"
 #include "kernel_tile.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
@@ -49,7 +49,7 @@ typedef struct kernel_local_stages {
 
 struct kernel_local_lanes {
     const kernel_local_stages *stages;
-    kernel_tile_take *take; /* callback that traces cells that cannot be processed in lanes */
+    kernel_tile_trace_cell *take; /* callback that traces cells that cannot be processed in lanes */
     int volume, part;
     kernel_arrays arrays; /* the arrays of the current mesh part */
     kernel_local_queue queues[KERNEL_CURVED_TYPES];
@@ -64,7 +64,7 @@ struct kernel_local_lanes {
 };
 
 SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, const kernel_local_stages *stages, int volume,
-                                          kernel_tile_take *take)
+                                          kernel_tile_trace_cell *take)
 {
     l->stages = stages;
     l->take = take;
@@ -74,7 +74,7 @@ SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, const kernel_lo
 }
 
 /* Makes the mesh part with index `part` the one whose cells are queued from now on. The queues must be empty. */
-SIMD_INLINE void kernel_local_lanes_turn(const kernel_tile_trace *t, kernel_local_lanes *l, int part)
+SIMD_INLINE void kernel_local_lanes_set_part(const kernel_tile_trace *t, kernel_local_lanes *l, int part)
 {
     l->part = part;
     kernel_arrays_begin(&l->arrays, t->frame->job->parts[part].cells,
@@ -93,18 +93,18 @@ SIMD_INLINE int kernel_local_queue_of(int type)
 SIMD_INLINE void kernel_local_fetch(kernel_local_lanes *l, const kernel_local_queue *q, int vertices)
 {
     const kernel_arrays *p = &l->arrays;
-    const kernel_whole none = kernel_whole_set(NAN);
+    const kernel_wide_doubles none = kernel_wide_doubles_set(NAN);
     const vm drawn = vm_from_bits(kernel_arrays_drawn(p, q->cell, (1u << SIMD_WIDTH) - 1));
     for (int i = 0; i < vertices; i++) {
         vi vertex;
         memcpy(&vertex, q->vertex[i], sizeof vertex);
         for (int a = 0; a < 3; a++) {
-            const kernel_whole place = kernel_numbers_take(&p->coordinates[a], vertex);
+            const kernel_wide_doubles place = kernel_numbers_gather(&p->coordinates[a], vertex);
             memcpy(l->world[a][i], &place, sizeof place);
         }
         if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, q->cell, sizeof vertex);
-        kernel_whole value = kernel_numbers_take(&p->values, vertex);
-        if (__builtin_expect(p->own != NULL, 0)) value = kernel_whole_select(drawn, &value, &none);
+        kernel_wide_doubles value = kernel_numbers_gather(&p->values, vertex);
+        if (__builtin_expect(p->source_cells != NULL, 0)) value = kernel_wide_doubles_select(drawn, &value, &none);
         memcpy(l->scalars[i], &value, sizeof value);
     }
 }
@@ -118,15 +118,15 @@ SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scal
     vm finite = vm_all_lanes();
     for (int i = 0; i < count; i++) {
         for (int half = 0; half < 2; half++) {
-            kernel_half v;
+            kernel_f64 v;
             memcpy(&v, scalars[i] + half * KERNEL_HALF, sizeof v);
-            kernel_half_put(&odd, half, v - v);
-            kernel_half_put(&plain[i], half, kernel_half_hold(v, 3e38));
-            kernel_half_put(&values[i], half, kernel_half_hold((v - t->low) * t->inverse_width, 1e18));
+            kernel_f64_store_lanes(&odd, half, v - v);
+            kernel_f64_store_lanes(&plain[i], half, kernel_f64_clamp(v, 3e38));
+            kernel_f64_store_lanes(&values[i], half, kernel_f64_clamp((v - t->low) * t->inverse_width, 1e18));
         }
         finite = vm_and(finite, vf_eq(odd, odd));
     }
-    return vm_and(finite, kernel_interest_meets_values(&t->interest, plain, count));
+    return vm_and(finite, kernel_visible_values_overlap_cells(&t->visible_values, plain, count));
 }
 
 /* Computes the tile's first and last column and row of pixels in which each lane's cell may be visible. The margin of
@@ -179,27 +179,27 @@ SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigne
 /* Transforms the fetched cells into tile space. lists[0] to lists[2] get the vertices' positions, lists[3] the field;
  * all list_count rows are then sorted by the vertices' canonical order. Returns a mask of the visible cells. *lanes:
  * mask of those that can be processed in lanes. */
-SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local_lanes *l, vf (*lists)[8],
-                                        int list_count, float most_bent, unsigned *lanes, int type)
+SIMD_INLINE unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_local_lanes *l, vf (*lists)[8],
+                                            int list_count, float most_bent, unsigned *lanes, int type)
 {
     const int count = grid_type_vertices(type);
     const vm shows = kernel_local_domain(&t->frame->volumes[l->volume], l->scalars, count, lists[3]);
     for (int i = 0; i < count; i++) {
-        kernel_whole places[3];
+        kernel_wide_doubles places[3];
         vf at[3];
         for (int a = 0; a < 3; a++) memcpy(&places[a], l->world[a][i], sizeof places[a]);
-        const kernel_whole *const world[3] = {&places[0], &places[1], &places[2]};
-        kernel_lanes_place(t->frame, &t->tile, world, at);
+        const kernel_wide_doubles *const world[3] = {&places[0], &places[1], &places[2]};
+        kernel_lanes_transform(t->frame, &t->tile, world, at);
         for (int a = 0; a < 3; a++) lists[a][i] = at[a];
     }
-    kernel_local_turn(type, lists, list_count);
+    kernel_local_sort_vertices(type, lists, list_count);
     kernel_local_pixels(t, count, (const vf(*)[8])lists, l->ends);
     *lanes = vm_bits(vm_and(shows, kernel_local_setup(type, (const vf(*)[8])lists, lists[3], most_bent, &l->cells)));
     return vm_bits(shows);
 }
 
 /* Reads the vertex indices of all queued cells before index `end` that have not been read yet. */
-SIMD_INLINE void kernel_local_learn(const kernel_arrays *p, kernel_local_queue *q, int end, int type)
+SIMD_INLINE void kernel_local_read_indices(const kernel_arrays *p, kernel_local_queue *q, int end, int type)
 {
     for (; q->known < end; q->known++)
         kernel_arrays_vertices(p, q->cell[q->known], grid_type_vertices(type), q->vertex[0] + q->known,
@@ -211,7 +211,7 @@ SIMD_INLINE void kernel_local_learn(const kernel_arrays *p, kernel_local_queue *
 SIMD_INLINE unsigned kernel_local_fetch_all(kernel_local_lanes *l, kernel_local_queue *q, int type)
 {
     const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH, vertices = grid_type_vertices(type);
-    kernel_local_learn(&l->arrays, q, count, type);
+    kernel_local_read_indices(&l->arrays, q, count, type);
     for (int n = count; n < SIMD_WIDTH; n++) {
         q->cell[n] = q->cell[0];
         for (int i = 0; i < vertices; i++) q->vertex[i][n] = q->vertex[i][0];
@@ -242,28 +242,29 @@ SIMD_INLINE bool kernel_local_push(const kernel_arrays *p, kernel_local_queue *q
     q->cell[n] = cell;
     q->blocks[n] = (uint16_t)blocks;
     q->box[n] = (uint16_t)box;
-    kernel_local_learn(p, q, q->count - KERNEL_LOCAL_AHEAD, type);
+    kernel_local_read_indices(p, q, q->count - KERNEL_LOCAL_AHEAD, type);
     return q->count == KERNEL_LOCAL_ROOM;
 }
 
 /* ---- intervals of rays in cells ---- */
 
 /* Computes the interval of depths, relative to `depth`, in which each ray may be inside its cell's slabs. */
-SIMD_INLINE void kernel_local_stretch(const kernel_local_cells *cells, const kernel_lane_rays *rays, vf depth, vf *near,
-                                      vf *far)
+SIMD_INLINE void kernel_local_slab_interval(const kernel_local_cells *cells, const kernel_lane_rays *rays, vf depth,
+                                            vf *near, vf *far)
 {
-    const vf d[2] = {(rays->rays.origin_x + rays->rays.slope_x * depth) - kernel_take(cells->origin[0], rays->lane),
-                     (rays->rays.origin_y + rays->rays.slope_y * depth) - kernel_take(cells->origin[1], rays->lane)};
+    const vf d[2] = {
+        (rays->rays.origin_x + rays->rays.slope_x * depth) - kernel_gather_lane(cells->origin[0], rays->lane),
+        (rays->rays.origin_y + rays->rays.slope_y * depth) - kernel_gather_lane(cells->origin[1], rays->lane)};
     *near = vf_set(-INFINITY);
     *far = vf_set(INFINITY);
     for (int i = 0; i < 3; i++) {
         vf row[3];
-        for (int a = 0; a < 3; a++) row[a] = kernel_take(cells->inverse[i][a], rays->lane);
-        const vf offset = kernel_take(cells->offset[i], rays->lane);
+        for (int a = 0; a < 3; a++) row[a] = kernel_gather_lane(cells->inverse[i][a], rays->lane);
+        const vf offset = kernel_gather_lane(cells->offset[i], rays->lane);
         const vf at = vf_muladd(row[0], d[0], vf_muladd(row[1], d[1], offset));
         const vf inverse = 1.0f / vf_muladd(row[0], rays->rays.slope_x, vf_muladd(row[1], rays->rays.slope_y, row[2]));
-        const vf low = (kernel_take(cells->low[i], rays->lane) - at) * inverse;
-        const vf high = (kernel_take(cells->high[i], rays->lane) - at) * inverse;
+        const vf low = (kernel_gather_lane(cells->low[i], rays->lane) - at) * inverse;
+        const vf high = (kernel_gather_lane(cells->high[i], rays->lane) - at) * inverse;
         /* A ray parallel to a slab may give NaN here; max() and min() then keep the bounds of the other slabs. */
         *near = vf_max(vf_min(low, high), *near);
         *far = vf_min(vf_max(low, high), *far);

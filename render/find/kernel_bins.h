@@ -6,32 +6,33 @@
 #include "simd.h"
 
 /* A range of rows or columns of pixels, relative to the tile's first one. */
-typedef struct kernel_tile_span {
+typedef struct kernel_tile_range {
     unsigned first, last;
-} kernel_tile_span;
+} kernel_tile_range;
 
 /* Clips pixels first .. last to the tile that begins at pixel `begin`. */
-static inline kernel_tile_span kernel_span_in_tile(int first, int last, int begin)
+static inline kernel_tile_range kernel_range_in_tile(int first, int last, int begin)
 {
     const int from = first - begin, to = last - begin;
-    return (kernel_tile_span){(unsigned)(from > 0 ? from : 0), (unsigned)(to < KERNEL_TILE - 1 ? to : KERNEL_TILE - 1)};
+    return (kernel_tile_range){(unsigned)(from > 0 ? from : 0),
+                               (unsigned)(to < KERNEL_TILE - 1 ? to : KERNEL_TILE - 1)};
 }
 
 /* Returns a mask with a bit for each row or column of blocks that the pixels meet. */
-static inline unsigned kernel_span_blocks(kernel_tile_span s)
+static inline unsigned kernel_range_blocks(kernel_tile_range s)
 {
     return ~0u << s.first / KERNEL_BLOCK & ((2u << s.last / KERNEL_BLOCK) - 1);
 }
 
-static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candidate *c, kernel_tile_span columns,
-                                                             kernel_tile_span rows)
+static inline kernel_tile_candidate kernel_candidate_in_tile(const kernel_candidate *c, kernel_tile_range columns,
+                                                             kernel_tile_range rows)
 {
     return (kernel_tile_candidate){
         .near = c->near,
         .far = c->far,
         .cell = c->cell,
         .source = c->source,
-        .blocks = (uint16_t)kernel_blocks_at(kernel_span_blocks(columns), kernel_span_blocks(rows)),
+        .blocks = (uint16_t)kernel_blocks_at(kernel_range_blocks(columns), kernel_range_blocks(rows)),
         .box = (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
 }
 

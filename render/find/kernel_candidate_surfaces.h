@@ -79,7 +79,7 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, k
 {
     const kernel_differential *differential = kernel_cell_differential(type);
     const int count = grid_type_vertices(type);
-    vf d[4][3], n[3][3], middle[4], g[3], size = vf_set(0), error = size, blur = size;
+    vf d[4][3], n[3][3], middle[4], g[3], size = vf_set(0), error = size, error_bound = size;
     for (int a = 0; a < 4; a++) {
         middle[a] = d[a][0] = d[a][1] = d[a][2] = vf_set(0);
         for (int i = 0; i < count; i++) {
@@ -114,9 +114,9 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, k
     for (int a = 0; a < 3; a++) {
         vf reach = vf_set(0);
         for (int i = 0; i < count; i++) reach = vf_max(vf_abs(l->at[i][a]), reach);
-        blur += vf_abs(g[a]) * reach;
+        error_bound += vf_abs(g[a]) * reach;
     }
-    const vf thickness = error + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * blur;
+    const vf thickness = error + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * error_bound;
     out->thickness = vf_select(vf_lt(thickness, vf_set(1)), thickness, vf_set(INFINITY));
 }
 
@@ -168,27 +168,27 @@ SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_curv
 }
 
 /* Reads the vertices' positions and rotates them into the camera's axes. */
-SIMD_INLINE void kernel_curved_lanes_place(const kernel_finder *s, const kernel_cells *c, int count,
-                                           kernel_curved_lanes *l)
+SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const kernel_cells *c, int count,
+                                               kernel_curved_lanes *l)
 {
     l->count = count;
     l->usual = vm_all_lanes();
     for (int i = 0; i < count; i++) {
         vf from_eye[3];
-        kernel_found_place(s, kernel_cells_vertex(c, i), from_eye);
-        l->usual = kernel_usual_place(l->usual, from_eye);
-        kernel_place_turn(s, from_eye, l->at[i]);
+        kernel_finder_positions(s, kernel_cells_vertex(c, i), from_eye);
+        l->usual = kernel_usual_position(l->usual, from_eye);
+        kernel_rotate_to_camera(s, from_eye, l->at[i]);
     }
 }
 
 /* Sets f to the values minus the isovalue, and removes lanes whose values are too large, too small or NaN from `usual`.
  * Returns the largest |f| of each lane. */
-SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_taken *v, int count,
+SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_raw_numbers *v, int count,
                                           const kernel_level *level, kernel_curved_lanes *l)
 {
     vf size = vf_set(0);
     for (int i = 0; i < count; i++) {
-        l->f[i] = kernel_taken_less(&s->arrays.values, &v[i], level);
+        l->f[i] = kernel_raw_minus(&s->arrays.values, &v[i], level);
         size = vf_max(vf_abs(l->f[i]), size);
         l->usual = vm_and(l->usual, vf_lt(vf_abs(l->f[i]), vf_set(1e30f)));
     }
@@ -218,9 +218,9 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 {
     const unsigned all = (1u << c->count) - 1;
     kernel_curved_lanes l;
-    kernel_taken v[4];
+    kernel_raw_numbers v[4];
     for (int i = 0; i < 4; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
-    kernel_curved_lanes_place(s, c, 4, &l);
+    kernel_curved_lanes_transform(s, c, 4, &l);
     const vm usual = l.usual;
     for (int value = 0; value < s->surface->layer->value_count; value++) {
         const kernel_level level = kernel_level_of(s->surface->layer->values[value]);
@@ -229,7 +229,7 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
         l.usual = usual;
         kernel_curved_lanes_values(s, v, 4, &level, &l);
         for (int i = 0; i < 4; i++) {
-            negative[i] = kernel_taken_below(&s->arrays.values, &v[i], &level);
+            negative[i] = kernel_raw_below(&s->arrays.values, &v[i], &level);
             any = vm_or(any, negative[i]);
             every = vm_and(every, negative[i]);
         }
@@ -250,9 +250,9 @@ SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int ver
     kernel_curved_lanes l;
     kernel_curved_slab slab;
     kernel_ends_lanes e;
-    kernel_taken v[8];
+    kernel_raw_numbers v[8];
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
-    kernel_curved_lanes_place(s, c, vertices, &l);
+    kernel_curved_lanes_transform(s, c, vertices, &l);
     const vf size = kernel_curved_lanes_values(s, v, vertices, &level, &l);
     /* `power` has the bits of the power of two that scales the largest value to near 1: its exponent is the negated
      * one. */
@@ -283,7 +283,7 @@ static void kernel_find_all_crossed(kernel_finder *s)
  * changes, the queue is processed first. */
 SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
 {
-    kernel_crossed *h = &s->crossed[kernel_found_number(from->type)];
+    kernel_crossed *h = &s->crossed[kernel_lane_type_index(from->type)];
     if (lanes && value != h->value) kernel_find_crossed(s, h);
     for (; lanes; lanes &= lanes - 1) {
         if (h->cells.count == SIMD_WIDTH) kernel_find_crossed(s, h);
@@ -299,13 +299,13 @@ SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c,
 {
     const render_surface_layer *layer = s->surface->layer;
     const unsigned all = (1u << c->count) - 1;
-    kernel_taken v[8];
+    kernel_raw_numbers v[8];
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     for (int value = 0; value < layer->value_count; value++) {
         const kernel_level level = kernel_level_of(layer->values[value]);
         vm any = vm_none(), every = vm_all_lanes();
         for (int i = 0; i < vertices; i++) {
-            const vm below = kernel_taken_below(&s->arrays.values, &v[i], &level);
+            const vm below = kernel_raw_below(&s->arrays.values, &v[i], &level);
             any = vm_or(any, below);
             every = vm_and(every, below);
         }

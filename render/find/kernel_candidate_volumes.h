@@ -7,12 +7,12 @@
 #include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_finder.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_wide.h"
 #include "simd.h"
 
 /* Reads one cell's positions and values from the mesh into s->cell. */
-SIMD_INLINE void kernel_found_fetch(kernel_finder *s, uint32_t cell)
+SIMD_INLINE void kernel_finder_fetch_cell(kernel_finder *s, uint32_t cell)
 {
     kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], cell);
 }
@@ -25,22 +25,22 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
     vf v[8] = {vf_set(0)};
     for (int i = 0; i < c->vertices; i++) {
         const vi vertex = kernel_cells_vertex(c, i);
-        kernel_taken value;
+        kernel_raw_numbers value;
         vf place[3], at[3];
         kernel_arrays_values(&s->arrays, vertex, c->cell, &value);
-        v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_whole_narrow(&value.wide);
+        v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_wide_doubles_narrow(&value.wide);
         usual = vm_and(usual, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
-        kernel_found_place(s, vertex, place);
-        usual = kernel_usual_place(usual, place);
-        kernel_place_turn(s, place, at);
+        kernel_finder_positions(s, vertex, place);
+        usual = kernel_usual_position(usual, place);
+        kernel_rotate_to_camera(s, place, at);
         kernel_ends_add(s, &e, at, vm_all_lanes());
     }
-    const vm shows = kernel_interest_meets_values(s->interest, v, c->vertices);
+    const vm shows = kernel_visible_values_overlap_cells(s->visible_values, v, c->vertices);
     const unsigned all = (1u << c->count) - 1;
     const unsigned good = kernel_arrays_drawn(&s->arrays, c->cell, all & vm_bits(vm_and(usual, shows)));
     if (good) kernel_add_lanes(s, &e, good, c->cell, s->source);
     for (unsigned odd = all & ~vm_bits(usual); odd; odd &= odd - 1) {
-        kernel_found_fetch(s, c->cell[__builtin_ctz(odd)]);
+        kernel_finder_fetch_cell(s, c->cell[__builtin_ctz(odd)]);
         kernel_find_volume(s);
     }
 }

@@ -22,7 +22,7 @@
 #include "kernel_candidate_volumes.h"
 #include "kernel_cell.h"
 #include "kernel_finder.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_prefetch.h"
 #include "kernel_tile.h"
 #include "kernel_types.h"
@@ -48,7 +48,7 @@ static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 /* Tests one cell that cannot be processed in lanes, and adds it to the candidates if it is visible. */
 static __attribute__((noinline)) void kernel_find_one(kernel_finder *s, uint32_t cell)
 {
-    kernel_found_fetch(s, cell);
+    kernel_finder_fetch_cell(s, cell);
     if (kernel_has_own_faces(s->cell.type))
         kernel_find_polyhedron(s, cell);
     else if (!s->surface)
@@ -69,7 +69,7 @@ static void kernel_find_queued(kernel_finder *s)
             kernel_find_one(s, s->queued[n]);
             continue;
         }
-        kernel_cells *c = &s->pending[kernel_found_number(type)];
+        kernel_cells *c = &s->pending[kernel_lane_type_index(type)];
         if (c->count == SIMD_WIDTH) kernel_find_pending(s, c);
         const int room = SIMD_WIDTH - c->count, last = room < s->queued_count - n ? n + room : s->queued_count;
         while (end < last && kernel_arrays_type(p, s->queued[end]) == type) end++;
@@ -96,7 +96,7 @@ static void kernel_find_leaf(kernel_finder *s, const uint32_t *cells, int count)
     }
 }
 
-static void kernel_find_rest(kernel_finder *s)
+static void kernel_find_flush(kernel_finder *s)
 {
     kernel_find_queued(s);
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_find_pending(s, &s->pending[i]);
@@ -134,7 +134,7 @@ SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, 
     int left = 0;
     for (int n = 0; n < count; n++) {
         candidates[left] = entries[n];
-        left += kernel_node_shows(s->interest, ranges, entries[n] >> 1);
+        left += kernel_node_is_visible(s->visible_values, ranges, entries[n] >> 1);
     }
     front->count = 0;
     for (int n = 0; n < left; n++) {
@@ -191,7 +191,7 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
             stack[top++] = left;
         }
     }
-    kernel_find_rest(s);
+    kernel_find_flush(s);
 }
 
 #endif

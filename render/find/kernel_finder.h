@@ -53,7 +53,7 @@ SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
 }
 
 /* Returns the position of a cell type in the list kernel_lane_types. */
-SIMD_INLINE int kernel_found_number(int type)
+SIMD_INLINE int kernel_lane_type_index(int type)
 {
     return kernel_is_linear(type) ? KERNEL_CURVED_TYPES : kernel_shape_number(type);
 }
@@ -71,7 +71,7 @@ typedef struct kernel_finder {
     const kernel_surface *surface;   /* the surface layer that is searched; NULL if a volume is searched */
     const kernel_transfer *transfer; /* transfer function of the volume, used if surface is NULL */
     const render_field *field;
-    const kernel_interest *interest;
+    const kernel_visible_values *visible_values;
     kernel_candidate_list *list;
     bool (*grow)(kernel_candidate_list *list);
     int part;
@@ -84,7 +84,7 @@ typedef struct kernel_finder {
     kernel_cell cell;
     uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is being prefetched */
     int queued_count;
-    /* per type (kernel_found_number()), cells whose vertices are being prefetched */
+    /* per type (kernel_lane_type_index()), cells whose vertices are being prefetched */
     kernel_cells pending[KERNEL_LANE_TYPES];
     kernel_crossed crossed[KERNEL_CURVED_TYPES];
     kernel_arrays arrays;
@@ -108,7 +108,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
         while (f->isovalues[s->source % RENDER_MAX_ISOVALUES].surface != subtree->surface) s->source++;
     }
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
-    s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
+    s->visible_values = s->surface ? &s->surface->visible_values : &s->transfer->visible_values;
     s->queued_count = 0;
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
         const int type = kernel_lane_types[i];
@@ -157,10 +157,10 @@ SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
 /* Computes the pixels between the extent's ends, clipped to from .. to. Returns false if there are none. `zero` is the
  * pixel at extent 0. blur: the error bound of the extent, in pixels. The extent is widened by blur, by 1/100 pixel and
  * by 3e-5 of the numbers, which is more than the error of rays that hit only by rounding. */
-SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int from, int to, uint16_t *first,
+SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float error_bound, int from, int to, uint16_t *first,
                                      uint16_t *last)
 {
-    const float pad = 0.01f + 3e-5f * (simd_max(fabsf(e.low), fabsf(e.high)) + fabsf(zero)) + blur;
+    const float pad = 0.01f + 3e-5f * (simd_max(fabsf(e.low), fabsf(e.high)) + fabsf(zero)) + error_bound;
     const float low = simd_max(ceilf(e.low + zero - pad), (float)from);
     const float high = simd_min(floorf(e.high + zero + pad), (float)to);
     if (!(low <= high)) return false;
@@ -189,10 +189,11 @@ SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent 
         out->y1 = (uint16_t)s->last[1];
         return true;
     }
-    const float blur = 2e-6f * (camera->is_orthographic ? size + 1 : 1);
-    return kernel_extent_range(columns, s->column_0, blur * fabsf(s->column_scale), s->first[0], s->last[0], &out->x0,
-                               &out->x1) &&
-           kernel_extent_range(rows, s->row_0, blur * fabsf(s->row_scale), s->first[1], s->last[1], &out->y0, &out->y1);
+    const float error_bound = 2e-6f * (camera->is_orthographic ? size + 1 : 1);
+    return kernel_extent_range(columns, s->column_0, error_bound * fabsf(s->column_scale), s->first[0], s->last[0],
+                               &out->x0, &out->x1) &&
+           kernel_extent_range(rows, s->row_0, error_bound * fabsf(s->row_scale), s->first[1], s->last[1], &out->y0,
+                               &out->y1);
 }
 
 SIMD_INLINE bool kernel_outline_candidate(const kernel_finder *s, kernel_outline *o, kernel_candidate *out)
@@ -246,7 +247,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
         double world[3];
         float place[3];
         grid_vertex(g, vertex, world);
-        kernel_place_in(s->frame, &s->picture, world, &place[0], &place[1], &place[2]);
+        kernel_transform_in_tile(s->frame, &s->picture, world, &place[0], &place[1], &place[2]);
         for (int a = 0; a < 3; a++) {
             low[a] = simd_min(place[a], low[a]);
             high[a] = simd_max(place[a], high[a]);
@@ -260,11 +261,11 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
 }
 
 /* Adds the fetched cell to the candidates, with the pixels of its vertices' bounding box. */
-static __attribute__((noinline)) void kernel_find_whole(kernel_finder *s, kernel_cell *c, uint32_t source)
+static __attribute__((noinline)) void kernel_add_cell_box(kernel_finder *s, kernel_cell *c, uint32_t source)
 {
     kernel_outline o;
     kernel_candidate candidate = {.cell = c->index, .source = source};
-    if (!c->is_placed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
+    if (!c->is_transformed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
     kernel_vertex_outline(c, &o);
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
@@ -273,13 +274,13 @@ static __attribute__((noinline)) void kernel_find_whole(kernel_finder *s, kernel
 SIMD_INLINE void kernel_find_surface(kernel_finder *s, kernel_cell *c, int value)
 {
     if (c->is_finite && kernel_values_straddle(c->values, c->count, s->surface->layer->values[value]))
-        kernel_find_whole(s, c, s->source + (uint32_t)value);
+        kernel_add_cell_box(s, c, s->source + (uint32_t)value);
 }
 
 /* Adds the fetched cell to the candidates if its values are visible in the volume. */
 SIMD_INLINE void kernel_find_volume(kernel_finder *s)
 {
-    if (s->cell.is_finite && kernel_cell_shows(&s->cell, s->transfer)) kernel_find_whole(s, &s->cell, s->source);
+    if (s->cell.is_finite && kernel_cell_is_visible(&s->cell, s->transfer)) kernel_add_cell_box(s, &s->cell, s->source);
 }
 
 /* ---- cells in lanes ---- */
@@ -291,27 +292,27 @@ typedef struct kernel_ends_lanes {
 } kernel_ends_lanes;
 
 /* Reads each lane's vertex as a position relative to the eye, multiplied by the space's scale. */
-SIMD_INLINE void kernel_found_place(const kernel_finder *s, vi vertex, vf out[3])
+SIMD_INLINE void kernel_finder_positions(const kernel_finder *s, vi vertex, vf out[3])
 {
     const render_job *job = s->frame->job;
     for (int a = 0; a < 3; a++) {
         const kernel_numbers *c = &s->arrays.coordinates[a];
-        kernel_taken world;
-        kernel_numbers_take_raw(c, vertex, &world);
-        out[a] = kernel_taken_less(c, &world, &s->eye[a]) * (float)job->space.scale;
+        kernel_raw_numbers world;
+        kernel_numbers_gather_raw(c, vertex, &world);
+        out[a] = kernel_raw_minus(c, &world, &s->eye[a]) * (float)job->space.scale;
     }
 }
 
 /* Returns the lanes of `usual` whose coordinates are small enough for float32 lanes and not NaN. Other cells are tested
  * one by one. */
-SIMD_INLINE vm kernel_usual_place(vm usual, const vf place[3])
+SIMD_INLINE vm kernel_usual_position(vm usual, const vf place[3])
 {
     for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
     return usual;
 }
 
 /* Rotates positions relative to the eye into the camera's axes: right, up and forward. */
-SIMD_INLINE void kernel_place_turn(const kernel_finder *s, const vf place[3], vf at[3])
+SIMD_INLINE void kernel_rotate_to_camera(const kernel_finder *s, const vf place[3], vf at[3])
 {
     const render_camera *camera = &s->frame->job->camera;
     const double *axes[3] = {camera->right, camera->up, camera->forward};
@@ -342,9 +343,10 @@ SIMD_INLINE kernel_ends_lanes kernel_no_ends(void)
 
 /* Computes the first and the last pixel between each lane's bounds low and high, with the margin of
  * kernel_extent_range(). Returns the lanes that contain a pixel. */
-SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, const int ends[2], vf *first, vf *last)
+SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound, const int ends[2], vf *first,
+                                  vf *last)
 {
-    const vf pad = (0.01f + blur + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));
+    const vf pad = (0.01f + error_bound + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));
     *first = vf_max(-vf_floor(pad - (low + zero)), vf_set((float)ends[0]));
     *last = vf_min(vf_floor((high + zero) + pad), vf_set((float)ends[1]));
     return vf_le(*first, *last);
@@ -363,12 +365,12 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsig
     int32_t ends[4][SIMD_WIDTH];
     const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
     /* All lanes use the largest error bound of any of them. */
-    const float blur = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
+    const float error_bound = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
     const int columns[2] = {s->first[0], s->last[0]}, rows[2] = {s->first[1], s->last[1]};
-    vm candidates =
-        kernel_pixel_range(e->left, e->right, s->column_0, blur * fabsf(s->column_scale), columns, &first[0], &last[0]);
-    candidates = vm_and(candidates, kernel_pixel_range(e->top, e->bottom, s->row_0, blur * fabsf(s->row_scale), rows,
-                                                       &first[1], &last[1]));
+    vm candidates = kernel_pixel_range(e->left, e->right, s->column_0, error_bound * fabsf(s->column_scale), columns,
+                                       &first[0], &last[0]);
+    candidates = vm_and(candidates, kernel_pixel_range(e->top, e->bottom, s->row_0, error_bound * fabsf(s->row_scale),
+                                                       rows, &first[1], &last[1]));
     const vm anywhere = flat ? vm_none() : vm_not(vf_lt(0.01f * size, e->near));
     const vm behind = vf_lt((e->far + s->t_near) + pad, vf_set(s->t_near));
     lanes &= vm_bits(vm_andnot(vm_or(candidates, anywhere), behind));

@@ -29,8 +29,9 @@ SIMD_INLINE void kernel_prefetch_vertices(const grid *g, const grid_field *field
     const int vertices = grid_type_vertices(grid_cell_type(g, cell));
     const int64_t first = kernel_arrays_first(g, cell, vertices);
     for (int i = 0; i < vertices; i++)
-        kernel_prefetch_vertex(
-            g, field, g->lattice ? first + g->lattice->corner[i] : grid_array_index(&g->connectivity, first + i));
+        kernel_prefetch_vertex(g, field,
+                               g->lattice ? first + g->lattice->corner_offsets[i]
+                                          : grid_array_index(&g->connectivity, first + i));
 }
 
 /* Prefetches all data of the given cells: first all indices, then all vertices. */

@@ -112,10 +112,10 @@ static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint3
 {
     for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
         for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++) {
-            const kernel_tile_span rows = kernel_span_in_tile(s->y0, s->y1, y * KERNEL_TILE);
+            const kernel_tile_range rows = kernel_range_in_tile(s->y0, s->y1, y * KERNEL_TILE);
             for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++)
                 out[at[y * across + x]++] =
-                    kernel_candidate_in_tile(s, kernel_span_in_tile(s->x0, s->x1, x * KERNEL_TILE), rows);
+                    kernel_candidate_in_tile(s, kernel_range_in_tile(s->x0, s->x1, x * KERNEL_TILE), rows);
         }
 }
 
@@ -188,13 +188,13 @@ bool render_candidates_gather(const kernel_frame *frame, kernel_thread *thread, 
 /* ---- positions of cells in the picture ---------------------------------------------------------------------- */
 
 /* A range of positions along the columns or rows of pixels, in pixels. */
-typedef struct span {
+typedef struct pixel_range {
     double low, high;
-} span;
+} pixel_range;
 
 /* Extends the ranges of columns (spans[0]) and rows (spans[1]) by a point in the trees' space. Returns the point's
  * depth from the eye, or 1 if the camera is orthographic. */
-static double widen(const kernel_frame *f, const double point[3], span spans[2])
+static double widen(const kernel_frame *f, const double point[3], pixel_range spans[2])
 {
     const render_camera *c = &f->job->camera;
     const render_space *s = &f->job->space;
@@ -215,7 +215,7 @@ static double widen(const kernel_frame *f, const double point[3], span spans[2])
 }
 
 /* Extends the ranges of columns and rows by all corners of the tree's box. Returns the smallest depth of a corner. */
-static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, span spans[2])
+static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, pixel_range spans[2])
 {
     float lower[4], upper[4];
     double least = INFINITY;
@@ -231,8 +231,8 @@ static double widen_by_tree(const kernel_frame *f, const mmbvh *tree, span spans
 /* The number of cells of some mesh parts, and the area of the picture that their bounding boxes cover. */
 typedef struct coverage {
     double cells;
-    double pixels; /* sum of the areas of the parts' boxes */
-    span all[2];   /* ranges of columns and rows that all boxes together cover */
+    double pixels;      /* sum of the areas of the parts' boxes */
+    pixel_range all[2]; /* ranges of columns and rows that all boxes together cover */
 } coverage;
 
 /* Measures the parts on which the field has ranges of values, or all parts if ranges is NULL. Returns false if a part
@@ -242,11 +242,11 @@ static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, cov
     *out = (coverage){.all = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}}};
     for (int part = 0; part < f->job->part_count; part++) {
         const mmbvh *tree = f->job->parts[part].tree;
-        span own[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+        pixel_range own[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
         if ((ranges && !ranges[part].low) || !tree->node_count) continue;
         if (!(widen_by_tree(f, tree, own) > 0)) return false;
         for (int a = 0; a < 2; a++)
-            out->all[a] = (span){fmin(own[a].low, out->all[a].low), fmax(own[a].high, out->all[a].high)};
+            out->all[a] = (pixel_range){fmin(own[a].low, out->all[a].low), fmax(own[a].high, out->all[a].high)};
         out->cells += (double)tree->cell_count;
         out->pixels += (own[0].high - own[0].low) * (own[1].high - own[1].low);
     }
@@ -280,8 +280,8 @@ static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int pa
         memcpy(&low, ranges->low + node * ranges->stride, sizeof low);
         memcpy(&high, ranges->high + node * ranges->stride, sizeof high);
         out->cells += count;
-        for (int i = 0; i < s->interest.count; i++)
-            if (low <= s->interest.high[i] && high >= s->interest.low[i]) out->crossed += count;
+        for (int i = 0; i < s->visible_values.count; i++)
+            if (low <= s->visible_values.high[i] && high >= s->visible_values.low[i]) out->crossed += count;
     }
 }
 
@@ -318,7 +318,7 @@ void render_trees_cover(kernel_frame *f)
 {
     const render_job *job = f->job;
     const int most[2] = {job->camera.width - 1, job->camera.height - 1};
-    span spans[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+    pixel_range spans[2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
     double least = INFINITY, size = 2;
     for (int part = 0; part < job->part_count; part++)
         if (job->parts[part].tree->node_count) least = fmin(widen_by_tree(f, job->parts[part].tree, spans), least);
@@ -383,7 +383,7 @@ static bool begin_lists(search *s, int threads)
 }
 
 /* Returns whether every thread has binned all of its cells, and the number of all cells is at most `most`. */
-static bool is_whole(const search *s, int threads, int64_t most)
+static bool is_complete(const search *s, int threads, int64_t most)
 {
     const int64_t tiles = tile_count(s->frame);
     int64_t count = 0;
@@ -403,7 +403,7 @@ static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thre
     search s = {.frame = frame, .bound = bound};
     const bool is_begun = begin_lists(&s, threads) && cut_trees(frame, is_volume, &s.subtrees);
     if (is_begun) run(&s, thread_of, threads);
-    if (!is_begun || !is_whole(&s, threads, 2 * bound)) {
+    if (!is_begun || !is_complete(&s, threads, 2 * bound)) {
         bins_free(s.bins);
         s.bins = NULL;
     }

@@ -42,7 +42,7 @@ SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
 
 /* Returns the position in the colour table, with 0 and 1 as its ends, of a value on a logarithmic or symlog scale. The
  * result is that of render_scaled(), mapped to the table, with a relative error of 3e-7. */
-static __attribute__((noinline)) vf kernel_scaled_place(const kernel_scale *s, vf x)
+static __attribute__((noinline)) vf kernel_scaled_position(const kernel_scale *s, vf x)
 {
     const vf threshold = vf_set(s->threshold), size = vf_max(vf_abs(x), threshold);
     const vf above = vf_log2(size * s->inverse) * 0.69314718f;
@@ -51,9 +51,9 @@ static __attribute__((noinline)) vf kernel_scaled_place(const kernel_scale *s, v
     return vf_select(vf_lt(threshold, vf_abs(x)), beyond, x * s->inverse) * s->slope + s->shift;
 }
 
-SIMD_INLINE vf kernel_colour_place(const kernel_transfer *t, vf x)
+SIMD_INLINE vf kernel_colour_position(const kernel_transfer *t, vf x)
 {
-    return t->scale.kind == RENDER_LINEAR ? x : kernel_scaled_place(&t->scale, x);
+    return t->scale.kind == RENDER_LINEAR ? x : kernel_scaled_position(&t->scale, x);
 }
 
 /* Computes the colour at a position in the table; NaN gives the first colour. */
@@ -77,7 +77,7 @@ SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
  * colour. */
 SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
 {
-    kernel_table_at(t, kernel_colour_place(t, x), out);
+    kernel_table_at(t, kernel_colour_position(t, x), out);
 }
 
 /* Returns the opacity at a position in the colour table. */
@@ -93,7 +93,7 @@ SIMD_INLINE vf kernel_opacity_at(const kernel_transfer *t, vf place)
 
 SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)
 {
-    return kernel_opacity_at(t, kernel_colour_place(t, x));
+    return kernel_opacity_at(t, kernel_colour_position(t, x));
 }
 
 SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
@@ -150,7 +150,7 @@ typedef struct kernel_fragments {
 } kernel_fragments;
 
 /* Returns which rays have a visible fragment: one that absorbs light or is not black (fragment_shows()). */
-SIMD_INLINE vm kernel_shows(const vf colour[3], vf transmittance)
+SIMD_INLINE vm kernel_fragment_is_visible(const vf colour[3], vf transmittance)
 {
     const vf zero = vf_set(0);
     const vm black = vm_and(vf_eq(colour[0], zero), vm_and(vf_eq(colour[1], zero), vf_eq(colour[2], zero)));
@@ -189,7 +189,7 @@ SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const ker
  * NaN. */
 static __attribute__((noinline)) void kernel_marked_colour(const kernel_transfer *t, vf w, vf out[3])
 {
-    const vf place = kernel_colour_place(t, w), one = vf_set(1), zero = vf_set(0);
+    const vf place = kernel_colour_position(t, w), one = vf_set(1), zero = vf_set(0);
     if (t->is_banded) {
         const vf band = vf_floor(vf_clamp(place, zero, one) * (float)t->colour_count);
         const vi index = vi_from_vf(vf_min(band, vf_set((float)(t->colour_count - 1)))) * 3;

@@ -26,12 +26,12 @@ typedef struct kernel_hits {
     vf kind;
     int cut_count;           /* number of rows in `cut` */
     vf cut[KERNEL_MAX_CUTS]; /* row n holds the n-th crossing found of each ray, unsorted; +inf if a ray has fewer */
-    vm crowded;              /* rays with more than KERNEL_MAX_CUTS crossings */
+    vm overflowed;           /* rays with more than KERNEL_MAX_CUTS crossings */
 } kernel_hits;
 
 static inline void kernel_hits_begin(kernel_hits *hits)
 {
-    hits->found = hits->crowded = vm_none();
+    hits->found = hits->overflowed = vm_none();
     hits->cut_count = 0;
     hits->kind = hits->reach = vf_set(0);
     hits->cells.part = hits->cells.index = vi_set(-1);
@@ -44,7 +44,7 @@ SIMD_INLINE void kernel_hits_cut(kernel_hits *hits, vm hit, vf t)
 {
     for (int n = 0; vm_any(hit); n++) {
         if (n == KERNEL_MAX_CUTS) {
-            hits->crowded = vm_or(hits->crowded, hit);
+            hits->overflowed = vm_or(hits->overflowed, hit);
             return;
         }
         if (n == hits->cut_count) hits->cut[hits->cut_count++] = vf_set(INFINITY);

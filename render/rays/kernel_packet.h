@@ -43,7 +43,7 @@ typedef struct kernel_packet {
     vf clip_in, clip_out;
     /* Exact length of that interval, divided by the rounded one, clip_out - clip_in. The two differ much if a ray
      * grazes a sphere. */
-    vf clip_stretch;
+    vf clip_length_ratio;
     /* The active rays and the interval that surfaces leave of them, saved while volumes are traced with clips of their
      * own. */
     vm all_active;
@@ -198,7 +198,7 @@ static __attribute__((noinline, cold)) void kernel_packet_part(kernel_packet *p,
     }
     p->clip_in = vf_load(from);
     p->clip_out = vf_load(to);
-    p->clip_stretch = vf_load(stretch);
+    p->clip_length_ratio = vf_load(stretch);
 }
 
 /* Cuts the packet's rays at the clips that all layers have in common. */
@@ -255,7 +255,7 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
     if (f->volume_count) {
         p->clip_in = vf_set(-INFINITY);
         p->clip_out = vf_set(INFINITY);
-        p->clip_stretch = vf_set(1);
+        p->clip_length_ratio = vf_set(1);
     }
     if (f->common_clips) kernel_packet_clip(p);
 }

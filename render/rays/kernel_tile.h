@@ -40,7 +40,7 @@ static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, i
 }
 
 /* Returns the factor by which a ray's slope is multiplied to get its origin at Z = 0 in tile space. */
-static inline double kernel_reach(const kernel_frame *f)
+static inline double kernel_slope_to_origin(const kernel_frame *f)
 {
     return f->job->camera.is_orthographic ? f->job->space.scale : f->depth_shift;
 }
@@ -48,7 +48,7 @@ static inline double kernel_reach(const kernel_frame *f)
 static inline void kernel_tile_rays(kernel_tile *tile, const kernel_frame *f)
 {
     const bool flat = f->job->camera.is_orthographic;
-    const double reach = kernel_reach(f);
+    const double reach = kernel_slope_to_origin(f);
     for (int i = 0; i < KERNEL_TILE; i++) {
         const double dx = kernel_column(f, tile->x0 + i) - tile->centre_x;
         const double dy = kernel_row(f, tile->y0 + i) - tile->centre_y;
@@ -198,7 +198,7 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
 static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
-    const double reach = kernel_reach(f);
+    const double reach = kernel_slope_to_origin(f);
     float normal[3][KERNEL_LANES] = {{0}}, offset[KERNEL_LANES] = {0};
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
         const double x = kernel_border_x(f, tile, n), y = kernel_border_y(f, tile, n);

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "kernel_hits.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_packet.h"
 #include "kernel_tile.h"
 #include "kernel_types.h"
@@ -77,7 +77,7 @@ SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
 }
 
 /* Updates the farthest t_far of the block and of its pixels after new hits. */
-SIMD_INLINE void kernel_block_learn(kernel_tile_trace *t, int block)
+SIMD_INLINE void kernel_block_update_far(kernel_tile_trace *t, int block)
 {
     t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
     if (t->frame->candidates) return;
@@ -168,16 +168,18 @@ struct kernel_map;
 
 /* Callback for a cell that is ready for tracing; for a polyhedron only the cell's index is set. map is NULL if the cell
  * needs no inverse map. */
-typedef void kernel_tile_take(kernel_tile_trace *t, int part, const struct kernel_cell *c, const struct kernel_map *map,
-                              unsigned blocks);
+typedef void kernel_tile_trace_cell(kernel_tile_trace *t, int part, const struct kernel_cell *c,
+                                    const struct kernel_map *map, unsigned blocks);
 
 /* Returns the node's placement with those of the given blocks that it may meet; none if its values are invisible.
  * interest is NULL if all values are visible. */
-SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                              const kernel_interest *interest, int64_t node, unsigned blocks)
+SIMD_INLINE kernel_placement kernel_tile_classify_node(const kernel_tile_trace *t, const mmbvh *tree,
+                                                       const mmbvh_ranges *ranges,
+                                                       const kernel_visible_values *visible_values, int64_t node,
+                                                       unsigned blocks)
 {
     kernel_placement placement = {0};
-    if (interest && !kernel_node_shows(interest, ranges, node)) return placement;
+    if (visible_values && !kernel_node_is_visible(visible_values, ranges, node)) return placement;
     placement = kernel_box_placement(&t->tree_planes, tree, node);
     placement.blocks &= placement.far < t->t_near ? 0 : blocks;
     if (placement.blocks) {
@@ -187,20 +189,20 @@ SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const 
             __builtin_prefetch(tree->cells + ref);
         } else {
             mmbvh_prefetch_node(tree, ref);
-            if (interest) __builtin_prefetch(ranges->low + ref * ranges->stride);
+            if (visible_values) __builtin_prefetch(ranges->low + ref * ranges->stride);
         }
     }
     return placement;
 }
 
 SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                      const kernel_interest *interest, unsigned blocks, int part,
+                                      const kernel_visible_values *visible_values, unsigned blocks, int part,
                                       kernel_tile_visit *visit)
 {
     kernel_tile_entry stack[MMBVH_MAX_DEPTH + 1];
     int top = 0;
     if (!tree->node_count) return;
-    const kernel_placement root = kernel_tile_look(t, tree, ranges, interest, 0, blocks);
+    const kernel_placement root = kernel_tile_classify_node(t, tree, ranges, visible_values, 0, blocks);
     if (root.blocks) stack[top++] = (kernel_tile_entry){0, root.near, root.blocks};
     while (top) {
         const kernel_tile_entry e = stack[--top];
@@ -212,8 +214,8 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
             visit(t, part, tree->cells + ref, count, blocks);
             continue;
         }
-        const kernel_placement left = kernel_tile_look(t, tree, ranges, interest, ref, blocks);
-        const kernel_placement right = kernel_tile_look(t, tree, ranges, interest, ref + 1, blocks);
+        const kernel_placement left = kernel_tile_classify_node(t, tree, ranges, visible_values, ref, blocks);
+        const kernel_placement right = kernel_tile_classify_node(t, tree, ranges, visible_values, ref + 1, blocks);
         const kernel_tile_entry entries[2] = {{ref, left.near, left.blocks}, {ref + 1, right.near, right.blocks}};
         const int far = left.along < right.along;
         if (entries[far].blocks) stack[top++] = entries[far];

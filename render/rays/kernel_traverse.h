@@ -4,7 +4,7 @@
 #ifndef RENDER_KERNEL_TRAVERSE_H
 #define RENDER_KERNEL_TRAVERSE_H
 
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_packet.h"
 #include "kernel_types.h"
 #include "mmbvh.h"
@@ -15,7 +15,7 @@
 typedef void kernel_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays);
 
 /* Returns whether the right child is nearer than the left one along the packet's direction. */
-SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh *tree, int64_t left)
+SIMD_INLINE bool kernel_right_child_first(const kernel_packet *p, const mmbvh *tree, int64_t left)
 {
     float lower[2][4], upper[2][4], along = 0;
     for (int side = 0; side < 2; side++) mmbvh_node_box(tree, left + side, lower[side], upper[side]);
@@ -27,7 +27,7 @@ SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh *tree, i
 /* Parameters of a traversal. leaf() is called for each visible leaf that a ray enters between t_low and *t_high; it may
  * lower *t_high. */
 typedef struct kernel_descent {
-    const kernel_interest *interest; /* intervals of visible values; NULL if all values are visible */
+    const kernel_visible_values *visible_values; /* intervals of visible values; NULL if all values are visible */
     vf t_low;
     const vf *t_high;
     kernel_leaf *leaf;
@@ -37,10 +37,10 @@ typedef struct kernel_descent {
 SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbvh_ranges *ranges,
                                  const kernel_descent *d, vm rays, int part)
 {
-    const kernel_interest *interest = d->interest;
+    const kernel_visible_values *visible_values = d->visible_values;
     int64_t stack[MMBVH_MAX_DEPTH];
     int top = 0;
-    if (tree->node_count && (!interest || kernel_node_shows(interest, ranges, 0))) stack[top++] = 0;
+    if (tree->node_count && (!visible_values || kernel_node_is_visible(visible_values, ranges, 0))) stack[top++] = 0;
     while (top) {
         const int64_t node = stack[--top];
         vf t_in = d->t_low, t_out = *d->t_high;
@@ -52,10 +52,10 @@ SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbv
             continue;
         }
         const int64_t left = mmbvh_node_ref(tree, node);
-        const bool swap = kernel_right_first(p, tree, left);
+        const bool swap = kernel_right_child_first(p, tree, left);
         const int64_t near = left + swap, far = left + !swap;
-        if (!interest || kernel_node_shows(interest, ranges, far)) stack[top++] = far;
-        if (!interest || kernel_node_shows(interest, ranges, near)) stack[top++] = near;
+        if (!visible_values || kernel_node_is_visible(visible_values, ranges, far)) stack[top++] = far;
+        if (!visible_values || kernel_node_is_visible(visible_values, ranges, near)) stack[top++] = near;
     }
 }
 

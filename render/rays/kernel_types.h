@@ -11,8 +11,8 @@
 
 enum {
     KERNEL_TILE = 16,
-    KERNEL_TILE_RUN = 4, /* number of consecutive tiles, row by row, that one thread draws before it takes more */
-    KERNEL_BLOCK = 4,    /* pixels along a block's side */
+    KERNEL_TILES_PER_TASK = 4, /* number of consecutive tiles, row by row, that one thread draws before it takes more */
+    KERNEL_BLOCK = 4,          /* pixels along a block's side */
     KERNEL_MAX_GROUP = RENDER_MAX_GROUP,
     KERNEL_MAX_INTERVALS = RENDER_MAX_ISOVALUES /* of a volume's visible values, or of a layer's isovalues */
 };
@@ -31,7 +31,7 @@ typedef float kernel_real;
 #define KERNEL_SHORT 2e-6f
 #endif
 
-enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64, KERNEL_SWING_BINS = 128, KERNEL_SWING_WIDTHS = 29 };
+enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WIDTHS = 29 };
 
 /* Entries of a piece: a part of a transfer function on which opacity and colour are linear. At a value x they are
  * entry[..] + (x - low) * slope. 1 - opacity has entries of its own, because near an opacity of 1 the difference would
@@ -66,10 +66,10 @@ typedef struct kernel_bound {
 /* Bounds of a transfer function over a range of values that contains no step of the opacity. A field error d changes
  * the light by at most cost * d per unit distance. For fixed light from the front and from behind, that change varies
  * by at most swing * d. */
-typedef struct kernel_swing {
-    float swing, cost;
+typedef struct kernel_light_variation {
+    float variation, cost;
     float extinction, steepness; /* maximum of the extinction, and of its slope times the contrast */
-} kernel_swing;
+} kernel_light_variation;
 
 /* A step of the opacity: its exact value, and that value rounded to float, at which pieces end. */
 typedef struct kernel_step {
@@ -86,18 +86,18 @@ typedef struct kernel_steep {
 
 /* A bin of the table of sums for preintegration (kernel_preintegral.h), in integer units. Each array holds the
  * extinction first, then the emission in three channels. The struct is read as rows of four floats. */
-typedef struct kernel_pre_entry {
+typedef struct kernel_preint_entry {
     int32_t before[4]; /* sums over all earlier bins */
     float own[4];
-    int32_t colour; /* colour at the bin's middle, 10 bits per channel */
-    float rough;    /* variation of extinction and emission within the bin, as light */
+    int32_t colour;    /* colour at the bin's middle, 10 bits per channel */
+    float table_error; /* variation of extinction and emission within the bin, as light */
     float unused[2];
-} kernel_pre_entry;
+} kernel_preint_entry;
 
 typedef struct kernel_preintegral {
-    int bin_count;             /* number of bins of equal width; one infinite entry before and one behind them */
-    kernel_pre_entry *entries; /* bin_count + 2 */
-    float low, inverse;        /* value at which the first bin begins, and 1 / the width of a bin */
+    int bin_count;                /* number of bins of equal width; one infinite entry before and one behind them */
+    kernel_preint_entry *entries; /* bin_count + 2 */
+    float low, inverse;           /* value at which the first bin begins, and 1 / the width of a bin */
     float depth_unit, light_unit;
     float colour_unit, colour_error;
     float bend_square, bend, bend_at_ends, contrast;
@@ -115,11 +115,11 @@ typedef struct kernel_pieces {
      * constant. */
     float bound_inverse;
     kernel_bound bounds[KERNEL_BOUND_BINS];
-    /* Bounds over ranges of values, in a table of KERNEL_SWING_WIDTHS × KERNEL_SWING_BINS: its row is the range's class
-     * of width, its column the equal-width bin in which the range begins; bins begin at bin_low
-     * (kernel_swing_entry()). */
-    float swing_inverse;
-    kernel_swing *swings;
+    /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS: its row is the
+     * range's class of width, its column the equal-width bin in which the range begins; bins begin at bin_low
+     * (kernel_light_variation_entry()). */
+    float variation_inverse;
+    kernel_light_variation *variations;
     /* Set if a ramp of the opacity is so narrow that the rounding of its ends is visible: values near it then use the
      * ends' rounding errors (KERNEL_PIECE_LOW_REST). */
     bool has_rests;
@@ -142,10 +142,10 @@ typedef struct kernel_tile {
 } kernel_tile;
 
 /* Intervals of visible values, rounded outward: a node whose range meets none of them is skipped. */
-typedef struct kernel_interest {
+typedef struct kernel_visible_values {
     int count;
     float low[KERNEL_MAX_INTERVALS], high[KERNEL_MAX_INTERVALS];
-} kernel_interest;
+} kernel_visible_values;
 
 /* Maps values to positions in a colour table with a logarithmic or symlog scale s: position = s(value) * slope +
  * shift. */
@@ -173,7 +173,7 @@ typedef struct kernel_transfer {
     float ramp_start[RENDER_MAX_OPACITY_POINTS], ramp_inverse[RENDER_MAX_OPACITY_POINTS];
     float ramp_rise[RENDER_MAX_OPACITY_POINTS];
     float exponent; /* step / unit_distance: the power of (1 - opacity) that gives the transmittance of a sample */
-    kernel_interest interest;
+    kernel_visible_values visible_values;
 } kernel_transfer;
 
 /* The levels of contour lines, in a domain in which the first level is 0 and the last, if there are several, is 1. gap:
@@ -186,12 +186,12 @@ typedef struct kernel_lines {
 
 typedef struct kernel_surface {
     const render_surface_layer *layer;
-    kernel_interest interest; /* the visible values: the layer's isovalues */
-    kernel_transfer colour;   /* transfer function of the colour field; set if layer->colour_map */
-    kernel_lines lines;       /* contour lines on the surface; set if layer->lines */
-    uint32_t own_clips;       /* one bit per clip of this layer that is not among the frame's common_clips */
-    uint32_t first_kind;      /* fragment kind of the layer's first isovalue */
-    double value_scale;       /* power of two that scales the field's range to near 1, for differences */
+    kernel_visible_values visible_values; /* the visible values: the layer's isovalues */
+    kernel_transfer colour;               /* transfer function of the colour field; set if layer->colour_map */
+    kernel_lines lines;                   /* contour lines on the surface; set if layer->lines */
+    uint32_t own_clips;  /* one bit per clip of this layer that is not among the frame's common_clips */
+    uint32_t first_kind; /* fragment kind of the layer's first isovalue */
+    double value_scale;  /* power of two that scales the field's range to near 1, for differences */
 } kernel_surface;
 
 /* A cell whose isosurface or volume may be visible: its range of depths, and the box of pixels that it may cover, from
@@ -285,7 +285,7 @@ typedef struct kernel_frame {
     uint32_t common_clips; /* one bit per clip that all layers share and that leaves a single interval of a ray */
     /* Maximum number of intervals that the clips of volumes may leave of a ray; 0 if volumes have no clips of their
      * own. */
-    int volume_turns;
+    int volume_intervals;
     bool has_transparent;
     bool is_binned;     /* whether surfaces' cells are binned by tile, if that pays */
     bool bins_volume;   /* whether the cells of the only volume are binned by tile */
@@ -321,8 +321,8 @@ typedef struct kernel_thread {
     bool (*reserve)(fragment_list *list, int64_t more);
     /* Hits whose normals need samples of other ranks' cells, and the function that adds space for more; it returns
      * false if memory ran out. */
-    render_waiting_list waiting;
-    bool (*grow_waiting)(render_waiting_list *list);
+    render_pending_list waiting;
+    bool (*grow_pending)(render_pending_list *list);
     bool out_of_memory;
     /* counters for render_statistics: failed inversions of cells' maps, and cells visited by volumes */
     int64_t map_failures, volume_cells;
@@ -338,7 +338,7 @@ typedef struct kernel_thread {
 struct kernel_bundle;
 struct kernel_occluder;
 struct kernel_occluders;
-struct kernel_straights;
+struct kernel_secondary_rays;
 
 /* The functions that the object of one instruction set exports. */
 typedef struct kernel_table {
@@ -352,17 +352,17 @@ typedef struct kernel_table {
                             kernel_candidate_list *list, bool (*grow)(kernel_candidate_list *list));
     /* Removes the rays that an opaque surface certainly blocks, and records the cells that must be tested exactly. */
     void (*occlude)(const kernel_frame *frame, kernel_thread *thread, const struct kernel_occluders *occluders,
-                    struct kernel_straights *rays);
+                    struct kernel_secondary_rays *rays);
     /* Clears the open bits of the bundle's rays that this cell blocks. */
     void (*occlude_by_cell)(const kernel_frame *frame, kernel_thread *thread, struct kernel_bundle *bundle,
                             const struct kernel_occluder *occluder);
     /* Samples this rank's cells around each of `count` hits, for normals by central differences; out[i] belongs to
      * hits[i]. */
-    void (*sample_waiting)(const kernel_frame *frame, kernel_thread *thread, const render_waiting_hit *hits,
-                           render_samples_about *out, int64_t count);
+    void (*sample_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_hit *hits,
+                           render_difference_samples *out, int64_t count);
     /* Computes the fragments out[i] of the list's hits i from samples[i], first <= i < first + count. */
-    void (*light_waiting)(const kernel_frame *frame, kernel_thread *thread, const render_waiting_list *list,
-                          const render_samples_about *samples, int64_t first, int64_t count, fragment *out);
+    void (*light_pending)(const kernel_frame *frame, kernel_thread *thread, const render_pending_list *list,
+                          const render_difference_samples *samples, int64_t first, int64_t count, fragment *out);
 } kernel_table;
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;

@@ -1,5 +1,5 @@
-/* Vectors of doubles, and permutations that give each ray the numbers of its own cell. A kernel_half has SIMD_WIDTH / 2
- * doubles and fills one register; compilers split larger vectors and compare their lanes one by one. */
+/* Vectors of doubles, and permutations that give each ray the numbers of its own cell. A kernel_f64 has SIMD_WIDTH
+ * / 2 doubles and fills one register; compilers split larger vectors and compare their lanes one by one. */
 #ifndef RENDER_KERNEL_WIDE_H
 #define RENDER_KERNEL_WIDE_H
 
@@ -9,63 +9,63 @@
 #include "simd.h"
 
 enum { KERNEL_HALF = SIMD_WIDTH / 2 };
-typedef vd kernel_half;
-typedef int64_t kernel_half_mask __attribute__((vector_size(8 * KERNEL_HALF)));
-typedef float kernel_half_floats __attribute__((vector_size(4 * KERNEL_HALF)));
+typedef vd kernel_f64;
+typedef int64_t kernel_f64_mask __attribute__((vector_size(8 * KERNEL_HALF)));
+typedef float kernel_f64_floats __attribute__((vector_size(4 * KERNEL_HALF)));
 
 /* Returns of[lane] for each ray, where `lane` is the lane that holds the ray's cell. */
-SIMD_INLINE vf kernel_take(const float *of, vi lane)
+SIMD_INLINE vf kernel_gather_lane(const float *of, vi lane)
 {
     return vf_permute(vf_load(of), lane);
 }
 
-SIMD_INLINE kernel_half kernel_half_widen(kernel_half_floats v)
+SIMD_INLINE kernel_f64 kernel_f64_widen(kernel_f64_floats v)
 {
-    return __builtin_convertvector(v, kernel_half);
+    return __builtin_convertvector(v, kernel_f64);
 }
 
-SIMD_INLINE kernel_half_floats kernel_half_narrow(kernel_half v)
+SIMD_INLINE kernel_f64_floats kernel_f64_narrow(kernel_f64 v)
 {
-    return __builtin_convertvector(v, kernel_half_floats);
+    return __builtin_convertvector(v, kernel_f64_floats);
 }
 
 /* Returns the first half (0) or the second half (1) of a mask's lanes. */
-SIMD_INLINE kernel_half_mask kernel_half_of_mask(vm m, int half)
+SIMD_INLINE kernel_f64_mask kernel_f64_of_mask(vm m, int half)
 {
-    typedef int32_t kernel_half_ints __attribute__((vector_size(4 * KERNEL_HALF)));
+    typedef int32_t kernel_f64_ints __attribute__((vector_size(4 * KERNEL_HALF)));
     int32_t lanes[SIMD_WIDTH];
-    kernel_half_ints ints;
+    kernel_f64_ints ints;
     const vi all = (vi)vf_select(m, (vf)vi_set(-1), (vf)vi_set(0));
     memcpy(lanes, &all, sizeof all);
     memcpy(&ints, lanes + half * KERNEL_HALF, sizeof ints);
-    return __builtin_convertvector(ints, kernel_half_mask);
+    return __builtin_convertvector(ints, kernel_f64_mask);
 }
 
-SIMD_INLINE kernel_half kernel_half_select(kernel_half_mask m, kernel_half a, kernel_half b)
+SIMD_INLINE kernel_f64 kernel_f64_select(kernel_f64_mask m, kernel_f64 a, kernel_f64 b)
 {
-    return (kernel_half)(((kernel_half_mask)a & m) | ((kernel_half_mask)b & ~m));
+    return (kernel_f64)(((kernel_f64_mask)a & m) | ((kernel_f64_mask)b & ~m));
 }
 
 /* Returns the first half (0) or the second half (1) of v's lanes, converted to double. */
-SIMD_INLINE kernel_half kernel_half_of(const vf *v, int half)
+SIMD_INLINE kernel_f64 kernel_f64_of(const vf *v, int half)
 {
-    kernel_half_floats f;
+    kernel_f64_floats f;
     memcpy(&f, (const char *)v + half * (int)sizeof f, sizeof f);
-    return kernel_half_widen(f);
+    return kernel_f64_widen(f);
 }
 
-SIMD_INLINE void kernel_half_put(vf *v, int half, kernel_half d)
+SIMD_INLINE void kernel_f64_store_lanes(vf *v, int half, kernel_f64 d)
 {
-    const kernel_half_floats f = kernel_half_narrow(d);
+    const kernel_f64_floats f = kernel_f64_narrow(d);
     memcpy((char *)v + half * (int)sizeof f, &f, sizeof f);
 }
 
-SIMD_INLINE kernel_half kernel_half_abs(kernel_half a)
+SIMD_INLINE kernel_f64 kernel_f64_abs(kernel_f64 a)
 {
-    return (kernel_half)((kernel_half_mask)a & INT64_MAX);
+    return (kernel_f64)((kernel_f64_mask)a & INT64_MAX);
 }
 
-SIMD_INLINE kernel_half kernel_half_sqrt(kernel_half v)
+SIMD_INLINE kernel_f64 kernel_f64_sqrt(kernel_f64 v)
 {
     double d[KERNEL_HALF];
     memcpy(d, &v, sizeof d);
@@ -74,61 +74,62 @@ SIMD_INLINE kernel_half kernel_half_sqrt(kernel_half v)
     return v;
 }
 
-SIMD_INLINE kernel_half kernel_half_max(kernel_half a, kernel_half b)
+SIMD_INLINE kernel_f64 kernel_f64_max(kernel_f64 a, kernel_f64 b)
 {
-    return kernel_half_select((kernel_half_mask)(b < a), a, b);
+    return kernel_f64_select((kernel_f64_mask)(b < a), a, b);
 }
 
 /* Returns v with each lane clamped to the interval [-limit, limit]. */
-SIMD_INLINE kernel_half kernel_half_hold(kernel_half v, double limit)
+SIMD_INLINE kernel_f64 kernel_f64_clamp(kernel_f64 v, double limit)
 {
-    const kernel_half most = (kernel_half){0} + limit;
-    v = kernel_half_select((kernel_half_mask)(v < -most), -most, v);
-    return kernel_half_select((kernel_half_mask)(most < v), most, v);
+    const kernel_f64 most = (kernel_f64){0} + limit;
+    v = kernel_f64_select((kernel_f64_mask)(v < -most), -most, v);
+    return kernel_f64_select((kernel_f64_mask)(most < v), most, v);
 }
 
 /* A vector of SIMD_WIDTH doubles, one per lane, stored as two halves. */
-typedef struct kernel_whole {
-    kernel_half half[2];
-} kernel_whole;
+typedef struct kernel_wide_doubles {
+    kernel_f64 half[2];
+} kernel_wide_doubles;
 
-SIMD_INLINE vm kernel_whole_lt(const kernel_whole *a, const kernel_whole *b)
+SIMD_INLINE vm kernel_wide_doubles_lt(const kernel_wide_doubles *a, const kernel_wide_doubles *b)
 {
     return vd_lt(a->half, b->half);
 }
 
-SIMD_INLINE vm kernel_whole_eq(const kernel_whole *a, const kernel_whole *b)
+SIMD_INLINE vm kernel_wide_doubles_eq(const kernel_wide_doubles *a, const kernel_wide_doubles *b)
 {
     return vd_eq(a->half, b->half);
 }
 
-SIMD_INLINE kernel_whole kernel_whole_select(vm m, const kernel_whole *a, const kernel_whole *b)
+SIMD_INLINE kernel_wide_doubles kernel_wide_doubles_select(vm m, const kernel_wide_doubles *a,
+                                                           const kernel_wide_doubles *b)
 {
-    kernel_whole out;
+    kernel_wide_doubles out;
     vd_select(m, a->half, b->half, out.half);
     return out;
 }
 
-SIMD_INLINE kernel_whole kernel_whole_set(double x)
+SIMD_INLINE kernel_wide_doubles kernel_wide_doubles_set(double x)
 {
-    const kernel_half all = (kernel_half){0} + x;
-    return (kernel_whole){{all, all}};
+    const kernel_f64 all = (kernel_f64){0} + x;
+    return (kernel_wide_doubles){{all, all}};
 }
 
-SIMD_INLINE kernel_whole kernel_whole_widen(vf v)
+SIMD_INLINE kernel_wide_doubles kernel_wide_doubles_widen(vf v)
 {
-    return (kernel_whole){{kernel_half_of(&v, 0), kernel_half_of(&v, 1)}};
+    return (kernel_wide_doubles){{kernel_f64_of(&v, 0), kernel_f64_of(&v, 1)}};
 }
 
-SIMD_INLINE vf kernel_whole_narrow(const kernel_whole *v)
+SIMD_INLINE vf kernel_wide_doubles_narrow(const kernel_wide_doubles *v)
 {
     vf out;
-    for (int half = 0; half < 2; half++) kernel_half_put(&out, half, v->half[half]);
+    for (int half = 0; half < 2; half++) kernel_f64_store_lanes(&out, half, v->half[half]);
     return out;
 }
 
 /* Returns the double in the given lane. */
-SIMD_INLINE double kernel_whole_lane(const kernel_whole *v, int lane)
+SIMD_INLINE double kernel_wide_doubles_lane(const kernel_wide_doubles *v, int lane)
 {
     return v->half[lane / KERNEL_HALF][lane % KERNEL_HALF];
 }

@@ -36,13 +36,13 @@ void hit_normal(const float folded[2], double n[3])
     normalize(n);
 }
 
-hit_place hit_place_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift)
+hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift)
 {
     const render_camera *c = &job->camera;
     const uint32_t width = (uint32_t)c->width;
     const double z = (double)t / job->space.scale + job->space.depth_origin, above = lift / job->space.scale;
     double base[3], direction[3], n[3];
-    hit_place out;
+    hit_frame out;
     render_camera_ray(c, (int)(pixel % width), (int)(pixel / width), base, direction);
     hit_normal(normal, n);
     out.a = hit_axes_around(n);
@@ -79,7 +79,7 @@ static const double golden[2] = {-0.7373688780783197, 0.6754902942615239};
 
 /* Computes `count` unit directions with z along the normal. The last ones are kept away from the horizon, where a
  * rounding error of the surface would become a large error of distance. */
-static void spread(const hemisphere *h, int count, double (*out)[3])
+static void hemisphere_directions(const hemisphere *h, int count, double (*out)[3])
 {
     double x = h->cosine, y = h->sine;
     for (int k = 0; k < count; k++) {
@@ -95,7 +95,7 @@ static void spread(const hemisphere *h, int count, double (*out)[3])
 void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3])
 {
     const hemisphere h = hemisphere_of(job, pixel);
-    spread(&h, job->occlusion->samples, out);
+    hemisphere_directions(&h, job->occlusion->samples, out);
 }
 
 void hit_directions(const render_job *job, uint32_t pixel, const hit_axes *a, double (*out)[3])
@@ -117,11 +117,11 @@ static void grow_box(render_box *box, const render_space *s, const mmbvh *tree)
     }
 }
 
-render_box hit_box(const render_job *job, bool (*is_wanted)(const render_surface_layer *layer))
+render_box hit_box(const render_job *job, bool (*has_active_pixel)(const render_surface_layer *layer))
 {
     render_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     for (int i = 0; i < job->surface_count; i++) {
-        if (!is_wanted(&job->surfaces[i])) continue;
+        if (!has_active_pixel(&job->surfaces[i])) continue;
         for (int part = 0; part < job->part_count; part++)
             if (job->surfaces[i].field.ranges[part].low && job->parts[part].tree->node_count)
                 grow_box(&out, &job->space, job->parts[part].tree);

@@ -10,10 +10,10 @@ typedef struct hit_axes {
 } hit_axes;
 
 /* The point at which a hit's rays begin, the unit direction to the eye, and axes of which `forward` is the normal. */
-typedef struct hit_place {
+typedef struct hit_frame {
     double start[3], view[3];
     hit_axes a;
-} hit_place;
+} hit_frame;
 
 static inline double hit_dot(const double a[3], const double b[3])
 {
@@ -22,7 +22,7 @@ static inline double hit_dot(const double a[3], const double b[3])
 
 /* Returns the bounding box, in the scene's coordinates, of this rank's trees on which a surface layer accepted by
  * is_wanted() has values. */
-render_box hit_box(const render_job *job, bool (*is_wanted)(const render_surface_layer *layer));
+render_box hit_box(const render_job *job, bool (*has_active_pixel)(const render_surface_layer *layer));
 
 /* Returns axes of unit length, of which `forward` is the unit vector n. */
 hit_axes hit_axes_around(const double n[3]);
@@ -32,7 +32,7 @@ void hit_normal(const float folded[2], double n[3]);
 
 /* Computes the position and axes of a hit at depth t on the pixel's ray. Its rays begin `lift` scaled units above the
  * surface. */
-hit_place hit_place_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift);
+hit_frame hit_frame_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift);
 
 /* Computes occlusion->samples unit directions for the pixel's hit, relative to the surface: z is along the normal. */
 void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3]);

@@ -17,21 +17,21 @@ static char warning[160];
 
 static void choose(void)
 {
-    const char *wish = getenv("INSITU_ISA");
+    const char *query = getenv("INSITU_ISA");
     const cpu_isa best = cpu_best_isa();
     chosen = best;
-    if (!wish || !*wish) return;
+    if (!query || !*query) return;
     for (int i = 0; i < CPU_ISA_COUNT; i++) {
-        if (strcmp(wish, cpu_isa_name((cpu_isa)i)) != 0) continue;
+        if (strcmp(query, cpu_isa_name((cpu_isa)i)) != 0) continue;
         if (i <= (int)best) {
             chosen = (cpu_isa)i;
             return;
         }
-        snprintf(warning, sizeof warning, "INSITU_ISA=%s: this machine has %s at best, which is used", wish,
+        snprintf(warning, sizeof warning, "INSITU_ISA=%s: this machine has %s at best, which is used", query,
                  cpu_isa_name(best));
         return;
     }
-    snprintf(warning, sizeof warning, "INSITU_ISA=%.40s is none of avx512, avx2, sse4.2, plain: %s is used", wish,
+    snprintf(warning, sizeof warning, "INSITU_ISA=%.40s is none of avx512, avx2, sse4.2, plain: %s is used", query,
              cpu_isa_name(best));
 }
 

@@ -34,7 +34,7 @@ double render_domain_of(const render_transfer *t, double value)
     return x < -1e18 ? -1e18 : x > 1e18 ? 1e18 : x;
 }
 
-double render_entry_place(const render_transfer *t, int i)
+double render_entry_position(const render_transfer *t, int i)
 {
     const double along = (double)i / (t->colour_count - 1);
     if (t->scale == RENDER_LINEAR) return along;

@@ -8,6 +8,6 @@
 void render_transfer_domain(const render_transfer *t, double *low, double *inverse_width);
 /* Return the position in the transfer function's domain of a value, and of the i-th entry of its colour table. */
 double render_domain_of(const render_transfer *t, double value);
-double render_entry_place(const render_transfer *t, int i);
+double render_entry_position(const render_transfer *t, int i);
 
 #endif

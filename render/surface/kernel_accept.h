@@ -54,7 +54,7 @@ static void kernel_smooth_setup(const kernel_packet *p, const render_surface_lay
     out->part = part;
     out->index = index;
     kernel_cell_fetch(c, g, &layer->field.fields[part], (uint32_t)index);
-    kernel_cell_place_in(c, p->frame, p->tile, g);
+    kernel_cell_transform_in_tile(c, p->frame, p->tile, g);
     for (int i = 0; i < c->count; i++) {
         double gradient[3];
         kernel_vertex_gradient(p->frame, &layer->gradients[part], c->vertices[i], gradient);
@@ -268,25 +268,25 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
 }
 
 /* Properties of hits before lighting: a vector along the normal, in camera axes, and the colour. */
-typedef struct kernel_look {
+typedef struct kernel_shading_input {
     vf normal[3], colour[3];
-} kernel_look;
+} kernel_shading_input;
 
-SIMD_INLINE kernel_look kernel_look_of(const vf normal[3], const vf colour[3])
+SIMD_INLINE kernel_shading_input kernel_shading_input_of(const vf normal[3], const vf colour[3])
 {
-    return (kernel_look){{normal[0], normal[1], normal[2]}, {colour[0], colour[1], colour[2]}};
+    return (kernel_shading_input){{normal[0], normal[1], normal[2]}, {colour[0], colour[1], colour[2]}};
 }
 
 /* Moves hits whose normals need samples of other ranks to the thread's waiting list, and emits a placeholder fragment
  * for each, at which volumes are cut. Returns the remaining hits. reach: distance to the samples; hits with 0 do not
  * wait. */
-static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const kernel_surface *s, int value, vm hit,
-                                                      vf t, vf reach, const kernel_look *look)
+static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, const kernel_surface *s, int value,
+                                                            vm hit, vf t, vf reach, const kernel_shading_input *look)
 {
     const vf *normal = look->normal, *colour = look->colour;
-    render_waiting_list *list = &p->thread->waiting;
+    render_pending_list *list = &p->thread->waiting;
     const vm waits = vm_and(hit, vf_lt(vf_set(0), reach));
-    if (list->capacity - list->count < SIMD_WIDTH && !p->thread->grow_waiting(list)) {
+    if (list->capacity - list->count < SIMD_WIDTH && !p->thread->grow_pending(list)) {
         p->thread->out_of_memory = true;
         return vm_none();
     }
@@ -294,19 +294,19 @@ static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const ke
     kernel_emit(p, waits, s->first_kind + (uint32_t)value, &place);
     for (unsigned left = vm_bits(waits); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
-        list->items[list->count] = (render_waiting_hit){p->pixel[i], s->first_kind + (uint32_t)value, t[i], reach[i]};
-        list->looks[list->count++] = (render_waiting_look){{normal[0][i], normal[1][i], normal[2][i]},
-                                                           {colour[0][i], colour[1][i], colour[2][i]}};
+        list->items[list->count] = (render_pending_hit){p->pixel[i], s->first_kind + (uint32_t)value, t[i], reach[i]};
+        list->shadings[list->count++] = (render_pending_shading){{normal[0][i], normal[1][i], normal[2][i]},
+                                                                 {colour[0][i], colour[1][i], colour[2][i]}};
     }
     return vm_andnot(hit, waits);
 }
 
 /* Hits of rays: the depth; a vector along the normal, or the reference coordinates from which kernel_vertex_normals()
  * computes one; the value w of the colour field; and the field of contour lines (NULL if the surface has none). */
-typedef struct kernel_hit_places {
+typedef struct kernel_hit_points {
     vf t, normal[3], w;
-    const kernel_along *along;
-} kernel_hit_places;
+    const kernel_line_field *along;
+} kernel_hit_points;
 
 /* Returns the value that colours the surface, in the field's units, or the isovalue if there is no colour field. w: the
  * value in the colour map's domain. */
@@ -345,7 +345,7 @@ static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *
 }
 
 /* Returns those of the hits at t that are in front of the eye and are kept by the surface's own clips. */
-SIMD_INLINE vm kernel_kept(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
+SIMD_INLINE vm kernel_unclipped_hits(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
     const vm in_front = vm_and(hit, vf_le(p->t_near, t));
     if (__builtin_expect(s->own_clips == 0, 1)) return in_front;
@@ -354,7 +354,7 @@ SIMD_INLINE vm kernel_kept(const kernel_packet *p, const kernel_surface *s, vm h
 
 SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
-    return kernel_kept(p, s, vm_and(hit, vf_le(t, p->t_far)), t);
+    return kernel_unclipped_hits(p, s, vm_and(hit, vf_le(t, p->t_far)), t);
 }
 
 /* ---- hits of rays in lanes, each with its own cell ---- */

@@ -17,7 +17,7 @@
 #include "kernel_cell_values.h"
 #include "kernel_crossings.h"
 #include "kernel_map.h"
-#include "kernel_placed.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_shapes.h"
 #include "kernel_surface.h"
 #include "kernel_surface_cells.h"
@@ -35,9 +35,9 @@ enum {
 _Static_assert(SIMD_WIDTH *KERNEL_BATCH_PIXELS <= KERNEL_LIST_PIXELS, "a batch's rays have room in a list");
 
 typedef struct kernel_batch {
-    const kernel_surface_cells *own; /* the cells being traced */
-    kernel_placed tets;              /* transformed cells; f is the field minus the isovalue, scaled */
-    bool is_of_faces;                /* copy of the layer's is_of_faces */
+    const kernel_surface_cells *queued; /* the cells being traced */
+    kernel_transformed_tets tets;       /* transformed cells; f is the field minus the isovalue, scaled */
+    bool is_of_faces;                   /* copy of the layer's is_of_faces */
     bool has_normals;
     vf normal[3];
     kernel_pixel_list rays; /* list of rays to be traced */
@@ -51,9 +51,9 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
 {
     const double scale = f->job->space.scale;
     for (int half = 0; half < 2; half++) {
-        kernel_half d[3][3], df[3], g[3], largest = {0};
+        kernel_f64 d[3][3], df[3], g[3], largest = {0};
         for (int i = 0; i < 3; i++) {
-            df[i] = kernel_half_of(&b->tets.f[i + 1], half) - kernel_half_of(&b->tets.f[0], half);
+            df[i] = kernel_f64_of(&b->tets.f[i + 1], half) - kernel_f64_of(&b->tets.f[0], half);
             for (int a = 0; a < 3; a++)
                 d[i][a] = (b->tets.world[a][i + 1].half[half] - b->tets.world[a][0].half[half]) * scale;
         }
@@ -61,13 +61,13 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
             const int p = (a + 1) % 3, q = (a + 2) % 3;
             g[a] = df[0] * (d[1][p] * d[2][q] - d[1][q] * d[2][p]) + df[1] * (d[2][p] * d[0][q] - d[2][q] * d[0][p]) +
                    df[2] * (d[0][p] * d[1][q] - d[0][q] * d[1][p]);
-            largest = kernel_half_max(kernel_half_abs(g[a]), largest);
+            largest = kernel_f64_max(kernel_f64_abs(g[a]), largest);
         }
-        const kernel_half inverse =
-            kernel_half_select((kernel_half_mask)(largest > 0), 1 / (largest * scale), (kernel_half){0});
+        const kernel_f64 inverse =
+            kernel_f64_select((kernel_f64_mask)(largest > 0), 1 / (largest * scale), (kernel_f64){0});
         for (int a = 0; a < 3; a++) {
             const double *axis = f->scaled_axes[a];
-            kernel_half_put(&b->normal[a], half, (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) * inverse);
+            kernel_f64_store_lanes(&b->normal[a], half, (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) * inverse);
         }
     }
     b->has_normals = true;
@@ -79,12 +79,12 @@ static __attribute__((noinline)) void kernel_batch_cell(const kernel_tile_trace 
                                                         kernel_cell *c)
 {
     const render_surface_layer *layer = t->surface->layer;
-    kernel_placed_cell(&b->tets, n, c);
-    c->part = b->own->part;
-    c->index = b->own->cell[n];
+    kernel_transformed_tets_cell(&b->tets, n, c);
+    c->part = b->queued->part;
+    c->index = b->queued->cell[n];
     c->has_normal = true;
     for (int a = 0; a < 3; a++) c->normal[a] = b->normal[a][n];
-    if (layer->normal == RENDER_DIFFERENCES || layer->lines) kernel_placed_exactly(&b->tets, n, c);
+    if (layer->normal == RENDER_DIFFERENCES || layer->lines) kernel_transformed_tets_double(&b->tets, n, c);
     if (!layer->colour_map && !layer->lines) return;
     for (int i = 0; i < 4; i++) c->vertices[i] = b->tets.vertex[i][n];
     if (layer->colour_map) kernel_values_colours(t->surface, c->part, c->index, c->vertices, 4, c->g);
@@ -118,10 +118,10 @@ static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi pl
     if (!b->has_normals) kernel_batch_normals(b, t->frame);
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), n = lanes[i];
-        const float *colour = t->surface->layer->colours + 3 * b->own->value[n];
-        const kernel_ray_hit one = {.part = b->own->part,
-                                    .value = b->own->value[n],
-                                    .cell = b->own->cell[n],
+        const float *colour = t->surface->layer->colours + 3 * b->queued->value[n];
+        const kernel_ray_hit one = {.part = b->queued->part,
+                                    .value = b->queued->value[n],
+                                    .cell = b->queued->cell[n],
                                     .depth = depth[i],
                                     .normal = {b->normal[0][n], b->normal[1][n], b->normal[2][n]},
                                     .colour = {colour[0], colour[1], colour[2]}};
@@ -139,45 +139,46 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
         vf depth;
         kernel_lane_rays_begin(&r, t, &b->rays, first);
         r.far = kernel_batch_far(t, r.at);
-        r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->own->near), r.lane), r.far));
+        r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->queued->near), r.lane), r.far));
         if (!vm_any(r.active)) continue;
         const vm hit = kernel_batch_hit(b, t->t_near, &r, &depth);
         if (vm_any(hit)) nearer |= kernel_batch_accept(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
     }
-    for (; nearer; nearer &= nearer - 1) kernel_block_learn(t, __builtin_ctz(nearer));
+    for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
     b->rays.count = 0;
 }
 
 /* ---- batches ---- */
 
-static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b, kernel_surface_cells *own)
+static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b,
+                                                       kernel_surface_cells *queued)
 {
     const render_surface_layer *layer = t->surface->layer;
     /* Layers that need more of a hit than its depth and normal are traced cell by cell. */
     const bool by_ray = kernel_tile_layer_batches(t) && !layer->colour_map && !layer->lines;
     const int most = by_ray ? KERNEL_BATCH_PIXELS : 0;
-    kernel_surface_cells_close(own);
-    kernel_place_tets(&b->tets, &own->arrays, t->frame, &t->tile, own->vertex, own->count);
-    kernel_lanes_relative(b->tets.values, 4, own->isovalue, b->tets.f);
-    b->own = own;
+    kernel_surface_cells_close(queued);
+    kernel_transform_tets(&b->tets, &queued->arrays, t->frame, &t->tile, queued->vertex, queued->count);
+    kernel_lanes_relative(b->tets.values, 4, queued->isovalue, b->tets.f);
+    b->queued = queued;
     b->is_of_faces = layer->is_of_faces;
     b->has_normals = false;
     b->rays.count = 0;
-    for (int n = 0; n < own->count; n++) {
-        unsigned blocks = own->blocks[n] & kernel_blocks_beyond(t, own->near[n]);
+    for (int n = 0; n < queued->count; n++) {
+        unsigned blocks = queued->blocks[n] & kernel_blocks_beyond(t, queued->near[n]);
         if (!blocks) continue;
-        if (kernel_box_pixels(own->box[n]) <= most) {
-            kernel_pixel_list_add_box(&b->rays, own->box[n], n);
-            for (blocks = own->blocks[n] & ~t->begun; blocks; blocks &= blocks - 1)
+        if (kernel_box_pixels(queued->box[n]) <= most) {
+            kernel_pixel_list_add_box(&b->rays, queued->box[n], n);
+            for (blocks = queued->blocks[n] & ~t->begun; blocks; blocks &= blocks - 1)
                 kernel_block_begin(t, __builtin_ctz(blocks));
             continue;
         }
         if (!b->has_normals) kernel_batch_normals(b, t->frame);
         kernel_batch_cell(t, b, n, t->cell);
-        kernel_blocks_meet(t, blocks, own->part, t->cell->index, t->cell, own->value[n]);
+        kernel_blocks_trace(t, blocks, queued->part, t->cell->index, t->cell, queued->value[n]);
     }
     kernel_batch_trace(t, b);
-    own->count = 0;
+    queued->count = 0;
 }
 
 #endif

@@ -44,13 +44,13 @@ enum { KERNEL_CONTRACTION_STEPS = 7 };
 
 /* A ray in the coordinates of its cell: y and w as above, from the ray's point at the depth of vertex 0 on; L at that
  * point (level) and its derivative along the ray (rise). */
-typedef struct kernel_sight {
+typedef struct kernel_cell_ray {
     vf y[3], w[3], level, rise;
-} kernel_sight;
+} kernel_cell_ray;
 
 /* The coefficients of kernel_contractions, gathered for each ray's own cell. */
 typedef struct kernel_contraction {
-    vf offset[3], middle, bent[4][3], field[4], grow, blur, rim;
+    vf offset[3], middle, nonlinear_part[4][3], field[4], grow, error_bound, domain_margin;
 } kernel_contraction;
 
 /* The result for each ray: whether it has exactly one crossing, or none. For rays in `one`, t is the depth relative to
@@ -61,47 +61,47 @@ typedef struct kernel_contracted {
 } kernel_contracted;
 
 /* Converts the rays to the coordinates of their cells. */
-SIMD_INLINE void kernel_sight_of(const kernel_curved *c, const kernel_rays *rays, vi lane, kernel_sight *out)
+SIMD_INLINE void kernel_cell_ray_of(const kernel_curved *c, const kernel_rays *rays, vi lane, kernel_cell_ray *out)
 {
     vf origin[3], normal[3], g[3];
     for (int a = 0; a < 3; a++) {
-        origin[a] = kernel_take(c->at[a][0], lane);
-        g[a] = kernel_take(c->bounds->gradient[a], lane);
+        origin[a] = kernel_gather_lane(c->at[a][0], lane);
+        g[a] = kernel_gather_lane(c->bounds->gradient[a], lane);
     }
     const vf x = (rays->origin_x + rays->slope_x * origin[2]) - origin[0];
     const vf y = (rays->origin_y + rays->slope_y * origin[2]) - origin[1];
     for (int i = 0; i < 3; i++) {
-        for (int a = 0; a < 3; a++) normal[a] = kernel_take(c->bounds->normal[i][a], lane);
+        for (int a = 0; a < 3; a++) normal[a] = kernel_gather_lane(c->bounds->normal[i][a], lane);
         out->y[i] = normal[0] * x + normal[1] * y;
         out->w[i] = (normal[0] * rays->slope_x + normal[1] * rays->slope_y) + normal[2];
     }
-    out->level = kernel_take(c->bounds->level, lane) + (g[0] * x + g[1] * y);
+    out->level = kernel_gather_lane(c->bounds->level, lane) + (g[0] * x + g[1] * y);
     out->rise = (g[0] * rays->slope_x + g[1] * rays->slope_y) + g[2];
 }
 
 SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type, kernel_contraction *out)
 {
     const kernel_contractions *c = &b->contractions;
-    for (int i = 0; i < 3; i++) out->offset[i] = kernel_take(c->offset[i], lane);
-    for (int k = 0; k < kernel_bent_terms(type); k++) {
-        for (int i = 0; i < 3; i++) out->bent[k][i] = kernel_take(c->bent[k][i], lane);
-        out->field[k] = kernel_take(c->field[k], lane);
+    for (int i = 0; i < 3; i++) out->offset[i] = kernel_gather_lane(c->offset[i], lane);
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
+        for (int i = 0; i < 3; i++) out->nonlinear_part[k][i] = kernel_gather_lane(c->nonlinear_part[k][i], lane);
+        out->field[k] = kernel_gather_lane(c->field[k], lane);
     }
-    out->middle = kernel_take(c->middle, lane);
-    out->grow = kernel_take(c->grow, lane);
-    out->blur = kernel_take(c->blur, lane);
-    out->rim = kernel_take(c->rim, lane);
+    out->middle = kernel_gather_lane(c->middle, lane);
+    out->grow = kernel_gather_lane(c->grow, lane);
+    out->error_bound = kernel_gather_lane(c->error_bound, lane);
+    out->domain_margin = kernel_gather_lane(c->domain_margin, lane);
 }
 
 /* Moves the reference coordinates r to the nearest point of the domain D, which for hexes and wedges is widened by
  * `rim`. For a pyramid the point is only close to the nearest one. */
-SIMD_INLINE void kernel_contraction_hold(int type, vf rim, vf r[3])
+SIMD_INLINE void kernel_contraction_clamp(int type, vf domain_margin, vf r[3])
 {
-    const vf half = 0.5f + rim;
+    const vf half = 0.5f + domain_margin;
     if (kernel_is_box(type)) {
         for (int a = 0; a < 3; a++) r[a] = vf_clamp(r[a], -half, half);
     } else if (kernel_is_prism(type)) {
-        const vf low = -1.0f / 3 - rim, most = 1.0f / 3 + 2.0f * rim, high = most - low;
+        const vf low = -1.0f / 3 - domain_margin, most = 1.0f / 3 + 2.0f * domain_margin, high = most - low;
         const vm over = vf_lt(most, r[0] + r[1]);
         const vf slant = vf_clamp(0.5f * ((r[0] - r[1]) + most), low, high);
         r[0] = vf_select(over, slant, vf_max(r[0], low));
@@ -120,12 +120,12 @@ SIMD_INLINE void kernel_contraction_hold(int type, vf rim, vf r[3])
 }
 
 /* Returns the maximum of the dot product s . x over all points x of the reference domain D. */
-SIMD_INLINE vf kernel_contraction_reach(int type, vf rim, const vf s[3])
+SIMD_INLINE vf kernel_contraction_reach(int type, vf domain_margin, const vf s[3])
 {
-    const vf half = 0.5f + rim;
+    const vf half = 0.5f + domain_margin;
     if (kernel_is_box(type)) return half * ((vf_abs(s[0]) + vf_abs(s[1])) + vf_abs(s[2]));
     if (kernel_is_prism(type)) {
-        const vf low = -1.0f / 3 - rim, side = 1.0f + 4.0f * rim;
+        const vf low = -1.0f / 3 - domain_margin, side = 1.0f + 4.0f * domain_margin;
         return low * (s[0] + s[1]) + side * vf_max(vf_max(s[0], s[1]), vf_set(0)) + half * vf_abs(s[2]);
     }
     return vf_max((vf_max(s[0], vf_set(0)) + vf_max(s[1], vf_set(0))) + s[2], vf_set(0));
@@ -155,32 +155,32 @@ SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
  * blur times (|s| + 2), and a thousandth of |s|^2 covers the rest. */
 SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
-    const vf most = kernel_contraction_reach(type, c->rim, s) - kernel_dot(s, q);
-    vf blur = 8.0f * c->blur;
+    const vf most = kernel_contraction_reach(type, c->domain_margin, s) - kernel_dot(s, q);
+    vf error_bound = 8.0f * c->error_bound;
     /* twice the error of crossings of faces, because for a pyramid the reference domain is not widened */
-    if (kernel_has_apex(type)) blur = 4.0f * c->rim;
-    return vf_lt(2.0f * most + blur, 0.999f * kernel_dot(s, s));
+    if (kernel_has_apex(type)) error_bound = 4.0f * c->domain_margin;
+    return vf_lt(2.0f * most + error_bound, 0.999f * kernel_dot(s, s));
 }
 
-SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight *ray, vm rays, kernel_contracted *out,
-                                 int type)
+SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_ray *ray, vm rays,
+                                 kernel_contracted *out, int type)
 {
-    const int terms = kernel_bent_terms(type);
+    const int terms = kernel_nonlinear_count(type);
     const vf over = 1.0f / ray->rise, t = (ray->level + c->middle) * over;
     vf a[3], slope[4][3], q[3], s[3], local[3];
-    kernel_bend bend;
+    kernel_nonlinear_terms bend;
     out->one = out->none = vm_none();
     out->t = vf_set(0);
     for (int i = 0; i < 3; i++) q[i] = a[i] = (ray->y[i] + c->offset[i]) - ray->w[i] * t;
     for (int k = 0; k < terms; k++) {
         const vf rate = c->field[k] * over;
-        for (int i = 0; i < 3; i++) slope[k][i] = c->bent[k][i] + ray->w[i] * rate;
+        for (int i = 0; i < 3; i++) slope[k][i] = c->nonlinear_part[k][i] + ray->w[i] * rate;
     }
     const vm sure = vm_and(rays, vf_lt(c->grow, vf_set(INFINITY)));
     for (int n = 0; n < KERNEL_CONTRACTION_STEPS; n++) {
-        kernel_contraction_hold(type, c->rim, q);
+        kernel_contraction_clamp(type, c->domain_margin, q);
         kernel_contraction_local(type, q, local);
-        kernel_bend_at(type, local, &bend);
+        kernel_nonlinear_terms_at(type, local, &bend);
         /* kernel_bounds.h computes the Jacobian at the centre with a b / k² = 1/2 instead of 1/4, which leaves this
          * linear term */
         if (kernel_has_apex(type)) bend.term[0] += 0.25f * q[2];
@@ -196,8 +196,8 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_sight
         }
         for (int i = 0; i < 3; i++) q[i] = out->r[i];
     }
-    const vf off = c->grow * vf_sqrt(kernel_dot(s, s)) + (1.0f + c->grow) * c->blur;
-    const vm inside = vf_lt(off + c->rim, kernel_contraction_inside(type, out->r));
+    const vf off = c->grow * vf_sqrt(kernel_dot(s, s)) + (1.0f + c->grow) * c->error_bound;
+    const vm inside = vf_lt(off + c->domain_margin, kernel_contraction_inside(type, out->r));
     out->one = vm_andnot(vm_and(sure, vm_and(inside, vf_lt(off, vf_set(KERNEL_CONTRACTION_END)))), out->none);
     vf e = ray->level + c->middle;
     for (int k = 0; k < terms; k++) e += c->field[k] * bend.term[k];

@@ -29,7 +29,7 @@
 #include "kernel_lines.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
-#include "kernel_placed_curved.h"
+#include "kernel_transformed_curved.h"
 #include "kernel_roots.h"
 #include "kernel_shapes.h"
 #include "kernel_surface.h"
@@ -44,8 +44,8 @@
 enum { KERNEL_CURVED_PIXELS = 64 };
 
 typedef struct kernel_curved_batch {
-    const kernel_surface_cells *own; /* the cells being traced */
-    kernel_placed_curved placed;
+    const kernel_surface_cells *queued; /* the cells being traced */
+    kernel_transformed_curved transformed;
     /* colour field by vertex and lane, as in kernel_cell.g; set only if the layer has one */
     float colours[8][SIMD_WIDTH];
     float lines[8][SIMD_WIDTH]; /* field of the contour lines by vertex and lane; set only if the layer has lines */
@@ -67,8 +67,8 @@ static void kernel_curved_batch_begin(kernel_curved_batch *h)
 
 SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h)
 {
-    return (kernel_curved){.type = h->own->type,
-                           .at = (const float(*)[8][SIMD_WIDTH])h->placed.at,
+    return (kernel_curved){.type = h->queued->type,
+                           .at = (const float(*)[8][SIMD_WIDTH])h->transformed.at,
                            .colours = (const float(*)[SIMD_WIDTH])h->colours,
                            .bounds = &h->bounds};
 }
@@ -80,19 +80,19 @@ SIMD_INLINE void kernel_curved_ready(const kernel_tile_trace *t, kernel_curved_b
 {
     if (h->ready >> n & 1) return;
     h->ready |= 1u << n;
-    kernel_placed_curved_cell(&h->placed, h->own->type, n, &h->cells[n]);
+    kernel_transformed_curved_cell(&h->transformed, h->queued->type, n, &h->cells[n]);
     kernel_cell_lines(&h->cells[n], t->frame, &t->tile);
-    h->cells[n].part = h->own->part;
-    h->cells[n].index = h->own->cell[n];
+    h->cells[n].part = h->queued->part;
+    h->cells[n].index = h->queued->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
-    for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->placed.vertex[i][n];
+    for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->transformed.vertex[i][n];
 }
 
 /* Traces the rays in `wanted` one by one in their cells; rays of one cell and packet are traced together. Returns the
  * mask of blocks in which a ray has a nearer hit than before. */
-static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                                    const kernel_pixel_list *rays, int first,
-                                                                    vi at_lanes, unsigned wanted)
+static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                           const kernel_pixel_list *rays, int first,
+                                                                           vi at_lanes, unsigned wanted)
 {
     kernel_curved curved = kernel_curved_batch_cells(h);
     unsigned blocks = 0;
@@ -117,7 +117,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_
         p->is_nearer = false;
         kernel_curved_ready(t, h, n);
         curved.lane = n;
-        kernel_cell_surface(p, &state, &h->cells[n], &curved, h->own->value[n], vm_and(p->active, vm_from_bits(same)));
+        kernel_cell_surface(p, &state, &h->cells[n], &curved, h->queued->value[n],
+                            vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
     }
     return blocks;
@@ -128,14 +129,14 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_alone(kernel_tile_
 /* Returns the rays that are outside the slab that contains the isosurface, throughout the part of the ray between the
  * cell's bounding planes. On these rays the faces' values have L's sign, so there is no root. Depths are relative to
  * vertex 0. */
-SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_sight *ray)
+SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_cell_ray *ray)
 {
-    const vf thick = kernel_take(h->bounds.thickness, lane);
+    const vf thick = kernel_gather_lane(h->bounds.thickness, lane);
     vf from = vf_set(-INFINITY), to = vf_set(INFINITY);
     for (int i = 0; i < 3; i++) {
         const vf inverse = 1.0f / ray->w[i];
-        const vf low = (kernel_take(h->bounds.low[i], lane) - ray->y[i]) * inverse;
-        const vf high = (kernel_take(h->bounds.high[i], lane) - ray->y[i]) * inverse;
+        const vf low = (kernel_gather_lane(h->bounds.low[i], lane) - ray->y[i]) * inverse;
+        const vf high = (kernel_gather_lane(h->bounds.high[i], lane) - ray->y[i]) * inverse;
         from = vf_max(vf_min(low, high), from);
         to = vf_min(vf_max(low, high), to);
     }
@@ -172,18 +173,18 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
     h->found.count = 0;
     for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
         kernel_lane_rays p;
-        kernel_sight ray;
+        kernel_cell_ray ray;
         kernel_contraction c;
         kernel_contracted at;
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_batch_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_take(h->own->near, p.lane), p.far));
-        kernel_sight_of(&cells, &p.rays, p.lane, &ray);
+        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
+        kernel_cell_ray_of(&cells, &p.rays, p.lane, &ray);
         p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &ray));
         if (!vm_any(p.active)) continue;
         kernel_contraction_of(&h->bounds, p.lane, type, &c);
         kernel_contract(&c, &ray, p.active, &at, type);
-        const vf depth = at.t + kernel_take(h->placed.at[2][0], p.lane);
+        const vf depth = at.t + kernel_gather_lane(h->transformed.at[2][0], p.lane);
         kept = kernel_curved_batch_part(h, n, &at, depth, vm_bits(vm_andnot(p.active, vm_or(at.one, at.none))), kept);
     }
     h->rays.count = kept;
@@ -193,12 +194,12 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
 
 static __attribute__((noinline)) void kernel_curved_batch_contract(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_contract_of, t, h);
+    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_contract_of, t, h);
 }
 
 /* Lists the rays that cross two faces of their cells in `met`, with the numbers of these faces. Traces rays of other
  * cases one by one. Returns the mask of blocks in which a ray has a nearer hit than before. */
-SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_curved_batch *h, int type)
+SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
     h->met.count = 0;
@@ -208,9 +209,9 @@ SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_cu
         uint8_t faces[SIMD_WIDTH];
         kernel_lane_rays_begin(&p, t, &h->rays, n);
         p.far = kernel_batch_far(t, p.at);
-        p.active = vm_and(p.active, vf_le(kernel_take(h->own->near, p.lane), p.far));
+        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
         if (!vm_any(p.active)) continue;
-        kernel_curved_faces(&h->placed, &p, type, &crossed);
+        kernel_curved_faces(&h->transformed, &p, type, &crossed);
         const vi both = crossed.first | crossed.last << 3;
         for (int i = 0; i < SIMD_WIDTH; i++) faces[i] = (uint8_t)both[i];
         for (unsigned bits = vm_bits(crossed.two); bits; bits &= bits - 1) {
@@ -219,16 +220,16 @@ SIMD_INLINE unsigned kernel_curved_batch_meet_of(kernel_tile_trace *t, kernel_cu
             kernel_curved_ray_add(&h->met, &h->rays, n + i);
         }
         if (__builtin_expect(vm_any(crossed.alone), 0))
-            nearer |= kernel_curved_batch_alone(t, h, &h->rays, n, p.at, vm_bits(crossed.alone));
+            nearer |= kernel_curved_batch_trace_singly(t, h, &h->rays, n, p.at, vm_bits(crossed.alone));
     }
     kernel_pixel_list_close(&h->met);
     memset(h->faces + h->met.count, 0, SIMD_WIDTH);
     return nearer;
 }
 
-static __attribute__((noinline)) unsigned kernel_curved_batch_meet(kernel_tile_trace *t, kernel_curved_batch *h)
+static __attribute__((noinline)) unsigned kernel_curved_batch_find_faces(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_meet_of, t, h);
+    return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_find_faces_of_type, t, h);
 }
 
 /* Computes the points at which rays enter and leave their cells. Rays with exactly one root, by the values at the ends,
@@ -245,7 +246,7 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
         const vi faces = kernel_bytes(h->faces + n);
         kernel_lane_rays_begin(&p, t, &h->met, n);
         p.far = kernel_batch_far(t, p.at);
-        kernel_curved_cross(&h->placed, &p, type, faces, ends);
+        kernel_curved_cross(&h->transformed, &p, type, faces, ends);
         vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(vf_set(t->t_near), ends[1].t));
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
         const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
@@ -258,19 +259,19 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
 
 static __attribute__((noinline)) void kernel_curved_batch_cross(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_cross_of, t, h);
+    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_cross_of, t, h);
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r in each ray's
  * own cell. */
-SIMD_INLINE void kernel_curved_batch_along(const kernel_tile_trace *t, const kernel_curved_batch *h, vi lane,
-                                           const vf r[3], kernel_along *out, int type)
+SIMD_INLINE void kernel_curved_batch_line_field(const kernel_tile_trace *t, const kernel_curved_batch *h, vi lane,
+                                                const vf r[3], kernel_line_field *out, int type)
 {
     kernel_map map;
     vf c[8];
-    kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->placed.at, lane, &map, type);
+    kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, lane, &map, type);
     kernel_maps_polynomial((const float(*)[SIMD_WIDTH])h->lines, lane, c, type);
-    kernel_map_along(&t->tile, &map, c, r, out);
+    kernel_map_line_field(&t->tile, &map, c, r, out);
 }
 
 /* Reads the colour field at the vertices of the lanes' cells, in the cells' order of vertices. */
@@ -278,49 +279,49 @@ static __attribute__((noinline)) void kernel_curved_batch_fetch_colours(const ke
                                                                         kernel_curved_batch *h)
 {
     const kernel_surface *s = t->surface;
-    const grid_field *field = &s->layer->colour_field.fields[h->own->part];
-    const int count = grid_type_vertices(h->own->type);
-    for (int n = 0; n < h->own->count; n++)
+    const grid_field *field = &s->layer->colour_field.fields[h->queued->part];
+    const int count = grid_type_vertices(h->queued->type);
+    for (int n = 0; n < h->queued->count; n++)
         for (int i = 0; i < count; i++) {
-            const int64_t vertex = h->placed.vertex[i][n];
-            const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->own->cell[n] : vertex);
+            const int64_t vertex = h->transformed.vertex[i][n];
+            const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->queued->cell[n] : vertex);
             h->colours[i][n] = (float)((v - s->colour.low) * s->colour.inverse_width);
         }
 }
 
 /* Hits of a vector of rays: r, the reference coordinates, is used for colours; `normal` is a normal or r, as in
  * kernel_hits. */
-typedef struct kernel_curved_batch_places {
+typedef struct kernel_curved_batch_points {
     vf t, normal[3], r[3];
-} kernel_curved_batch_places;
+} kernel_curved_batch_points;
 
 /* Reads the field of the contour lines at the vertices of the lanes' cells. */
 static __attribute__((noinline)) void kernel_curved_batch_fetch_lines(const kernel_tile_trace *t,
                                                                       kernel_curved_batch *h)
 {
-    const grid_field *field = &t->surface->layer->lines->field.fields[h->own->part];
-    for (int n = 0; n < h->own->count; n++)
-        for (int i = 0; i < grid_type_vertices(h->own->type); i++)
-            h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->placed.vertex[i][n]);
+    const grid_field *field = &t->surface->layer->lines->field.fields[h->queued->part];
+    for (int n = 0; n < h->queued->count; n++)
+        for (int i = 0; i < grid_type_vertices(h->queued->type); i++)
+            h->lines[i][n] = (float)kernel_lines_value(t->surface, field, h->transformed.vertex[i][n]);
 }
 
 /* Computes the colours of hits if the surface has a colour field or contour lines. */
 static __attribute__((noinline)) void
 kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batch *h, const uint8_t *lanes,
-                            const kernel_lane_rays *p, const kernel_curved_batch_places *places, vf colours[3])
+                            const kernel_lane_rays *p, const kernel_curved_batch_points *places, vf colours[3])
 {
     const render_surface_layer *layer = t->surface->layer;
     if (layer->colour_map) {
         const vf place =
-            kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, places->r, h->own->type);
+            kernel_maps_value_of_type((const float(*)[SIMD_WIDTH])h->colours, p->lane, places->r, h->queued->type);
         kernel_base_colour(t->surface, 0, place, colours);
     } else {
         for (int i = 0; i < SIMD_WIDTH; i++)
-            for (int a = 0; a < 3; a++) colours[a][i] = layer->colours[3 * h->own->value[lanes[i]] + a];
+            for (int a = 0; a < 3; a++) colours[a][i] = layer->colours[3 * h->queued->value[lanes[i]] + a];
     }
     if (!layer->lines) return;
-    kernel_along along;
-    KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_along, t, h, p->lane, places->r, &along);
+    kernel_line_field along;
+    KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_line_field, t, h, p->lane, places->r, &along);
     kernel_draw_lines(t->frame, &t->tile, t->surface, &p->rays, places->t, &along, colours);
 }
 
@@ -329,7 +330,7 @@ kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batc
 static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
                                                                      const kernel_pixel_list *rays, int first,
                                                                      const kernel_lane_rays *p, unsigned hit,
-                                                                     const kernel_curved_batch_places *places)
+                                                                     const kernel_curved_batch_points *places)
 {
     const render_surface_layer *layer = t->surface->layer;
     const bool has_own = layer->colour_map || layer->lines;
@@ -339,11 +340,11 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     if (has_own) kernel_curved_batch_colours(t, h, rays->lane + first, p, places, colours);
     memcpy(at, &p->at, sizeof at);
     for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit), value = h->own->value[rays->lane[first + i]];
+        const int i = __builtin_ctz(hit), value = h->queued->value[rays->lane[first + i]];
         const float *plain = layer->colours + 3 * value;
-        const kernel_ray_hit one = {.part = h->own->part,
+        const kernel_ray_hit one = {.part = h->queued->part,
                                     .value = value,
-                                    .cell = h->own->cell[rays->lane[first + i]],
+                                    .cell = h->queued->cell[rays->lane[first + i]],
                                     .depth = places->t[i],
                                     .normal = {places->normal[0][i], places->normal[1][i], places->normal[2][i]},
                                     .colour = {has_own ? colours[0][i] : plain[0], has_own ? colours[1][i] : plain[1],
@@ -367,11 +368,11 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
 }
 
 /* Accepts hits of the rays in `found` from index n on. Returns the mask of blocks with a nearer hit. */
-SIMD_INLINE unsigned kernel_curved_batch_take(kernel_tile_trace *t, kernel_curved_batch *h, int n,
-                                              const kernel_lane_rays *p, const kernel_map *map, const kernel_point *at,
-                                              vm hit)
+SIMD_INLINE unsigned kernel_curved_batch_accept_hits(kernel_tile_trace *t, kernel_curved_batch *h, int n,
+                                                     const kernel_lane_rays *p, const kernel_map *map,
+                                                     const kernel_point *at, vm hit)
 {
-    kernel_curved_batch_places places;
+    kernel_curved_batch_points places;
     places.t = at->t;
     kernel_curved_batch_normal(t, map, at->r, places.normal);
     memcpy(places.r, at->r, sizeof places.r);
@@ -397,7 +398,7 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
             ends[e].value = vf_load(found->v[e] + n);
             for (int a = 0; a < 3; a++) ends[e].r[a] = vf_load(found->r[e][a] + n);
         }
-        kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->placed.at, p.lane, &map, type);
+        kernel_maps_of((const float(*)[8][SIMD_WIDTH])h->transformed.at, p.lane, &map, type);
         if (is_contracted) {
             at = ends[0];
             kernel_polish_near(&p.rays, &map, p.active, KERNEL_CONTRACTION_END, &at);
@@ -406,20 +407,21 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         }
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (__builtin_expect(vm_any(open), 0))
-            nearer |= kernel_curved_batch_alone(t, h, &h->found, n, p.at, vm_bits(open));
-        if (vm_any(hit)) nearer |= kernel_curved_batch_take(t, h, n, &p, &map, &at, hit);
+            nearer |= kernel_curved_batch_trace_singly(t, h, &h->found, n, p.at, vm_bits(open));
+        if (vm_any(hit)) nearer |= kernel_curved_batch_accept_hits(t, h, n, &p, &map, &at, hit);
     }
     return nearer;
 }
 
 static __attribute__((noinline)) unsigned kernel_curved_batch_hit(kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h, false);
+    return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, false);
 }
 
-static __attribute__((noinline)) unsigned kernel_curved_batch_known(kernel_tile_trace *t, kernel_curved_batch *h)
+static __attribute__((noinline)) unsigned kernel_curved_batch_hit_contracted(kernel_tile_trace *t,
+                                                                             kernel_curved_batch *h)
 {
-    return KERNEL_OF_TYPE(h->own->type, kernel_curved_batch_hit_of, t, h, true);
+    return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, true);
 }
 
 /* Searches the rays of `others` from index n on for their first visible root, and accepts it. Returns the mask of
@@ -430,7 +432,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
     const kernel_curved_ends *ends = &h->other_ends;
     kernel_lane_rays p;
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
-    kernel_curved_batch_places places = {.t = vf_set(0)};
+    kernel_curved_batch_points places = {.t = vf_set(0)};
     kernel_search s;
     vm hits = vm_none();
     kernel_lane_rays_begin(&p, t, &h->others, n);
@@ -471,14 +473,14 @@ static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trac
 {
     kernel_pixel_list_close(&h->rays);
     kernel_curved_batch_contract(t, h);
-    unsigned nearer = kernel_curved_batch_known(t, h);
-    nearer |= kernel_curved_batch_meet(t, h);
+    unsigned nearer = kernel_curved_batch_hit_contracted(t, h);
+    nearer |= kernel_curved_batch_find_faces(t, h);
     kernel_curved_batch_cross(t, h);
     kernel_pixel_list_close(&h->found);
     kernel_pixel_list_close(&h->others);
     nearer |= kernel_curved_batch_hit(t, h);
     for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_curved_batch_search(t, h, n);
-    for (; nearer; nearer &= nearer - 1) kernel_block_learn(t, __builtin_ctz(nearer));
+    for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
     h->rays.count = 0;
 }
 
@@ -493,42 +495,42 @@ SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved
 
 /* Transforms the queued cells, and lists their rays; cells whose rays are not traced in lanes go to packets one by one.
  */
-static __attribute__((noinline)) void kernel_curved_batch_place(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                                kernel_surface_cells *own)
+static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                    kernel_surface_cells *queued)
 {
     const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
     const bool by_ray = kernel_tile_layer_batches(t);
-    kernel_surface_cells_close(own);
-    h->own = own;
-    const vm collapsed =
-        kernel_place_curved(&h->placed, &own->arrays, t->frame, &t->tile, own->vertex, own->isovalue, own->type);
-    kernel_bounds_of(own->type, (const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
+    kernel_surface_cells_close(queued);
+    h->queued = queued;
+    const vm collapsed = kernel_transform_curved(&h->transformed, &queued->arrays, t->frame, &t->tile, queued->vertex,
+                                                 queued->isovalue, queued->type);
+    kernel_bounds_of(queued->type, (const float(*)[8][SIMD_WIDTH])h->transformed.at, &beam, &h->bounds);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
     h->ready = 0;
     kernel_curved *const alone = t->curved;
     kernel_curved cells = kernel_curved_batch_cells(h);
     t->curved = &cells;
-    for (int n = 0; n < own->count; n++) {
-        const unsigned blocks = own->blocks[n] & t->wanted & kernel_blocks_beyond(t, own->near[n]);
+    for (int n = 0; n < queued->count; n++) {
+        const unsigned blocks = queued->blocks[n] & t->wanted & kernel_blocks_beyond(t, queued->near[n]);
         if (!blocks) continue;
         if (by_ray && !(vm_bits(collapsed) >> n & 1)) {
-            kernel_curved_batch_rays_of(t, h, n, own->box[n], own->blocks[n]);
+            kernel_curved_batch_rays_of(t, h, n, queued->box[n], queued->blocks[n]);
             continue;
         }
         kernel_curved_ready(t, h, n);
         cells.lane = n;
-        kernel_blocks_meet(t, blocks, h->own->part, own->cell[n], &h->cells[n], own->value[n]);
+        kernel_blocks_trace(t, blocks, h->queued->part, queued->cell[n], &h->cells[n], queued->value[n]);
     }
     t->curved = alone;
 }
 
 static __attribute__((noinline)) void kernel_curved_batch_run(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                              kernel_surface_cells *own)
+                                                              kernel_surface_cells *queued)
 {
-    kernel_curved_batch_place(t, h, own);
+    kernel_curved_batch_transform(t, h, queued);
     if (h->rays.count) kernel_curved_batch_trace(t, h);
-    own->count = 0;
+    queued->count = 0;
 }
 
 #endif

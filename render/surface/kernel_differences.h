@@ -100,8 +100,8 @@ static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uin
     for (int n = 0; n < count; n++) {
         kernel_cell *c = kernel_cell_find(p, probe->layer, part, &field->fields[part], cells[n]);
         if (!c->is_finite || kernel_has_own_faces(c->type)) continue;
-        const bool is_fresh = !c->is_placed;
-        if (is_fresh) kernel_cell_place(c, p, p->frame->job->parts[part].cells);
+        const bool is_fresh = !c->is_transformed;
+        if (is_fresh) kernel_cell_transform(c, p, p->frame->job->parts[part].cells);
         if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_values(probe, c);
         const vm near = kernel_probe_in_box(p, probe, c, rays);
         if (vm_any(near)) kernel_probe_cell(p, probe, c, near);
@@ -136,15 +136,16 @@ SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm r
 
 /* Samples around a packet's hits: before and behind each hit along the first axis, then along the second and the
  * third. */
-typedef struct kernel_samples_about {
+typedef struct kernel_difference_samples {
     vm found[RENDER_DIFFERENCE_SAMPLES];
     vf values[RENDER_DIFFERENCE_SAMPLES];
-} kernel_samples_about;
+} kernel_difference_samples;
 
 /* Takes six samples of the field around each hit at depth t, at the distance `reach` from it. s must be one of the
  * frame's surfaces. */
-static __attribute__((noinline)) void kernel_sample_about(const kernel_packet *p, const kernel_surface *s, int value,
-                                                          vm hit, vf t, vf reach, kernel_samples_about *out)
+static __attribute__((noinline)) void kernel_sample_differences(const kernel_packet *p, const kernel_surface *s,
+                                                                int value, vm hit, vf t, vf reach,
+                                                                kernel_difference_samples *out)
 {
     const kernel_frame *f = p->frame;
     kernel_probe probe = {.surface = s,
@@ -160,7 +161,8 @@ static __attribute__((noinline)) void kernel_sample_about(const kernel_packet *p
 /* Replaces the cells' gradients in `normal` (camera axes) by differences of the samples, for the rays in `hit`. The
  * difference is one-sided if one sample of an axis is in no cell. If both are in no cell, the ray keeps its cell's
  * gradient. */
-SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_samples_about *about, vm hit, vf normal[3])
+SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_difference_samples *about, vm hit,
+                                      vf normal[3])
 {
     const render_camera *c = &p->frame->job->camera;
     const double *axes[3] = {c->right, c->up, c->forward};
@@ -182,9 +184,9 @@ SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_sampl
 SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
                                     vf normal[3])
 {
-    kernel_samples_about about;
+    kernel_difference_samples about;
     hit = vm_and(hit, vf_lt(vf_set(0), reach));
-    kernel_sample_about(p, s, value, hit, t, reach, &about);
+    kernel_sample_differences(p, s, value, hit, t, reach, &about);
     kernel_differentiate(p, &about, hit, normal);
 }
 
@@ -198,7 +200,7 @@ SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_s
 /* ---- hits that wait for samples of other ranks ---- */
 
 /* A run of consecutive hits of a list: all are in one packet and of one isovalue, each in its own lane. */
-typedef struct kernel_waiting_run {
+typedef struct kernel_pending_group {
     kernel_tile tile; /* the run's tile, which is kept for the next run */
     kernel_packet packet;
     const kernel_surface *surface;
@@ -206,19 +208,19 @@ typedef struct kernel_waiting_run {
     int lanes[SIMD_WIDTH];
     vm rays;
     vf t, reach;
-} kernel_waiting_run;
+} kernel_pending_group;
 
-SIMD_INLINE void kernel_waiting_begin(kernel_waiting_run *run)
+SIMD_INLINE void kernel_pending_packet_begin(kernel_pending_group *run)
 {
     run->tile.x0 = run->tile.y0 = -1;
 }
 
-SIMD_INLINE int kernel_waiting_lane(int x, int y)
+SIMD_INLINE int kernel_pending_lane(int x, int y)
 {
     return y % KERNEL_PACKET_ROWS * KERNEL_PACKET_COLUMNS + x % KERNEL_PACKET_COLUMNS;
 }
 
-SIMD_INLINE void kernel_waiting_surface(kernel_waiting_run *run, const kernel_frame *f, uint32_t kind)
+SIMD_INLINE void kernel_pending_surface(kernel_pending_group *run, const kernel_frame *f, uint32_t kind)
 {
     for (int n = 0; n < f->surface_count; n++) {
         const kernel_surface *s = &f->surfaces[n];
@@ -229,8 +231,8 @@ SIMD_INLINE void kernel_waiting_surface(kernel_waiting_run *run, const kernel_fr
 }
 
 /* Sets up the run that begins with the first of the hits; run->count becomes its length. */
-static void kernel_waiting_take(kernel_waiting_run *run, const kernel_frame *f, kernel_thread *thread,
-                                const render_waiting_hit *hits, int64_t count)
+static void kernel_pending_group_begin(kernel_pending_group *run, const kernel_frame *f, kernel_thread *thread,
+                                       const render_pending_hit *hits, int64_t count)
 {
     const uint32_t width = (uint32_t)f->job->camera.width, kind = hits->kind;
     const int x = (int)(hits->pixel % width), y = (int)(hits->pixel / width);
@@ -242,13 +244,13 @@ static void kernel_waiting_take(kernel_waiting_run *run, const kernel_frame *f, 
         kernel_tile_rays(&run->tile, f);
         thread->serial++;
     }
-    kernel_waiting_surface(run, f, kind);
+    kernel_pending_surface(run, f, kind);
     for (run->count = 0; run->count < count; run->count++) {
-        const render_waiting_hit *hit = &hits[run->count];
+        const render_pending_hit *hit = &hits[run->count];
         const int column = (int)(hit->pixel % width) - x0, row = (int)(hit->pixel / width) - y0;
         if (hit->kind != kind || column < 0 || column >= KERNEL_PACKET_COLUMNS || row < 0 || row >= KERNEL_PACKET_ROWS)
             break;
-        const int lane = kernel_waiting_lane(column, row);
+        const int lane = kernel_pending_lane(column, row);
         if (bits >> lane & 1) break;
         bits |= 1u << lane;
         run->lanes[run->count] = lane;
@@ -263,18 +265,18 @@ static void kernel_waiting_take(kernel_waiting_run *run, const kernel_frame *f, 
 }
 
 /* Samples this rank's cells around all hits of the list; out[i] gets the samples of hits[i]. */
-static void kernel_sample_waiting(const kernel_frame *f, kernel_thread *thread, const render_waiting_hit *hits,
-                                  render_samples_about *out, int64_t count)
+static void kernel_sample_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_hit *hits,
+                                  render_difference_samples *out, int64_t count)
 {
-    kernel_waiting_run run;
-    kernel_waiting_begin(&run);
+    kernel_pending_group run;
+    kernel_pending_packet_begin(&run);
     for (int64_t i = 0; i < count; i += run.count) {
-        kernel_samples_about about;
-        kernel_waiting_take(&run, f, thread, hits + i, count - i);
-        kernel_sample_about(&run.packet, run.surface, run.value, run.rays, run.t, run.reach, &about);
+        kernel_difference_samples about;
+        kernel_pending_group_begin(&run, f, thread, hits + i, count - i);
+        kernel_sample_differences(&run.packet, run.surface, run.value, run.rays, run.t, run.reach, &about);
         for (int n = 0; n < run.count; n++) {
-            render_samples_about *own = &out[i + n];
-            *own = (render_samples_about){0, 0, {0}};
+            render_difference_samples *own = &out[i + n];
+            *own = (render_difference_samples){0, 0, {0}};
             for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
                 const bool is_found = vm_bits(about.found[k]) >> run.lanes[n] & 1;
                 own->found |= (uint32_t)is_found << k;
@@ -284,8 +286,9 @@ static void kernel_sample_waiting(const kernel_frame *f, kernel_thread *thread, 
     }
 }
 
-SIMD_INLINE void kernel_load_about(const kernel_waiting_run *run, const render_samples_about *samples,
-                                   kernel_samples_about *out)
+SIMD_INLINE void kernel_load_difference_samples(const kernel_pending_group *run,
+                                                const render_difference_samples *samples,
+                                                kernel_difference_samples *out)
 {
     for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
         float values[SIMD_WIDTH] = {0};

@@ -33,7 +33,7 @@ SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2])
 }
 
 /* Computes the vertex's position relative to each ray, at the vertex's depth. */
-SIMD_INLINE void kernel_edge_place(const kernel_packet *p, float x, float y, float z, vf out[2])
+SIMD_INLINE void kernel_edge_position(const kernel_packet *p, float x, float y, float z, vf out[2])
 {
     out[0] = x - (p->origin_x + p->slope_x * z);
     out[1] = y - (p->origin_y + p->slope_y * z);
@@ -49,8 +49,8 @@ SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, con
         double world[3];
         float x, y, z;
         grid_vertex(g, corners[i % count], world);
-        kernel_place_in(p->frame, p->tile, world, &x, &y, &z);
-        kernel_edge_place(p, x, y, z, next);
+        kernel_transform_in_tile(p->frame, p->tile, world, &x, &y, &z);
+        kernel_edge_position(p, x, y, z, next);
         if (i > 0) nearest = vf_min(nearest, kernel_edge_distance(last, next));
         if (i > 0 && i % step == 0) *length = vf_max(*length, kernel_square_between(begin, next));
         memcpy(last, next, sizeof last);
@@ -70,7 +70,7 @@ SIMD_INLINE vf kernel_nearest_edge(const kernel_packet *p, const kernel_cell *c,
     if (part->loops && part->loops[c->index])
         return kernel_nearest_of_loop(p, part->cells, part->loops + part->loops[c->index], length);
     for (int i = 0; i < c->count && count < 4; i++)
-        if (c->f[i] == 0) kernel_edge_place(p, c->x[i], c->y[i], c->z[i], places[count++]);
+        if (c->f[i] == 0) kernel_edge_position(p, c->x[i], c->y[i], c->z[i], places[count++]);
     for (int i = 0; i < count; i++) {
         nearest = vf_min(nearest, kernel_edge_distance(places[i], places[(i + 1) % count]));
         *length = vf_max(*length, kernel_square_between(places[i], places[(i + 1) % count]));

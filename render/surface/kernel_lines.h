@@ -28,9 +28,9 @@
 
 /* The contour lines' field at hits: its value in the levels' domain; its gradient per scaled unit, and a vector of any
  * length along the surface's normal, both in camera axes. */
-typedef struct kernel_along {
+typedef struct kernel_line_field {
     vf value, gradient[3], normal[3];
-} kernel_along;
+} kernel_line_field;
 
 /* Returns the value, in the levels' domain, of the contour lines' field at a vertex; it may be NaN. */
 SIMD_INLINE double kernel_lines_value(const kernel_surface *s, const grid_field *field, int64_t vertex)
@@ -69,9 +69,9 @@ SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const 
 
 /* Computes the contour lines' field, its gradient and the surface's normal at hits in a tet. t, normal: depths of the
  * hits, and normals from kernel_tet_normal(). */
-static __attribute__((noinline)) void kernel_tet_along(const kernel_packet *p, const kernel_surface *s,
-                                                       const kernel_cell *c, vf t, const vf normal[3],
-                                                       kernel_along *out)
+static __attribute__((noinline)) void kernel_tet_line_field(const kernel_packet *p, const kernel_surface *s,
+                                                            const kernel_cell *c, vf t, const vf normal[3],
+                                                            kernel_line_field *out)
 {
     const grid_field *field = &s->layer->lines->field.fields[c->part];
     const double *const corner[4] = {c->world[0], c->world[1], c->world[2], c->world[3]};
@@ -91,8 +91,8 @@ static __attribute__((noinline)) void kernel_tet_along(const kernel_packet *p, c
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r, each lane in
  * its own cell. `line` is the polynomial of the contour lines' field. */
-SIMD_INLINE void kernel_map_along(const kernel_tile *tile, const kernel_map *map, const vf line[8], const vf r[3],
-                                  kernel_along *out)
+SIMD_INLINE void kernel_map_line_field(const kernel_tile *tile, const kernel_map *map, const vf line[8], const vf r[3],
+                                       kernel_line_field *out)
 {
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
     kernel_jacobian j;
@@ -111,9 +111,9 @@ SIMD_INLINE void kernel_map_along(const kernel_tile *tile, const kernel_map *map
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the hits of a packet in one hex, wedge or
  * pyramid. */
-static __attribute__((noinline)) void kernel_curved_along(const kernel_packet *p, const kernel_surface *s,
-                                                          const kernel_cell *c, const kernel_map *map, const vf r[3],
-                                                          kernel_along *out)
+static __attribute__((noinline)) void kernel_curved_line_field(const kernel_packet *p, const kernel_surface *s,
+                                                               const kernel_cell *c, const kernel_map *map,
+                                                               const vf r[3], kernel_line_field *out)
 {
     const grid_field *field = &s->layer->lines->field.fields[c->part];
     double value[GRID_MAX_CELL_VERTICES], fit[8];
@@ -121,20 +121,21 @@ static __attribute__((noinline)) void kernel_curved_along(const kernel_packet *p
     for (int i = 0; i < c->count; i++) value[i] = (double)(float)kernel_lines_value(s, field, c->vertices[i]);
     kernel_polynomial_fit(fit, c->type, value);
     for (int i = 0; i < 8; i++) line[i] = vf_set((float)fit[i]);
-    kernel_map_along(p->tile, map, line, r, out);
+    kernel_map_line_field(p->tile, map, line, r, out);
 }
 
 /* The share of each hit's pixel that the nearest line covers, and the index of that line. */
-typedef struct kernel_cover {
+typedef struct kernel_line_coverage {
     vf share;
     vi line;
-} kernel_cover;
+} kernel_line_coverage;
 
 /* Computes which line is nearest to each hit, and the share of the pixel that it covers: 0 if the field is constant or
  * NaN. */
-static __attribute__((noinline)) kernel_cover kernel_lines_cover(const kernel_frame *f, const kernel_tile *tile,
-                                                                 const kernel_surface *s, const kernel_rays *rays, vf t,
-                                                                 const kernel_along *at)
+static __attribute__((noinline)) kernel_line_coverage kernel_lines_cover(const kernel_frame *f, const kernel_tile *tile,
+                                                                         const kernel_surface *s,
+                                                                         const kernel_rays *rays, vf t,
+                                                                         const kernel_line_field *at)
 {
     const kernel_lines *l = &s->lines;
     const vf zero = vf_set(0), one = vf_set(1), *g = at->gradient, *n = at->normal;
@@ -144,7 +145,7 @@ static __attribute__((noinline)) kernel_cover kernel_lines_cover(const kernel_fr
     const vf dx = rays->slope_x + tile->shear_x, dy = rays->slope_y + tile->shear_y;
     const vf turn = ((g[0] * dx + g[1] * dy) + g[2]), tilt = ((n[0] * dx + n[1] * dy) + n[2]);
     const vf change[3] = {(g[0] - n[0] / tilt * turn) * pixel, (g[1] - n[1] / tilt * turn) * pixel, zero};
-    kernel_cover out = {zero, vi_set(0)};
+    kernel_line_coverage out = {zero, vi_set(0)};
     vf distance = vf_set(INFINITY), gap = distance;
     vm still;
     const vf inverse = kernel_inverse_length(change, &still);
@@ -164,10 +165,10 @@ static __attribute__((noinline)) kernel_cover kernel_lines_cover(const kernel_fr
 
 /* Draws contour lines over unlit colours; returns the share of each pixel that a line covers. */
 SIMD_INLINE vf kernel_draw_lines(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
-                                 const kernel_rays *rays, vf t, const kernel_along *at, vf colour[3])
+                                 const kernel_rays *rays, vf t, const kernel_line_field *at, vf colour[3])
 {
     const float *colours = s->layer->lines->colours;
-    const kernel_cover cover = kernel_lines_cover(f, tile, s, rays, t, at);
+    const kernel_line_coverage cover = kernel_lines_cover(f, tile, s, rays, t, at);
     for (int a = 0; a < 3 && colours; a++) {
         const vf own = vf_gather(colours + a, cover.line * 3);
         colour[a] = s->layer->lines->is_alone ? own : (vf)(colour[a] + cover.share * (own - colour[a]));

@@ -40,12 +40,13 @@ enum {
     KERNEL_SLAB_GRADIENT = 6,
     KERNEL_SLAB_LEVEL = 9,
     KERNEL_SLAB_THICKNESS,
-    KERNEL_SLAB_BLUR, /* rounding error of the slab's linear function L, divided by the size of positions */
+    KERNEL_SLAB_ERROR, /* rounding error of the slab's linear function L, divided by the size of positions */
     KERNEL_SLAB_REACH,
     KERNEL_SLAB_ROWS
 };
 
-/* A hex's record: 8 vertices with their values less the isovalue, corners as in kernel_placed_curved, and no more. */
+/* A hex's record: 8 vertices with their values less the isovalue, corners as in kernel_transformed_curved, and no more.
+ */
 enum { KERNEL_CURVED_RECORD_QUADS = 32, KERNEL_CURVED_RECORD_WORDS = 40 };
 
 /* A cell, and one of the isovalues that cross it. */
@@ -75,29 +76,29 @@ typedef struct kernel_occluders {
 } kernel_occluders;
 
 /* A ray from a hit, in tree space. It ends at the distance `far`, and is open until something blocks it. */
-typedef struct kernel_straight {
+typedef struct kernel_secondary_ray {
     float origin[3], direction[3]; /* the direction has unit length */
     float far;
     bool is_open;
-} kernel_straight;
+} kernel_secondary_ray;
 
 /* A ray that the trees cannot decide for a cell, so that it must be traced in that cell. */
-typedef struct kernel_doubt {
+typedef struct kernel_undecided_pair {
     int32_t ray, occluder;
-} kernel_doubt;
+} kernel_undecided_pair;
 
-typedef struct kernel_straights {
+typedef struct kernel_secondary_rays {
     int count;
-    kernel_straight *rays;
-    int64_t doubt_count, capacity;
-    kernel_doubt *doubts; /* undecided ray-cell pairs, sorted by ray */
-    bool (*grow)(struct kernel_straights *rays);
-} kernel_straights;
+    kernel_secondary_ray *rays;
+    int64_t undecided_count, capacity;
+    kernel_undecided_pair *undecided; /* undecided ray-cell pairs, sorted by ray */
+    bool (*grow)(struct kernel_secondary_rays *rays);
+} kernel_secondary_rays;
 
 /* ---- a ray, prepared for traversal ---- */
 
-typedef struct kernel_plumb {
-    const kernel_straight *ray;
+typedef struct kernel_prepared_ray {
+    const kernel_secondary_ray *ray;
     /* A plane is met at the distance plane * inverse + shift. The shifts of near and far planes extend boxes by their
      * rounding. */
     vf inverse[3], near_shift[3], far_shift[3];
@@ -105,9 +106,9 @@ typedef struct kernel_plumb {
     int kx, ky, kz; /* kz is the axis with the largest component of the direction; kx and ky follow it cyclically */
     float shear_x, shear_y, stretch;
     float size; /* size of positions, from which the rounding error of the slabs' linear functions is computed */
-} kernel_plumb;
+} kernel_prepared_ray;
 
-SIMD_INLINE void kernel_plumb_axes(const kernel_straight *ray, kernel_plumb *p)
+SIMD_INLINE void kernel_prepared_ray_axes(const kernel_secondary_ray *ray, kernel_prepared_ray *p)
 {
     const float x = fabsf(ray->direction[0]), y = fabsf(ray->direction[1]), z = fabsf(ray->direction[2]);
     p->kz = x > y ? (x > z ? 0 : 2) : y > z ? 1 : 2;
@@ -120,7 +121,7 @@ SIMD_INLINE void kernel_plumb_axes(const kernel_straight *ray, kernel_plumb *p)
 
 /* Prepares a ray for a tree. The distance to a plane, two products and a difference, rounds by at most 3 units of the
  * positions' size, the inverse by one more; boxes are extended by more than that. */
-SIMD_INLINE void kernel_plumb_begin(const kernel_straight *ray, float tree_size, kernel_plumb *p)
+SIMD_INLINE void kernel_prepared_ray_begin(const kernel_secondary_ray *ray, float tree_size, kernel_prepared_ray *p)
 {
     float size = tree_size;
     p->ray = ray;
@@ -136,11 +137,11 @@ SIMD_INLINE void kernel_plumb_begin(const kernel_straight *ray, float tree_size,
         p->near_row[a] = (inverse < 0 ? 3 + a : a) * SIMD_WIDTH;
         p->far_row[a] = (inverse < 0 ? a : 3 + a) * SIMD_WIDTH;
     }
-    kernel_plumb_axes(ray, p);
+    kernel_prepared_ray_axes(ray, p);
 }
 
 /* Returns the boxes, given in six rows, that the ray meets; stores the distances at which it enters and leaves them. */
-SIMD_INLINE vm kernel_plumb_boxes(const kernel_plumb *p, const float *rows, vf *low, vf *high)
+SIMD_INLINE vm kernel_prepared_ray_boxes(const kernel_prepared_ray *p, const float *rows, vf *low, vf *high)
 {
     *low = vf_set(0);
     *high = vf_set(p->ray->far);
@@ -154,7 +155,7 @@ SIMD_INLINE vm kernel_plumb_boxes(const kernel_plumb *p, const float *rows, vf *
 /* ---- triangles ---- */
 
 /* Returns the triangles of a leaf that the ray meets, and stores the distances of the crossings in *t. */
-SIMD_INLINE vm kernel_plumb_triangles(const kernel_plumb *p, const float *rows, vf *t)
+SIMD_INLINE vm kernel_prepared_ray_triangles(const kernel_prepared_ray *p, const float *rows, vf *t)
 {
     const float *o = p->ray->origin;
     vf x[3], y[3], z[3];
@@ -178,7 +179,8 @@ SIMD_INLINE vm kernel_plumb_triangles(const kernel_plumb *p, const float *rows, 
 
 /* Computes the linear function L of each slab along the ray, as level + rise * t, and the slab's thickness including
  * rounding. */
-SIMD_INLINE void kernel_plumb_level(const kernel_plumb *p, const float *rows, vf *level, vf *rise, vf *thickness)
+SIMD_INLINE void kernel_prepared_ray_level(const kernel_prepared_ray *p, const float *rows, vf *level, vf *rise,
+                                           vf *thickness)
 {
     *level = vf_load(rows + KERNEL_SLAB_LEVEL * SIMD_WIDTH);
     *rise = vf_set(0);
@@ -188,19 +190,20 @@ SIMD_INLINE void kernel_plumb_level(const kernel_plumb *p, const float *rows, vf
         *rise += g * p->ray->direction[a];
     }
     *thickness =
-        vf_load(rows + KERNEL_SLAB_BLUR * SIMD_WIDTH) * p->size + vf_load(rows + KERNEL_SLAB_THICKNESS * SIMD_WIDTH);
+        vf_load(rows + KERNEL_SLAB_ERROR * SIMD_WIDTH) * p->size + vf_load(rows + KERNEL_SLAB_THICKNESS * SIMD_WIDTH);
 }
 
 /* Returns the cells of a leaf in which the ray may meet the surface: it meets the cell's box, and the slab within the
  * box. */
-SIMD_INLINE vm kernel_plumb_slabs(const kernel_plumb *p, const float *rows, vf *level, vf *rise, vf *thickness)
+SIMD_INLINE vm kernel_prepared_ray_slabs(const kernel_prepared_ray *p, const float *rows, vf *level, vf *rise,
+                                         vf *thickness)
 {
     vf low, high;
-    const vm met = kernel_plumb_boxes(p, rows, &low, &high);
+    const vm met = kernel_prepared_ray_boxes(p, rows, &low, &high);
     *level = *rise = *thickness = vf_set(0);
     if (!vm_any(met)) return met;
     low = vf_max(0.9999f * vf_load(rows + KERNEL_SLAB_REACH * SIMD_WIDTH), low);
-    kernel_plumb_level(p, rows, level, rise, thickness);
+    kernel_prepared_ray_level(p, rows, level, rise, thickness);
     const vf first = *level + *rise * low, last = *level + *rise * high;
     /* A ray without an end leaves the box at a finite distance, so `high` is finite. */
     const vm beside = vm_or(vf_lt(*thickness, vf_min(first, last)), vf_lt(vf_max(first, last), -*thickness));

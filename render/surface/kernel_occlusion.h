@@ -61,7 +61,7 @@ static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_pac
 }
 
 /* Ends the rays whose roots at t block them, and returns these rays. */
-SIMD_INLINE vm kernel_occlusion_take(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
+SIMD_INLINE vm kernel_occlusion_block(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
 {
     vm hit = vm_and(found, vm_and(vf_le(p->t_near, t), vf_lt(t, p->t_far)));
     if (!vm_any(hit)) return hit;
@@ -77,7 +77,7 @@ SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *
     kernel_interval i;
     kernel_tet_interval(p, c, rays, false, &i);
     const vm change = vm_and(kernel_is_near(p, &i), kernel_changes_sign(&i));
-    if (vm_any(change)) kernel_occlusion_take(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
+    if (vm_any(change)) kernel_occlusion_block(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
 }
 
 /* Finds the roots of the interval one after the other, until each ray is blocked or has no more roots. */
@@ -91,7 +91,7 @@ SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion
         kernel_point at;
         if (!vm_any(s.found)) continue;
         kernel_polish(&s, &at);
-        kernel_search_close(&s, kernel_occlusion_take(p, o, s.found, at.t));
+        kernel_search_close(&s, kernel_occlusion_block(p, o, s.found, at.t));
     } while (kernel_search_on(&s));
 }
 
@@ -100,7 +100,7 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
-    kernel_curved_room room;
+    kernel_curved_storage room;
     kernel_curved curved = {.room = &room};
     const int count = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < count; n++) {
@@ -108,33 +108,33 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
         const vm room_left = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
         const vm wanted = vm_and(kernel_is_near(p, i), room_left);
         if (!vm_any(wanted)) continue;
-        if (!curved.bounds) kernel_curved_alone(c, &beam, &curved);
+        if (!curved.bounds) kernel_curved_single_bounds(c, &beam, &curved);
         kernel_occlusion_roots(p, o, &curved, i, wanted);
     }
 }
 
-static void kernel_occlusion_stay(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_passage *r,
-                                  kernel_stay *stay)
+static void kernel_occlusion_interval(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_poly_crossings *r,
+                                      kernel_polyhedron_interval *polyhedron_interval)
 {
-    kernel_walk walk;
-    kernel_passage_profile(r, stay);
-    kernel_walk_begin(stay, wanted, &walk);
+    kernel_profile_walk walk;
+    kernel_poly_profile(r, polyhedron_interval);
+    kernel_profile_walk_begin(polyhedron_interval, wanted, &walk);
     do {
-        const vm found = kernel_walk_next(r, stay, &walk);
-        walk.open = vm_andnot(walk.open, kernel_occlusion_take(p, o, found, walk.t));
+        const vm found = kernel_profile_walk_next(r, polyhedron_interval, &walk);
+        walk.open = vm_andnot(walk.open, kernel_occlusion_block(p, o, found, walk.t));
     } while (vm_any(walk.open));
 }
 
 static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion *o, polyhedron *c, vm rays)
 {
-    kernel_passage r;
-    kernel_stay stay;
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
-    while (kernel_passage_next(&r, &stay)) {
-        const vm changes = kernel_changes_sign(&stay.interval);
-        const vm wanted =
-            vm_and(kernel_is_near(p, &stay.interval), vm_or(changes, kernel_polyhedron_turns(p, c, &r, &stay)));
-        if (vm_any(wanted)) kernel_occlusion_stay(p, o, wanted, &r, &stay);
+    kernel_poly_crossings r;
+    kernel_polyhedron_interval polyhedron_interval;
+    if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    while (kernel_poly_next(&r, &polyhedron_interval)) {
+        const vm changes = kernel_changes_sign(&polyhedron_interval.interval);
+        const vm wanted = vm_and(kernel_is_near(p, &polyhedron_interval.interval),
+                                 vm_or(changes, kernel_polyhedron_may_cross(p, c, &r, &polyhedron_interval)));
+        if (vm_any(wanted)) kernel_occlusion_interval(p, o, wanted, &r, &polyhedron_interval);
     }
 }
 
@@ -148,22 +148,22 @@ static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, co
                                                &o->surface->layer->field.fields[part], part, o->layer, occluder->cell);
     if (!c) p->thread->out_of_memory = true;
     if (!c || !c->is_finite) return;
-    c->has_slopes = c->is_placed = false;
+    c->has_slopes = c->is_transformed = false;
     o->world = c->world;
     o->vertex_count = c->vertex_count;
     if (!kernel_values_straddle(c->values, c->vertex_count, value)) return;
-    kernel_polyhedron_place(c, p);
+    kernel_polyhedron_transform(c, p);
     c->scale = kernel_values_relative(c->values, c->vertex_count + 1, value, c->f);
     kernel_occlusion_polyhedron(p, o, c, p->active);
 }
 
-SIMD_INLINE void kernel_occlusion_place(const kernel_packet *p, kernel_cell *c, int part)
+SIMD_INLINE void kernel_occlusion_transform(const kernel_packet *p, kernel_cell *c, int part)
 {
-    if (!c->is_placed) {
-        kernel_cell_place_in(c, p->frame, p->tile, p->frame->job->parts[part].cells);
+    if (!c->is_transformed) {
+        kernel_cell_transform_in_tile(c, p->frame, p->tile, p->frame->job->parts[part].cells);
         return;
     }
-    for (int i = 0; i < c->count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    for (int i = 0; i < c->count; i++) kernel_transform(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->has_lines = c->has_normal = false;
 }
 
@@ -180,7 +180,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
     if (!c->is_finite) return;
     o->world = c->world;
     o->vertex_count = c->count;
-    kernel_occlusion_place(p, c, occluder->part);
+    kernel_occlusion_transform(p, c, occluder->part);
     kernel_cell_relative(c, layer->values[occluder->value]);
     if (kernel_is_linear(c->type))
         kernel_occlusion_tet(p, o, c, p->active);
@@ -197,9 +197,9 @@ static void kernel_occlude_by_cell(const kernel_frame *f, kernel_thread *thread,
         kernel_occlusion o = {&f->surfaces[occluder->surface], occluder->surface, b, first, NULL, 0};
         if (!(b->open >> first & (((uint64_t)1 << SIMD_WIDTH) - 1))) continue;
         kernel_bundle_packet(&p, f, thread, b, first);
-        const unsigned asked = vm_bits(p.active);
+        const unsigned prefetched = vm_bits(p.active);
         kernel_occlusion_cell(&p, &o, occluder);
-        b->open &= ~((uint64_t)(asked & ~vm_bits(p.active)) << first);
+        b->open &= ~((uint64_t)(prefetched & ~vm_bits(p.active)) << first);
     }
 }
 

@@ -11,7 +11,7 @@
 #include "kernel_curved_rays.h"
 #include "kernel_map.h"
 #include "kernel_occluders.h"
-#include "kernel_placed_curved.h"
+#include "kernel_transformed_curved.h"
 #include "kernel_shapes.h"
 #include "kernel_wide.h"
 #include "simd.h"
@@ -20,27 +20,28 @@ typedef struct kernel_curved_pairs {
     int count;
     int32_t ray[SIMD_WIDTH], occluder[SIMD_WIDTH];
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
-    kernel_placed_curved placed;
+    kernel_transformed_curved transformed;
 } kernel_curved_pairs;
 
-SIMD_INLINE bool kernel_doubts_add(kernel_straights *s, int32_t ray, int32_t occluder)
+SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int32_t occluder)
 {
-    if (s->doubt_count == s->capacity && !s->grow(s)) return false;
-    s->doubts[s->doubt_count++] = (kernel_doubt){ray, occluder};
+    if (s->undecided_count == s->capacity && !s->grow(s)) return false;
+    s->undecided[s->undecided_count++] = (kernel_undecided_pair){ray, occluder};
     return true;
 }
 
 /* Rays in lanes: origin and shear along each ray's own axes. */
-typedef struct kernel_plumb_lanes {
+typedef struct kernel_prepared_ray_lanes {
     int32_t record[SIMD_WIDTH]; /* index of the first float of the hex's record */
     float axis[SIMD_WIDTH];     /* number of the axis kz, as a float; kx and ky follow it cyclically */
     float origin[3][SIMD_WIDTH], shear[2][SIMD_WIDTH], stretch[SIMD_WIDTH], far[SIMD_WIDTH];
-} kernel_plumb_lanes;
+} kernel_prepared_ray_lanes;
 
-SIMD_INLINE void kernel_pair_ray(const kernel_straight *ray, int32_t record, int lane, kernel_plumb_lanes *out)
+SIMD_INLINE void kernel_pair_ray(const kernel_secondary_ray *ray, int32_t record, int lane,
+                                 kernel_prepared_ray_lanes *out)
 {
-    kernel_plumb p;
-    kernel_plumb_axes(ray, &p);
+    kernel_prepared_ray p;
+    kernel_prepared_ray_axes(ray, &p);
     const int axes[3] = {p.kx, p.ky, p.kz};
     out->record[lane] = record * KERNEL_CURVED_RECORD_WORDS;
     out->axis[lane] = (float)p.kz;
@@ -60,9 +61,10 @@ SIMD_INLINE vi kernel_load_ints(const int32_t *from)
 
 /* Computes the vertices as seen by their rays: x and y across the ray, which is at the origin, and the distance along
  * it. */
-SIMD_INLINE void kernel_pairs_place(kernel_curved_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays)
+SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float *hexes,
+                                        const kernel_prepared_ray_lanes *rays)
 {
-    kernel_placed_curved *h = &pairs->placed;
+    kernel_transformed_curved *h = &pairs->transformed;
     const vm along_x = vf_eq(vf_load(rays->axis), vf_set(0)), along_y = vf_eq(vf_load(rays->axis), vf_set(1));
     vf words[2][4];
     for (int i = 0; i < 8; i++) {
@@ -84,9 +86,9 @@ SIMD_INLINE void kernel_pairs_place(kernel_curved_pairs *pairs, const float *hex
 
 /* The result for each ray-hex pair: the hex blocks the ray, or it is in doubt; in all other pairs the hex does not
  * block the ray. */
-typedef struct kernel_pair_verdict {
+typedef struct kernel_pair_result {
     vm blocked, doubt;
-} kernel_pair_verdict;
+} kernel_pair_result;
 
 /* Returns the value, at the distance t along each ray, of the linear function L that defines the slab around the
  * surface. */
@@ -110,12 +112,12 @@ static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_curved_pa
 {
     static const kernel_beam beam = {.spread = 0};
     kernel_bounds bounds;
-    kernel_bounds_of(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->placed.at, &beam, &bounds);
+    kernel_bounds_of(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->transformed.at, &beam, &bounds);
     const vf jump = vf_load(bounds.jump);
     return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].value), vf_abs(ends[1].value))));
 }
 
-SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pairs, vm active, vf far)
+SIMD_INLINE kernel_pair_result kernel_pairs_classify(const kernel_curved_pairs *pairs, vm active, vf far)
 {
     const vf zero = vf_set(0), reach = vf_load(pairs->reach);
     kernel_lane_rays p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
@@ -124,11 +126,11 @@ SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pa
     int32_t lanes[SIMD_WIDTH];
     for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = i;
     p.lane = kernel_load_ints(lanes);
-    kernel_curved_faces(&pairs->placed, &p, GRID_HEX, &crossed);
-    kernel_pair_verdict out = {vm_none(), crossed.alone};
+    kernel_curved_faces(&pairs->transformed, &p, GRID_HEX, &crossed);
+    kernel_pair_result out = {vm_none(), crossed.alone};
     if (!vm_any(crossed.two)) return out;
     p.active = crossed.two;
-    kernel_curved_cross(&pairs->placed, &p, GRID_HEX, crossed.first | crossed.last << 3, ends);
+    kernel_curved_cross(&pairs->transformed, &p, GRID_HEX, crossed.first | crossed.last << 3, ends);
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
     const vm near = vm_and(crossed.two, vf_le(from, to));
     const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
@@ -145,25 +147,25 @@ SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_curved_pairs *pa
     return out;
 }
 
-static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o, kernel_straights *s,
+static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o, kernel_secondary_rays *s,
                                                        kernel_curved_pairs *pairs)
 {
-    kernel_plumb_lanes rays;
+    kernel_prepared_ray_lanes rays;
     bool is_well = true;
     if (!pairs->count) return true;
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const int from = i < pairs->count ? i : 0;
         kernel_pair_ray(&s->rays[pairs->ray[from]], o->cells[pairs->occluder[from]].record, i, &rays);
     }
-    kernel_pairs_place(pairs, o->hexes, &rays);
+    kernel_pairs_transform(pairs, o->hexes, &rays);
     const vm active = vm_from_bits((1u << pairs->count) - 1);
-    const kernel_pair_verdict verdict = kernel_pairs_judge(pairs, active, vf_load(rays.far));
+    const kernel_pair_result verdict = kernel_pairs_classify(pairs, active, vf_load(rays.far));
     for (unsigned bits = vm_bits(verdict.blocked); bits; bits &= bits - 1)
         s->rays[pairs->ray[__builtin_ctz(bits)]].is_open = false;
     for (unsigned bits = vm_bits(vm_and(verdict.doubt, active)); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
         if (s->rays[pairs->ray[i]].is_open)
-            is_well = kernel_doubts_add(s, pairs->ray[i], pairs->occluder[i]) && is_well;
+            is_well = kernel_undecided_add(s, pairs->ray[i], pairs->occluder[i]) && is_well;
     }
     pairs->count = 0;
     return is_well;

@@ -29,22 +29,23 @@ SIMD_INLINE void kernel_path_begin(kernel_path *path, const kernel_occluder_tree
 }
 
 /* Returns the next leaf that the ray may meet, or -1. */
-SIMD_INLINE int32_t kernel_path_next(kernel_path *path, const kernel_plumb *p)
+SIMD_INLINE int32_t kernel_path_next(kernel_path *path, const kernel_prepared_ray *p)
 {
     while (path->top) {
         const int64_t at = path->stack[--path->top];
         if (at < 0) return (int32_t)~at;
         const int32_t *children = path->tree->children + at * SIMD_WIDTH;
         vf low, high;
-        unsigned met = vm_bits(kernel_plumb_boxes(p, path->tree->boxes + at * (6 * SIMD_WIDTH), &low, &high));
+        unsigned met = vm_bits(kernel_prepared_ray_boxes(p, path->tree->boxes + at * (6 * SIMD_WIDTH), &low, &high));
         for (; met; met &= met - 1) path->stack[path->top++] = children[__builtin_ctz(met)];
     }
     return -1;
 }
 
 /* Returns whether the clips keep the ray's crossing of at least one of the surfaces in `met`. */
-static __attribute__((noinline, cold)) bool kernel_straight_kept(const kernel_frame *f, const kernel_straight *ray,
-                                                                 const int32_t *surfaces, unsigned met, vf t)
+static __attribute__((noinline, cold)) bool kernel_secondary_ray_unclipped(const kernel_frame *f,
+                                                                           const kernel_secondary_ray *ray,
+                                                                           const int32_t *surfaces, unsigned met, vf t)
 {
     kernel_clip_ray line;
     for (int a = 0; a < 3; a++) {
@@ -59,18 +60,20 @@ static __attribute__((noinline, cold)) bool kernel_straight_kept(const kernel_fr
     return false;
 }
 
-static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_tree *tree, const kernel_straight *ray)
+static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_tree *tree,
+                                   const kernel_secondary_ray *ray)
 {
     kernel_path path;
-    kernel_plumb p;
-    kernel_plumb_begin(ray, tree->size, &p);
+    kernel_prepared_ray p;
+    kernel_prepared_ray_begin(ray, tree->size, &p);
     kernel_path_begin(&path, tree);
     for (int64_t leaf; (leaf = kernel_path_next(&path, &p)) >= 0;) {
         vf t;
         const unsigned met =
-            vm_bits(kernel_plumb_triangles(&p, tree->leaves + leaf * (KERNEL_TRIANGLE_ROWS * SIMD_WIDTH), &t));
+            vm_bits(kernel_prepared_ray_triangles(&p, tree->leaves + leaf * (KERNEL_TRIANGLE_ROWS * SIMD_WIDTH), &t));
         if (!met) continue;
-        if (!f->job->clip_count || kernel_straight_kept(f, ray, tree->sources + leaf * SIMD_WIDTH, met, t)) return true;
+        if (!f->job->clip_count || kernel_secondary_ray_unclipped(f, ray, tree->sources + leaf * SIMD_WIDTH, met, t))
+            return true;
     }
     return false;
 }
@@ -85,10 +88,10 @@ typedef struct kernel_leaf_lanes {
 
 /* Queues the ray-cell pair in lane i: with other hexes if it is a hex with a record, else as a pair to be traced
  * exactly. Returns false if memory ran out. */
-static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, kernel_curved_pairs *pairs,
+static bool kernel_meets_slab(const kernel_occluders *o, kernel_secondary_rays *s, kernel_curved_pairs *pairs,
                               const kernel_leaf_lanes *lanes, int i, int32_t occluder)
 {
-    if (o->cells[occluder].record < 0) return kernel_doubts_add(s, lanes->ray, occluder);
+    if (o->cells[occluder].record < 0) return kernel_undecided_add(s, lanes->ray, occluder);
     const int n = pairs->count++;
     pairs->ray[n] = lanes->ray;
     pairs->occluder[n] = occluder;
@@ -99,19 +102,19 @@ static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, ke
     return pairs->count < SIMD_WIDTH || kernel_pairs_run(o, s, pairs);
 }
 
-static bool kernel_meets_slabs(const kernel_occluders *o, kernel_straights *s, kernel_curved_pairs *pairs, int ray)
+static bool kernel_meets_slabs(const kernel_occluders *o, kernel_secondary_rays *s, kernel_curved_pairs *pairs, int ray)
 {
     const kernel_occluder_tree *tree = &o->slabs;
     kernel_path path;
-    kernel_plumb p;
+    kernel_prepared_ray p;
     bool is_well = true;
-    kernel_plumb_begin(&s->rays[ray], tree->size, &p);
+    kernel_prepared_ray_begin(&s->rays[ray], tree->size, &p);
     kernel_path_begin(&path, tree);
     for (int64_t leaf; s->rays[ray].is_open && (leaf = kernel_path_next(&path, &p)) >= 0;) {
         const float *rows = tree->leaves + leaf * (KERNEL_SLAB_ROWS * SIMD_WIDTH);
         kernel_leaf_lanes lanes;
         vf level, rise, thickness;
-        unsigned met = vm_bits(kernel_plumb_slabs(&p, rows, &level, &rise, &thickness));
+        unsigned met = vm_bits(kernel_prepared_ray_slabs(&p, rows, &level, &rise, &thickness));
         if (!met) continue;
         lanes.ray = ray;
         vf_store(lanes.level, level);
@@ -128,7 +131,8 @@ static bool kernel_meets_slabs(const kernel_occluders *o, kernel_straights *s, k
 }
 
 /* Closes the rays that are certainly blocked, and records the cells in which the other rays must be traced. */
-static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, const kernel_occluders *o, kernel_straights *s)
+static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, const kernel_occluders *o,
+                           kernel_secondary_rays *s)
 {
     kernel_curved_pairs pairs;
     bool is_well = true;

@@ -20,7 +20,7 @@ SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface 
     for (int value = 0; value < s->layer->value_count; value++) {
         const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
         if (!vm_any(mine)) continue;
-        kernel_look look = kernel_look_of(hits->normal, hits->colour);
+        kernel_shading_input look = kernel_shading_input_of(hits->normal, hits->colour);
         ready = vm_or(ready, kernel_differ(p, s, value, mine, p->t_far, hits->reach, &look));
         for (int a = 0; a < 3; a++) hits->normal[a] = look.normal[a];
     }
@@ -47,23 +47,23 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
 
 /* Lights `count` hits of the waiting list from index `first` on, by the merged samples of all ranks. out[i] becomes the
  * fragment of hit i. */
-static void kernel_light_waiting(const kernel_frame *f, kernel_thread *thread, const render_waiting_list *list,
-                                 const render_samples_about *samples, int64_t first, int64_t count, fragment *out)
+static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_list *list,
+                                 const render_difference_samples *samples, int64_t first, int64_t count, fragment *out)
 {
-    kernel_waiting_run run;
-    kernel_waiting_begin(&run);
+    kernel_pending_group run;
+    kernel_pending_packet_begin(&run);
     for (int64_t i = first; i < first + count; i += run.count) {
-        kernel_samples_about about;
+        kernel_difference_samples about;
         vf normal[3], colour[3];
-        kernel_waiting_take(&run, f, thread, list->items + i, first + count - i);
+        kernel_pending_group_begin(&run, f, thread, list->items + i, first + count - i);
         for (int a = 0; a < 3; a++) {
             normal[a] = colour[a] = vf_set(0);
             for (int n = 0; n < run.count; n++) {
-                normal[a][run.lanes[n]] = list->looks[i + n].normal[a];
-                colour[a][run.lanes[n]] = list->looks[i + n].colour[a];
+                normal[a][run.lanes[n]] = list->shadings[i + n].normal[a];
+                colour[a][run.lanes[n]] = list->shadings[i + n].colour[a];
             }
         }
-        kernel_load_about(&run, samples + i, &about);
+        kernel_load_difference_samples(&run, samples + i, &about);
         kernel_differentiate(&run.packet, &about, run.rays, normal);
         const float opacity = run.surface->layer->opacity;
         const vf kind = vf_set((float)((int)run.surface->first_kind + run.value));

@@ -48,15 +48,15 @@
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
 
 /* What is known about a piece of the interval, per ray. */
-typedef struct kernel_verdict {
+typedef struct kernel_piece_class {
     vm clear;    /* the piece has no root: the field has the sign `side` everywhere */
     vm monotone; /* the field is monotone, so the piece has at most one root */
     vm tiny;     /* the field is so close to 0 everywhere that its sign is only rounding */
-} kernel_verdict;
+} kernel_piece_class;
 
 /* The bounds of kernel_bounds, gathered for each ray's own cell. */
 typedef struct kernel_limits {
-    vf bent[3][8], inverse[3][3], stretch, slope, curve, twist;
+    vf nonlinear_part[3][8], inverse[3][3], stretch, slope, curve, twist;
     vf coarsest; /* pieces longer than this share of the interval are always halved */
     vm is_monotone;
 } kernel_limits;
@@ -65,18 +65,18 @@ SIMD_INLINE void kernel_limits_of(const kernel_bounds *b, vi lane, kernel_limits
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++) {
-            out->bent[i][j] = vf_set(0);
-            out->bent[i][4 + j] = kernel_take(b->bent[i][j], lane);
+            out->nonlinear_part[i][j] = vf_set(0);
+            out->nonlinear_part[i][4 + j] = kernel_gather_lane(b->nonlinear_part[i][j], lane);
         }
     for (int i = 0; i < 3; i++)
-        for (int a = 0; a < 3; a++) out->inverse[i][a] = kernel_take(b->normal[i][a], lane);
-    out->stretch = kernel_take(b->stretch, lane);
-    out->slope = kernel_take(b->slope, lane);
-    out->curve = kernel_take(b->curve, lane);
-    out->twist = kernel_take(b->twist, lane);
-    const vm is_proved = vf_lt(kernel_take(b->thickness, lane), vf_set(INFINITY));
+        for (int a = 0; a < 3; a++) out->inverse[i][a] = kernel_gather_lane(b->normal[i][a], lane);
+    out->stretch = kernel_gather_lane(b->stretch, lane);
+    out->slope = kernel_gather_lane(b->slope, lane);
+    out->curve = kernel_gather_lane(b->curve, lane);
+    out->twist = kernel_gather_lane(b->twist, lane);
+    const vm is_proved = vf_lt(kernel_gather_lane(b->thickness, lane), vf_set(INFINITY));
     out->coarsest = vf_select(is_proved, vf_set(1), vf_set(0.125f));
-    out->is_monotone = vf_le(vf_set(0), kernel_take(b->jump, lane));
+    out->is_monotone = vf_le(vf_set(0), kernel_gather_lane(b->jump, lane));
 }
 
 /* The chord between two points in reference coordinates, and the map's product m at both. */
@@ -94,10 +94,10 @@ SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, cons
     vf first = vf_set(0), second = first, between = first;
     for (int i = 0; i < 3; i++) {
         vf g0[3], g1[3];
-        kernel_gradient_of(b->bent[i], is_pyramid, &c->m[0], from, g0);
-        kernel_gradient_of(b->bent[i], is_pyramid, &c->m[1], to, g1);
-        const vf rise = kernel_value_of(b->bent[i], is_pyramid, &c->m[1], to) -
-                        kernel_value_of(b->bent[i], is_pyramid, &c->m[0], from);
+        kernel_gradient_of(b->nonlinear_part[i], is_pyramid, &c->m[0], from, g0);
+        kernel_gradient_of(b->nonlinear_part[i], is_pyramid, &c->m[1], to, g1);
+        const vf rise = kernel_value_of(b->nonlinear_part[i], is_pyramid, &c->m[1], to) -
+                        kernel_value_of(b->nonlinear_part[i], is_pyramid, &c->m[0], from);
         const vf e1 = (kernel_dot(g0, c->move) - rise) * (1.0f / 3), e2 = (rise - kernel_dot(g1, c->move)) * (1.0f / 3);
         first += e1 * e1;
         second += e2 * e2;
@@ -110,8 +110,8 @@ SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, cons
 
 /* Judges the piece between two points. side: the sign of the field at `from`, 1 or -1. gap: upper bound of the distance
  * of Y(from) and Y(to) from the ray. */
-SIMD_INLINE kernel_verdict kernel_judge(const kernel_map *map, const kernel_limits *b, const kernel_point *from,
-                                        const kernel_point *to, vf gap, vf side)
+SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, const kernel_limits *b,
+                                                     const kernel_point *from, const kernel_point *to, vf gap, vf side)
 {
     const bool is_pyramid = map->is_pyramid;
     kernel_chord chord = {
@@ -140,7 +140,7 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map *map, const kernel_limi
     const vf off_slope = b->stretch * (b->twist * scale * off * length + 3.0f * bend_slope + 2.0f * gap);
     const vf tolerance = b->curve * scale * off * (length + off_slope) + b->slope * off_slope + KERNEL_ROOT_BAND;
     const vf low = vf_min(middle, vf_min(d0, d1)), high = vf_max(middle, vf_max(d0, d1));
-    kernel_verdict out;
+    kernel_piece_class out;
     out.clear = vf_lt(bound, least);
     out.monotone = vm_or(vf_lt(tolerance, low), vf_lt(tolerance, -high));
     out.tiny = vf_le(most + wrong, vf_set(KERNEL_ROOT_BAND));
@@ -215,11 +215,11 @@ SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays,
 {
     vf g[3], at[3];
     for (int a = 0; a < 3; a++) {
-        g[a] = kernel_take(c->bounds->gradient[a], lane);
-        at[a] = kernel_take(c->at[a][0], lane);
+        g[a] = kernel_gather_lane(c->bounds->gradient[a], lane);
+        at[a] = kernel_gather_lane(c->at[a][0], lane);
     }
     const vf x = (rays->origin_x + rays->slope_x * t) - at[0], y = (rays->origin_y + rays->slope_y * t) - at[1];
-    return (kernel_take(c->bounds->level, lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
+    return (kernel_gather_lane(c->bounds->level, lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
 }
 
 /* Decides rays by the values at the ends of their intervals and the bounds of their cells. *found: rays with exactly
@@ -227,14 +227,14 @@ SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays,
 SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
                                   const kernel_point *in, const kernel_point *out, vm *found)
 {
-    const vf zero = vf_set(0), jump = kernel_take(c->bounds->jump, lane), side = kernel_side(in->value);
+    const vf zero = vf_set(0), jump = kernel_gather_lane(c->bounds->jump, lane), side = kernel_side(in->value);
     const vm change = vm_xor(vf_lt(in->value, zero), vf_lt(out->value, zero)), monotone = vf_le(zero, jump);
     *found = vm_and(wanted, vm_and(monotone, change));
     vm left = vm_andnot(wanted, *found);
     left = vm_andnot(left, vm_and(monotone, vf_lt(jump, vf_min(vf_abs(in->value), vf_abs(out->value)))));
     const vm searched = vm_andnot(vm_andnot(left, monotone), change);
     if (!vm_any(searched)) return left;
-    const vf thick = kernel_take(c->bounds->thickness, lane);
+    const vf thick = kernel_gather_lane(c->bounds->thickness, lane);
     const vm far = vm_and(vf_lt(thick, side * kernel_linear_at(c, rays, lane, in->t)),
                           vf_lt(thick, side * kernel_linear_at(c, rays, lane, out->t)));
     return vm_andnot(left, vm_and(searched, far));
@@ -246,7 +246,7 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     const kernel_interval *i = s->interval;
     const vm change = kernel_search_changes(s);
     const vf gap = vf_max(kernel_face_gap(s, &s->low), kernel_face_gap(s, &s->high));
-    const kernel_verdict v = kernel_judge(&s->map, &s->limits, &s->low, &s->high, gap, s->side);
+    const kernel_piece_class v = kernel_classify_piece(&s->map, &s->limits, &s->low, &s->high, gap, s->side);
     const vf jump = s->limits.slope * s->limits.stretch * gap + KERNEL_ROOT_BAND;
     const vm faced = vf_lt(jump, vf_min(i->v_in * s->side, i->v_out * s->side));
     const vm monotone = vm_or(s->limits.is_monotone, v.monotone), sure = vf_le(vf_set(1), s->limits.coarsest);
@@ -293,7 +293,7 @@ SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_poi
     *to = s->end;
     if (!vm_any(inner)) return;
     kernel_point at = {.t = vf_select(inner, i->t_in + (i->t_out - i->t_in) * u, i->t_out)};
-    kernel_place_between(&s->from, &s->end, at.t, at.r);
+    kernel_reference_between(&s->from, &s->end, at.t, at.r);
     at.value = kernel_solve_lanes(&s->rays, &s->map, i, inner, at.t, at.r, s->failures);
     kernel_point_move(inner, &at, to);
 }
@@ -319,7 +319,7 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
     while (vm_any(going)) {
         kernel_point to;
         kernel_search_piece(s, going, &to);
-        const kernel_verdict v = kernel_judge(&s->map, &s->limits, &s->from, &to, vf_set(0), s->side);
+        const kernel_piece_class v = kernel_classify_piece(&s->map, &s->limits, &s->from, &to, vf_set(0), s->side);
         const vm small =
             vm_or(vf_le(s->size, vf_set(KERNEL_SMALLEST_PIECE)), vf_lt(vf_set(KERNEL_ROOT_PIECES), s->pieces));
         const vm certain = vm_and(vm_or(v.monotone, v.clear), vf_le(s->size, s->limits.coarsest));
@@ -376,7 +376,7 @@ SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *o
     for (int n = 0; n < KERNEL_BRACKET_STEPS && vm_any(rays); n++) {
         kernel_point at = {.t = kernel_secant(low.t, low.value, high.t, high.value)};
         if (n % 3 == 2) at.t = low.t + (high.t - low.t) * 0.5f;
-        kernel_place_between(&low, &high, at.t, at.r);
+        kernel_reference_between(&low, &high, at.t, at.r);
         at.value = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at.t, at.r, s->failures);
         const vm same = vf_eq(kernel_side(at.value), kernel_side(low.value));
         kernel_point_move(rays, &at, out);
@@ -390,7 +390,7 @@ SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *o
 
 /* ---- the last step of a refinement ---- */
 
-SIMD_INLINE kernel_half kernel_half_value(const kernel_half c[8], const kernel_half r[3], kernel_half m)
+SIMD_INLINE kernel_f64 kernel_f64_value(const kernel_f64 c[8], const kernel_f64 r[3], kernel_f64 m)
 {
     return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
@@ -402,22 +402,22 @@ SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map *map
                                   vf *value)
 {
     for (int half = 0; half < 2; half++) {
-        kernel_half r[3], target[3];
-        const kernel_half t = kernel_half_of(&at->t, half);
-        for (int a = 0; a < 3; a++) r[a] = kernel_half_of(&at->r[a], half);
-        kernel_half m = r[0] * r[1];
+        kernel_f64 r[3], target[3];
+        const kernel_f64 t = kernel_f64_of(&at->t, half);
+        for (int a = 0; a < 3; a++) r[a] = kernel_f64_of(&at->r[a], half);
+        kernel_f64 m = r[0] * r[1];
         if (map->is_pyramid) {
             const vf k = vf_max(at->r[2], vf_set(1e-6f));
-            m /= kernel_half_of(&k, half);
+            m /= kernel_f64_of(&k, half);
         }
-        target[0] = kernel_half_of(&rays->origin_x, half) + kernel_half_of(&rays->slope_x, half) * t;
-        target[1] = kernel_half_of(&rays->origin_y, half) + kernel_half_of(&rays->slope_y, half) * t;
+        target[0] = kernel_f64_of(&rays->origin_x, half) + kernel_f64_of(&rays->slope_x, half) * t;
+        target[1] = kernel_f64_of(&rays->origin_y, half) + kernel_f64_of(&rays->slope_y, half) * t;
         target[2] = t;
         for (int a = 0; a < 3; a++)
-            kernel_half_put(&off[a], half,
-                            target[a] - kernel_half_of(&map->origin[a], half) -
-                                kernel_half_value(map->exact[half][a], r, m));
-        kernel_half_put(value, half, kernel_half_value(map->exact[half][3], r, m));
+            kernel_f64_store_lanes(&off[a], half,
+                                   target[a] - kernel_f64_of(&map->origin[a], half) -
+                                       kernel_f64_value(map->exact[half][a], r, m));
+        kernel_f64_store_lanes(value, half, kernel_f64_value(map->exact[half][3], r, m));
     }
 }
 

@@ -39,9 +39,9 @@
 /* Computes the normals of hits by differences, and returns the hits. If other ranks may have samples, hits are moved to
  * the waiting list instead, and only the remaining ones are returned. */
 SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
-                             kernel_look *look)
+                             kernel_shading_input *look)
 {
-    if (p->frame->job->waiting) return kernel_wait(p, s, value, hit, t, reach, look);
+    if (p->frame->job->waiting) return kernel_defer_hits(p, s, value, hit, t, reach, look);
     kernel_differences(p, s, value, hit, t, reach, look->normal);
     return hit;
 }
@@ -51,7 +51,7 @@ typedef struct kernel_accepted {
     int value;
     vf t, reach;
     vf opacity; /* used only by transparent surfaces */
-    kernel_look look;
+    kernel_shading_input look;
     kernel_hit_cells cells;
 } kernel_accepted;
 
@@ -59,7 +59,7 @@ typedef struct kernel_accepted {
 static __attribute__((noinline, cold)) void kernel_accept_tied(kernel_packet *p, const kernel_surface *s, vm tied,
                                                                const kernel_accepted *h)
 {
-    kernel_look own = h->look;
+    kernel_shading_input own = h->look;
     vm ready = tied;
     if (s->layer->normal == RENDER_DIFFERENCES) ready = kernel_differ(p, s, h->value, tied, h->t, h->reach, &own);
     if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, tied, h->t, &h->cells, own.normal);
@@ -109,7 +109,7 @@ SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_stat
 /* Draws contour lines over the hits' colours, unless numbers are painted. Returns the visible hits: if only lines are
  * drawn, those that a line covers. */
 static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, const kernel_surface *s, vm hit,
-                                                        const kernel_hit_places *at, kernel_accepted *h)
+                                                        const kernel_hit_points *at, kernel_accepted *h)
 {
     const kernel_rays rays = kernel_packet_rays(p);
     const bool is_alone = s->layer->lines->is_alone, are_numbers = p->frame->job->paint == RENDER_VALUES;
@@ -127,7 +127,7 @@ static __attribute__((noinline)) vm kernel_accept_lines(const kernel_packet *p, 
 /* Accepts hits: those of an opaque surface are kept as the nearest ones; those of a transparent surface are emitted at
  * once. c: the cell; NULL for polyhedra. */
 SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
-                               const kernel_hit_places *at)
+                               const kernel_hit_points *at)
 {
     const kernel_surface *s = state->surface;
     kernel_accepted h = {.value = value, .t = at->t};
@@ -162,16 +162,16 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
     const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
     const vm hit = kernel_visible(p, state->surface, change, t);
     if (!vm_any(hit)) return;
-    kernel_hit_places at = {.t = t, .w = vf_set(0)};
+    kernel_hit_points at = {.t = t, .w = vf_set(0)};
     kernel_tet_normal(p, c, at.normal);
     if (has_colour) {
         const vf length = i.t_out - i.t_in;
         const vf along = vf_select(vf_lt(vf_set(0), length), (t - i.t_in) / length, vf_set(0));
         at.w = i.w_in + along * (i.w_out - i.w_in);
     }
-    kernel_along along;
+    kernel_line_field along;
     if (state->surface->layer->lines) {
-        kernel_tet_along(p, state->surface, c, t, at.normal, &along);
+        kernel_tet_line_field(p, state->surface, c, t, at.normal, &along);
         at.along = &along;
     }
     kernel_accept(p, state, c, value, hit, &at);
@@ -192,7 +192,7 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *stat
 {
     const vm hit = kernel_visible(p, state->surface, found, at->t);
     if (!vm_any(hit)) return hit;
-    kernel_hit_places places = {.t = at->t, .w = vf_set(0)};
+    kernel_hit_points places = {.t = at->t, .w = vf_set(0)};
     if (state->surface->layer->normal == RENDER_VERTEX) {
         memcpy(places.normal, at->r, sizeof places.normal);
     } else {
@@ -201,9 +201,9 @@ SIMD_INLINE vm kernel_curved_accept(kernel_packet *p, kernel_surface_state *stat
     }
     if (state->surface->layer->colour_map)
         places.w = kernel_maps_value_of_type(curved->colours, vi_set(curved->lane), at->r, curved->type);
-    kernel_along along;
+    kernel_line_field along;
     if (state->surface->layer->lines) {
-        kernel_curved_along(p, state->surface, c, map, at->r, &along);
+        kernel_curved_line_field(p, state->surface, c, map, at->r, &along);
         places.along = &along;
     }
     kernel_accept(p, state, c, value, hit, &places);
@@ -231,11 +231,11 @@ SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays 
                                       kernel_contracted *out, int type)
 {
     kernel_contraction contraction;
-    kernel_sight ray;
-    kernel_sight_of(c, rays, lane, &ray);
+    kernel_cell_ray ray;
+    kernel_cell_ray_of(c, rays, lane, &ray);
     kernel_contraction_of(c->bounds, lane, type, &contraction);
     kernel_contract(&contraction, &ray, wanted, out, type);
-    out->t += kernel_take(c->at[2][0], lane);
+    out->t += kernel_gather_lane(c->at[2][0], lane);
 }
 
 /* Decides the rays of a packet in one cell by contraction (kernel_contraction.h), without its faces. */
@@ -247,9 +247,9 @@ static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved
 
 /* Accepts the crossings that are computed by contraction (kernel_contraction.h). Returns the rays that contraction has
  * decided. */
-static __attribute__((noinline)) vm kernel_curved_known(kernel_packet *p, kernel_surface_state *state,
-                                                        const kernel_cell *c, const kernel_curved *curved, int value,
-                                                        vm wanted)
+static __attribute__((noinline)) vm kernel_curved_accept_contracted(kernel_packet *p, kernel_surface_state *state,
+                                                                    const kernel_cell *c, const kernel_curved *curved,
+                                                                    int value, vm wanted)
 {
     const kernel_rays rays = kernel_packet_rays(p);
     const vi lane = vi_set(curved->lane);
@@ -273,25 +273,25 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
     const render_surface_layer *layer = state->surface->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int count = kernel_curved_intervals(p, c, rays, list);
-    vm asked[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
+    vm prefetched[KERNEL_MAX_CELL_INTERVALS], any = vm_none(), known = vm_none();
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
         i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
         /* If a ray crosses both triangles of a quad but not its patch, both ends of the interval are the same point
          * outside the ray; such an interval is skipped. */
         const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        asked[n] = vm_and(kernel_is_near(p, i), room);
-        any = vm_or(any, asked[n]);
+        prefetched[n] = vm_and(kernel_is_near(p, i), room);
+        any = vm_or(any, prefetched[n]);
     }
     if (!vm_any(any)) return;
     if (!curved->bounds) {
         const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
-        kernel_curved_alone(c, &beam, curved);
+        kernel_curved_single_bounds(c, &beam, curved);
     }
-    if (!state->is_contracted) known = kernel_curved_known(p, state, c, curved, value, any);
+    if (!state->is_contracted) known = kernel_curved_accept_contracted(p, state, c, curved, value, any);
     for (int n = 0; n < count; n++) {
         kernel_interval *i = &list[n];
-        const vm wanted = vm_andnot(vm_and(asked[n], kernel_is_near(p, i)), known);
+        const vm wanted = vm_andnot(vm_and(prefetched[n], kernel_is_near(p, i)), known);
         if (vm_any(wanted)) kernel_curved_robust(p, state, c, curved, value, i, wanted);
     }
 }
@@ -342,13 +342,13 @@ static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron 
 
 /* Computes the signed sum of the gradients of overlapping tets at the hits. Returns the rays for which the signs sum to
  * 1, so that the sum is valid. */
-static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron *c, const kernel_passage *r, vm hit,
-                                        vf t, vf out[3])
+static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron *c, const kernel_poly_crossings *r,
+                                        vm hit, vf t, vf out[3])
 {
     vf cover = vf_set(0);
     for (int n = 0; n < r->segment_count; n++) {
-        const kernel_tet_span *s = &r->segments[n];
-        const vm in = vm_and(hit, kernel_tet_span_holds(s, t, false));
+        const kernel_subtet_interval *s = &r->segments[n];
+        const vm in = vm_and(hit, kernel_subtet_interval_contains(s, t, false));
         if (!vm_any(in)) continue;
         double g[3];
         kernel_polyhedron_gradient(p, c, s->facet, g);
@@ -360,14 +360,14 @@ static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron
 
 /* Computes the gradient at the hits: that of the tet with positive sign that contains the hit or is nearest to it along
  * the ray. */
-static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c, const kernel_passage *r, vm hit, vf t,
-                                     vf out[3])
+static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c, const kernel_poly_crossings *r,
+                                     vm hit, vf t, vf out[3])
 {
     for (int a = 0; a < 3; a++) out[a] = vf_set(0);
     if (!c->is_star) hit = vm_andnot(hit, kernel_polyhedron_sum_normals(p, c, r, hit, t, out));
     vf nearest = vf_set(INFINITY);
     for (int n = 0; n < r->segment_count; n++) {
-        const kernel_tet_span *s = &r->segments[n];
+        const kernel_subtet_interval *s = &r->segments[n];
         const vf away = vf_max(vf_max(s->t0 - t, t - s->t1), vf_set(0));
         const vm nearer = vm_and(vm_and(hit, s->mask), vf_lt(away, nearest));
         if (!vm_any(nearer) || s->sign < 0) continue;
@@ -395,12 +395,12 @@ static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhed
 
 /* Finds, for each hit, the tet of non-negative sign that contains it or is nearest to it along the ray; -1 if there is
  * none. */
-static void kernel_polyhedron_facets(const kernel_passage *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
+static void kernel_polyhedron_facets(const kernel_poly_crossings *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
 {
     vf nearest = vf_set(INFINITY);
     vi facet = vi_set(-1);
     for (int n = 0; n < r->segment_count; n++) {
-        const kernel_tet_span *s = &r->segments[n];
+        const kernel_subtet_interval *s = &r->segments[n];
         const vf away = vf_max(vf_max(s->t0 - t, t - s->t1), vf_set(0));
         const vm nearer = vm_and(vm_and(hit, s->mask), vf_lt(away, nearest));
         if (s->sign < 0) continue;
@@ -413,7 +413,7 @@ static void kernel_polyhedron_facets(const kernel_passage *r, vm hit, vf t, int3
 /* Computes normals by interpolating the vertices' gradients in the tets (RENDER_VERTEX). */
 static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_packet *p, const polyhedron *c,
                                                                const render_surface_layer *layer,
-                                                               const kernel_passage *r, vm hit, vf t, vf out[3])
+                                                               const kernel_poly_crossings *r, vm hit, vf t, vf out[3])
 {
     const render_vertex_gradients *gradients = &layer->gradients[c->part];
     const int centre = c->vertex_count;
@@ -489,19 +489,19 @@ SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
 /* Returns the rays that may be on the other side of the isovalue between two faces of the same sign. The bound is not
  * valid if tets overlap, or if a ray crosses a quad's triangles but not its patch or the reverse; such rays are always
  * returned. */
-SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, const kernel_passage *r,
-                                       const kernel_stay *stay)
+SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c, const kernel_poly_crossings *r,
+                                           const kernel_polyhedron_interval *polyhedron_interval)
 {
-    const kernel_interval *i = &stay->interval;
+    const kernel_interval *i = &polyhedron_interval->interval;
     const vm longer = vm_and(i->mask, vf_lt(i->t_in, i->t_out));
     if (!c->is_star || !p->is_pencil) return longer;
     if (!c->has_slopes) kernel_polyhedron_slopes(c, p);
     const vf zero = vf_set(0), fall = kernel_slope_of(c, c->fall), rise = kernel_slope_of(c, c->rise);
-    const vf in = stay->in.v, out = stay->out.v;
+    const vf in = polyhedron_interval->in.v, out = polyhedron_interval->out.v;
     const vm below = vf_lt(i->v_in, zero);
     const vm differs = vm_or(vm_xor(vf_lt(in, zero), below), vm_xor(vf_lt(out, zero), below));
     const vf away = vf_select(below, fall, rise) * vf_abs(in) + vf_select(below, rise, fall) * vf_abs(out);
-    const vm turns = vf_lt(away, fall * rise * (stay->out.t - stay->in.t));
+    const vm turns = vf_lt(away, fall * rise * (polyhedron_interval->out.t - polyhedron_interval->in.t));
     return vm_and(longer, vm_or(turns, vm_or(differs, r->uneven)));
 }
 
@@ -510,28 +510,29 @@ SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, co
 /* The state of rays that follow their profiles from crossing to crossing. If tets overlap at a face, the field just
  * behind it may be on the other side of the isovalue than the face's own value, which decides. The field then jumps at
  * the face, and the jump is a crossing. */
-typedef struct kernel_walk {
+typedef struct kernel_profile_walk {
     vm open;  /* rays whose profile continues */
     vm below; /* rays that are below the isovalue at the end of the current piece */
     /* rays whose face value and profile are on different sides of the isovalue, at the entry and at the exit */
     vm jump_in, jump_out;
     kernel_profile_piece piece; /* current piece of each ray */
     vf t, w;                    /* depth of the crossing that was found, and the colour field there */
-} kernel_walk;
+} kernel_profile_walk;
 
-static void kernel_walk_begin(const kernel_stay *stay, vm rays, kernel_walk *walk)
+static void kernel_profile_walk_begin(const kernel_polyhedron_interval *polyhedron_interval, vm rays,
+                                      kernel_profile_walk *walk)
 {
-    const kernel_interval *i = &stay->interval;
+    const kernel_interval *i = &polyhedron_interval->interval;
     const vf zero = vf_set(0);
     const vm below = vf_lt(i->v_in, zero);
     walk->open = rays;
-    walk->below = vf_lt(stay->u_in, zero);
+    walk->below = vf_lt(polyhedron_interval->u_in, zero);
     walk->jump_in = vm_and(rays, vm_xor(walk->below, below));
-    walk->jump_out = vm_and(rays, vm_xor(vf_lt(stay->u_out, zero), vf_lt(i->v_out, zero)));
-    walk->piece = kernel_profile_begin(stay, stay->u_in);
+    walk->jump_out = vm_and(rays, vm_xor(vf_lt(polyhedron_interval->u_out, zero), vf_lt(i->v_out, zero)));
+    walk->piece = kernel_profile_begin(polyhedron_interval, polyhedron_interval->u_in);
 }
 
-SIMD_INLINE void kernel_piece_take(vm rays, const kernel_profile_piece *from, kernel_profile_piece *to)
+SIMD_INLINE void kernel_piece_select(vm rays, const kernel_profile_piece *from, kernel_profile_piece *to)
 {
     to->t0 = vf_select(rays, from->t0, to->t0);
     to->t1 = vf_select(rays, from->t1, to->t1);
@@ -545,33 +546,37 @@ SIMD_INLINE void kernel_piece_take(vm rays, const kernel_profile_piece *from, ke
  * face counts as a piece. A value inside the cell that equals the isovalue up to rounding is treated as if it were on
  * the side from which the ray comes: a ray may meet several sheets at one point, each with its own rounding, and their
  * signs would alternate. The values at the faces are not changed. */
-SIMD_INLINE vm kernel_walk_on(const kernel_passage *r, const kernel_stay *stay, vm left, kernel_walk *walk)
+SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r,
+                                           const kernel_polyhedron_interval *polyhedron_interval, vm left,
+                                           kernel_profile_walk *walk)
 {
     kernel_profile_piece next = walk->piece;
     const vf zero = vf_set(0);
-    const vm inside = kernel_profile_open(stay, &next, left);
-    kernel_profile_next(r, stay, vf_select(inside, stay->u_out, stay->interval.v_out), &next);
-    const vm rounding =
-        vm_and(kernel_profile_open(stay, &next, inside), vf_le(vf_abs(next.v1), vf_set(KERNEL_ROOT_BAND)));
+    const vm inside = kernel_profile_open(polyhedron_interval, &next, left);
+    kernel_profile_next(r, polyhedron_interval,
+                        vf_select(inside, polyhedron_interval->u_out, polyhedron_interval->interval.v_out), &next);
+    const vm rounding = vm_and(kernel_profile_open(polyhedron_interval, &next, inside),
+                               vf_le(vf_abs(next.v1), vf_set(KERNEL_ROOT_BAND)));
     next.v1 = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v1);
-    kernel_piece_take(left, &next, &walk->piece);
-    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(stay, &next, inside)));
+    kernel_piece_select(left, &next, &walk->piece);
+    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(polyhedron_interval, &next, inside)));
 }
 
 /* Returns a number that is one or two roundings above t. */
-SIMD_INLINE vf kernel_just_behind(vf t)
+SIMD_INLINE vf kernel_next_float(vf t)
 {
     return t + (vf_abs(t) * 2.4e-7f + 1e-30f);
 }
 
 /* Finds the next crossing of each open ray; returns the rays that have one. */
-static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, kernel_walk *walk)
+static vm kernel_profile_walk_next(const kernel_poly_crossings *r,
+                                   const kernel_polyhedron_interval *polyhedron_interval, kernel_profile_walk *walk)
 {
     const vm jump = walk->jump_in;
     vm found = jump, left = vm_andnot(walk->open, jump);
     walk->jump_in = vm_none();
     while (vm_any(left)) {
-        const vm on = kernel_walk_on(r, stay, left, walk);
+        const vm on = kernel_profile_walk_advance(r, polyhedron_interval, left, walk);
         const vm cross = vm_and(left, vm_xor(vf_lt(walk->piece.v1, vf_set(0)), walk->below));
         walk->below = vm_xor(walk->below, cross);
         walk->open = vm_andnot(walk->open, vm_andnot(left, on));
@@ -582,15 +587,16 @@ static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, ker
     const vf length = piece->t1 - piece->t0;
     const vf t = kernel_secant(piece->t0, piece->v0, piece->t1, piece->v1);
     const vf along = vf_select(vf_lt(vf_set(0), length), (t - piece->t0) / length, vf_set(0));
-    walk->t = vf_select(vf_lt(piece->t0, piece->t1), t, vf_select(jump, kernel_just_behind(piece->t0), piece->t0));
+    walk->t = vf_select(vf_lt(piece->t0, piece->t1), t, vf_select(jump, kernel_next_float(piece->t0), piece->t0));
     walk->w = piece->w0 + along * (piece->w1 - piece->w0);
     return found;
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the hits, in the tet that contains the
  * hit or is nearest to it. */
-static __attribute__((noinline)) void kernel_polyhedron_along(const kernel_packet *p, const kernel_surface *s,
-                                                              const kernel_passage *r, vm hit, vf t, kernel_along *out)
+static __attribute__((noinline)) void kernel_polyhedron_line_field(const kernel_packet *p, const kernel_surface *s,
+                                                                   const kernel_poly_crossings *r, vm hit, vf t,
+                                                                   kernel_line_field *out)
 {
     const polyhedron *c = r->cell;
     const grid_field *field = &s->layer->lines->field.fields[c->part];
@@ -598,7 +604,7 @@ static __attribute__((noinline)) void kernel_polyhedron_along(const kernel_packe
     double mean = 0;
     kernel_polyhedron_facets(r, hit, t, facets);
     for (int i = 0; i < c->vertex_count; i++) mean += kernel_lines_value(s, field, c->vertices[i]) / c->vertex_count;
-    *out = (kernel_along){.value = vf_set(NAN)};
+    *out = (kernel_line_field){.value = vf_set(NAN)};
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int ray = __builtin_ctz(left);
         if (facets[ray] < 0) continue;
@@ -624,19 +630,19 @@ static __attribute__((noinline)) void kernel_polyhedron_along(const kernel_packe
     }
 }
 
-static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, int value, kernel_passage *r,
-                                     vm hit, const kernel_walk *walk)
+static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, int value, kernel_poly_crossings *r,
+                                     vm hit, const kernel_profile_walk *walk)
 {
-    kernel_hit_places at = {.t = walk->t, .w = walk->w};
+    kernel_hit_points at = {.t = walk->t, .w = walk->w};
     if (!vm_any(hit)) return;
-    kernel_passage_segments(r);
+    kernel_poly_segments(r);
     if (state->surface->layer->normal == RENDER_VERTEX)
         kernel_polyhedron_smooth(p, r->cell, state->surface->layer, r, hit, walk->t, at.normal);
     else
         kernel_polyhedron_normal(p, r->cell, r, hit, walk->t, at.normal);
-    kernel_along along;
+    kernel_line_field along;
     if (state->surface->layer->lines) {
-        kernel_polyhedron_along(p, state->surface, r, hit, walk->t, &along);
+        kernel_polyhedron_line_field(p, state->surface, r, hit, walk->t, &along);
         at.along = &along;
     }
     kernel_accept(p, state, NULL, value, hit, &at);
@@ -644,14 +650,14 @@ static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *sta
 
 /* Accepts the crossings of one interval. A ray ends at the first crossing of an opaque surface in front of the eye. */
 static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, int value, vm wanted,
-                                    kernel_passage *r, kernel_stay *stay)
+                                    kernel_poly_crossings *r, kernel_polyhedron_interval *polyhedron_interval)
 {
-    kernel_walk walk;
-    kernel_passage_profile(r, stay);
-    kernel_walk_begin(stay, wanted, &walk);
+    kernel_profile_walk walk;
+    kernel_poly_profile(r, polyhedron_interval);
+    kernel_profile_walk_begin(polyhedron_interval, wanted, &walk);
     do {
-        const vm found = kernel_walk_next(r, stay, &walk);
-        const vm kept = kernel_kept(p, state->surface, found, walk.t);
+        const vm found = kernel_profile_walk_next(r, polyhedron_interval, &walk);
+        const vm kept = kernel_unclipped_hits(p, state->surface, found, walk.t);
         kernel_polyhedron_accept(p, state, value, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
         if (state->is_opaque) walk.open = vm_andnot(walk.open, kept);
     } while (vm_any(walk.open));
@@ -660,15 +666,15 @@ static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *stat
 static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *state, polyhedron *c, int value, vm rays)
 {
     const render_surface_layer *layer = state->surface->layer;
-    kernel_passage r;
-    kernel_stay stay;
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, layer->colour_map != NULL)) return;
-    while (kernel_passage_next(&r, &stay)) {
-        const vm near = kernel_is_near(p, &stay.interval);
+    kernel_poly_crossings r;
+    kernel_polyhedron_interval polyhedron_interval;
+    if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, layer->colour_map != NULL)) return;
+    while (kernel_poly_next(&r, &polyhedron_interval)) {
+        const vm near = kernel_is_near(p, &polyhedron_interval.interval);
         if (!vm_any(near)) continue;
-        const vm wanted =
-            vm_and(near, vm_or(kernel_changes_sign(&stay.interval), kernel_polyhedron_turns(p, c, &r, &stay)));
-        if (vm_any(wanted)) kernel_polyhedron_cross(p, state, value, wanted, &r, &stay);
+        const vm wanted = vm_and(near, vm_or(kernel_changes_sign(&polyhedron_interval.interval),
+                                             kernel_polyhedron_may_cross(p, c, &r, &polyhedron_interval)));
+        if (vm_any(wanted)) kernel_polyhedron_cross(p, state, value, wanted, &r, &polyhedron_interval);
     }
 }
 
@@ -681,9 +687,9 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *s
     if (!c || !c->is_finite) return;
     for (int value = 0; value < layer->value_count; value++) {
         if (!kernel_values_straddle(c->values, c->vertex_count, layer->values[value])) continue;
-        const bool is_fresh = !c->is_placed;
+        const bool is_fresh = !c->is_transformed;
         if (is_fresh) {
-            kernel_polyhedron_place(c, p);
+            kernel_polyhedron_transform(c, p);
             if (layer->colour_map)
                 c->g[c->vertex_count] =
                     (float)kernel_values_colours(state->surface, part, c->index, c->vertices, c->vertex_count, c->g);
@@ -697,8 +703,8 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *s
 /* ---- the blocks of a tile that a cell may meet ---- */
 
 /* Traces the cell with the block's rays. cell is NULL for a polyhedron, for which all isovalues are traced. */
-SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, uint32_t index, const kernel_cell *cell,
-                                   int value)
+SIMD_INLINE void kernel_block_trace(kernel_tile_trace *t, int block, int part, uint32_t index, const kernel_cell *cell,
+                                    int value)
 {
     bool is_nearer = false;
     kernel_block_begin(t, block);
@@ -716,13 +722,13 @@ SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, ui
             kernel_polyhedron_surfaces(p, &state, part, index, p->active);
         is_nearer = is_nearer || p->is_nearer;
     }
-    if (is_nearer) kernel_block_learn(t, block);
+    if (is_nearer) kernel_block_update_far(t, block);
 }
 
-SIMD_INLINE void kernel_blocks_meet(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,
-                                    const kernel_cell *cell, int value)
+SIMD_INLINE void kernel_blocks_trace(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,
+                                     const kernel_cell *cell, int value)
 {
-    for (; blocks; blocks &= blocks - 1) kernel_block_meet(t, __builtin_ctz(blocks), part, index, cell, value);
+    for (; blocks; blocks &= blocks - 1) kernel_block_trace(t, __builtin_ctz(blocks), part, index, cell, value);
 }
 
 #endif

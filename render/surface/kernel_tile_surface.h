@@ -115,12 +115,12 @@ SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *range
 
 /* Where nodes are: their least depths, their boxes of pixels, their positions along the tile, and a mask of those that
  * may be visible. */
-typedef struct kernel_node_places {
+typedef struct kernel_node_bounds {
     float near[SIMD_WIDTH];
     int32_t box[SIMD_WIDTH];
     vf along;
     unsigned shown;
-} kernel_node_places;
+} kernel_node_bounds;
 
 /* Adds the first and last column (shift 0) or row (shift 8) to the boxes of pixels. low: lower bound of the distance
  * from the tile's first border; high: upper bound of that from its last border. Returns the lanes that meet a pixel. A
@@ -136,8 +136,8 @@ SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box,
 }
 
 /* Computes where the nodes are, and which of them may be visible. */
-SIMD_INLINE void kernel_tile_find_places(const kernel_tile_trace *t, const kernel_node_lanes *nodes,
-                                         kernel_node_places *out)
+SIMD_INLINE void kernel_tile_find_node_bounds(const kernel_tile_trace *t, const kernel_node_lanes *nodes,
+                                              kernel_node_bounds *out)
 {
     const kernel_tile_finder *s = t->search;
     vf at[KERNEL_FIND_PLANES], reach[KERNEL_FIND_PLANES], middle[3], half[3];
@@ -162,7 +162,8 @@ SIMD_INLINE void kernel_tile_find_places(const kernel_tile_trace *t, const kerne
         shown = vm_and(
             shown, kernel_node_pixels(at[first] - reach[first], at[last] + reach[last], scale, s->pad[a], &box, 8 * a));
     }
-    shown = vm_and(shown, kernel_interest_meets_lanes(&t->surface->interest, nodes->range_low, nodes->range_high));
+    shown = vm_and(
+        shown, kernel_visible_values_overlap_lanes(&t->surface->visible_values, nodes->range_low, nodes->range_high));
     vf_store(out->near, vf_max(at[KERNEL_FIND_DEPTH] - reach[KERNEL_FIND_DEPTH], vf_set(-INFINITY)));
     memcpy(out->box, &box, sizeof box);
     out->along = at[KERNEL_FIND_ALONG];
@@ -172,7 +173,7 @@ SIMD_INLINE void kernel_tile_find_places(const kernel_tile_trace *t, const kerne
 /* Pushes a node on the stack if it may be visible, and prefetches what is read next. Returns the number of nodes
  * pushed, 0 or 1. */
 SIMD_INLINE int kernel_tile_find_push(const mmbvh *tree, const mmbvh_ranges *ranges, int64_t node,
-                                      const kernel_node_places *places, int lane, kernel_tile_node *to)
+                                      const kernel_node_bounds *places, int lane, kernel_tile_node *to)
 {
     if (!(places->shown >> lane & 1)) return 0;
     const int64_t ref = mmbvh_node_ref(tree, node);
@@ -196,7 +197,7 @@ SIMD_INLINE int kernel_tile_find_children(const kernel_tile_trace *t, const mmbv
 {
     int64_t node[SIMD_WIDTH];
     kernel_node_lanes lanes;
-    kernel_node_places places;
+    kernel_node_bounds places;
     float along[SIMD_WIDTH];
     int top = 0;
     for (int n = 0; n < KERNEL_NODES_AT_ONCE; n++) {
@@ -204,7 +205,7 @@ SIMD_INLINE int kernel_tile_find_children(const kernel_tile_trace *t, const mmbv
         node[2 * n + 1] = node[2 * n] + 1;
     }
     kernel_nodes_fetch(tree, ranges, node, &lanes);
-    kernel_tile_find_places(t, &lanes, &places);
+    kernel_tile_find_node_bounds(t, &lanes, &places);
     vf_store(along, places.along);
     for (int n = 2 * (count - 1); n >= 0; n -= 2) {
         const int far = along[n] < along[n + 1];
@@ -287,11 +288,11 @@ SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
     const kernel_frame *f = t->frame;
     const bool flat = f->job->camera.is_orthographic;
     const double unit = flat ? f->job->space.scale : 1;
-    const float blur = flat ? 4e-6f * (2 + fabsf((float)f->depth_shift)) : 4e-6f;
+    const float error_bound = flat ? 4e-6f * (2 + fabsf((float)f->depth_shift)) : 4e-6f;
     s->column_scale = (float)(1 / (fabs(f->slope_dx) * unit));
     s->row_scale = (float)(1 / (fabs(f->slope_dy) * unit));
-    s->pad[0] = 0.01f + blur * s->column_scale + 3e-5f * (float)f->job->camera.width;
-    s->pad[1] = 0.01f + blur * s->row_scale + 3e-5f * (float)f->job->camera.height;
+    s->pad[0] = 0.01f + error_bound * s->column_scale + 3e-5f * (float)f->job->camera.width;
+    s->pad[1] = 0.01f + error_bound * s->row_scale + 3e-5f * (float)f->job->camera.height;
     kernel_tile_find_planes(&t->tree_planes, s->planes);
 }
 

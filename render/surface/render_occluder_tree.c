@@ -73,22 +73,22 @@ static float area_of(const float box[6])
 }
 
 /* A range of pieces in the binary tree's order: all pieces below a node, or some pieces of a leaf. */
-typedef struct span {
+typedef struct piece_range {
     int64_t node; /* the node; -1 for some pieces of a leaf */
     int64_t first, count;
     float box[6];
-} span;
+} piece_range;
 
-static span span_of(const widening *w, int64_t node)
+static piece_range node_range(const widening *w, int64_t node)
 {
-    span out = {node, w->first[node], w->count[node], {0}};
+    piece_range out = {node, w->first[node], w->count[node], {0}};
     memcpy(out.box, w->boxes + 6 * node, sizeof out.box);
     return out;
 }
 
-static span some_of(const widening *w, int64_t first, int64_t count)
+static piece_range leaf_part(const widening *w, int64_t first, int64_t count)
 {
-    span out = {-1, first, count, {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY}};
+    piece_range out = {-1, first, count, {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY}};
     float lower[3], upper[3];
     for (int64_t n = 0; n < count; n++) {
         box_of(w->of, w->binary->cells[first + n], lower, upper);
@@ -98,20 +98,21 @@ static span some_of(const widening *w, int64_t first, int64_t count)
 }
 
 /* Divides a range that has more pieces than there are lanes into two. */
-static void divide(const widening *w, const span *whole, span out[2])
+static void divide(const widening *w, const piece_range *whole, piece_range out[2])
 {
     const int64_t half = whole->count / 2;
     if (whole->node >= 0 && !mmbvh_node_count(w->binary, whole->node)) {
-        for (int n = 0; n < 2; n++) out[n] = span_of(w, mmbvh_node_ref(w->binary, whole->node) + n);
+        for (int n = 0; n < 2; n++) out[n] = node_range(w, mmbvh_node_ref(w->binary, whole->node) + n);
         return;
     }
-    const span both[2] = {some_of(w, whole->first, half), some_of(w, whole->first + half, whole->count - half)};
+    const piece_range both[2] = {leaf_part(w, whole->first, half),
+                                 leaf_part(w, whole->first + half, whole->count - half)};
     memcpy(out, both, sizeof both);
 }
 
 /* Divides the range with the largest box, repeatedly, until there are as many ranges as lanes or each fits into a leaf.
  * Returns their number. */
-static int divide_all(const widening *w, const span *whole, span *out)
+static int divide_all(const widening *w, const piece_range *whole, piece_range *out)
 {
     int count = 1;
     out[0] = *whole;
@@ -121,7 +122,7 @@ static int divide_all(const widening *w, const span *whole, span *out)
             if (out[i].count > w->width && (largest < 0 || area_of(out[i].box) > area_of(out[largest].box)))
                 largest = i;
         if (largest < 0) break;
-        span halves[2];
+        piece_range halves[2];
         divide(w, &out[largest], halves);
         out[largest] = halves[0];
         out[count++] = halves[1];
@@ -131,7 +132,7 @@ static int divide_all(const widening *w, const span *whole, span *out)
 
 /* Makes a leaf and returns ~index. Its sources are the pieces' indices. Lanes without a piece get NaN or empty boxes,
  * so that no ray meets them. */
-static int32_t make_leaf(widening *w, const span *of)
+static int32_t make_leaf(widening *w, const piece_range *of)
 {
     const int32_t leaf = w->out->leaf_count++;
     const int rows = w->of->rows, width = w->width;
@@ -149,9 +150,9 @@ static int32_t make_leaf(widening *w, const span *of)
     return ~leaf;
 }
 
-static int32_t make_node(widening *w, const span *of)
+static int32_t make_node(widening *w, const piece_range *of)
 {
-    span children[MOST_LANES];
+    piece_range children[MOST_LANES];
     const int32_t node = w->out->node_count++;
     const int count = divide_all(w, of, children), width = w->width;
     float *boxes = w->out->boxes + (int64_t)node * 6 * width;
@@ -181,10 +182,10 @@ static bool reserve(const widening *w, size_t nodes, size_t leaves)
 static void count_use(const widening *w)
 {
     const size_t width = (size_t)w->width, nodes = (size_t)w->out->node_count, leaves = (size_t)w->out->leaf_count;
-    base_use(w->out->boxes, nodes * 6 * width * sizeof(float));
-    base_use(w->out->children, nodes * width * sizeof(int32_t));
-    base_use(w->out->leaves, leaves * (size_t)w->of->rows * width * sizeof(float));
-    base_use(w->out->sources, leaves * width * sizeof(int32_t));
+    base_set_used_bytes(w->out->boxes, nodes * 6 * width * sizeof(float));
+    base_set_used_bytes(w->out->children, nodes * width * sizeof(int32_t));
+    base_set_used_bytes(w->out->leaves, leaves * (size_t)w->of->rows * width * sizeof(float));
+    base_set_used_bytes(w->out->sources, leaves * width * sizeof(int32_t));
 }
 
 static bool widen(widening *w)
@@ -196,7 +197,7 @@ static bool widen(widening *w)
     const bool is_well = w->first && w->count && w->boxes && reserve(w, nodes, nodes + 1);
     if (is_well) {
         sum_up(w);
-        const span all = span_of(w, 0);
+        const piece_range all = node_range(w, 0);
         make_node(w, &all);
         count_use(w);
         for (int k = 0; k < 6; k++) w->out->size = fmaxf(w->out->size, fabsf(w->boxes[k]));

@@ -16,7 +16,7 @@
 #include "grid.h"
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "memory.h"
 #include "mmbvh.h"
 #include "region.h"
@@ -44,13 +44,13 @@ typedef struct list {
 } list;
 
 /* The occluders that one thread has found, or those of all threads. */
-typedef struct finds {
+typedef struct occluder_list {
     list triangles, slabs, hexes;
     bool out_of_memory;
-} finds;
+} occluder_list;
 
 /* Appends an item to a list and returns it; NULL if memory ran out. */
-static void *add(finds *f, list *l, size_t size)
+static void *add(occluder_list *f, list *l, size_t size)
 {
     if (l->count == l->room) {
         const int64_t room = l->room + l->room / 2 + 256;
@@ -65,7 +65,7 @@ static void *add(finds *f, list *l, size_t size)
     return (char *)l->items + (size_t)l->count++ * size;
 }
 
-static void free_finds(finds *f)
+static void free_occluder_list(occluder_list *f)
 {
     base_free(f->triangles.items);
     base_free(f->slabs.items);
@@ -76,7 +76,7 @@ static void free_finds(finds *f)
 
 /* The cell that is currently searched for occluders, and the isovalue for which it is searched. */
 typedef struct subject {
-    finds *into;
+    occluder_list *into;
     const kernel_frame *frame;
     int surface, part, value;
     uint32_t index;
@@ -198,7 +198,7 @@ static void solve(double m[3][3], const double b[3], double x[3])
 
 /* Computes the linear function L that fits the values best, by least squares about the mean of the vertices. Values are
  * taken minus the isovalue, times `scale`. *level receives L at the origin. */
-static void fit(const subject *s, double isovalue, double scale, double gradient[3], double *level)
+static void fit_linear_function(const subject *s, double isovalue, double scale, double gradient[3], double *level)
 {
     double mean[3] = {0, 0, 0}, value = 0, m[3][3] = {{0}}, b[3] = {0, 0, 0};
     for (int i = 0; i < s->count; i++) {
@@ -230,7 +230,7 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
     double low[3], high[3], gradient[3], level, off = 0, steep = 0, size = 0;
     const double scale = scale_of(s, isovalue);
     bounds_of(s, low, high);
-    fit(s, isovalue, scale, gradient, &level);
+    fit_linear_function(s, isovalue, scale, gradient, &level);
     for (int i = 0; i < s->count; i++) {
         double l = level;
         for (int a = 0; a < 3; a++) l += gradient[a] * place_of(s, i)[a];
@@ -247,11 +247,11 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
     /* Values are rounded to 6e-8 of the largest. Roots have an error of KERNEL_ROOT_BAND and of the rounding of
      * positions. */
     out->rows[KERNEL_SLAB_THICKNESS] = (float)(off * 1.0001 + 1e-5);
-    out->rows[KERNEL_SLAB_BLUR] = (float)(16 * 6e-8 * steep);
+    out->rows[KERNEL_SLAB_ERROR] = (float)(16 * 6e-8 * steep);
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
 }
 
-/* Faces' corners as kernel_placed_curved has them. */
+/* Faces' corners as kernel_transformed_curved has them. */
 static void fill_faces(const kernel_cell *c, hex_record *out)
 {
     for (int face = 0; face < 6; face++) {
@@ -301,7 +301,7 @@ static void add_slab(subject *s, const kernel_cell *c, double isovalue)
 /* ---- collecting -------------------------------------------------------------------------------------------------- */
 
 /* Lists the vertices of a cell that is not a polyhedron, in the canonical order that kernels use. */
-static bool take_vertices(subject *s, kernel_cell *c, const grid *g)
+static bool list_cell_vertices(subject *s, kernel_cell *c, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
     kernel_cell_order(c);
@@ -310,7 +310,7 @@ static bool take_vertices(subject *s, kernel_cell *c, const grid *g)
     return true;
 }
 
-static bool take_polyhedron(subject *s, const grid *g, const grid_field *field)
+static bool list_polyhedron_vertices(subject *s, const grid *g, const grid_field *field)
 {
     grid_walk walk = grid_walk_cell(g, s->index);
     int64_t vertex;
@@ -333,7 +333,7 @@ static void find_in_cell(subject *s)
     if (!is_polyhedron && !c.is_finite) return;
     s->count = 0;
     s->places.count = s->values.count = 0;
-    if (is_polyhedron ? !take_polyhedron(s, g, field) : !take_vertices(s, &c, g)) return;
+    if (is_polyhedron ? !list_polyhedron_vertices(s, g, field) : !list_cell_vertices(s, &c, g)) return;
     s->reach = reach_of(s, (double)layer->contact);
     for (s->value = 0; s->value < layer->value_count; s->value++) {
         const double isovalue = layer->values[s->value];
@@ -358,7 +358,7 @@ static void find_in_subtree(subject *s, const kernel_subtree *subtree)
     while (top && !s->into->out_of_memory) {
         const int64_t node = stack[--top], ref = mmbvh_node_ref(tree, node);
         const int count = mmbvh_node_count(tree, node);
-        if (!kernel_node_shows(&surface->interest, ranges, node)) continue;
+        if (!kernel_node_is_visible(&surface->visible_values, ranges, node)) continue;
         for (int n = 0; n < count; n++) {
             s->index = tree->cells[ref + n];
             find_in_cell(s);
@@ -396,7 +396,7 @@ static bool join(list *to, list *from, size_t size)
     return true;
 }
 
-static bool join_finds(finds *to, finds *from)
+static bool join_occluder_lists(occluder_list *to, occluder_list *from)
 {
     const int64_t hexes = to->hexes.count;
     slab *slabs = from->slabs.items;
@@ -406,21 +406,21 @@ static bool join_finds(finds *to, finds *from)
            join(&to->slabs, &from->slabs, sizeof(slab)) && join(&to->hexes, &from->hexes, sizeof(hex_record));
 }
 
-static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees, int threads, finds *out)
+static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees, int threads, occluder_list *out)
 {
     bool is_well = true;
 #pragma omp parallel num_threads(threads) reduction(&& : is_well)
     {
         region_enter();
-        finds own = {0};
+        occluder_list own = {0};
         subject s = {.into = &own, .frame = frame};
 #pragma omp for schedule(dynamic, 1) nowait
         for (int64_t i = 0; i < subtrees->count; i++) find_in_subtree(&s, &subtrees->items[i]);
 #pragma omp critical(occluders)
-        is_well = join_finds(out, &own);
+        is_well = join_occluder_lists(out, &own);
         base_free(s.places.items);
         base_free(s.values.items);
-        free_finds(&own);
+        free_occluder_list(&own);
         region_leave();
     }
     return is_well;
@@ -428,7 +428,7 @@ static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees,
 
 /* ---- building the trees ------------------------------------------------------------------------------------------ */
 
-static insitu_status build_trees(const finds *f, int threads, kernel_occluders *out, base_error *error)
+static insitu_status build_trees(const occluder_list *f, int threads, kernel_occluders *out, base_error *error)
 {
     const triangle *t = f->triangles.items;
     const slab *s = f->slabs.items;
@@ -452,7 +452,7 @@ insitu_status occluders_build(const kernel_frame *frame, int width, int threads,
                               base_error *error)
 {
     render_subtrees subtrees = {0};
-    finds all = {0};
+    occluder_list all = {0};
     insitu_status status = INSITU_OK;
     *out = (kernel_occluders){.width = width};
     if (!list_subtrees(frame, &subtrees) || !find_all(frame, &subtrees, threads, &all))
@@ -463,7 +463,7 @@ insitu_status occluders_build(const kernel_frame *frame, int width, int threads,
     if (!status) status = build_trees(&all, threads, out, error);
     out->hexes = all.hexes.items;
     all.hexes.items = NULL;
-    free_finds(&all);
+    free_occluder_list(&all);
     base_free(subtrees.items);
     return status;
 }

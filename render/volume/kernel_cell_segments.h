@@ -12,7 +12,7 @@
 #include "kernel_double.h"
 #include "kernel_exact.h"
 #include "kernel_integral.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
@@ -61,17 +61,17 @@ enum { KERNEL_BISECTION_DEPTH = 40, KERNEL_BISECTION_ROOM = 128, KERNEL_BISECTIO
 /* ---- the field on a ray ---- */
 
 /* A point of the ray: depth t, value v of the field, and reference coordinates r in the cell. */
-typedef struct kernel_knot {
+typedef struct kernel_exact_point {
     double t, v, r[3];
-} kernel_knot;
+} kernel_exact_point;
 
 /* State of the bisection of one ray's interval. */
 typedef struct kernel_bisection {
     const kernel_segment_state *state;
-    const kernel_span *span;
+    const kernel_cell_interval *cell_interval;
     const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
     double u, v, slope, shift;   /* constants of the ray: at depth t it is at (u, v) * (slope * t + shift) */
-    kernel_knot in, out;         /* ends of the interval, at the crossings of the faces */
+    kernel_exact_point in, out;  /* ends of the interval, at the crossings of the faces */
     /* unit distances per t; length of the interval; share of the light that reaches the current subinterval */
     double per_t, length, light;
     int64_t *map_failures;
@@ -84,10 +84,10 @@ static inline double kernel_between(double from, double to, double share)
 }
 
 /* Returns the point at depth t by Newton's method from `guess`, as kernel_solve() does it. */
-static kernel_knot kernel_knot_at(const kernel_bisection *h, double t, const double guess[3])
+static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, double t, const double guess[3])
 {
     const double whole = h->out.t - h->in.t, share = whole > 0 ? (t - h->in.t) / whole : 0;
-    kernel_knot out = {.t = t, .v = kernel_between(h->in.v, h->out.v, share)};
+    kernel_exact_point out = {.t = t, .v = kernel_between(h->in.v, h->out.v, share)};
     if (!h->map) return out;
     const double reach = h->slope * t + h->shift, target[3] = {h->u * reach, h->v * reach, t};
     double slopes[3];
@@ -105,24 +105,25 @@ static kernel_knot kernel_knot_at(const kernel_bisection *h, double t, const dou
     return out;
 }
 
-static kernel_knot kernel_knot_between(const kernel_bisection *h, const kernel_knot *a, const kernel_knot *b,
-                                       double share)
+static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, const kernel_exact_point *a,
+                                                     const kernel_exact_point *b, double share)
 {
     double guess[3];
     for (int n = 0; n < 3; n++) guess[n] = kernel_between(a->r[n], b->r[n], share);
-    return kernel_knot_at(h, kernel_between(a->t, b->t, share), guess);
+    return kernel_exact_point_at(h, kernel_between(a->t, b->t, share), guess);
 }
 
 /* Returns the point between a and b, whose values lie on either side of x, at which the field is x. It uses regula
  * falsi that halves the value at an end that stays (the Illinois method). */
-static kernel_knot kernel_knot_where(const kernel_bisection *h, const kernel_knot *a, const kernel_knot *b, double x)
+static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, const kernel_exact_point *a,
+                                                   const kernel_exact_point *b, double x)
 {
-    kernel_knot low = *a, high = *b, at = *a;
+    kernel_exact_point low = *a, high = *b, at = *a;
     double low_v = low.v - x, high_v = high.v - x;
     const double enough = 1e-15 * fmax(1, fabs(x));
     for (int n = 0; n < 60; n++) {
         const double share = n % 3 == 2 ? 0.5 : low_v / (low_v - high_v);
-        at = kernel_knot_between(h, &low, &high, share);
+        at = kernel_exact_point_between(h, &low, &high, share);
         const double v = at.v - x;
         if (fabs(v) <= enough || high.t - low.t <= 1e-16 * fabs(at.t)) break;
         if ((v < 0) == (low_v < 0)) {
@@ -215,7 +216,7 @@ static kernel_medium_range kernel_medium_range_of(const kernel_pieces *t, double
 
 /* A subinterval: its end and middle, its bisection depth, and whether the field is known to be monotone on it. */
 typedef struct kernel_subinterval {
-    kernel_knot end, middle;
+    kernel_exact_point end, middle;
     int depth;
     bool is_monotone;
 } kernel_subinterval;
@@ -226,9 +227,9 @@ typedef struct kernel_subinterval_values {
 
 /* Computes the subinterval's largest sampled deviation from its chord, and the range of its values, from the field at
  * its middle and quarters. */
-static kernel_subinterval_values kernel_subinterval_look(const kernel_bisection *h, const kernel_knot *from,
-                                                         kernel_subinterval *sub, const kernel_knot *first,
-                                                         const kernel_knot *third)
+static kernel_subinterval_values kernel_subinterval_sample(const kernel_bisection *h, const kernel_exact_point *from,
+                                                           kernel_subinterval *sub, const kernel_exact_point *first,
+                                                           const kernel_exact_point *third)
 {
     const double a = from->v, b = sub->end.v, rise = b - a;
     kernel_subinterval_values out = {0, fmin(a, b), fmax(a, b)};
@@ -260,8 +261,8 @@ static double kernel_subinterval_error(const kernel_bisection *h, const kernel_s
 /* Returns a step of the opacity whose value is strictly between low and high, or NULL if there is none. */
 static const kernel_step *kernel_step_between(const kernel_bisection *h, double low, double high)
 {
-    const kernel_step *steps = h->state->pieces->steps + h->span->first_step;
-    for (int i = 0; i < h->span->step_count; i++)
+    const kernel_step *steps = h->state->pieces->steps + h->cell_interval->first_step;
+    for (int i = 0; i < h->cell_interval->step_count; i++)
         if (low < steps[i].at && steps[i].at < high) return &steps[i];
     return NULL;
 }
@@ -308,8 +309,9 @@ static kernel_medium_range kernel_subinterval_range(const kernel_bisection *h, c
 /* ---- segments ---- */
 
 /* Emits the subinterval as `subdivisions` equal segments. */
-static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_knot *from,
-                                    const kernel_knot *to, const double values[2], double subdivisions)
+static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane,
+                                    const kernel_exact_point *from, const kernel_exact_point *to,
+                                    const double values[2], double subdivisions)
 {
     float begin = (float)from->t;
     for (int n = 1; n <= (int)subdivisions; n++) {
@@ -317,11 +319,11 @@ static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h,
         const float end = n < (int)subdivisions ? (float)kernel_between(from->t, to->t, after) : (float)to->t;
         const double in = kernel_between(values[0], values[1], before);
         const double out = kernel_between(values[0], values[1], after);
-        const kernel_run run = {.length = vf_set((float)((to->t - from->t) / subdivisions * h->per_t)),
-                                .v_in = vf_set((float)in),
-                                .v_out = vf_set((float)out),
-                                .rest_in = vf_set((float)(in - (double)(float)in)),
-                                .rest_out = vf_set((float)(out - (double)(float)out))};
+        const kernel_unit_segment run = {.length = vf_set((float)((to->t - from->t) / subdivisions * h->per_t)),
+                                         .v_in = vf_set((float)in),
+                                         .v_out = vf_set((float)out),
+                                         .rest_in = vf_set((float)(in - (double)(float)in)),
+                                         .rest_out = vf_set((float)(out - (double)(float)out))};
         if (begin < end) kernel_emit_segment(p, h->state, lane, vf_set(begin), vf_set(end), &run);
         begin = end;
     }
@@ -329,7 +331,7 @@ static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h,
 
 /* Adds the subinterval's segments, on its chord. They are not raised to the field's mean, as equal subintervals are,
  * because they might then reach values that have not been checked. */
-static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_knot *from,
+static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_exact_point *from,
                                    const kernel_subinterval *sub, const kernel_subinterval_values *values,
                                    const kernel_medium_range *s)
 {
@@ -357,8 +359,8 @@ static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, 
                                .t_out = vf_set((float)sub->end.t),
                                .v_in = vf_set(v[0]),
                                .v_out = vf_set(v[1])};
-    const kernel_double precise = {vf_set((float)(sub->end.t - from->t)), vf_set((float)rest[0]),
-                                   vf_set((float)rest[1])};
+    const kernel_precise_interval precise = {vf_set((float)(sub->end.t - from->t)), vf_set((float)rest[0]),
+                                             vf_set((float)rest[1])};
     if (!list->is_double) lane = vm_and(lane, vf_lt(i.t_in, i.t_out));
     kernel_segments_add(h->state->pieces, list, lane, &i, list->is_double ? &precise : NULL);
 }
@@ -377,8 +379,8 @@ static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_s
 }
 
 /* Divides an interval, whose ends and middle are known, into subintervals by bisection, and adds their segments. */
-static void kernel_stretch_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_knot from,
-                                 kernel_subinterval whole)
+static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_exact_point from,
+                                     kernel_subinterval whole)
 {
     const kernel_segments *list = h->state->list;
     const vm only = vm_from_bits(1u << lane);
@@ -387,9 +389,9 @@ static void kernel_stretch_halve(kernel_packet *p, kernel_bisection *h, int lane
     stack[0] = whole;
     while (count > 0 && (float)from.t < list->t_end[lane]) {
         kernel_subinterval sub = stack[--count];
-        const kernel_knot first = kernel_knot_between(h, &from, &sub.middle, 0.5);
-        const kernel_knot third = kernel_knot_between(h, &sub.middle, &sub.end, 0.5);
-        const kernel_subinterval_values values = kernel_subinterval_look(h, &from, &sub, &first, &third);
+        const kernel_exact_point first = kernel_exact_point_between(h, &from, &sub.middle, 0.5);
+        const kernel_exact_point third = kernel_exact_point_between(h, &sub.middle, &sub.end, 0.5);
+        const kernel_subinterval_values values = kernel_subinterval_sample(h, &from, &sub, &first, &third);
         const kernel_step *step = kernel_step_between(h, values.low, values.high);
         const kernel_medium_range s = kernel_subinterval_range(h, &values, sub.middle.v, step);
         const double length = (sub.end.t - from.t) * h->per_t;
@@ -406,9 +408,9 @@ static void kernel_stretch_halve(kernel_packet *p, kernel_bisection *h, int lane
         kernel_subinterval near = {sub.middle, first, sub.depth + 1, sub.is_monotone};
         kernel_subinterval far = {sub.end, third, sub.depth + 1, sub.is_monotone};
         if (step && sub.is_monotone) {
-            near.end = kernel_knot_where(h, &from, &sub.end, step->at);
-            near.middle = kernel_knot_between(h, &from, &near.end, 0.5);
-            far.middle = kernel_knot_between(h, &near.end, &far.end, 0.5);
+            near.end = kernel_exact_point_where(h, &from, &sub.end, step->at);
+            near.middle = kernel_exact_point_between(h, &from, &near.end, 0.5);
+            far.middle = kernel_exact_point_between(h, &near.end, &far.end, 0.5);
         }
         stack[count++] = far;
         stack[count++] = near;
@@ -416,22 +418,24 @@ static void kernel_stretch_halve(kernel_packet *p, kernel_bisection *h, int lane
 }
 
 /* Adds the segments of the rays' intervals from t0 to t1 by bisection; only those that begin in the window are kept. */
-static __attribute__((noinline, cold)) void kernel_span_bisect(kernel_packet *p, const kernel_segment_state *state,
-                                                               const kernel_span *span, vm rays, vf t0, vf t1)
+static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_packet *p,
+                                                                        const kernel_segment_state *state,
+                                                                        const kernel_cell_interval *cell_interval,
+                                                                        vm rays, vf t0, vf t1)
 {
-    const kernel_interval *i = span->interval;
+    const kernel_interval *i = cell_interval->interval;
     const kernel_frame *f = p->frame;
     const bool is_flat = f->job->camera.is_orthographic;
     kernel_exact_map map;
     kernel_lanes at;
     kernel_packet_lanes(p, &at);
     const kernel_transfer *transfer = &f->volumes[state->volume];
-    if (span->map) kernel_exact_setup(&map, p, span->cell, transfer);
+    if (cell_interval->map) kernel_exact_setup(&map, p, cell_interval->cell, transfer);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int n = __builtin_ctz(bits);
         kernel_bisection h = {.state = state,
-                              .span = span,
-                              .map = span->map ? &map : NULL,
+                              .cell_interval = cell_interval,
+                              .map = cell_interval->map ? &map : NULL,
                               .u = at.px[n] - p->tile->centre_x,
                               .v = at.py[n] - p->tile->centre_y,
                               .slope = is_flat ? 0 : 1,
@@ -442,22 +446,23 @@ static __attribute__((noinline, cold)) void kernel_span_bisect(kernel_packet *p,
                               .length = (double)((t1[n] - t0[n]) * state->list->per_t[n]),
                               .light = 1,
                               .map_failures = &p->thread->map_failures};
-        for (int a = 0; a < 3 && span->map; a++) {
+        for (int a = 0; a < 3 && cell_interval->map; a++) {
             h.in.r[a] = (double)i->r_in[a][n];
             h.out.r[a] = (double)i->r_out[a][n];
         }
-        if (!span->map && span->cell) h.in.v = h.out.v = kernel_double_domain(transfer, span->cell->values[0]);
+        if (!cell_interval->map && cell_interval->cell)
+            h.in.v = h.out.v = kernel_double_domain(transfer, cell_interval->cell->values[0]);
         const double whole = h.out.t - h.in.t;
         if (!(whole > 0)) continue;
         const double a = ((double)t0[n] - h.in.t) / whole, b = ((double)t1[n] - h.in.t) / whole;
-        const kernel_knot from = kernel_knot_between(&h, &h.in, &h.out, a);
-        kernel_subinterval sub = {.end = kernel_knot_between(&h, &h.in, &h.out, b)};
-        kernel_knot begin = from;
+        const kernel_exact_point from = kernel_exact_point_between(&h, &h.in, &h.out, a);
+        kernel_subinterval sub = {.end = kernel_exact_point_between(&h, &h.in, &h.out, b)};
+        kernel_exact_point begin = from;
         begin.t = (double)t0[n];
         sub.end.t = (double)t1[n];
-        sub.middle = kernel_knot_between(&h, &from, &sub.end, 0.5);
-        sub.is_monotone = !span->map;
-        kernel_stretch_halve(p, &h, n, begin, sub);
+        sub.middle = kernel_exact_point_between(&h, &from, &sub.end, 0.5);
+        sub.is_monotone = !cell_interval->map;
+        kernel_subinterval_halve(p, &h, n, begin, sub);
     }
 }
 
@@ -465,7 +470,7 @@ static __attribute__((noinline, cold)) void kernel_span_bisect(kernel_packet *p,
 
 /* The state while an interval's equal subintervals are processed in order: the field at three consecutive ends. */
 typedef struct kernel_parts {
-    vf t0, t1, span, count;
+    vf t0, t1, cell_interval, count;
     vf last;     /* field at the interval's end t1 */
     vf from, to; /* depths of the current subinterval's ends */
     /* field at the begin and the end of the current subinterval, and at the end of the next one */
@@ -474,20 +479,20 @@ typedef struct kernel_parts {
 } kernel_parts;
 
 /* Returns t at the n-th boundary between subintervals, and stores the field there in *value. */
-SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_span *span, const kernel_parts *s, vm rays, int n,
-                                vf *value)
+SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_cell_interval *cell_interval, const kernel_parts *s,
+                                vm rays, int n, vf *value)
 {
     const vm inner = vm_and(rays, vf_lt(vf_set((float)n), s->count));
-    const vf t = vf_select(inner, s->t0 + s->span * (float)n, s->t1);
+    const vf t = vf_select(inner, s->t0 + s->cell_interval * (float)n, s->t1);
     *value = s->last;
-    if (vm_any(inner)) *value = vf_select(inner, kernel_span_value(p, span, inner, t), s->last);
+    if (vm_any(inner)) *value = vf_select(inner, kernel_cell_interval_value(p, cell_interval, inner, t), s->last);
     return t;
 }
 
 /* Returns by how much a subinterval's chord must be raised so that its mean equals the field's mean. For a parabola
  * that is a twelfth of the second difference, which is estimated from the adjacent subintervals. A single subinterval
  * is not raised. */
-SIMD_INLINE vf kernel_parts_lift(const kernel_parts *s, vm is_first, vm is_last)
+SIMD_INLINE vf kernel_parts_chord_offset(const kernel_parts *s, vm is_first, vm is_last)
 {
     const vf zero = vf_set(0), both = 0.5f * (s->bend + s->next_bend);
     const vf bend = vf_select(is_first, vf_select(is_last, zero, s->next_bend), vf_select(is_last, s->bend, both));
@@ -495,55 +500,58 @@ SIMD_INLINE vf kernel_parts_lift(const kernel_parts *s, vm is_first, vm is_last)
 }
 
 /* Adds a tet's interval from t0 to t1 as one segment, computed in double, if it begins in the window. */
-SIMD_INLINE void kernel_span_double(kernel_segment_state *state, const kernel_span *span, vm rays, vf t0, vf t1)
+SIMD_INLINE void kernel_cell_interval_double(kernel_segment_state *state, const kernel_cell_interval *cell_interval,
+                                             vm rays, vf t0, vf t1)
 {
-    const kernel_interval *i = span->interval;
-    const kernel_double *precise = span->precise;
-    const kernel_run whole = {precise->length, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
-    const kernel_run run = kernel_run_within(&whole, kernel_share(i, t0), kernel_share(i, t1));
+    const kernel_interval *i = cell_interval->interval;
+    const kernel_precise_interval *precise = cell_interval->precise;
+    const kernel_unit_segment whole = {precise->length, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
+    const kernel_unit_segment run =
+        kernel_unit_segment_part(&whole, kernel_interval_fraction(i, t0), kernel_interval_fraction(i, t1));
     const kernel_interval sub = {.t_in = t0, .t_out = t1, .v_in = run.v_in, .v_out = run.v_out};
-    const kernel_double own = {run.length, run.rest_in, run.rest_out};
+    const kernel_precise_interval own = {run.length, run.rest_in, run.rest_out};
     const vm mine = vm_and(vf_le(state->list->t_begin, t0), vf_lt(t0, state->list->t_end));
     kernel_segments_add(state->pieces, state->list, vm_and(rays, mine), &sub, &own);
 }
 
 /* Adds the segments of the interval from t0 to t1 that begin in the window. */
-SIMD_INLINE void kernel_span_segments(kernel_packet *p, kernel_segment_state *state, const kernel_span *span, vm rays,
-                                      vf t0, vf t1)
+SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segment_state *state,
+                                               const kernel_cell_interval *cell_interval, vm rays, vf t0, vf t1)
 {
     kernel_segments *list = state->list;
     kernel_parts s = {.t0 = t0, .t1 = t1, .from = t0};
-    if (span->precise) {
-        kernel_span_double(state, span, rays, t0, t1);
+    if (cell_interval->precise) {
+        kernel_cell_interval_double(state, cell_interval, rays, t0, t1);
         return;
     }
-    s.before = kernel_span_value(p, span, rays, t0);
-    s.last = kernel_span_value(p, span, rays, t1);
+    s.before = kernel_cell_interval_value(p, cell_interval, rays, t0);
+    s.last = kernel_cell_interval_value(p, cell_interval, rays, t1);
     vm halved;
     const kernel_interval stretch = {.t_in = t0, .t_out = t1, .v_in = s.before, .v_out = s.last};
-    s.count = kernel_span_subdivisions(p, state, span, rays, &stretch, &halved);
+    s.count = kernel_cell_interval_subdivisions(p, state, cell_interval, rays, &stretch, &halved);
     if (__builtin_expect(vm_any(halved), 0)) {
-        kernel_span_bisect(p, state, span, halved, t0, t1);
+        kernel_cell_interval_bisect(p, state, cell_interval, halved, t0, t1);
         rays = vm_andnot(rays, halved);
         if (!vm_any(rays)) return;
     }
-    s.span = (t1 - t0) / s.count;
-    s.to = kernel_parts_end(p, span, &s, rays, 1, &s.after);
+    s.cell_interval = (t1 - t0) / s.count;
+    s.to = kernel_parts_end(p, cell_interval, &s, rays, 1, &s.after);
     s.bend = vf_set(0);
     vm open = rays;
     for (int n = 1; vm_any(open); n++) {
         const vm inner = vm_and(open, vf_lt(vf_set((float)n), s.count));
-        const vf next = kernel_parts_end(p, span, &s, inner, n + 1, &s.ahead);
+        const vf next = kernel_parts_end(p, cell_interval, &s, inner, n + 1, &s.ahead);
         s.next_bend = (s.before - s.after) + (s.ahead - s.after);
-        const vf lift = kernel_parts_lift(&s, n == 1 ? rays : vm_none(), vm_not(inner));
+        const vf lift = kernel_parts_chord_offset(&s, n == 1 ? rays : vm_none(), vm_not(inner));
         const vm mine = vm_and(vf_le(list->t_begin, s.from), vf_lt(s.from, list->t_end));
         if (!(state->mixing > 0)) {
             const kernel_interval sub = {
                 .t_in = s.from, .t_out = s.to, .v_in = s.before + lift, .v_out = s.after + lift};
-            const kernel_double precise = kernel_double_of(&sub);
+            const kernel_precise_interval precise = kernel_precise_interval_of(&sub);
             kernel_segments_add(state->pieces, list, vm_and(open, mine), &sub, list->is_double ? &precise : NULL);
         } else if (vm_any(vm_and(open, mine))) {
-            const kernel_run run = kernel_run_of((s.to - s.from) * list->per_t, s.before + lift, s.after + lift);
+            const kernel_unit_segment run =
+                kernel_unit_segment_of((s.to - s.from) * list->per_t, s.before + lift, s.after + lift);
             kernel_emit_segment(p, state, vm_and(open, mine), s.from, s.to, &run);
         }
         s.from = s.to;
@@ -556,9 +564,10 @@ SIMD_INLINE void kernel_span_segments(kernel_packet *p, kernel_segment_state *st
 }
 
 /* Divides the interval at surfaces, and adds the segments of its parts that begin in the window. */
-SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, const kernel_span *span)
+SIMD_INLINE void kernel_cell_interval_integrate(kernel_packet *p, kernel_segment_state *state,
+                                                const kernel_cell_interval *cell_interval)
 {
-    const kernel_interval *i = span->interval;
+    const kernel_interval *i = cell_interval->interval;
     const kernel_segments *list = state->list;
     vf from = vf_max(i->t_in, p->t_near);
     /* Segments that are to be mixed are not cut at this rank's surfaces, so that they are the same on any partition. */
@@ -568,7 +577,7 @@ SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, 
         vf to = end;
         if (list->cuts.row_count) to = vf_min(end, kernel_next_cut(p, &list->cuts, from, true));
         const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
-        if (vm_any(mine)) kernel_span_segments(p, state, span, mine, from, to);
+        if (vm_any(mine)) kernel_cell_interval_segments(p, state, cell_interval, mine, from, to);
         from = to;
         open = vm_and(open, vf_lt(from, end));
     }
@@ -576,19 +585,20 @@ SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, 
 
 /* Adds a tet's segments on rays whose interval is cut by surfaces, or whose segments must be mixed with other
  * volumes. */
-static __attribute__((noinline)) void kernel_tet_course(kernel_packet *p, kernel_segment_state *state,
-                                                        const kernel_cell *c, const kernel_double_cell *double_cell,
-                                                        kernel_interval i)
+static __attribute__((noinline)) void kernel_tet_segments_general(kernel_packet *p, kernel_segment_state *state,
+                                                                  const kernel_cell *c,
+                                                                  const kernel_double_cell *double_cell,
+                                                                  kernel_interval i)
 {
-    kernel_span span = {.interval = &i};
-    kernel_double precise;
+    kernel_cell_interval cell_interval = {.interval = &i};
+    kernel_precise_interval precise;
     if (state->mixing > 0) {
-        kernel_span_bound(state, c->f, c->count, &span);
+        kernel_cell_interval_bound(state, c->f, c->count, &cell_interval);
     } else if (state->list->is_double) {
         precise = kernel_tet_double(p, c, double_cell, &state->list->rays, &i);
-        span.precise = &precise;
+        cell_interval.precise = &precise;
     }
-    kernel_span_run(p, state, &span);
+    kernel_cell_interval_integrate(p, state, &cell_interval);
 }
 
 /* Adds a tet's interval as one segment, which only surfaces cut. double_cell is read only if the list is in double. */
@@ -606,14 +616,14 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     cut = state->mixing > 0 ? hit : vm_and(hit, cut);
     if (__builtin_expect(vm_any(cut), 0)) {
         i.mask = cut;
-        kernel_tet_course(p, state, c, double_cell, i);
+        kernel_tet_segments_general(p, state, c, double_cell, i);
         i.mask = vm_andnot(hit, cut);
     }
     const vm window = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
     vm mine = vm_and(i.mask, window);
     if (!list->is_double) mine = vm_and(mine, vf_lt(i.t_in, i.t_out));
     if (!vm_any(mine)) return;
-    kernel_double precise;
+    kernel_precise_interval precise;
     if (list->is_double) {
         /* A ray may have many segments whose ends are equal in float32, so lengths are compared in double. */
         precise = kernel_tet_double(p, c, double_cell, &list->rays, &i);
@@ -627,12 +637,13 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, k
                                                              const kernel_cell *c, const kernel_map *map)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_span span = {.map = map, .cell = c};
+    kernel_cell_interval cell_interval = {.map = map, .cell = c};
     const int intervals = kernel_curved_intervals(p, c, p->active, list);
-    if (intervals && (map || state->pieces->has_rests)) kernel_span_bound(state, c->f, c->count, &span);
+    if (intervals && (map || state->pieces->has_rests))
+        kernel_cell_interval_bound(state, c->f, c->count, &cell_interval);
     for (int k = 0; k < intervals; k++) {
-        span.interval = &list[k];
-        kernel_span_run(p, state, &span);
+        cell_interval.interval = &list[k];
+        kernel_cell_interval_integrate(p, state, &cell_interval);
     }
 }
 
@@ -640,12 +651,13 @@ static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, k
 
 SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *t)
 {
-    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
+    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_clamp((c->values[i] - t->low) * t->inverse_width, 1e18);
 }
 
 /* Sets the window's samples begin .. end - 1 that lie in the piece of the profile and in the interval. A sample that
  * another cell has already set keeps its value, as in kernel_fill(). */
-static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state, const kernel_stay *stay,
+static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state,
+                                   const kernel_polyhedron_interval *polyhedron_interval,
                                    const kernel_profile_piece *piece, int begin, int end)
 {
     kernel_samples *s = state->samples;
@@ -653,33 +665,34 @@ static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state,
     const vf slope = vf_select(vf_lt(vf_set(0), length), (piece->v1 - piece->v0) / length, vf_set(0));
     for (int n = begin; n < end; n++) {
         const vf t = kernel_sample_t(p, s->first + n);
-        vm own = vm_and(stay->interval.mask, vm_andnot(vf_lt(t, piece->t1), vf_lt(t, piece->t0)));
+        vm own = vm_and(polyhedron_interval->interval.mask, vm_andnot(vf_lt(t, piece->t1), vf_lt(t, piece->t0)));
         if (!vm_any(own)) continue;
         const vf value = piece->v0 + slope * (t - piece->t0), active = s->value[state->volume][n];
         const vm apart = vm_and(own, vf_eq(active, active));
         if (__builtin_expect(vm_any(apart), 0)) {
-            kernel_emit_sample(p, state, &stay->interval, apart, t, value);
+            kernel_emit_sample(p, state, &polyhedron_interval->interval, apart, t, value);
             own = vm_andnot(own, apart);
         }
         s->value[state->volume][n] = vf_select(own, value, active);
         if (p->frame->needs_contact) {
-            s->t_in[n] = vf_select(own, stay->interval.t_in, s->t_in[n]);
-            s->t_out[n] = vf_select(own, stay->interval.t_out, s->t_out[n]);
+            s->t_in[n] = vf_select(own, polyhedron_interval->interval.t_in, s->t_in[n]);
+            s->t_out[n] = vf_select(own, polyhedron_interval->interval.t_out, s->t_out[n]);
         }
     }
 }
 
-static void kernel_polyhedron_stay(kernel_packet *p, kernel_volume_state *state, kernel_passage *r, kernel_stay *stay)
+static void kernel_polyhedron_interval_integrate(kernel_packet *p, kernel_volume_state *state, kernel_poly_crossings *r,
+                                                 kernel_polyhedron_interval *polyhedron_interval)
 {
-    const kernel_interval *i = &stay->interval;
+    const kernel_interval *i = &polyhedron_interval->interval;
     int begin, end;
-    kernel_sample_span(p, state->samples, i, &begin, &end);
+    kernel_sample_range(p, state->samples, i, &begin, &end);
     if (begin >= end) return;
-    if (!r->cell->is_constant) kernel_passage_profile(r, stay);
-    kernel_profile_piece piece = kernel_profile_begin(stay, stay->u_in);
-    while (vm_any(kernel_profile_open(stay, &piece, i->mask))) {
-        kernel_profile_next(r, stay, stay->u_out, &piece);
-        kernel_polyhedron_fill(p, state, stay, &piece, begin, end);
+    if (!r->cell->is_constant) kernel_poly_profile(r, polyhedron_interval);
+    kernel_profile_piece piece = kernel_profile_begin(polyhedron_interval, polyhedron_interval->u_in);
+    while (vm_any(kernel_profile_open(polyhedron_interval, &piece, i->mask))) {
+        kernel_profile_next(r, polyhedron_interval, polyhedron_interval->u_out, &piece);
+        kernel_polyhedron_fill(p, state, polyhedron_interval, &piece, begin, end);
     }
 }
 
@@ -692,9 +705,9 @@ static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int par
     polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part,
                                                p->frame->surface_count + volume, index);
     if (!c) p->thread->out_of_memory = true;
-    if (!c || !c->is_finite || !kernel_values_show(c->values, c->vertex_count, transfer)) return NULL;
-    if (!c->is_placed) {
-        kernel_polyhedron_place(c, p);
+    if (!c || !c->is_finite || !kernel_values_are_visible(c->values, c->vertex_count, transfer)) return NULL;
+    if (!c->is_transformed) {
+        kernel_polyhedron_transform(c, p);
         kernel_polyhedron_domain(c, transfer);
     }
     return c;
@@ -703,32 +716,33 @@ static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int par
 static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *state, int part, uint32_t index, vm rays)
 {
     const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
-    kernel_passage r;
-    kernel_stay stay;
-    if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
-    while (kernel_passage_next(&r, &stay)) kernel_polyhedron_stay(p, state, &r, &stay);
+    kernel_poly_crossings r;
+    kernel_polyhedron_interval polyhedron_interval;
+    if (!c || !kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    while (kernel_poly_next(&r, &polyhedron_interval))
+        kernel_polyhedron_interval_integrate(p, state, &r, &polyhedron_interval);
 }
 
 /* Adds the segments of a polyhedron: the pieces of the ray's profile, on which the field is exactly linear. */
 static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *state, int part, uint32_t index, vm rays)
 {
     const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
-    kernel_passage r;
-    kernel_stay stay;
-    if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
-    kernel_span span = {.map = NULL};
-    if (state->mixing > 0) kernel_span_bound(state, c->f, c->vertex_count, &span);
-    while (kernel_passage_next(&r, &stay)) {
-        if (!c->is_constant) kernel_passage_profile(&r, &stay);
-        kernel_profile_piece piece = kernel_profile_begin(&stay, stay.u_in);
-        vm open = kernel_profile_open(&stay, &piece, stay.interval.mask);
+    kernel_poly_crossings r;
+    kernel_polyhedron_interval polyhedron_interval;
+    if (!c || !kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    kernel_cell_interval cell_interval = {.map = NULL};
+    if (state->mixing > 0) kernel_cell_interval_bound(state, c->f, c->vertex_count, &cell_interval);
+    while (kernel_poly_next(&r, &polyhedron_interval)) {
+        if (!c->is_constant) kernel_poly_profile(&r, &polyhedron_interval);
+        kernel_profile_piece piece = kernel_profile_begin(&polyhedron_interval, polyhedron_interval.u_in);
+        vm open = kernel_profile_open(&polyhedron_interval, &piece, polyhedron_interval.interval.mask);
         while (vm_any(open)) {
-            kernel_profile_next(&r, &stay, stay.u_out, &piece);
+            kernel_profile_next(&r, &polyhedron_interval, polyhedron_interval.u_out, &piece);
             const kernel_interval i = {
                 .mask = open, .t_in = piece.t0, .t_out = piece.t1, .v_in = piece.v0, .v_out = piece.v1};
-            span.interval = &i;
-            kernel_span_run(p, state, &span);
-            open = kernel_profile_open(&stay, &piece, open);
+            cell_interval.interval = &i;
+            kernel_cell_interval_integrate(p, state, &cell_interval);
+            open = kernel_profile_open(&polyhedron_interval, &piece, open);
         }
     }
 }

@@ -65,14 +65,14 @@ SIMD_INLINE vf kernel_exp(vf x)
 
 /* Returns the offset, in floats, into the table `swings` of the entry with the bounds for the values from low to
  * high. */
-SIMD_INLINE vi kernel_swing_entry(const kernel_pieces *t, vf low, vf high)
+SIMD_INLINE vi kernel_light_variation_entry(const kernel_pieces *t, vf low, vf high)
 {
-    const vf zero = vf_set(0), last = vf_set(KERNEL_SWING_BINS - 1);
-    const vf begin = vf_clamp((low - t->bin_low) * t->swing_inverse, zero, last);
-    const vf end = vf_clamp((high - t->bin_low) * t->swing_inverse, begin, last);
+    const vf zero = vf_set(0), last = vf_set(KERNEL_VARIATION_BINS - 1);
+    const vf begin = vf_clamp((low - t->bin_low) * t->variation_inverse, zero, last);
+    const vf end = vf_clamp((high - t->bin_low) * t->variation_inverse, begin, last);
     /* The number of bins that the values cover, plus 1, is classified by quarters of an octave. */
     const vi width = (vi_from_bits((end - begin) + 1.0f) >> 21) - (127 << 2);
-    return (width * KERNEL_SWING_BINS + vi_from_vf(begin)) * (int)(sizeof(kernel_swing) / sizeof(float));
+    return (width * KERNEL_VARIATION_BINS + vi_from_vf(begin)) * (int)(sizeof(kernel_light_variation) / sizeof(float));
 }
 #endif
 
@@ -100,31 +100,31 @@ SIMD_INLINE kernel_light kernel_clear(void)
 /* A segment: its length in unit distances, and the values at its ends in the transfer function's domain. Each value is
  * v + rest, where rest is the rounding error of v as far as it is known; it matters because steps and poles of the
  * function magnify it. */
-typedef struct kernel_run {
+typedef struct kernel_unit_segment {
     vf length, v_in, v_out, rest_in, rest_out;
-} kernel_run;
+} kernel_unit_segment;
 
-SIMD_INLINE kernel_run kernel_run_of(vf length, vf v_in, vf v_out)
+SIMD_INLINE kernel_unit_segment kernel_unit_segment_of(vf length, vf v_in, vf v_out)
 {
-    return (kernel_run){length, v_in, v_out, vf_set(0), vf_set(0)};
+    return (kernel_unit_segment){length, v_in, v_out, vf_set(0), vf_set(0)};
 }
 
 /* The piece of the transfer function that each ray is in. If all rays are in the same piece, `common` points to it,
  * which saves gathers. */
-typedef struct kernel_piece_place {
+typedef struct kernel_piece_index {
     vi at;
     const kernel_piece *common;
-} kernel_piece_place;
+} kernel_piece_index;
 
-SIMD_INLINE kernel_piece_place kernel_piece_place_of(const kernel_pieces *t, vm rays, vf piece)
+SIMD_INLINE kernel_piece_index kernel_piece_index_of(const kernel_pieces *t, vm rays, vf piece)
 {
     const int lane = __builtin_ctz(vm_bits(rays));
     const int first = (int)piece[lane];
     const bool is_common = !vm_any(vm_andnot(rays, vf_eq(piece, vf_set((kernel_real)first))));
-    return (kernel_piece_place){vi_from_vf(vf_select(rays, piece, vf_set(0))), is_common ? &t->pieces[first] : NULL};
+    return (kernel_piece_index){vi_from_vf(vf_select(rays, piece, vf_set(0))), is_common ? &t->pieces[first] : NULL};
 }
 
-SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_place *place, int entry)
+SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_index *place, int entry)
 {
     if (place->common) return vf_set(place->common->entry[entry]);
     return vf_gather(t->pieces[0].entry + entry, place->at * KERNEL_PIECE_ENTRIES);
@@ -135,7 +135,7 @@ typedef struct kernel_piece_ends {
     vf low, high, low_rest, high_rest;
 } kernel_piece_ends;
 
-SIMD_INLINE kernel_piece_ends kernel_piece_ends_of(const kernel_pieces *t, const kernel_piece_place *at)
+SIMD_INLINE kernel_piece_ends kernel_piece_ends_of(const kernel_pieces *t, const kernel_piece_index *at)
 {
     kernel_piece_ends out = {kernel_piece_entry(t, at, KERNEL_PIECE_LOW), kernel_piece_entry(t, at, KERNEL_PIECE_HIGH),
                              vf_set(0), vf_set(0)};
@@ -153,7 +153,7 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
     const vf spot = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
     vf piece = vf_gather(t->bin_first, vi_from_vf(spot));
     for (vm open = rays; vm_any(open);) {
-        const kernel_piece_place at = kernel_piece_place_of(t, open, piece);
+        const kernel_piece_index at = kernel_piece_index_of(t, open, piece);
         const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
         vf below = x - ends.low, above = ends.high - x;
         if (__builtin_expect(t->has_rests, 0)) {
@@ -170,28 +170,28 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
 }
 
 /* A ray's position in a piece of the transfer function. */
-typedef struct kernel_way {
+typedef struct kernel_piece_state {
     vf below, above; /* distances of the value to the piece's low and high end */
-    vf todo;         /* remaining change of the value within this piece */
+    vf remaining;    /* remaining change of the value within this piece */
     vf left;         /* length of the ray over which this change takes place, in unit distances */
     vf shortest;     /* lower limit of a step's length, in unit distances */
     /* value at the end of the piece that the ray is approaching, and its rounding error; initially the value at the
      * segment's begin */
     vf edge, rest;
     vm is_last; /* the segment ends in this piece */
-} kernel_way;
+} kernel_piece_state;
 
 /* Properties of a segment that are the same in all its pieces. */
-typedef struct kernel_leg {
+typedef struct kernel_segment_constants {
     vm falling, level;
     vf turn; /* sign of the value's change along the ray: 1 or -1 */
     vf v_out, rest_out, length, per_value;
-} kernel_leg;
+} kernel_segment_constants;
 
-SIMD_INLINE kernel_leg kernel_leg_of(const kernel_run *run)
+SIMD_INLINE kernel_segment_constants kernel_segment_constants_of(const kernel_unit_segment *run)
 {
     const vf one = vf_set(1), rise = (run->v_out - run->v_in) + (run->rest_out - run->rest_in), change = vf_abs(rise);
-    kernel_leg out = {.v_out = run->v_out, .rest_out = run->rest_out, .length = run->length};
+    kernel_segment_constants out = {.v_out = run->v_out, .rest_out = run->rest_out, .length = run->length};
     out.falling = vf_lt(rise, vf_set(0));
     out.level = vf_lt(change, vf_set(KERNEL_TINY));
     out.turn = vf_select(out.falling, -one, one);
@@ -200,62 +200,65 @@ SIMD_INLINE kernel_leg kernel_leg_of(const kernel_run *run)
 }
 
 /* Sets the positions of the rays in `fresh`, which enter the piece with the given ends. */
-SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fresh, const kernel_piece_ends *ends)
+SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *piece_state, const kernel_segment_constants *constants,
+                                          vm fresh, const kernel_piece_ends *ends)
 {
-    const vf v = way->edge, zero = vf_set(0);
-    const vf below = vf_max((v - ends->low) + (way->rest - ends->low_rest), zero);
-    const vf above = vf_max((ends->high - v) + (ends->high_rest - way->rest), zero);
-    const vf ahead = vf_abs((leg->v_out - v) + (leg->rest_out - way->rest));
-    const vf most = vf_select(leg->falling, below, above), todo = vf_min(most, ahead);
-    way->below = vf_select(fresh, below, way->below);
-    way->above = vf_select(fresh, above, way->above);
-    way->todo = vf_select(fresh, todo, way->todo);
-    const vf left = vf_select(leg->level, leg->length, todo * leg->per_value);
-    way->left = vf_select(fresh, left, way->left);
-    way->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, way->shortest);
-    way->edge = vf_select(fresh, vf_select(leg->falling, ends->low, ends->high), way->edge);
-    way->rest = vf_select(fresh, vf_select(leg->falling, ends->low_rest, ends->high_rest), way->rest);
-    way->is_last = vm_or(vm_andnot(way->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
+    const vf v = piece_state->edge, zero = vf_set(0);
+    const vf below = vf_max((v - ends->low) + (piece_state->rest - ends->low_rest), zero);
+    const vf above = vf_max((ends->high - v) + (ends->high_rest - piece_state->rest), zero);
+    const vf ahead = vf_abs((constants->v_out - v) + (constants->rest_out - piece_state->rest));
+    const vf most = vf_select(constants->falling, below, above), remaining = vf_min(most, ahead);
+    piece_state->below = vf_select(fresh, below, piece_state->below);
+    piece_state->above = vf_select(fresh, above, piece_state->above);
+    piece_state->remaining = vf_select(fresh, remaining, piece_state->remaining);
+    const vf left = vf_select(constants->level, constants->length, remaining * constants->per_value);
+    piece_state->left = vf_select(fresh, left, piece_state->left);
+    piece_state->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, piece_state->shortest);
+    piece_state->edge = vf_select(fresh, vf_select(constants->falling, ends->low, ends->high), piece_state->edge);
+    piece_state->rest =
+        vf_select(fresh, vf_select(constants->falling, ends->low_rest, ends->high_rest), piece_state->rest);
+    piece_state->is_last = vm_or(vm_andnot(piece_state->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
 /* Interpolates between at_low and at_high from both ends of the piece. Near an end with value 0 the result is as exact
  * as the distance to that end. */
-SIMD_INLINE vf kernel_way_weigh(const kernel_way *way, vf inverse, vf at_low, vf at_high)
+SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *piece_state, vf inverse, vf at_low, vf at_high)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    const vf from_low = at_low * vf_clamp(way->above * inverse, zero, one);
-    const vf from_high = at_high * vf_clamp(way->below * inverse, zero, one);
+    const vf from_low = at_low * vf_clamp(piece_state->above * inverse, zero, one);
+    const vf from_high = at_high * vf_clamp(piece_state->below * inverse, zero, one);
     return vf_min(from_low + from_high, one);
 }
 
 /* One step of the integration in a piece. */
-typedef struct kernel_stretch {
+typedef struct kernel_integration_step {
     vf opacity, clear; /* opacity at the step's begin, and 1 - opacity */
     vf rise;           /* change of the opacity over the rest of the ray's part in the piece */
     vf share;          /* fraction of that rest that the step covers */
     vf length;         /* length of the step, in unit distances */
     vm is_opaque;
-} kernel_stretch;
+} kernel_integration_step;
 
-SIMD_INLINE kernel_stretch kernel_stretch_begin(const kernel_pieces *t, const kernel_piece_place *at,
-                                                const kernel_way *way, vf turn)
+SIMD_INLINE kernel_integration_step kernel_integration_step_begin(const kernel_pieces *t, const kernel_piece_index *at,
+                                                                  const kernel_piece_state *piece_state, vf turn)
 {
     const vf inverse = kernel_piece_entry(t, at, KERNEL_PIECE_INVERSE);
-    kernel_stretch out;
-    out.opacity = kernel_way_weigh(way, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
-                                   kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
-    out.clear = kernel_way_weigh(way, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
-                                 kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
-    out.rise = turn * way->todo * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
+    kernel_integration_step out;
+    out.opacity = kernel_piece_state_interpolate(piece_state, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
+                                                 kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
+    out.clear = kernel_piece_state_interpolate(piece_state, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
+                                               kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
+    out.rise = turn * piece_state->remaining * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
     return out;
 }
 
-SIMD_INLINE void kernel_stretch_limit(kernel_stretch *st, vf left, vf shortest)
+SIMD_INLINE void kernel_integration_step_limit(kernel_integration_step *st, vf left, vf shortest)
 {
     const vf zero = vf_set(0), one = vf_set(1), rise = vf_abs(st->rise), ratio = st->clear * KERNEL_STEP_RATIO;
-    const vm bent = vf_lt(ratio, rise);
+    const vm nonlinear_part = vf_lt(ratio, rise);
     st->share = one;
-    if (vm_any(bent)) st->share = vf_select(bent, vf_min(vf_max(ratio / rise, shortest / left), one), one);
+    if (vm_any(nonlinear_part))
+        st->share = vf_select(nonlinear_part, vf_min(vf_max(ratio / rise, shortest / left), one), one);
     st->is_opaque = vm_and(vf_eq(st->clear, zero), vf_eq(rise, zero));
     const vf up = vf_max(st->share * st->rise, zero), clear = vf_max(st->clear - up, vf_set(KERNEL_TINY));
     const vf most = kernel_extinction(vf_min(st->opacity + up, one), clear), length = left * st->share;
@@ -270,7 +273,7 @@ SIMD_INLINE void kernel_stretch_limit(kernel_stretch *st, vf left, vf shortest)
 
 /* Computes the step's emitted light (*e0) and the first moment of the emission along the step (*e1). Returns the step's
  * optical depth. */
-SIMD_INLINE vf kernel_stretch_sum(const kernel_stretch *st, vf *e0, vf *e1)
+SIMD_INLINE vf kernel_integration_step_sum(const kernel_integration_step *st, vf *e0, vf *e1)
 {
     vf sigma[KERNEL_NODES], depth = vf_set(0);
     const vf rise = st->rise * st->share, zero = vf_set(0), one = vf_set(1);
@@ -293,11 +296,11 @@ SIMD_INLINE vf kernel_stretch_sum(const kernel_stretch *st, vf *e0, vf *e1)
 
 /* Adds the light of one integration step, over which the value changes by `move`. `below` is the distance of the value
  * at the step's begin from the piece's low end. */
-SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_place *at, vm open, vf below, vf move,
-                                   const kernel_stretch *st, kernel_light *light)
+SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_index *at, vm open, vf below, vf move,
+                                   const kernel_integration_step *st, kernel_light *light)
 {
     vf e0, e1;
-    const vf depth = kernel_stretch_sum(st, &e0, &e1);
+    const vf depth = kernel_integration_step_sum(st, &e0, &e1);
     const vf whole = light->transmittance * e0, moment = light->transmittance * e1 * move;
     for (int a = 0; a < 3; a++) {
         const vf slope = kernel_piece_entry(t, at, KERNEL_PIECE_COLOUR_SLOPE + a);
@@ -310,31 +313,32 @@ SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_pl
 }
 
 /* Integrates the segment and adds its light behind that in *light. */
-SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_run *run, kernel_light *light)
+SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_unit_segment *run, kernel_light *light)
 {
-    const kernel_leg leg = kernel_leg_of(run);
+    const kernel_segment_constants constants = kernel_segment_constants_of(run);
     const vf zero = vf_set(0);
-    kernel_way way = {zero, zero, zero, zero, zero, run->v_in, run->rest_in, vm_none()};
-    vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, leg.falling);
+    kernel_piece_state piece_state = {zero, zero, zero, zero, zero, run->v_in, run->rest_in, vm_none()};
+    vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, constants.falling);
     vm open = rays, fresh = rays;
     while (vm_any(open)) {
-        const kernel_piece_place at = kernel_piece_place_of(t, open, piece);
+        const kernel_piece_index at = kernel_piece_index_of(t, open, piece);
         if (vm_any(fresh)) {
             const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
-            kernel_way_enter(&way, &leg, fresh, &ends);
+            kernel_piece_state_enter(&piece_state, &constants, fresh, &ends);
         }
-        kernel_stretch st = kernel_stretch_begin(t, &at, &way, leg.turn);
-        kernel_stretch_limit(&st, way.left, way.shortest);
-        const vf size = way.todo * st.share, move = leg.turn * size;
-        kernel_light_step(t, &at, open, way.below, move, &st, light);
-        way.below += move;
-        way.above -= move;
-        way.todo -= size;
-        way.left -= st.length;
+        kernel_integration_step st = kernel_integration_step_begin(t, &at, &piece_state, constants.turn);
+        kernel_integration_step_limit(&st, piece_state.left, piece_state.shortest);
+        const vf size = piece_state.remaining * st.share, move = constants.turn * size;
+        kernel_light_step(t, &at, open, piece_state.below, move, &st, light);
+        piece_state.below += move;
+        piece_state.above -= move;
+        piece_state.remaining -= size;
+        piece_state.left -= st.length;
         const vm through = vf_le(vf_set(1), st.share);
-        open = vm_and(vm_andnot(open, vm_and(through, way.is_last)), vf_lt(vf_set(KERNEL_BLACK), light->transmittance));
+        open = vm_and(vm_andnot(open, vm_and(through, piece_state.is_last)),
+                      vf_lt(vf_set(KERNEL_BLACK), light->transmittance));
         fresh = vm_and(open, through);
-        piece = vf_select(fresh, piece + leg.turn, piece);
+        piece = vf_select(fresh, piece + constants.turn, piece);
     }
 }
 

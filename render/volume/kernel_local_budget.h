@@ -5,10 +5,9 @@
  * ray, with g = (s c)' - s' b, where b is the light from behind. On each segment v - f has mean zero, apart from the
  * polynomial's own error, so that only the variation of T g along the segment counts: the error is at most half the
  * oscillation of T g times the integral of |v - f|. g depends on the value and on b. Over a range of values it is at
- * most `cost`, and varies by `swing` for fixed b; g is linear in b, so both follow from b's two bounds (kernel_swing).
- * Let D be the segment's depth and R the colours' contrast. Along the segment T falls by min(D, 1), and b changes by R
- * min(D, 1):
- * changes by R min(D, 1):
+ * most `cost`, and varies by `swing` for fixed b; g is linear in b, so both follow from b's two bounds
+ * (kernel_light_variation). Let D be the segment's depth and R the colours' contrast. Along the segment T falls by
+ * min(D, 1), and b changes by R min(D, 1): changes by R min(D, 1):
  *
  *     oscillation of T g <= T (swing + min(D, 1) (cost + R |s'|)),      and no more than 2 T cost.
  *
@@ -58,11 +57,11 @@ enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_PIECES = 32
 /* Share of the allowed error that the residual of Newton's method may use. */
 #define KERNEL_LOCAL_SLACK 0.4f
 
-/* Bounds, per lane, of how a field error changes the light, over the values of the lane's cell (kernel_swing). sway is
- * the variation of that change, cost its maximum. */
+/* Bounds, per lane, of how a field error changes the light, over the values of the lane's cell
+ * (kernel_light_variation). sway is the variation of that change, cost its maximum. */
 typedef struct kernel_local_bounds {
     float cost[SIMD_WIDTH];
-    float sway[SIMD_WIDTH];
+    float error_variation[SIMD_WIDTH];
     /* upper bound of the change of the error's weight per depth: cost + R |s'|, as defined at the top of this file */
     float fade[SIMD_WIDTH];
     float extinction[SIMD_WIDTH];
@@ -81,12 +80,12 @@ typedef struct kernel_local_budget {
 /* ---- cells ---- */
 
 /* Sets the lanes' bounds from the values at their vertices. The ends of chords may lie outside the cell's values: those
- * of one chord by at most three sixteenths of the values' range (kernel_local_strays()), those of several by a sixth of
- * the parabola's maximum, which is less than that range. */
+ * of one chord by at most three sixteenths of the values' range (kernel_local_leaves_range()), those of several by a
+ * sixth of the parabola's maximum, which is less than that range. */
 SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values)[SIMD_WIDTH], int type)
 {
     const kernel_pieces *t = b->pieces;
-    vf low = vf_load(values[0]), high = low, sway, cost, extinction, steepness;
+    vf low = vf_load(values[0]), high = low, error_variation, cost, extinction, steepness;
     for (int i = 1; i < grid_type_vertices(type); i++) {
         low = vf_min(vf_load(values[i]), low);
         high = vf_max(vf_load(values[i]), high);
@@ -94,11 +93,11 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
     const vf margin = 0.1875f * (high - low);
     low -= margin;
     high += margin;
-    const vi entry = kernel_swing_entry(t, low, high);
-    vf_gather_pair(&t->swings->swing, entry, &sway, &cost);
-    vf_gather_pair(&t->swings->extinction, entry, &extinction, &steepness);
+    const vi entry = kernel_light_variation_entry(t, low, high);
+    vf_gather_pair(&t->variations->variation, entry, &error_variation, &cost);
+    vf_gather_pair(&t->variations->extinction, entry, &extinction, &steepness);
     vf_store(b->bounds.cost, cost);
-    vf_store(b->bounds.sway, sway);
+    vf_store(b->bounds.error_variation, error_variation);
     vf_store(b->bounds.fade, cost + steepness);
     vf_store(b->bounds.extinction, extinction);
     vf_store(b->bounds.low, low);
@@ -123,7 +122,7 @@ typedef struct kernel_local_pairs {
 } kernel_local_pairs;
 
 /* Returns by how much a single chord must be raised so that its mean equals the field's mean. */
-SIMD_INLINE vf kernel_local_lift(const kernel_local_pairs *p)
+SIMD_INLINE vf kernel_local_chord_offset(const kernel_local_pairs *p)
 {
     const vf *d = p->off_chord.field;
     return (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
@@ -131,16 +130,16 @@ SIMD_INLINE vf kernel_local_lift(const kernel_local_pairs *p)
 
 /* Returns the rays for which a single segment is not possible: the values at its ends, raised so that its mean equals
  * the field's, are outside the range of values for which the error bounds hold. */
-SIMD_INLINE vm kernel_local_strays(const kernel_local_budget *b, const kernel_local_pairs *p)
+SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_budget *b, const kernel_local_pairs *p)
 {
-    const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_lift(p);
+    const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_chord_offset(p);
     const vf low = vf_min(v0, v1) + lift, high = vf_max(v0, v1) + lift;
-    return vm_or(vf_lt(low, kernel_take(b->bounds.low, p->rays.lane)),
-                 vf_lt(kernel_take(b->bounds.high, p->rays.lane), high));
+    return vm_or(vf_lt(low, kernel_gather_lane(b->bounds.low, p->rays.lane)),
+                 vf_lt(kernel_gather_lane(b->bounds.high, p->rays.lane), high));
 }
 
 /* Error terms, per ray, if one segment replaces the ray's whole interval in its cell. */
-typedef struct kernel_local_wrong {
+typedef struct kernel_local_errors {
     vf mean;    /* mean of |v - f|; with n segments it is divided by n^2 */
     vf quartic; /* upper bound E of the quartic part of the field's deviation from its chord */
     vf unknown; /* error of the field due to the residual of Newton's method */
@@ -148,64 +147,64 @@ typedef struct kernel_local_wrong {
     /* variation of the error's weight g (see the top of this file) that is caused by the changes of T and b along the
      * segment */
     vf fade;
-} kernel_local_wrong;
+} kernel_local_errors;
 
-SIMD_INLINE void kernel_local_wrong_of(const kernel_local_budget *b, const kernel_local_pairs *p,
-                                       kernel_local_wrong *out)
+SIMD_INLINE void kernel_local_errors_of(const kernel_local_budget *b, const kernel_local_pairs *p,
+                                        kernel_local_errors *out)
 {
     const vi lane = p->rays.lane;
     const vf *d = p->off_chord.field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
-    const vf bend = kernel_take(b->nonlinear.bend, lane);
-    const vf unseen = p->unseen * kernel_take(b->nonlinear.unseen, lane);
+    const vf bend = kernel_gather_lane(b->nonlinear.bend, lane);
+    const vf unseen = p->unseen * kernel_gather_lane(b->nonlinear.unseen, lane);
     const vf least = vf_muladd(0.01f * bend, parabola + cubic, unseen);
-    const vf depth = vf_min(kernel_take(b->bounds.extinction, lane) * length, vf_set(1));
+    const vf depth = vf_min(kernel_gather_lane(b->bounds.extinction, lane) * length, vf_set(1));
     out->quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), least);
     out->mean = 0.26f * parabola + (1.09f * cubic + 4.0f * out->quartic);
-    out->unknown = kernel_take(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
+    out->unknown = kernel_gather_lane(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
     out->length = length;
-    out->fade = kernel_take(b->bounds.fade, lane) * depth;
+    out->fade = kernel_gather_lane(b->bounds.fade, lane) * depth;
 }
 
 /* Returns the error of light per unit distance if the interval becomes one segment: the part that varies along the
  * segment, plus the part of its mean. */
-SIMD_INLINE vf kernel_local_wrong_by_one(const kernel_local_wrong *w, vf sway, vf cost)
+SIMD_INLINE vf kernel_local_single_segment_error(const kernel_local_errors *w, vf error_variation, vf cost)
 {
-    const vf half = vf_min(0.5f * (sway + w->fade), cost);
+    const vf half = vf_min(0.5f * (error_variation + w->fade), cost);
     return vf_muladd(half, w->mean, cost * (w->quartic + w->unknown));
 }
 
 /* Computes the upper bounds of the change of light by a field error, over the range of the ray's own values, which
  * includes those of raised chords (see the top of this file). */
-SIMD_INLINE void kernel_local_own_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic, vf *sway,
-                                        vf *cost)
+SIMD_INLINE void kernel_local_ray_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic,
+                                        vf *error_variation, vf *cost)
 {
     const vf *d = p->off_chord.field, v0 = p->ends[0].value, v1 = p->ends[1].value, zero = vf_set(0);
     const vf wide = 0.85f * vf_abs(d[2] - d[0]) + 10.0f * quartic;
     const vf low = vf_min(v0, v1) + (1.17f * vf_min(d[1], zero) - wide);
     const vf high = vf_max(v0, v1) + (1.17f * vf_max(d[1], zero) + wide);
-    vf_gather_pair(&t->swings->swing, kernel_swing_entry(t, low, high), sway, cost);
+    vf_gather_pair(&t->variations->variation, kernel_light_variation_entry(t, low, high), error_variation, cost);
 }
 
 /* Sets the number of segments per ray, with an allowed error that includes the ray's absorption. Returns the rays for
  * which no number is enough. */
 static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_tile_trace *t,
                                                                 const kernel_local_budget *b,
-                                                                const kernel_local_wrong *wrong, vf least,
+                                                                const kernel_local_errors *wrong, vf least,
                                                                 kernel_local_pairs *p)
 {
     const kernel_transfer *transfer = &t->frame->volumes[0];
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, one = vf_set(1);
-    vf opacities = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1)), sway, cost;
+    vf opacities = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1)), error_variation, cost;
     for (int i = 0; i < 3; i++) {
         const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + p->off_chord.field[i];
         opacities += 0.25f * kernel_opacity(transfer, value);
     }
-    kernel_local_own_bound(b->pieces, p, wrong->quartic, &sway, &cost);
+    kernel_local_ray_bound(b->pieces, p, wrong->quartic, &error_variation, &cost);
     /* The error allowed per unit distance. */
     const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(wrong->length, opacities, one));
-    const vm few = vf_le(kernel_local_wrong_by_one(wrong, sway, cost), allowed);
-    const vf half = vf_min(0.5f * (sway + wrong->fade), cost), made = half * wrong->mean;
+    const vm few = vf_le(kernel_local_single_segment_error(wrong, error_variation, cost), allowed);
+    const vf half = vf_min(0.5f * (error_variation + wrong->fade), cost), made = half * wrong->mean;
     const vf rest = cost * (wrong->quartic + wrong->unknown) + vf_min(3.1f * half, 2.1f * cost) * wrong->quartic;
     const vf wanted = -vf_floor(-vf_sqrt(made / vf_max(allowed - rest, vf_set(1e-30f))));
     p->count = vf_select(few, least, vf_clamp(wanted, vf_set(2), vf_set(KERNEL_LOCAL_PIECES + 1)));
@@ -218,12 +217,14 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
  * kernel_local_count_by_depth(). */
 SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local_budget *b, kernel_local_pairs *p)
 {
-    kernel_local_wrong wrong;
-    kernel_local_wrong_of(b, p, &wrong);
+    kernel_local_errors wrong;
+    kernel_local_errors_of(b, p, &wrong);
     const vf one = vf_set(1), allowed = vf_set(b->allowance * (1 / b->reach));
-    const vf sway = kernel_take(b->bounds.sway, p->rays.lane), cost = kernel_take(b->bounds.cost, p->rays.lane);
-    const vm strays = kernel_local_strays(b, p);
-    const vm enough = vm_andnot(vf_le(kernel_local_wrong_by_one(&wrong, sway, cost), allowed), strays);
+    const vf error_variation = kernel_gather_lane(b->bounds.error_variation, p->rays.lane),
+             cost = kernel_gather_lane(b->bounds.cost, p->rays.lane);
+    const vm strays = kernel_local_leaves_range(b, p);
+    const vm enough =
+        vm_andnot(vf_le(kernel_local_single_segment_error(&wrong, error_variation, cost), allowed), strays);
     p->count = one;
     if (!vm_any(vm_andnot(p->active, enough))) return vm_none();
     const vm none = kernel_local_count_by_depth(t, b, &wrong, vf_select(strays, 2.0f * one, one), p);

@@ -18,13 +18,13 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
     const int type = kernel_curved_types[queue];
     const kernel_local_stages *stages = l->stages;
     kernel_local_queue *q = &l->queues[queue];
-    unsigned placed;
+    unsigned transformed;
     const unsigned all = KERNEL_OF_TYPE(type, kernel_local_fetch_all, l, q);
-    const unsigned showing = stages->place(t, l, type, &placed) & all;
-    placed &= all;
-    t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~placed));
+    const unsigned showing = stages->place(t, l, type, &transformed) & all;
+    transformed &= all;
+    t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~transformed));
     l->rays.count = 0;
-    for (unsigned lanes = placed; lanes; lanes &= lanes - 1) {
+    for (unsigned lanes = transformed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         unsigned box = q->box[n];
         if (!kernel_local_cut(l->ends, n, &box)) continue;
@@ -33,9 +33,9 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
     }
     stages->cast(t, l, type);
     stages->finish(t, l, type);
-    for (unsigned lanes = showing & ~placed; lanes; lanes &= lanes - 1) {
+    for (unsigned lanes = showing & ~transformed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        kernel_tile_meet_cell(t, l->volume, l->part, q->cell[n], stages->is_pencil, q->blocks[n], l->take);
+        kernel_tile_process_cell(t, l->volume, l->part, q->cell[n], stages->is_pencil, q->blocks[n], l->take);
     }
     kernel_local_pop(q);
 }
@@ -47,13 +47,13 @@ SIMD_INLINE void kernel_local_end(kernel_tile_trace *t, kernel_local_lanes *l)
 }
 
 /* Queues a hex, wedge or pyramid. */
-SIMD_INLINE void kernel_local_wait(kernel_tile_trace *t, kernel_local_lanes *l, int part, int type, uint32_t cell,
-                                   unsigned blocks, unsigned box)
+SIMD_INLINE void kernel_local_enqueue(kernel_tile_trace *t, kernel_local_lanes *l, int part, int type, uint32_t cell,
+                                      unsigned blocks, unsigned box)
 {
     const int queue = kernel_local_queue_of(type);
     if (part != l->part) {
         kernel_local_end(t, l);
-        kernel_local_lanes_turn(t, l, part);
+        kernel_local_lanes_set_part(t, l, part);
     }
     if (KERNEL_OF_TYPE(type, kernel_local_push, &l->arrays, &l->queues[queue], cell, blocks, box))
         kernel_local_run(t, l, queue);

@@ -21,7 +21,7 @@
 #include "kernel_local_run.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
-#include "kernel_placed.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_samples.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_cells.h"
@@ -79,7 +79,7 @@ static __attribute__((noinline, cold)) void kernel_local_decide(kernel_tile_trac
     kernel_volume_state state = {b->lanes.volume, &b->packets[at / SIMD_WIDTH].samples};
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_local_lanes *l = &b->lanes;
-    if (!kernel_tile_ready_alone(t, l->volume, l->part, q->cell[lane], true, lane, &l->alone)) return;
+    if (!kernel_tile_ready_single(t, l->volume, l->part, q->cell[lane], true, lane, &l->alone)) return;
     const vm ray = vm_and(p->active, vm_from_bits(1u << at % SIMD_WIDTH));
     const int intervals = kernel_curved_intervals(p, &cells->cell, ray, list);
     for (int k = 0; k < intervals; k++)
@@ -102,9 +102,10 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batc
     const vf place[3] = {rays.rays.origin_x + rays.rays.slope_x * depth, rays.rays.origin_y + rays.rays.slope_y * depth,
                          depth};
     const vm known = kernel_local_find(type, &b->lanes.cells, rays.lane, place, &points);
-    const vf inside = kernel_local_inside(type, points.r), blur = kernel_take(b->lanes.cells.blur, rays.lane);
-    const vm own = vm_and(vm_and(active, known), vf_lt(blur, inside));
-    const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -blur)));
+    const vf inside = kernel_local_inside(type, points.r),
+             error_bound = kernel_gather_lane(b->lanes.cells.error_bound, rays.lane);
+    const vm own = vm_and(vm_and(active, known), vf_lt(error_bound, inside));
+    const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -error_bound)));
     vf_store(values, kernel_local_value(type, &b->lanes.cells, rays.lane, &points));
     const vi numbers = bits >> KERNEL_LOCAL_NUMBER;
     memcpy(at, &rays.at, sizeof at);
@@ -160,8 +161,8 @@ SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batc
     kernel_lane_rays rays;
     vf base, step, near, far;
     kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_bytes(b->lanes.rays.lane + n));
-    const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
-    kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
+    const vf depth = kernel_gather_lane(b->lanes.cells.origin[2], rays.lane);
+    kernel_local_slab_interval(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
     const vf inverse = 1.0f / step, begin = depth - base, end = vf_min(depth + far, vf_gather(b->far, rays.at)) - base;
     const float zero = (float)b->first;
@@ -187,19 +188,19 @@ static __attribute__((noinline)) void kernel_local_cast(kernel_tile_trace *t, ke
 
 /* ---- cells ---- */
 
-static unsigned kernel_local_place_lanes(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes)
+static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes)
 {
     vf lists[4][8];
-    return KERNEL_OF_TYPE(type, kernel_local_place, t, l, lists, 4, KERNEL_LOCAL_BENT, lanes);
+    return KERNEL_OF_TYPE(type, kernel_local_transform, t, l, lists, 4, KERNEL_LOCAL_BENT, lanes);
 }
 
-static const kernel_local_stages kernel_sample_stages = {true, kernel_local_place_lanes, kernel_local_cast,
+static const kernel_local_stages kernel_sample_stages = {true, kernel_local_transform_lanes, kernel_local_cast,
                                                          kernel_local_fill};
 
 /* Begins the samples of a volume in a window. The packets of the given blocks must be set up. */
 SIMD_INLINE void kernel_local_samples_begin(const kernel_tile_trace *t, kernel_local_batch *b,
                                             kernel_tile_ray_samples *packets, unsigned blocks, int volume,
-                                            kernel_tile_take *take)
+                                            kernel_tile_trace_cell *take)
 {
     b->packets = packets;
     b->pad = 0;

@@ -37,8 +37,8 @@ typedef struct kernel_tile_ray_segments {
 } kernel_tile_ray_segments;
 
 /* Callback that adds a cell's segments on the packet's active rays. map is NULL for a constant field. */
-typedef void kernel_ray_segments_take(kernel_packet *p, kernel_segment_state *state, const kernel_cell *c,
-                                      const kernel_map *map);
+typedef void kernel_ray_segments_callback(kernel_packet *p, kernel_segment_state *state, const kernel_cell *c,
+                                          const kernel_map *map);
 
 /* A list of rays that have passed a stage, one word per ray: the pixel in the tile from bit 0 on, the lane of the cell
  * from KERNEL_LOCAL_CELL on, and the numbers of the two crossed faces from KERNEL_LOCAL_FACES on, three bits each. */
@@ -49,27 +49,27 @@ typedef struct kernel_local_list {
 
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
 
-typedef struct kernel_local_stretches {
-    kernel_local_lanes lanes;          /* must be the first member, as callbacks get it alone */
-    kernel_tile_ray_segments *packets; /* packets of the tile */
-    unsigned blocks;                   /* blocks of the current window */
-    kernel_ray_segments_take *alone;   /* callback that processes rays in a single cell */
+typedef struct kernel_local_segment_batch {
+    kernel_local_lanes lanes;            /* must be the first member, as callbacks get it alone */
+    kernel_tile_ray_segments *packets;   /* packets of the tile */
+    unsigned blocks;                     /* blocks of the current window */
+    kernel_ray_segments_callback *alone; /* callback that processes rays in a single cell */
     kernel_local_faces faces;
     kernel_local_budget budget;
     kernel_local_list met, crossed[2];
     /* By packet and lane: begin and end of the window, side by side; likewise begin and end of the ray. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
-} kernel_local_stretches;
+} kernel_local_segment_batch;
 
 /* Returns whether segments of cells of this type are computed in lanes in this frame. */
 SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
 {
-    return kernel_segments_fit(f) && f->pieces[0].swings && kernel_local_queue_of(type) >= 0;
+    return kernel_segments_fit(f) && f->pieces[0].variations && kernel_local_queue_of(type) >= 0;
 }
 
 /* Adds a segment to the list of the ray at `at`, if it begins before the window's end. It must not begin before the
  * window. */
-SIMD_INLINE void kernel_local_put(const kernel_local_stretches *b, int at, const kernel_segment *s)
+SIMD_INLINE void kernel_local_put(const kernel_local_segment_batch *b, int at, const kernel_segment *s)
 {
     kernel_tile_ray_segments *r = &b->packets[at / SIMD_WIDTH];
     kernel_segments *list = &r->list;
@@ -77,8 +77,9 @@ SIMD_INLINE void kernel_local_put(const kernel_local_stretches *b, int at, const
     if (!(s->t_in < list->t_end[lane])) return;
     const kernel_segment_double precise = {s->t_out - s->t_in, 0, 0, 0};
     if (__builtin_expect(kernel_segments_put(list, lane, s, &precise), 1)) return;
-    const kernel_run run = kernel_run_of((vf_set(s->t_out) - s->t_in) * list->per_t, vf_set(s->v_in), vf_set(s->v_out));
-    kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->heap);
+    const kernel_unit_segment run =
+        kernel_unit_segment_of((vf_set(s->t_out) - s->t_in) * list->per_t, vf_set(s->v_in), vf_set(s->v_out));
+    kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->unsorted_light);
 }
 
 /* Coefficients of a polynomial that is zero at u = -1/2 and 1/2. kernel_local_deviation() returns its value at u,
@@ -101,7 +102,7 @@ SIMD_INLINE vf kernel_local_primitive(const kernel_local_polynomial *p, vf u)
 
 /* Adds one segment per lane to the lists of the given rays. ends: t_in, t_out, v_in, v_out; places: position of each
  * ray's pixel among the packets. */
-SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, vi places, vm rays, const vf ends[4])
+SIMD_INLINE void kernel_local_put_all(const kernel_local_segment_batch *b, vi places, vm rays, const vf ends[4])
 {
     kernel_segment all[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
@@ -114,21 +115,21 @@ SIMD_INLINE void kernel_local_put_all(const kernel_local_stretches *b, vi places
 }
 
 /* Adds the segments of rays for which one segment is enough. */
-SIMD_INLINE void kernel_local_emit_one(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays)
+SIMD_INLINE void kernel_local_emit_one(const kernel_local_segment_batch *b, const kernel_local_pairs *p, vm rays)
 {
-    const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_lift(p);
+    const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_chord_offset(p);
     const vf ends[4] = {t0, t1, p->ends[0].value + lift, p->ends[1].value + lift};
     kernel_local_put_all(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
 }
 
 /* Adds the segments of rays that need several: equal subintervals of the interval, with chords that have the mean of
  * the polynomial through the sampled values. */
-static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_stretches *b,
+static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_segment_batch *b,
                                                              const kernel_local_pairs *p, vm rays)
 {
     const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].value,
              v1 = p->ends[1].value;
-    const vf share = 1.0f / p->count, span = t1 - t0, rise = v1 - v0;
+    const vf share = 1.0f / p->count, cell_interval = t1 - t0, rise = v1 - v0;
     kernel_local_polynomial f = {.a = 4.0f * d[1], .b = (32.0f / 3) * (d[2] - d[0])};
     f.c = 16.0f * ((8.0f / 3) * (d[0] + d[2]) - f.a);
     vf from = t0, u0 = vf_set(-0.5f), off0 = vf_set(0), sum0 = kernel_local_primitive(&f, u0);
@@ -137,7 +138,7 @@ static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_
         const vf number = vf_set((float)n), along = number * share;
         const vm inner = vm_and(open, vf_lt(number, p->count));
         const vf u1 = vf_select(inner, along - 0.5f, vf_set(0.5f)), sum1 = kernel_local_primitive(&f, u1);
-        const vf to = vf_select(inner, t0 + span * along, t1), off1 = kernel_local_deviation(&f, u1);
+        const vf to = vf_select(inner, t0 + cell_interval * along, t1), off1 = kernel_local_deviation(&f, u1);
         const vf lift = (sum1 - sum0) * p->count - 0.5f * (off0 + off1);
         const vf in = (v0 + (u0 + 0.5f) * rise) + (off0 + lift), out = (v1 - (0.5f - u1) * rise) + (off1 + lift);
         const vf ends[4] = {from, to, in, out};
@@ -150,7 +151,7 @@ static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_
     }
 }
 
-SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel_local_pairs *p, vm rays)
+SIMD_INLINE void kernel_local_emit(const kernel_local_segment_batch *b, const kernel_local_pairs *p, vm rays)
 {
     const vm single = vm_and(rays, vf_le(p->count, vf_set(1))), more = vm_andnot(rays, single);
     kernel_local_emit_one(b, p, single);
@@ -190,7 +191,7 @@ SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_loca
 /* Adds the segments of rays for which one polynomial is not accurate enough: their intervals are divided into halves,
  * quarters or eighths, with a polynomial for each part. Returns the rays for which eighths are not accurate enough
  * either. */
-SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_local_stretches *b,
+SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_local_segment_batch *b,
                                      const kernel_local_pairs *whole, vm rays, int type)
 {
     kernel_local_division d;
@@ -210,7 +211,7 @@ SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_lo
 }
 
 static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_tile_trace *t,
-                                                                const kernel_local_stretches *b,
+                                                                const kernel_local_segment_batch *b,
                                                                 const kernel_local_pairs *whole, vm rays, int type)
 {
     return KERNEL_OF_TYPE(type, kernel_local_by_parts, t, b, whole, rays);
@@ -219,9 +220,9 @@ static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_til
 /* ---- rays ---- */
 
 /* Processes the rays in `wanted` in single cells; rays of the same cell and packet are processed together. */
-static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_trace *t, kernel_local_stretches *b,
-                                                                  const kernel_local_queue *q,
-                                                                  const kernel_lane_rays *rays, unsigned wanted)
+static __attribute__((noinline)) void
+kernel_local_segments_process_singly(kernel_tile_trace *t, kernel_local_segment_batch *b, const kernel_local_queue *q,
+                                     const kernel_lane_rays *rays, unsigned wanted)
 {
     int32_t at[SIMD_WIDTH], lane[SIMD_WIDTH];
     memcpy(at, &rays->at, sizeof at);
@@ -238,7 +239,7 @@ static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_tr
         }
         kernel_local_lanes *l = &b->lanes;
         const uint32_t cell = q->cell[lane[first]];
-        if (!kernel_tile_ready_alone(t, l->volume, l->part, cell, false, lane[first], &l->alone)) continue;
+        if (!kernel_tile_ready_single(t, l->volume, l->part, cell, false, lane[first], &l->alone)) continue;
         const kernel_cell *c = &t->thread->tile_cells->cell;
         kernel_packet *p = &t->packets[packet];
         const vm active = p->active;
@@ -254,7 +255,7 @@ SIMD_INLINE void kernel_local_list_add(kernel_local_list *list, vm rays, vi word
 }
 
 /* Loads the rays of a list from index n on; returns the lanes that have one. */
-SIMD_INLINE vm kernel_local_list_take(const kernel_local_list *list, const kernel_tile *tile, int n, vi *words,
+SIMD_INLINE vm kernel_local_list_load(const kernel_local_list *list, const kernel_tile *tile, int n, vi *words,
                                       kernel_lane_rays *rays)
 {
     const int left = list->count - n;
@@ -266,23 +267,24 @@ SIMD_INLINE vm kernel_local_list_take(const kernel_local_list *list, const kerne
 
 /* Finds, for a vector of rays from index n on, the faces of their cells that they cross. Rays that cross two faces are
  * listed in `crossed`; uncertain rays are processed in single cells. */
-SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_stretches *b,
+SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_segment_batch *b,
                                              const kernel_local_queue *q, int type, int n)
 {
     kernel_lane_rays rays;
     kernel_curved_crossed crossed;
     vi words;
-    const vm all = kernel_local_list_take(&b->met, &t->tile, n, &words, &rays);
+    const vm all = kernel_local_list_load(&b->met, &t->tile, n, &words, &rays);
     kernel_local_find_faces(&b->faces, &rays, all, type, &crossed);
     const vm on_quad = kernel_curved_on_quad(type, 0, crossed.first);
     words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
     if (kernel_has_triangles(type)) kernel_local_list_add(&b->crossed[1], vm_andnot(crossed.two, on_quad), words);
-    if (__builtin_expect(vm_any(crossed.alone), 0)) kernel_local_segments_alone(t, b, q, &rays, vm_bits(crossed.alone));
+    if (__builtin_expect(vm_any(crossed.alone), 0))
+        kernel_local_segments_process_singly(t, b, q, &rays, vm_bits(crossed.alone));
 }
 
 /* Adds the segments of a vector of rays, from index n on, each of which crosses two faces of its cell. */
-SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_stretches *b,
+SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_segment_batch *b,
                                              const kernel_local_queue *q, const kernel_local_list *list, int type,
                                              int n)
 {
@@ -290,7 +292,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     vi words;
     vf end, near, far;
     p.unseen = 1;
-    p.active = kernel_local_list_take(list, &t->tile, n, &words, &p.rays);
+    p.active = kernel_local_list_load(list, &t->tile, n, &words, &p.rays);
     const kernel_curved_crossed crossed = {p.active, vm_none(), words >> KERNEL_LOCAL_FACES & 7,
                                            words >> (KERNEL_LOCAL_FACES + 3) & 7};
     kernel_local_cross(&b->faces, &p.rays, &crossed, type, p.ends);
@@ -305,11 +307,11 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     const vm coarse = vm_and(p.active, kernel_local_count(t, &b->budget, &p));
     kernel_local_emit(b, &p, vm_andnot(p.active, coarse));
     if (__builtin_expect(vm_any(coarse), 0)) alone = vm_or(alone, kernel_local_segments_parts(t, b, &p, coarse, type));
-    if (__builtin_expect(vm_any(alone), 0)) kernel_local_segments_alone(t, b, q, &p.rays, vm_bits(alone));
+    if (__builtin_expect(vm_any(alone), 0)) kernel_local_segments_process_singly(t, b, q, &p.rays, vm_bits(alone));
 }
 
 /* Lists those of the rays from index n on that may meet their cells within the window. */
-SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_local_stretches *b, int n)
+SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, kernel_local_segment_batch *b, int n)
 {
     const int left = b->lanes.rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
@@ -317,15 +319,15 @@ SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_l
     kernel_lane_rays rays;
     vf near, far, begin, end;
     kernel_lane_rays_of(&rays, &t->tile, pixel, lane);
-    const vf depth = kernel_take(b->lanes.cells.origin[2], rays.lane);
-    kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
+    const vf depth = kernel_gather_lane(b->lanes.cells.origin[2], rays.lane);
+    kernel_local_slab_interval(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
     const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
     kernel_local_list_add(&b->met, vm_and(active, meets), pixel | lane << KERNEL_LOCAL_CELL);
 }
 
-SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_local_stretches *b, const kernel_local_queue *q,
-                                           int type)
+SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_local_segment_batch *b,
+                                           const kernel_local_queue *q, int type)
 {
     for (int i = 0; i < 2; i++) b->crossed[i].count = 0;
     for (int n = 0; n < b->met.count; n += SIMD_WIDTH) kernel_local_segments_faces(t, b, q, type, n);
@@ -336,10 +338,10 @@ SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_local_st
 
 static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, kernel_local_lanes *l, int type)
 {
-    kernel_local_stretches *b = (kernel_local_stretches *)l;
+    kernel_local_segment_batch *b = (kernel_local_segment_batch *)l;
     kernel_pixel_list_close(&l->rays);
     b->met.count = 0;
-    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_segments_meet(t, b, n);
+    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_segments_overlap(t, b, n);
     KERNEL_OF_TYPE(type, kernel_local_segments_met, t, b, &l->queues[kernel_shape_number(type)]);
     l->rays.count = 0;
 }
@@ -348,12 +350,12 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 
 /* Transforms the queue's cells into tile space; returns the visible ones, and stores in *lanes those that can be
  * processed in lanes. */
-SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, kernel_local_stretches *b,
-                                                    unsigned *lanes, int type)
+SIMD_INLINE unsigned kernel_local_segments_transform_of_type(const kernel_tile_trace *t, kernel_local_segment_batch *b,
+                                                             unsigned *lanes, int type)
 {
     vf lists[5][8];
     kernel_local_rank((double(*const)[8][SIMD_WIDTH])b->lanes.world, grid_type_vertices(type), lists[4]);
-    const unsigned showing = kernel_local_place(t, &b->lanes, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes, type);
+    const unsigned showing = kernel_local_transform(t, &b->lanes, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes, type);
     kernel_local_faces_of(&t->tile, lists, b->lanes.ends, type, &b->faces);
     kernel_local_nonlinear_of(&b->lanes.cells, type, &b->budget.nonlinear);
     return showing;
@@ -363,16 +365,17 @@ SIMD_INLINE unsigned kernel_local_segments_place_of(const kernel_tile_trace *t, 
 SIMD_INLINE vm kernel_local_is_steep(const kernel_local_budget *b)
 {
     const kernel_segment_state state = {.pieces = b->pieces};
-    const kernel_span all = {.step_count = b->pieces->step_count};
+    const kernel_cell_interval all = {.step_count = b->pieces->step_count};
     const vf low = vf_load(b->bounds.low), high = vf_load(b->bounds.high);
-    return vm_or(kernel_span_is_steep(&state, low, high, false), kernel_span_steps(&state, &all, low, high));
+    return vm_or(kernel_cell_interval_is_steep(&state, low, high, false),
+                 kernel_cell_interval_steps(&state, &all, low, high));
 }
 
-static __attribute__((noinline)) unsigned kernel_local_segments_place(kernel_tile_trace *t, kernel_local_lanes *l,
-                                                                      int type, unsigned *lanes)
+static __attribute__((noinline)) unsigned kernel_local_segments_transform(kernel_tile_trace *t, kernel_local_lanes *l,
+                                                                          int type, unsigned *lanes)
 {
-    kernel_local_stretches *b = (kernel_local_stretches *)l;
-    const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_place_of, t, b, lanes);
+    kernel_local_segment_batch *b = (kernel_local_segment_batch *)l;
+    const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_transform_of_type, t, b, lanes);
     const float(*values)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])b->faces.at[3];
     KERNEL_OF_TYPE(type, kernel_local_bound, &b->budget, values);
     *lanes &= ~vm_bits(kernel_local_is_steep(&b->budget));
@@ -392,7 +395,7 @@ SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kern
 }
 
 /* Lowers the far limit of the blocks in which a ray's window has been shortened. */
-SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_local_stretches *b)
+SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_local_segment_batch *b)
 {
     for (unsigned blocks = b->blocks; blocks; blocks &= blocks - 1) {
         const int block = __builtin_ctz(blocks);
@@ -410,16 +413,16 @@ SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_loca
 static void kernel_local_segments_finish(kernel_tile_trace *t, kernel_local_lanes *l, int unused)
 {
     (void)unused;
-    kernel_local_segments_shorten(t, (kernel_local_stretches *)l);
+    kernel_local_segments_shorten(t, (kernel_local_segment_batch *)l);
 }
 
-static const kernel_local_stages kernel_segment_stages = {false, kernel_local_segments_place,
+static const kernel_local_stages kernel_segment_stages = {false, kernel_local_segments_transform,
                                                           kernel_local_segments_cast, kernel_local_segments_finish};
 
 /* Copies the packets' windows and the limits of their rays into arrays per pixel. */
-static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_stretches *b,
-                                        kernel_tile_ray_segments *packets, unsigned blocks, kernel_tile_take *take,
-                                        kernel_ray_segments_take *alone)
+static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_segment_batch *b,
+                                        kernel_tile_ray_segments *packets, unsigned blocks,
+                                        kernel_tile_trace_cell *take, kernel_ray_segments_callback *alone)
 {
     b->packets = packets;
     b->alone = alone;

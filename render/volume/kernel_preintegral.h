@@ -40,21 +40,21 @@
 #define KERNEL_PRE_PARTS 32.0f
 
 /* The position of a value in the tables of sums. */
-typedef struct kernel_pre_end {
+typedef struct kernel_preint_end {
     /* place: position within the bin, 0 .. 1; it may be outside this range in the first and the last bin */
     vf value, bin, place;
-    vf own[4], rough;     /* own: the bin's sums of extinction and emission; rough: the error bound of the bin */
-    vi before[4], colour; /* before: the sums of all earlier bins */
-} kernel_pre_end;
+    vf own[4], table_error; /* own: the bin's sums of extinction and emission; rough: the error bound of the bin */
+    vi before[4], colour;   /* before: the sums of all earlier bins */
+} kernel_preint_end;
 
 /* The light of a segment or of a subinterval of it, and bounds of its error. */
-typedef struct kernel_pre_subinterval {
+typedef struct kernel_preint_subinterval {
     vf colour[3], depth, absorbed;
     /* error: due to absorption within the segment; rough: due to the tables; allowed: error budget */
-    vf error, rough, allowed;
-} kernel_pre_subinterval;
+    vf error, table_error, allowed;
+} kernel_preint_subinterval;
 
-SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_pre_end *e)
+SIMD_INLINE void kernel_preint_find(const kernel_preintegral *t, vf value, kernel_preint_end *e)
 {
     const vf y = (value - t->low) * t->inverse + 1.0f;
     const float *entries = (const float *)t->entries;
@@ -69,13 +69,13 @@ SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_p
     vf_gather_rows(entries + 4, at, e->own);
     vf_gather_rows(entries + 8, at, rest);
     for (int i = 0; i < 4; i++) e->before[i] = vi_from_bits(before[i]);
-    e->rough = rest[1];
+    e->table_error = rest[1];
     e->colour = vi_from_bits(rest[0]);
 }
 
 /* Returns 1 - exp(-y). *share receives this number divided by y. For small y the series is used, whose first omitted
  * term is y^6 / 5040. */
-SIMD_INLINE vf kernel_gone(vf y, vf *share)
+SIMD_INLINE vf kernel_absorbed_share(vf y, vf *share)
 {
     vf p = y * (-1.0f / 720) + 1.0f / 120;
     p = p * y - 1.0f / 24;
@@ -92,13 +92,13 @@ SIMD_INLINE vf kernel_gone(vf y, vf *share)
     return gone;
 }
 
-SIMD_INLINE vf kernel_pre_channel(const kernel_preintegral *t, vi colour, int channel)
+SIMD_INLINE vf kernel_preint_channel(const kernel_preintegral *t, vi colour, int channel)
 {
     return vf_from_vi(colour >> (10 * channel) & 1023) * t->colour_unit;
 }
 
 /* Returns an upper bound of the deviation of a colour channel from its chord between two values. */
-SIMD_INLINE vf kernel_pre_bend(const kernel_preintegral *t, vf v0, vf v1)
+SIMD_INLINE vf kernel_preint_bend(const kernel_preintegral *t, vf v0, vf v1)
 {
     const vf width = vf_abs(v1 - v0), low = vf_min(v0, v1), high = vf_max(v0, v1);
     const vm outside = vm_or(vf_lt(low, vf_set(0)), vf_lt(vf_set(1), high));
@@ -106,8 +106,8 @@ SIMD_INLINE vf kernel_pre_bend(const kernel_preintegral *t, vf v0, vf v1)
     return bend + vf_select(outside, vf_min(width * t->bend_at_ends, vf_set(t->contrast)), vf_set(0));
 }
 
-SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pre_end *a, const kernel_pre_end *b,
-                                    vf length, kernel_pre_subinterval *out)
+SIMD_INLINE void kernel_preint_between(const kernel_preintegral *t, const kernel_preint_end *a,
+                                       const kernel_preint_end *b, vf length, kernel_preint_subinterval *out)
 {
     const vf one = vf_set(1), bins = vf_abs(b->bin - a->bin);
     const vm same = vf_eq(a->bin, b->bin), rising = vf_lt(a->bin, b->bin);
@@ -120,56 +120,56 @@ SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pr
         sum[i] = ((all - own) + (of_a * a->own[i] + of_b * b->own[i])) * per_bin;
     }
     out->depth = sum[0] * t->depth_unit;
-    const vf gone = kernel_gone(0.5f * out->depth, &mean);
+    const vf gone = kernel_absorbed_share(0.5f * out->depth, &mean);
     /* mean transmittance along the segment, which is its absorption divided by its optical depth */
     mean *= 1.0f - 0.5f * gone;
     const vf lost = 1.0f - mean, square = lost * lost * (1.0f + lost);
     mean *= t->light_unit;
     out->absorbed = gone * (2.0f - gone);
     for (int c = 0; c < 3; c++) {
-        const vf rise = kernel_pre_channel(t, b->colour, c) - kernel_pre_channel(t, a->colour, c);
+        const vf rise = kernel_preint_channel(t, b->colour, c) - kernel_preint_channel(t, a->colour, c);
         change = vf_max(change, vf_abs(rise));
         out->colour[c] = sum[1 + c] * mean - (0.25f * rise) * square;
     }
-    const vf rough = (a->rough + b->rough) * vf_min(one, 0.5f * inverse);
-    out->error = (0.25f * change + kernel_pre_bend(t, a->value, b->value)) * square;
-    out->rough = rough * length;
+    const vf table_error = (a->table_error + b->table_error) * vf_min(one, 0.5f * inverse);
+    out->error = (0.25f * change + kernel_preint_bend(t, a->value, b->value)) * square;
+    out->table_error = table_error * length;
     out->allowed = out->absorbed * t->allowed_absorbed + length * t->allowed_length;
 }
 
 /* Integrates the segment in `count` subintervals of equal value ranges. Each ray has its own count, and so its result
  * does not depend on other lanes. */
-static __attribute__((noinline)) void kernel_pre_subdivide(const kernel_preintegral *t, const kernel_pre_end *from,
-                                                           vf v_out, vf length, vf count, int most,
-                                                           kernel_pre_subinterval *all)
+static __attribute__((noinline)) void kernel_preint_subdivide(const kernel_preintegral *t,
+                                                              const kernel_preint_end *from, vf v_out, vf length,
+                                                              vf count, int most, kernel_preint_subinterval *all)
 {
     const vf zero = vf_set(0), share = 1.0f / count, rise = (v_out - from->value) * share;
-    kernel_pre_end ends[2] = {*from};
-    vf clear = vf_set(1), rough = zero;
-    *all = (kernel_pre_subinterval){{zero, zero, zero}, zero, zero, zero, zero, zero};
+    kernel_preint_end ends[2] = {*from};
+    vf clear = vf_set(1), table_error = zero;
+    *all = (kernel_preint_subinterval){{zero, zero, zero}, zero, zero, zero, zero, zero};
     for (int n = 1; n <= most; n++) {
         const vf number = vf_set((float)n);
         const vm inner = vf_lt(number, count), open = vf_le(number, count);
-        kernel_pre_subinterval sub;
-        kernel_pre_find(t, vf_select(inner, from->value + rise * number, v_out), &ends[n & 1]);
-        kernel_pre_between(t, &ends[~n & 1], &ends[n & 1], vf_select(open, length * share, zero), &sub);
+        kernel_preint_subinterval sub;
+        kernel_preint_find(t, vf_select(inner, from->value + rise * number, v_out), &ends[n & 1]);
+        kernel_preint_between(t, &ends[~n & 1], &ends[n & 1], vf_select(open, length * share, zero), &sub);
         for (int c = 0; c < 3; c++) all->colour[c] += clear * sub.colour[c];
         all->depth += sub.depth;
         all->error += clear * sub.error;
-        rough += sub.rough;
+        table_error += sub.table_error;
         clear -= clear * sub.absorbed;
     }
     all->absorbed = 1.0f - clear;
-    all->rough = all->absorbed * rough;
+    all->table_error = all->absorbed * table_error;
 }
 
-static __attribute__((noinline)) void kernel_integrate_apart(const kernel_pieces *t, vm rays, const kernel_run *run,
-                                                             kernel_light *light)
+static __attribute__((noinline)) void kernel_integrate_apart(const kernel_pieces *t, vm rays,
+                                                             const kernel_unit_segment *run, kernel_light *light)
 {
     kernel_integrate(t, rays, run, light);
 }
 
-SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_pre_subinterval *sub, const kernel_light *light)
+SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_preint_subinterval *sub, const kernel_light *light)
 {
     kernel_light out;
     for (int c = 0; c < 3; c++) out.colour[c] = vf_select(m, sub->colour[c], light->colour[c]);
@@ -179,28 +179,30 @@ SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_pre_subinterval 
 }
 
 /* Integrates the rays for which one subinterval is not accurate enough. */
-static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pieces, vm rays,
-                                                        const kernel_pre_end *from, const kernel_run *run,
-                                                        const kernel_pre_subinterval *whole, kernel_light *light)
+static __attribute__((noinline)) void kernel_preint_finely(const kernel_pieces *pieces, vm rays,
+                                                           const kernel_preint_end *from,
+                                                           const kernel_unit_segment *run,
+                                                           const kernel_preint_subinterval *whole, kernel_light *light)
 {
-    const vf room = vf_max(whole->allowed - whole->rough, vf_set(1e-30f));
+    const vf room = vf_max(whole->allowed - whole->table_error, vf_set(1e-30f));
     const vf wanted = vf_sqrt(vf_min(whole->error / room, vf_set(1e6f))) * 1.1f;
     const vm few = vm_and(rays, vf_le(wanted, vf_set(KERNEL_PRE_PARTS)));
     vm left = rays;
     if (vm_any(few)) {
-        kernel_pre_subinterval subdivisions;
+        kernel_preint_subinterval subdivisions;
         const vf count = vf_select(few, 1.0f + vf_floor(wanted), vf_set(1));
-        kernel_pre_subdivide(pieces->preintegral, from, run->v_out, run->length, count, (int)vf_reduce_max(count),
-                             &subdivisions);
-        const vm good = vm_and(few, vf_le(subdivisions.error + subdivisions.rough, whole->allowed - whole->rough));
+        kernel_preint_subdivide(pieces->preintegral, from, run->v_out, run->length, count, (int)vf_reduce_max(count),
+                                &subdivisions);
+        const vm good =
+            vm_and(few, vf_le(subdivisions.error + subdivisions.table_error, whole->allowed - whole->table_error));
         *light = kernel_light_select(good, &subdivisions, light);
         left = vm_andnot(rays, good);
     }
     if (!vm_any(left)) return;
     kernel_light exact = kernel_clear();
     kernel_integrate_apart(pieces, left, run, &exact);
-    const kernel_pre_subinterval sub = {.colour = {exact.colour[0], exact.colour[1], exact.colour[2]},
-                                        .depth = exact.depth};
+    const kernel_preint_subinterval sub = {.colour = {exact.colour[0], exact.colour[1], exact.colour[2]},
+                                           .depth = exact.depth};
     *light = kernel_light_select(left, &sub, light);
     light->transmittance = vf_select(left, exact.transmittance, light->transmittance);
 }
@@ -208,18 +210,18 @@ static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pie
 /* Returns the light of the segment alone, within the error budget; kernel_integrate() would compute it exactly. *end:
  * table position of the end of the rays' previous segments, which is reused if it is the begin of this one; it becomes
  * the end of this one. */
-SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_run *run,
-                                              kernel_pre_end *end)
+SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_unit_segment *run,
+                                              kernel_preint_end *end)
 {
     kernel_light light = kernel_clear();
-    kernel_pre_end next;
-    kernel_pre_subinterval sub;
-    if (vm_any(vm_andnot(rays, vf_eq(end->value, run->v_in)))) kernel_pre_find(pieces->preintegral, run->v_in, end);
-    kernel_pre_find(pieces->preintegral, run->v_out, &next);
-    kernel_pre_between(pieces->preintegral, end, &next, run->length, &sub);
-    const vm good = vf_le(sub.error + sub.rough, sub.allowed);
+    kernel_preint_end next;
+    kernel_preint_subinterval sub;
+    if (vm_any(vm_andnot(rays, vf_eq(end->value, run->v_in)))) kernel_preint_find(pieces->preintegral, run->v_in, end);
+    kernel_preint_find(pieces->preintegral, run->v_out, &next);
+    kernel_preint_between(pieces->preintegral, end, &next, run->length, &sub);
+    const vm good = vf_le(sub.error + sub.table_error, sub.allowed);
     light = kernel_light_select(good, &sub, &light);
-    if (vm_any(vm_andnot(rays, good))) kernel_pre_finely(pieces, vm_andnot(rays, good), end, run, &sub, &light);
+    if (vm_any(vm_andnot(rays, good))) kernel_preint_finely(pieces, vm_andnot(rays, good), end, run, &sub, &light);
     *end = next;
     return light;
 }

@@ -61,8 +61,8 @@ SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s
 
 /* Finds the window's samples that may lie in the interval of some ray, as indices *begin .. *end - 1 into the
  * window. */
-SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
-                                    int *begin, int *end)
+SIMD_INLINE void kernel_sample_range(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
+                                     int *begin, int *end)
 {
     const vf from = (i->t_in - p->sample_base) * p->sample_inverse;
     const vf to = (i->t_out - p->sample_base) * p->sample_inverse;
@@ -146,7 +146,7 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
                              const kernel_interval *i)
 {
     int begin, end;
-    kernel_sample_span(p, state->samples, i, &begin, &end);
+    kernel_sample_range(p, state->samples, i, &begin, &end);
     if (begin < end) kernel_fill_some(p, state, map, i, begin, end);
 }
 
@@ -159,9 +159,9 @@ typedef struct kernel_blend {
     vf depth, lost[3];
     vf light; /* share of the light that passes all of this rank's samples so far */
     /* Used if all samples and segments are folded (render_fold.h). stretch: number of the last sample's interval of
-     * length 1 / FRAGMENT_STRETCHES; within: light that passes all samples so far. `light` is then the light at the end
+     * length 1 / FRAGMENT_INTERVALS; within: light that passes all samples so far. `light` is then the light at the end
      * of the last interval. */
-    vf stretch, within;
+    vf interval_number, within;
 } kernel_blend;
 
 /* Ends the current fragments of the rays in mask, and emits them if they are visible. */
@@ -171,23 +171,23 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
     if (!vm_any(closing)) return;
     const kernel_fragments ended = {
         b->t_first, b->t_last, {b->colour[0], b->colour[1], b->colour[2]}, b->transmittance, vf_set(0)};
-    kernel_emit(p, vm_and(closing, kernel_shows(b->colour, b->transmittance)), FRAGMENT_VOLUME, &ended);
+    kernel_emit(p, vm_and(closing, kernel_fragment_is_visible(b->colour, b->transmittance)), FRAGMENT_VOLUME, &ended);
     b->open = vm_andnot(b->open, closing);
 }
 
 /* Emits each sample or segment as a fragment for the fold, and marks those in front of which another rank may have
  * fragments. The current fragment then has no light of its own, so that nothing is emitted when it ends. */
-SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
-                                    vf clear)
+SIMD_INLINE void kernel_blend_separate(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
+                                       vf clear)
 {
     const vm fresh = vm_andnot(has, b->open);
     const kernel_fragments own = {
         t_in, t_out, {colour[0], colour[1], colour[2]}, clear, vf_select(fresh, vf_set(FRAGMENT_EARLY), vf_set(0))};
-    kernel_emit(p, vm_and(has, vm_or(fresh, kernel_shows(colour, clear))), FRAGMENT_VOLUME, &own);
-    const vf stretch = vf_floor(t_in * (float)FRAGMENT_STRETCHES);
-    const vm next = vm_andnot(has, vf_eq(stretch, b->stretch));
+    kernel_emit(p, vm_and(has, vm_or(fresh, kernel_fragment_is_visible(colour, clear))), FRAGMENT_VOLUME, &own);
+    const vf interval_number = vf_floor(t_in * (float)FRAGMENT_INTERVALS);
+    const vm next = vm_andnot(has, vf_eq(interval_number, b->interval_number));
     b->light = vf_select(next, b->within, b->light);
-    b->stretch = vf_select(has, stretch, b->stretch);
+    b->interval_number = vf_select(has, interval_number, b->interval_number);
     b->within = vf_select(has, b->within * clear, b->within);
     b->t_first = vf_select(fresh, t_in, b->t_first);
     b->t_last = vf_select(has, vf_select(fresh, t_out, vf_max(b->t_last, t_out)), b->t_last);
@@ -199,7 +199,7 @@ SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, v
 SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_samples *s, int n,
                                    const kernel_hits *hits, vf t)
 {
-    vm broken = hits->crowded;
+    vm broken = hits->overflowed;
     for (int i = 0; i < hits->cut_count; i++)
         broken = vm_or(broken, vm_and(vf_lt(b->t_last, hits->cut[i]), vf_le(hits->cut[i], t)));
     if (p->frame->needs_contact) {
@@ -218,7 +218,7 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
         const vf value = s->value[v][n];
         const vm has = vf_eq(value, value);
         vf absorbed, c[3];
-        const vf place = kernel_colour_place(&f->volumes[v], value);
+        const vf place = kernel_colour_position(&f->volumes[v], value);
         const vf opacity = vf_select(has, kernel_opacity_at(&f->volumes[v], place), vf_set(0));
         if (!vm_any(vf_lt(vf_set(0), opacity))) continue;
         const vf left = kernel_transmittance(opacity, f->volumes[v].exponent, &absorbed);
@@ -256,7 +256,7 @@ SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_blend *b, const ke
             b->contact_out = vf_select(has, s->t_out[n], b->contact_out);
         }
         if (is_folded) {
-            kernel_blend_apart(p, b, has, t, t, colour, clear);
+            kernel_blend_separate(p, b, has, t, t, colour, clear);
             continue;
         }
         b->t_first = vf_select(fresh, t, b->t_first);

@@ -23,8 +23,8 @@ typedef struct kernel_segment {
     float t_in, t_out, v_in, v_out;
 } kernel_segment;
 
-/* Exact length and rounding errors of a segment, used if no error is allowed (one lane of kernel_double). It is as
- * large as kernel_segment, so that one index serves both. */
+/* Exact length and rounding errors of a segment, used if no error is allowed (one lane of kernel_precise_interval). It
+ * is as large as kernel_segment, so that one index serves both. */
 typedef struct kernel_segment_double {
     float length, rest_in, rest_out, unused;
 } kernel_segment_double;
@@ -49,7 +49,7 @@ typedef struct kernel_segments {
     kernel_double_rays rays;
     /* Light of the segments that do not fit into a list because too many begin at the same t, as in meshes that overlap
      * many times. Such segments have no order; they are integrated here at once, and blended behind the window. */
-    kernel_light heap;
+    kernel_light unsorted_light;
     vf t_begin, t_end; /* depth interval of each ray's window */
     bool is_shortened; /* set when t_end has been lowered since the flag was last cleared */
     vf per_t;          /* number of unit distances (of the transfer function) per unit of t on each ray */
@@ -161,11 +161,11 @@ static void kernel_items_sort(kernel_segments *list, int lane)
     }
 }
 
-SIMD_INLINE void kernel_heap_clear(kernel_light *heap, int lane)
+SIMD_INLINE void kernel_heap_clear(kernel_light *unsorted_light, int lane)
 {
-    for (int a = 0; a < 3; a++) heap->colour[a][lane] = 0;
-    heap->depth[lane] = 0;
-    heap->transmittance[lane] = 1;
+    for (int a = 0; a < 3; a++) unsorted_light->colour[a][lane] = 0;
+    unsorted_light->depth[lane] = 0;
+    unsorted_light->transmittance[lane] = 1;
 }
 
 /* Makes space in a full list: the window ends at the begin of one of its farther segments, and all segments from there
@@ -182,7 +182,7 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
         list->t_end[lane] = simd_max(s->t_in, first);
         if (s->t_in < first) {
             list->count[lane] = 0;
-            kernel_heap_clear(&list->heap, lane);
+            kernel_heap_clear(&list->unsorted_light, lane);
         }
     } else {
         while (items[count].t_in == first) count++;
@@ -210,7 +210,7 @@ SIMD_INLINE bool kernel_segments_put(kernel_segments *list, int lane, const kern
 /* Adds the segment of each given ray to its list. The segments must begin in the rays' windows. precise: NULL unless
  * the list is in double. */
 SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays,
-                                     const kernel_interval *i, const kernel_double *precise)
+                                     const kernel_interval *i, const kernel_precise_interval *precise)
 {
     kernel_segment all[SIMD_WIDTH];
     kernel_segment_double doubles[SIMD_WIDTH];
@@ -233,10 +233,11 @@ SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segment
         if (!kernel_segments_put(list, lane, &all[lane], &doubles[lane])) left |= bits & -bits;
     }
     if (__builtin_expect(left != 0, 0)) {
-        kernel_run run = kernel_run_of((i->t_out - i->t_in) * list->per_t, i->v_in, i->v_out);
+        kernel_unit_segment run = kernel_unit_segment_of((i->t_out - i->t_in) * list->per_t, i->v_in, i->v_out);
         if (precise)
-            run = (kernel_run){precise->length * list->per_t, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
-        kernel_integrate(pieces, vm_from_bits(left), &run, &list->heap);
+            run = (kernel_unit_segment){precise->length * list->per_t, i->v_in, i->v_out, precise->rest_in,
+                                        precise->rest_out};
+        kernel_integrate(pieces, vm_from_bits(left), &run, &list->unsorted_light);
     }
 }
 
@@ -317,22 +318,22 @@ typedef struct kernel_segment_state {
      * step */
     float allowance;
     /* > 0: error allowed by mixing; segments are then emitted at once, to be mixed with other volumes
-     * (kernel_span_mixed()) */
+     * (kernel_cell_interval_subdivisions_mixed()) */
     float mixing;
     float reach; /* upper bound of a ray's length in the cells, in unit distances */
 } kernel_segment_state;
 
 /* A ray's interval in the current cell: how the field is computed on it, and how accurate it must be. */
-typedef struct kernel_span {
+typedef struct kernel_cell_interval {
     const kernel_map *map;   /* inverse map of the cell; NULL if the field is linear */
     const kernel_cell *cell; /* the cell; NULL for a tet or a polyhedron; without a map the cell is constant */
     const kernel_interval *interval;
-    const kernel_double *precise; /* exact length and values of a tet's interval, or NULL */
+    const kernel_precise_interval *precise; /* exact length and values of a tet's interval, or NULL */
     float cost; /* change of light per unit distance for a field error of 1; 0 if neither error nor mixing is limited */
     int first_step, step_count; /* the opacity's steps that lie within the range of the cell's values */
     /* whether a steep ramp, and a narrow ramp, lies within the range of the cell's values */
     bool is_steep, is_narrow;
-} kernel_span;
+} kernel_cell_interval;
 
 /* Returns bounds of the transfer function over the values from low to high, except at steps. */
 SIMD_INLINE kernel_bound kernel_bound_between(const kernel_pieces *t, float low, float high)
@@ -358,7 +359,8 @@ SIMD_INLINE float kernel_bound_cost(const kernel_pieces *t, const kernel_bound *
 }
 
 /* Computes the maximum of this cost over the cell's values, and finds the steps and ramps within these values. */
-SIMD_INLINE void kernel_span_bound(const kernel_segment_state *state, const float *values, int count, kernel_span *out)
+SIMD_INLINE void kernel_cell_interval_bound(const kernel_segment_state *state, const float *values, int count,
+                                            kernel_cell_interval *out)
 {
     const kernel_pieces *t = state->pieces;
     float low = values[0], high = low;
@@ -379,14 +381,14 @@ SIMD_INLINE void kernel_span_bound(const kernel_segment_state *state, const floa
     }
 }
 
-SIMD_INLINE vf kernel_span_value(kernel_packet *p, const kernel_span *span, vm rays, vf t)
+SIMD_INLINE vf kernel_cell_interval_value(kernel_packet *p, const kernel_cell_interval *cell_interval, vm rays, vf t)
 {
-    const kernel_interval *i = span->interval;
-    return span->map ? kernel_value_at(p, span->map, i, rays, t) : kernel_line_value(i, t);
+    const kernel_interval *i = cell_interval->interval;
+    return cell_interval->map ? kernel_value_at(p, cell_interval->map, i, rays, t) : kernel_line_value(i, t);
 }
 
 /* Returns the rays whose values from low to high meet a steep ramp, or, if is_narrow is set, a narrow one. */
-SIMD_INLINE vm kernel_span_is_steep(const kernel_segment_state *state, vf low, vf high, bool is_narrow)
+SIMD_INLINE vm kernel_cell_interval_is_steep(const kernel_segment_state *state, vf low, vf high, bool is_narrow)
 {
     vm any = vm_none();
     for (int i = 0; i < state->pieces->steep_count; i++) {
@@ -398,11 +400,12 @@ SIMD_INLINE vm kernel_span_is_steep(const kernel_segment_state *state, vf low, v
 }
 
 /* Returns the rays whose values from low to high contain a step of the opacity. */
-SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel_span *span, vf low, vf high)
+SIMD_INLINE vm kernel_cell_interval_steps(const kernel_segment_state *state, const kernel_cell_interval *cell_interval,
+                                          vf low, vf high)
 {
     vm any = vm_none();
-    for (int i = 0; i < span->step_count; i++) {
-        const vf cut = vf_set(state->pieces->steps[span->first_step + i].cut);
+    for (int i = 0; i < cell_interval->step_count; i++) {
+        const vf cut = vf_set(state->pieces->steps[cell_interval->first_step + i].cut);
         any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
     }
     return any;
@@ -412,48 +415,50 @@ SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel
  * most 4e-7. */
 #define KERNEL_VALUE_ROUNDING 1e-6f
 
-enum { KERNEL_STRETCH_LOOKS = 8 };
+enum { KERNEL_DEVIATION_SAMPLES = 8 };
 
 /* Deviation of the field from the chord between its values at the interval's ends, sampled at each eighth of the
  * interval. */
-typedef struct kernel_span_deviation {
+typedef struct kernel_cell_interval_deviation {
     vf most;
     /* deviation at the middle of a parabola whose second derivative is the mean absolute one of the field */
     vf bend;
     vf opacity; /* mean opacity along the interval, from samples at its quarters */
-} kernel_span_deviation;
+} kernel_cell_interval_deviation;
 
-/* Returns the mean size of the field's second derivative, as a deviation (kernel_span_deviation.bend). Subintervals of
- * length h deviate from their chords by h^2 / 12 of the second derivative on average, and the error of light is the
- * integral of that. Second differences over an eighth give the mean size; towards the ends they are extrapolated. */
-SIMD_INLINE vf kernel_span_bend(const vf off[KERNEL_STRETCH_LOOKS + 1])
+/* Returns the mean size of the field's second derivative, as a deviation (kernel_cell_interval_deviation.bend).
+ * Subintervals of length h deviate from their chords by h^2 / 12 of the second derivative on average, and the error of
+ * light is the integral of that. Second differences over an eighth give the mean size; towards the ends they are
+ * extrapolated. */
+SIMD_INLINE vf kernel_cell_interval_curvature(const vf off[KERNEL_DEVIATION_SAMPLES + 1])
 {
-    vf second[KERNEL_STRETCH_LOOKS], sum = vf_set(0);
-    for (int i = 1; i < KERNEL_STRETCH_LOOKS; i++) {
+    vf second[KERNEL_DEVIATION_SAMPLES], sum = vf_set(0);
+    for (int i = 1; i < KERNEL_DEVIATION_SAMPLES; i++) {
         second[i] = (off[i + 1] - off[i]) - (off[i] - off[i - 1]);
         sum += vf_abs(second[i]);
     }
     const vf begin = 2.0f * second[1] - second[2];
-    const vf end = 2.0f * second[KERNEL_STRETCH_LOOKS - 1] - second[KERNEL_STRETCH_LOOKS - 2];
+    const vf end = 2.0f * second[KERNEL_DEVIATION_SAMPLES - 1] - second[KERNEL_DEVIATION_SAMPLES - 2];
     return sum + 0.5f * (vf_abs(begin) + vf_abs(end));
 }
 
-SIMD_INLINE void kernel_span_deviate(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span,
-                                     vm rays, const kernel_interval *stretch, kernel_span_deviation *out)
+SIMD_INLINE void kernel_cell_interval_deviate(kernel_packet *p, const kernel_segment_state *state,
+                                              const kernel_cell_interval *cell_interval, vm rays,
+                                              const kernel_interval *stretch, kernel_cell_interval_deviation *out)
 {
     const vf t0 = stretch->t_in, length = stretch->t_out - t0, v0 = stretch->v_in, v1 = stretch->v_out;
     const kernel_transfer *transfer = &p->frame->volumes[state->volume];
-    vf off[KERNEL_STRETCH_LOOKS + 1];
-    off[0] = off[KERNEL_STRETCH_LOOKS] = out->most = vf_set(0);
+    vf off[KERNEL_DEVIATION_SAMPLES + 1];
+    off[0] = off[KERNEL_DEVIATION_SAMPLES] = out->most = vf_set(0);
     out->opacity = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
-    for (int i = 1; i < KERNEL_STRETCH_LOOKS; i++) {
-        const float share = (1.0f / KERNEL_STRETCH_LOOKS) * (float)i;
-        const vf v = kernel_value_at(p, span->map, span->interval, rays, t0 + length * share);
+    for (int i = 1; i < KERNEL_DEVIATION_SAMPLES; i++) {
+        const float share = (1.0f / KERNEL_DEVIATION_SAMPLES) * (float)i;
+        const vf v = kernel_value_at(p, cell_interval->map, cell_interval->interval, rays, t0 + length * share);
         off[i] = v - (v0 + (v1 - v0) * share);
         out->most = vf_max(out->most, vf_abs(off[i]));
         if (i % 2 == 0) out->opacity += 0.25f * kernel_opacity(transfer, v);
     }
-    out->bend = kernel_span_bend(off);
+    out->bend = kernel_cell_interval_curvature(off);
 }
 
 /* Returns the number of subintervals, as a real number, into which the interval must be divided, and stores the largest
@@ -467,32 +472,33 @@ SIMD_INLINE void kernel_span_deviate(kernel_packet *p, const kernel_segment_stat
  * No number is enough in three cases: if a step of the opacity lies among the values; if a steep ramp does and too many
  * subintervals would be needed; or if a narrow ramp does in which the values' rounding alone would use an eighth of the
  * allowed error. */
-SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span, vm rays,
-                                  const kernel_interval *stretch, vf *deviation)
+SIMD_INLINE vf kernel_cell_interval_subdivisions_curved(kernel_packet *p, const kernel_segment_state *state,
+                                                        const kernel_cell_interval *cell_interval, vm rays,
+                                                        const kernel_interval *stretch, vf *deviation)
 {
     const vf length = stretch->t_out - stretch->t_in, v0 = stretch->v_in, v1 = stretch->v_out;
-    kernel_span_deviation off;
-    kernel_span_deviate(p, state, span, rays, stretch, &off);
+    kernel_cell_interval_deviation off;
+    kernel_cell_interval_deviate(p, state, cell_interval, rays, stretch, &off);
     const vf largest = vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
     const vf bend = vf_max(off.most, off.bend - 0.5f * KERNEL_VALUE_ROUNDING * largest);
     const vf distance = length * state->list->per_t, depth = distance * off.opacity;
     const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
-    const vf made = bend * span->cost * distance; /* the product of 3/2 and 2/3 is 1 */
+    const vf made = bend * cell_interval->cost * distance; /* the product of 3/2 and 2/3 is 1 */
     *deviation = off.most;
     const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
     const vf subdivisions = vf_min(wanted, vf_set(KERNEL_MAX_SUBDIVISIONS));
-    if (!span->step_count && !span->is_steep) return subdivisions;
+    if (!cell_interval->step_count && !cell_interval->is_steep) return subdivisions;
     const vf wide = 1.5f * off.most + KERNEL_VALUE_ROUNDING * largest, low = vf_min(v0, v1) - wide,
              high = vf_max(v0, v1) + wide;
-    vm too_few = kernel_span_steps(state, span, low, high);
-    if (span->is_steep) {
+    vm too_few = kernel_cell_interval_steps(state, cell_interval, low, high);
+    if (cell_interval->is_steep) {
         const vm many = vf_lt(vf_set(KERNEL_MAX_SUBDIVISIONS), wanted);
-        too_few = vm_or(too_few, vm_and(many, kernel_span_is_steep(state, low, high, false)));
+        too_few = vm_or(too_few, vm_and(many, kernel_cell_interval_is_steep(state, low, high, false)));
     }
-    if (span->is_narrow) {
-        const vf rounded = (8 * KERNEL_VALUE_ROUNDING) * largest * span->cost * distance;
+    if (cell_interval->is_narrow) {
+        const vf rounded = (8 * KERNEL_VALUE_ROUNDING) * largest * cell_interval->cost * distance;
         const vm shows = vf_lt(allowed, rounded);
-        too_few = vm_or(too_few, vm_and(shows, kernel_span_is_steep(state, low, high, true)));
+        too_few = vm_or(too_few, vm_and(shows, kernel_cell_interval_is_steep(state, low, high, true)));
     }
     return vf_select(too_few, vf_set(2 * KERNEL_MAX_SUBDIVISIONS), subdivisions);
 }
@@ -502,37 +508,40 @@ SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *
  * displaced from its assumed position, and the effect on light is attenuated by the other volumes' depth in the
  * interval. That depth, times the light that arrives there, sums to 1 over a ray; so d v / 4 may be the whole error
  * allowed. */
-SIMD_INLINE vf kernel_span_mixed(const kernel_segment_state *state, const kernel_span *span, vf length, vf change)
+SIMD_INLINE vf kernel_cell_interval_subdivisions_mixed(const kernel_segment_state *state,
+                                                       const kernel_cell_interval *cell_interval, vf length, vf change)
 {
-    const vf moved = change * span->cost * (length * state->list->per_t) * 0.25f;
+    const vf moved = change * cell_interval->cost * (length * state->list->per_t) * 0.25f;
     return vf_sqrt(vf_min(moved / state->mixing, vf_set(1e6f)));
 }
 
 /* Returns the number of equal subintervals into which each ray's interval is divided. *halved receives the rays for
  * which no number is accurate enough, so that their intervals must be divided by bisection. */
-SIMD_INLINE vf kernel_span_subdivisions(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span,
-                                        vm rays, const kernel_interval *stretch, vm *halved)
+SIMD_INLINE vf kernel_cell_interval_subdivisions(kernel_packet *p, const kernel_segment_state *state,
+                                                 const kernel_cell_interval *cell_interval, vm rays,
+                                                 const kernel_interval *stretch, vm *halved)
 {
     const vf length = stretch->t_out - stretch->t_in, most = vf_set(KERNEL_MAX_SUBDIVISIONS);
     const vf v0 = stretch->v_in, v1 = stretch->v_out;
     vf subdivisions = vf_set(1), off = vf_set(0);
     *halved = vm_none();
-    if (span->map && state->allowance > 0) {
-        subdivisions = kernel_span_curved(p, state, span, rays, stretch, &off);
+    if (cell_interval->map && state->allowance > 0) {
+        subdivisions = kernel_cell_interval_subdivisions_curved(p, state, cell_interval, rays, stretch, &off);
         *halved = vm_and(rays, vf_lt(most, subdivisions));
-    } else if (span->map) {
+    } else if (cell_interval->map) {
         subdivisions = length / p->sample_step;
-        if (span->step_count && state->mixing > 0) {
-            const vf wanted = kernel_span_curved(p, state, span, rays, stretch, &off);
+        if (cell_interval->step_count && state->mixing > 0) {
+            const vf wanted = kernel_cell_interval_subdivisions_curved(p, state, cell_interval, rays, stretch, &off);
             *halved = vm_and(rays, vf_lt(most, wanted));
         }
-    } else if (span->step_count && state->mixing > 0) {
-        *halved = vm_and(rays, kernel_span_steps(state, span, vf_min(v0, v1), vf_max(v0, v1)));
-    } else if (span->is_narrow && span->cell) {
+    } else if (cell_interval->step_count && state->mixing > 0) {
+        *halved = vm_and(rays, kernel_cell_interval_steps(state, cell_interval, vf_min(v0, v1), vf_max(v0, v1)));
+    } else if (cell_interval->is_narrow && cell_interval->cell) {
         *halved = rays;
     }
     if (state->mixing > 0)
-        subdivisions = vf_max(subdivisions, kernel_span_mixed(state, span, length, vf_abs(v1 - v0) + 2.0f * off));
+        subdivisions = vf_max(subdivisions, kernel_cell_interval_subdivisions_mixed(state, cell_interval, length,
+                                                                                    vf_abs(v1 - v0) + 2.0f * off));
     return vf_clamp(-vf_floor(-subdivisions), vf_set(1), most);
 }
 
@@ -545,11 +554,11 @@ SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
 }
 
 /* Returns the part of a segment from `from` to `to`, which are shares of its length. */
-SIMD_INLINE kernel_run kernel_run_within(const kernel_run *whole, vf from, vf to)
+SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segment *whole, vf from, vf to)
 {
     const vf rise = (whole->v_out - whole->v_in) + (whole->rest_out - whole->rest_in);
     const vm begins = vf_eq(from, vf_set(0)), ends = vf_eq(to, vf_set(1));
-    kernel_run out = {.length = whole->length * (to - from)};
+    kernel_unit_segment out = {.length = whole->length * (to - from)};
     out.v_in =
         vf_select(begins, whole->v_in, kernel_exact_sum(whole->v_in, rise * from + whole->rest_in, &out.rest_in));
     out.v_out = vf_select(ends, whole->v_out, kernel_exact_sum(whole->v_in, rise * to + whole->rest_in, &out.rest_out));
@@ -562,13 +571,13 @@ SIMD_INLINE kernel_run kernel_run_within(const kernel_run *whole, vf from, vf to
  * absorbed, so that its depth is then too small; but compositing mixes fragments by their depth. So a segment that is
  * so dense is bisected until its parts are not, and emission ends when no light is left. */
 static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *state, vm rays, vf t_in, vf t_out,
-                                const kernel_run *whole)
+                                const kernel_unit_segment *whole)
 {
     const vf one = vf_set(1), black = vf_set(KERNEL_BLACK);
     vf from = vf_set(0), to = one, depth = vf_set(0);
     for (vm open = rays; vm_any(open);) {
         kernel_light light = kernel_clear();
-        const kernel_run run = kernel_run_within(whole, from, to);
+        const kernel_unit_segment run = kernel_unit_segment_part(whole, from, to);
         const vf begin = t_in + (t_out - t_in) * from;
         const vf end = vf_select(vf_eq(to, one), t_out, t_in + (t_out - t_in) * to), middle = 0.5f * (from + to);
         kernel_integrate(state->pieces, open, &run, &light);
@@ -577,7 +586,8 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *st
         const vm put = vm_andnot(open, cut);
         const kernel_fragments segment = {
             begin, end, {light.colour[0], light.colour[1], light.colour[2]}, light.transmittance, vf_set(0)};
-        kernel_emit(p, vm_and(put, kernel_shows(light.colour, light.transmittance)), FRAGMENT_VOLUME, &segment);
+        kernel_emit(p, vm_and(put, kernel_fragment_is_visible(light.colour, light.transmittance)), FRAGMENT_VOLUME,
+                    &segment);
         depth += vf_select(put, light.depth, vf_set(0));
         open = vm_andnot(open, vm_and(put, vm_or(vf_eq(to, one), vf_lt(vf_set(KERNEL_DARK_DEPTH), depth))));
         from = vf_select(put, to, from);

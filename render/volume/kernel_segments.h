@@ -89,7 +89,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
                                   const kernel_segments *list)
 {
     kernel_sorted sorted;
-    kernel_pre_end end;
+    kernel_preint_end end;
     end.value = vf_set(NAN);
     kernel_segments_sort(list, &sorted);
     for (int n = 0; n < sorted.row_count; n++) {
@@ -102,7 +102,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         vi_store(items, item);
         vf_gather_rows(&list->items[0][0].t_in, items, segment);
         const vf t_out = segment[1];
-        kernel_run run = kernel_run_of((t_out - t_in) * list->per_t, segment[2], segment[3]);
+        kernel_unit_segment run = kernel_unit_segment_of((t_out - t_in) * list->per_t, segment[2], segment[3]);
         kernel_light light = kernel_clear();
         if (list->is_double) {
             vf_gather_rows(&list->precise[0][0].length, items, precise);
@@ -116,23 +116,24 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
             kernel_integrate(pieces, has, &run, &light);
         kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in, t_out)));
         if (p->frame->job->reproducible)
-            kernel_blend_apart(p, b, has, t_in, t_out, light.colour, light.transmittance);
+            kernel_blend_separate(p, b, has, t_in, t_out, light.colour, light.transmittance);
         else
             kernel_blend_light(b, has, t_in, t_out, &light);
     }
-    const vm heaped = kernel_shows(list->heap.colour, list->heap.transmittance);
+    const vm heaped = kernel_fragment_is_visible(list->unsorted_light.colour, list->unsorted_light.transmittance);
     if (!vm_any(heaped)) return;
     if (p->frame->job->reproducible)
-        kernel_blend_apart(p, b, heaped, b->t_last, b->t_last, list->heap.colour, list->heap.transmittance);
+        kernel_blend_separate(p, b, heaped, b->t_last, b->t_last, list->unsorted_light.colour,
+                              list->unsorted_light.transmittance);
     else
-        kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
+        kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->unsorted_light);
 }
 
 /* Begins a window at list->t_begin with empty lists. t_end: depth at which each ray's window ends. */
 SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 {
     memset(list->count, 0, sizeof list->count);
-    list->heap = kernel_clear();
+    list->unsorted_light = kernel_clear();
     list->t_end = t_end;
     list->is_shortened = false;
 }

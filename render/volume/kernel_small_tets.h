@@ -1,6 +1,6 @@
 /* Small tets, one pixel-tet pair per lane: of a packet's rays most would miss such a tet. Tets are transformed
- * SIMD_WIDTH at a time in any case (kernel_placed.h). The pixels of their bounding boxes are listed, and their
- * crossings computed by the operations of kernel_crossings.h, to the same bits (kernel_tets.h). */
+ * SIMD_WIDTH at a time in any case (kernel_transformed_tets.h). The pixels of their bounding boxes are listed, and
+ * their crossings computed by the operations of kernel_crossings.h, to the same bits (kernel_tets.h). */
 #ifndef RENDER_KERNEL_SMALL_TETS_H
 #define RENDER_KERNEL_SMALL_TETS_H
 
@@ -23,7 +23,7 @@ static unsigned kernel_small_tets_list(const kernel_tile_trace *t, unsigned lane
     vf places[3][8];
     unsigned others = 0;
     for (int a = 0; a < 3; a++)
-        for (int i = 0; i < 4; i++) places[a][i] = cells->placed.at[a][i];
+        for (int i = 0; i < 4; i++) places[a][i] = cells->transformed.at[a][i];
     kernel_local_pixels(t, 4, (const vf(*)[8])places, l->ends);
     l->rays.count = 0;
     for (; lanes; lanes &= lanes - 1) {

@@ -17,12 +17,12 @@
 #include "kernel_bins.h"
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
-#include "kernel_interest.h"
+#include "kernel_visible_values.h"
 #include "kernel_local_queue.h"
 #include "kernel_map.h"
 #include "kernel_outline.h"
 #include "kernel_packet.h"
-#include "kernel_placed.h"
+#include "kernel_transformed_tets.h"
 #include "kernel_prefetch.h"
 #include "kernel_tile.h"
 #include "kernel_tile_blocks.h"
@@ -36,7 +36,7 @@ enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64, KERNEL_SORT_ENDS = 48 };
 
 /* Callback that traces those of the given lanes' tets for which one ray-tet pair per lane is faster. Returns the
  * remaining lanes. */
-typedef unsigned kernel_tile_take_tets(kernel_tile_trace *t, unsigned lanes);
+typedef unsigned kernel_tile_trace_tets(kernel_tile_trace *t, unsigned lanes);
 
 /* The cells of a volume in the tile. The first open_count items begin before the end of the last window and end behind
  * its begin; `next` is the first item that no window has reached. Only the first `sorted` items are sorted, because a
@@ -50,10 +50,10 @@ typedef struct kernel_tile_cells {
     kernel_map map;       /* inverse map of that cell */
     kernel_arrays arrays; /* arrays of the volume's field on the current mesh part */
     int plain_volume, plain_part;
-    kernel_placed placed;
+    kernel_transformed_tets transformed;
     kernel_block_rays block_rays;
-    kernel_local_queue tets;          /* tets that are transformed SIMD_WIDTH at a time */
-    kernel_tile_take_tets *take_tets; /* NULL if each tet is processed on its own */
+    kernel_local_queue tets;            /* tets that are transformed SIMD_WIDTH at a time */
+    kernel_tile_trace_tets *trace_tets; /* NULL if each tet is processed on its own */
 } kernel_tile_cells;
 
 /* Transforms the fetched cell and prepares it for the rays of the blocks. Returns the blocks in which it may be
@@ -63,7 +63,7 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
 {
     kernel_cell *c = &cells->cell;
     kernel_outline outline;
-    if (!c->is_finite || !kernel_cell_shows(c, transfer)) return 0;
+    if (!c->is_finite || !kernel_cell_is_visible(c, transfer)) return 0;
     kernel_cell_move(c, t->frame, &t->tile, g);
     kernel_vertex_outline(c, &outline);
     const unsigned meets = kernel_tile_keep(t, &outline, blocks);
@@ -79,8 +79,9 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
 /* Makes a batch's cell the tile's current cell, ready for the rays of all blocks, unless it already is. cell: its
  * index; lane: its lane in the batch. Returns false if it is invisible. *alone: the lane whose cell is the current one,
  * or -1. */
-static __attribute__((noinline, cold)) bool kernel_tile_ready_alone(kernel_tile_trace *t, int volume, int part,
-                                                                    uint32_t cell, bool is_pencil, int lane, int *alone)
+static __attribute__((noinline, cold)) bool kernel_tile_ready_single(kernel_tile_trace *t, int volume, int part,
+                                                                     uint32_t cell, bool is_pencil, int lane,
+                                                                     int *alone)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     const grid *g = t->frame->job->parts[part].cells;
@@ -92,8 +93,8 @@ static __attribute__((noinline, cold)) bool kernel_tile_ready_alone(kernel_tile_
     return true;
 }
 
-SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int part, uint32_t index, bool is_pencil,
-                                       unsigned blocks, kernel_tile_take *take)
+SIMD_INLINE void kernel_tile_process_cell(kernel_tile_trace *t, int volume, int part, uint32_t index, bool is_pencil,
+                                          unsigned blocks, kernel_tile_trace_cell *take)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_cell *c = &cells->cell;
@@ -130,31 +131,33 @@ SIMD_INLINE unsigned kernel_tile_box(unsigned blocks, int box)
 /* ---- SIMD_WIDTH tets at once ---- */
 
 /* Converts the values to the domain of the transfer function. */
-SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transfer *t)
+SIMD_INLINE void kernel_transformed_domain(kernel_transformed_tets *transformed, const kernel_transfer *t)
 {
     for (int half = 0; half < 2; half++)
         for (int i = 0; i < 4; i++) {
-            const kernel_half f = (placed->values[i].half[half] - t->low) * t->inverse_width;
-            kernel_half_put(&placed->f[i], half, kernel_half_hold(f, 1e18));
+            const kernel_f64 f = (transformed->values[i].half[half] - t->low) * t->inverse_width;
+            kernel_f64_store_lanes(&transformed->f[i], half, kernel_f64_clamp(f, 1e18));
         }
 }
 
 /* Returns the lanes whose cells are visible and reach into the window; stores the least depth of each cell. */
-SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const kernel_placed *placed,
-                                           const kernel_interest *interest, float near[SIMD_WIDTH])
+SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
+                                                     const kernel_transformed_tets *transformed,
+                                                     const kernel_visible_values *visible_values,
+                                                     float near[SIMD_WIDTH])
 {
-    const vf *z = placed->at[2];
+    const vf *z = transformed->at[2];
     vf v[4], odd = vf_set(0);
     vm is_finite = vm_all_lanes();
     for (int i = 0; i < 4; i++) {
         for (int half = 0; half < 2; half++) {
-            const kernel_half own = placed->values[i].half[half];
-            kernel_half_put(&odd, half, own - own);
-            kernel_half_put(&v[i], half, kernel_half_hold(own, 3e38));
+            const kernel_f64 own = transformed->values[i].half[half];
+            kernel_f64_store_lanes(&odd, half, own - own);
+            kernel_f64_store_lanes(&v[i], half, kernel_f64_clamp(own, 3e38));
         }
         is_finite = vm_and(is_finite, vf_eq(odd, odd));
     }
-    const vm shows = kernel_interest_meets_values(interest, v, 4);
+    const vm shows = kernel_visible_values_overlap_cells(visible_values, v, 4);
     const vf front = vf_min(vf_min(z[0], z[1]), vf_min(z[2], z[3]));
     const vf back = vf_max(vf_max(z[0], z[1]), vf_max(z[2], z[3]));
     const vf pad = KERNEL_OUTLINE_PAD * vf_max(vf_abs(front), vf_abs(back));
@@ -164,18 +167,19 @@ SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const ker
 
 /* Transforms the first `count` pending tets. Returns the lanes of those that are visible in a block in which some ray
  * has no nearer end. */
-SIMD_INLINE unsigned kernel_tile_place_pending(kernel_tile_trace *t, kernel_tile_cells *cells, int count)
+SIMD_INLINE unsigned kernel_tile_transform_pending(kernel_tile_trace *t, kernel_tile_cells *cells, int count)
 {
     t->thread->volume_cells += count;
     const kernel_transfer *transfer = &t->frame->volumes[cells->plain_volume];
     int32_t vertices[4][SIMD_WIDTH];
     float near[SIMD_WIDTH];
     unsigned lanes = 0;
-    kernel_local_learn(&cells->arrays, &cells->tets, count, GRID_TET);
+    kernel_local_read_indices(&cells->arrays, &cells->tets, count, GRID_TET);
     for (int i = 0; i < 4; i++) memcpy(vertices[i], cells->tets.vertex[i], sizeof vertices[i]);
-    kernel_place_tets(&cells->placed, &cells->arrays, t->frame, &t->tile, vertices, count);
-    kernel_placed_domain(&cells->placed, transfer);
-    unsigned candidates = kernel_placed_showing(t, &cells->placed, &transfer->interest, near) & ((1u << count) - 1);
+    kernel_transform_tets(&cells->transformed, &cells->arrays, t->frame, &t->tile, vertices, count);
+    kernel_transformed_domain(&cells->transformed, transfer);
+    unsigned candidates =
+        kernel_transformed_tets_visible(t, &cells->transformed, &transfer->visible_values, near) & ((1u << count) - 1);
     candidates = kernel_arrays_drawn(&cells->arrays, cells->tets.cell, candidates);
     for (; candidates; candidates &= candidates - 1) {
         const int n = __builtin_ctz(candidates);
@@ -185,18 +189,18 @@ SIMD_INLINE unsigned kernel_tile_place_pending(kernel_tile_trace *t, kernel_tile
     return lanes;
 }
 
-/* Transforms the first vector of pending tets, and passes them to take_tets or, one by one, to take(). */
-static __attribute__((noinline)) void kernel_tile_take_some(kernel_tile_trace *t, kernel_tile_cells *cells,
-                                                            kernel_tile_take *take)
+/* Transforms the first vector of pending tets, and passes them to trace_tets or, one by one, to take(). */
+static __attribute__((noinline)) void kernel_tile_process_vector(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                                                 kernel_tile_trace_cell *take)
 {
     const int count = cells->tets.count < SIMD_WIDTH ? cells->tets.count : SIMD_WIDTH;
     const bool is_double = t->frame->is_double;
-    unsigned lanes = kernel_tile_place_pending(t, cells, count);
-    if (cells->take_tets && lanes) lanes = cells->take_tets(t, lanes);
+    unsigned lanes = kernel_tile_transform_pending(t, cells, count);
+    if (cells->trace_tets && lanes) lanes = cells->trace_tets(t, lanes);
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        kernel_placed_cell(&cells->placed, n, &cells->cell);
-        if (is_double) kernel_placed_exactly(&cells->placed, n, &cells->cell);
+        kernel_transformed_tets_cell(&cells->transformed, n, &cells->cell);
+        if (is_double) kernel_transformed_tets_double(&cells->transformed, n, &cells->cell);
         const unsigned blocks = cells->tets.blocks[n] & kernel_tet_blocks(&cells->block_rays, &cells->cell);
         cells->cell.index = cells->tets.cell[n];
         if (blocks) take(t, cells->plain_part, &cells->cell, NULL, blocks);
@@ -204,19 +208,20 @@ static __attribute__((noinline)) void kernel_tile_take_some(kernel_tile_trace *t
     kernel_local_pop(&cells->tets);
 }
 
-SIMD_INLINE void kernel_tile_take_pending(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_tile_take *take)
+SIMD_INLINE void kernel_tile_process_pending(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                             kernel_tile_trace_cell *take)
 {
-    while (cells->tets.count) kernel_tile_take_some(t, cells, take);
+    while (cells->tets.count) kernel_tile_process_vector(t, cells, take);
 }
 
 /* Makes the volume and mesh part those of the pending tets; tets of another part are processed first. Returns whether
  * the part's tets are processed in lanes: they are not if the field is constant per cell, because it is not
  * interpolated then. */
-SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
-                                      kernel_tile_take *take)
+SIMD_INLINE bool kernel_tile_set_tet_part(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
+                                          kernel_tile_trace_cell *take)
 {
     if (part != cells->plain_part || volume != cells->plain_volume) {
-        kernel_tile_take_pending(t, cells, take);
+        kernel_tile_process_pending(t, cells, take);
         kernel_arrays_begin(&cells->arrays, t->frame->job->parts[part].cells,
                             &t->frame->job->volumes[volume].field.fields[part]);
         cells->plain_volume = volume;
@@ -226,11 +231,11 @@ SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *c
 }
 
 /* Queues a tet. If the queue is full, some tets are processed. box: its box of pixels (kernel_tile_box()). */
-SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
-                                  unsigned box, kernel_tile_take *take)
+SIMD_INLINE void kernel_tile_enqueue_tet(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
+                                         unsigned box, kernel_tile_trace_cell *take)
 {
     if (kernel_local_push(&cells->arrays, &cells->tets, cell, blocks, box, GRID_TET))
-        kernel_tile_take_some(t, cells, take);
+        kernel_tile_process_vector(t, cells, take);
 }
 
 /* ---- cells found by traversing trees ---- */
@@ -238,25 +243,25 @@ SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells
 /* Callbacks that process a volume's cells. */
 typedef struct kernel_cell_visitor {
     bool is_pencil;
-    kernel_tile_take *take;
+    kernel_tile_trace_cell *take;
     /* Queues a cell if its type is processed in lanes; else returns false. box: its pixels, in a candidate's format, or
      * KERNEL_ALL_PIXELS for all of the blocks. */
     bool (*queue)(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box);
 } kernel_cell_visitor;
 
-SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume, int part,
-                                       const uint32_t *cells, int count, unsigned blocks)
+SIMD_INLINE void kernel_tile_process_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume,
+                                          int part, const uint32_t *cells, int count, unsigned blocks)
 {
     const grid *g = t->frame->job->parts[part].cells;
     kernel_tile_cells *pending = t->thread->tile_cells;
-    const bool waits = kernel_tile_wait_for(t, pending, volume, part, visitor->take);
+    const bool waits = kernel_tile_set_tet_part(t, pending, volume, part, visitor->take);
     if (!waits) kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
     const unsigned box = kernel_tile_box(blocks, KERNEL_ALL_PIXELS);
     for (int n = 0; n < count; n++)
         if (waits && kernel_is_linear(kernel_arrays_type(&pending->arrays, cells[n])))
-            kernel_tile_wait(t, pending, cells[n], blocks, box, visitor->take);
+            kernel_tile_enqueue_tet(t, pending, cells[n], blocks, box, visitor->take);
         else
-            kernel_tile_meet_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
+            kernel_tile_process_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
 }
 
 /* Traverses the trees of the given mesh parts, skipping nodes whose values are invisible in the volume. */
@@ -268,20 +273,20 @@ SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, cons
         const int part = (int)parts[n];
         if (field->ranges[part].low)
             kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part],
-                                 &t->frame->volumes[volume].interest, blocks, part, visit);
+                                 &t->frame->volumes[volume].visible_values, blocks, part, visit);
     }
 }
 
 /* Traverses the trees of all mesh parts, or the tree over the parts if there is one. take() receives their cells. */
 SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, kernel_tile_visit *parts,
-                                       kernel_tile_take *take)
+                                       kernel_tile_trace_cell *take)
 {
     const render_job *job = t->frame->job;
     if (job->parent)
         kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, parts);
     else
         for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) parts(t, 0, &part, 1, blocks);
-    kernel_tile_take_pending(t, t->thread->tile_cells, take);
+    kernel_tile_process_pending(t, t->thread->tile_cells, take);
 }
 
 /* Processes a leaf's cells: queues those whose types are processed in lanes, and transforms the others. */
@@ -294,7 +299,7 @@ SIMD_INLINE void kernel_visit_leaf(kernel_tile_trace *t, const kernel_cell_visit
     for (int n = 0; n < count; n++) kernel_prefetch_indices(g, cells[n]);
     for (int n = 0; n < count; n++)
         if (!visitor->queue(t, part, cells[n], blocks, KERNEL_ALL_PIXELS)) others[left++] = cells[n];
-    if (left) kernel_tile_meet_leaf(t, visitor, volume, part, others, left, blocks);
+    if (left) kernel_tile_process_leaf(t, visitor, volume, part, others, left, blocks);
 }
 
 /* ---- cells found before, as candidates of the tile ---- */
@@ -353,12 +358,12 @@ static __attribute__((noinline)) void kernel_tile_cells_sort(kernel_tile_cells *
 }
 
 /* Begins a tile, before its first window. Returns false if the tile is known to have no cells. */
-SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_take_tets *take_tets)
+SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_trace_tets *trace_tets)
 {
     const kernel_frame *f = t->frame;
     kernel_tile_cells *cells = t->thread->tile_cells;
     cells->tets.count = cells->tets.known = 0;
-    cells->take_tets = take_tets;
+    cells->trace_tets = trace_tets;
     cells->plain_part = -1;
     if (!f->volume_candidates) return true;
     cells->items = t->thread->volume_bin.items;
@@ -387,16 +392,16 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
 }
 
 /* Processes one of the cells that overlap the window. */
-SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *cells,
-                                       const kernel_tile_candidate *item, bool is_pencil, unsigned blocks,
-                                       kernel_tile_take *take)
+SIMD_INLINE void kernel_tile_process_item(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                          const kernel_tile_candidate *item, bool is_pencil, unsigned blocks,
+                                          kernel_tile_trace_cell *take)
 {
     const int part = (int)item->source;
-    if (kernel_tile_wait_for(t, cells, 0, part, take) &&
+    if (kernel_tile_set_tet_part(t, cells, 0, part, take) &&
         kernel_is_linear(kernel_arrays_type(&cells->arrays, item->cell)))
-        kernel_tile_wait(t, cells, item->cell, blocks, item->box, take);
+        kernel_tile_enqueue_tet(t, cells, item->cell, blocks, item->box, take);
     else
-        kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);
+        kernel_tile_process_cell(t, 0, part, item->cell, is_pencil, blocks, take);
 }
 
 /* Prefetches the next cells of the window: the vertex indices of 2 * KERNEL_OPEN_PIECE cells, and the vertices of
@@ -427,9 +432,9 @@ SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visit
         if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
         const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
         if (met && !visitor->queue(t, (int)item->source, item->cell, met, item->box))
-            kernel_tile_meet_item(t, cells, item, visitor->is_pencil, met, visitor->take);
+            kernel_tile_process_item(t, cells, item, visitor->is_pencil, met, visitor->take);
     }
-    kernel_tile_take_pending(t, cells, visitor->take);
+    kernel_tile_process_pending(t, cells, visitor->take);
 }
 
 /* ---- windows of depth ---- */
@@ -464,7 +469,7 @@ SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, 
         kernel_block_begin(t, block);
         for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
             const int i = block * KERNEL_BLOCK_PACKETS + n;
-            if (t->frame->volume_turns) kernel_packet_clip_volumes(&t->packets[i], t->turn);
+            if (t->frame->volume_intervals) kernel_packet_clip_volumes(&t->packets[i], t->turn);
             packets[count++] = i;
         }
     }

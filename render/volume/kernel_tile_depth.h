@@ -12,8 +12,8 @@
  *
  * Samples do not depend on windows (kernel_tile_volume.h). But windows decide which overlaps of cells are detected
  * behind the depth at which all light is absorbed, and so whether a pixel is drawn a second time. So that windows do
- * not depend on the number of threads, a tile uses results only of earlier tiles in its run of KERNEL_TILE_RUN tiles,
- * which one thread draws in order. */
+ * not depend on the number of threads, a tile uses results only of earlier tiles in its run of KERNEL_TILES_PER_TASK
+ * tiles, which one thread draws in order. */
 #ifndef RENDER_KERNEL_TILE_DEPTH_H
 #define RENDER_KERNEL_TILE_DEPTH_H
 
@@ -39,7 +39,7 @@ typedef struct kernel_tile_depth {
 } kernel_tile_depth;
 
 /* Begins a run of tiles, in which no earlier tile's depth is known. */
-SIMD_INLINE void kernel_depth_forget(kernel_tile_depth *d)
+SIMD_INLINE void kernel_depth_reset(kernel_tile_depth *d)
 {
     d->dark = INFINITY;
     d->has_met = false;
@@ -66,7 +66,7 @@ SIMD_INLINE void kernel_depth_begin(kernel_tile_depth *d, float begin)
 
 /* Returns the depth of the next window, which begins at depth `at`: an eighth more than the depth at which the tile is
  * expected to become dark. */
-SIMD_INLINE float kernel_depth_wanted(const kernel_tile_depth *d, float at)
+SIMD_INLINE float kernel_depth_next_window(const kernel_tile_depth *d, float at)
 {
     const float left = simd_min(d->begin, at) + d->dark - at;
     return 1.125f * simd_min(left > 0 ? left : INFINITY, d->expected);

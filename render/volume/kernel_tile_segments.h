@@ -45,7 +45,7 @@
 typedef struct kernel_tile_segments {
     kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
     kernel_double_cell precise;
-    kernel_local_stretches stretches;
+    kernel_local_segment_batch stretches;
     int volume;  /* index of the current volume */
     float depth; /* depth of the next window; 0 if it is not known yet */
 } kernel_tile_segments;
@@ -86,7 +86,7 @@ static bool kernel_segments_queue(kernel_tile_trace *t, int part, uint32_t cell,
     const int type = grid_cell_type(g, cell);
     if (!kernel_arrays_fit(g) || !kernel_local_segments_fit(t->frame, type)) return false;
     kernel_local_lanes *l = &t->thread->tile_segments->stretches.lanes;
-    kernel_local_wait(t, l, part, type, cell, blocks, kernel_tile_box(blocks, box));
+    kernel_local_enqueue(t, l, part, type, cell, blocks, kernel_tile_box(blocks, box));
     return true;
 }
 
@@ -124,7 +124,7 @@ static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_
     memcpy(lane, &lanes, sizeof lane);
     for (; rays; rays &= rays - 1) {
         const int i = __builtin_ctz(rays), packet = at[i] / SIMD_WIDTH;
-        kernel_placed_cell(&cells->placed, lane[i], &cells->cell);
+        kernel_transformed_tets_cell(&cells->transformed, lane[i], &cells->cell);
         kernel_tet_segments(&t->packets[packet], &s->packets[packet].state, &cells->cell, NULL,
                             vm_from_bits(1u << at[i] % SIMD_WIDTH));
     }
@@ -134,7 +134,7 @@ static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_
 static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_trace *t, unsigned lanes)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    kernel_local_stretches *b = &s->stretches;
+    kernel_local_segment_batch *b = &s->stretches;
     const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_PIXELS, &b->lanes);
     for (int n = 0; n < b->lanes.rays.count; n += SIMD_WIDTH) {
         kernel_lane_rays r;
@@ -144,7 +144,7 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
         const vi at = r.at;
         vf_gather_pair(b->window, 2 * at, &begin, &end);
         r.active = vm_and(r.active, vf_lt(begin, end));
-        kernel_tet_rays_interval(&t->thread->tile_cells->placed, &r, &i);
+        kernel_tet_rays_interval(&t->thread->tile_cells->transformed, &r, &i);
         if (!vm_any(i.mask)) continue;
         vf_gather_pair(b->reach, 2 * at, &near, &far);
         const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));
@@ -183,7 +183,7 @@ SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_tile_ray_
 {
     const kernel_frame *f = p->frame;
     const float mixing = f->job->separate_samples ? f->mixing : 0;
-    r->list.per_t = f->volumes[volume].exponent / p->sample_step * p->clip_stretch;
+    r->list.per_t = f->volumes[volume].exponent / p->sample_step * p->clip_length_ratio;
     r->state = (kernel_segment_state){&r->list, &f->pieces[volume], volume, f->allowance, mixing, f->reach[volume]};
 }
 
@@ -225,8 +225,8 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
 
 /* Chooses the next window's depth from the lengths of this window's lists, so that the fullest list will be three
  * quarters full. */
-SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *packets, int count, float begin,
-                                            float end)
+SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, const int *packets, int count, float begin,
+                                                   float end)
 {
     const int room = s->packets[packets[0]].list.room;
     int most = room / 16;
@@ -252,9 +252,9 @@ SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segme
 }
 
 /* Emits all segments of all volumes as fragments of their own, at once and without windows. */
-static __attribute__((noinline, cold)) void kernel_tile_segments_apart(kernel_tile_trace *t, kernel_tile_segments *s,
-                                                                       const int *packets, int count,
-                                                                       const kernel_placement *reach)
+static __attribute__((noinline, cold)) void kernel_tile_segments_separate(kernel_tile_trace *t, kernel_tile_segments *s,
+                                                                          const int *packets, int count,
+                                                                          const kernel_placement *reach)
 {
     for (int volume = 0; volume < t->frame->volume_count; volume++) {
         kernel_tile_segments_of(t, s, packets, count, volume, reach->near);
@@ -271,7 +271,7 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
         if (!(t->t_near < INFINITY)) break;
         const float end = s->depth > 0 ? t->t_near + s->depth : reach->far;
         kernel_tile_segments_find(t, s, reach->blocks, end);
-        kernel_tile_segments_learn(s, packets, count, t->t_near, fminf(end, reach->far));
+        kernel_tile_segments_adapt_window(s, packets, count, t->t_near, fminf(end, reach->far));
         for (int n = 0; n < count; n++) {
             kernel_tile_ray_segments *r = &s->packets[packets[n]];
             if (vm_any(t->packets[packets[n]].active))
@@ -293,7 +293,7 @@ static void kernel_tile_segments_trace(kernel_tile_trace *t)
     for (int n = 0; n < count; n++)
         kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, t->first_fragment);
     if (t->frame->job->separate_samples)
-        kernel_tile_segments_apart(t, s, packets, count, &reach);
+        kernel_tile_segments_separate(t, s, packets, count, &reach);
     else
         kernel_tile_segments_windows(t, s, packets, count, &reach);
     for (int n = 0; n < count; n++) {

@@ -88,7 +88,8 @@ static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, 
     const grid *g = t->frame->job->parts[part].cells;
     const int type = grid_cell_type(g, cell);
     if (!kernel_arrays_fit(g) || !kernel_local_fits(t->frame, type)) return false;
-    kernel_local_wait(t, &t->thread->tile_volume->batch.lanes, part, type, cell, blocks, kernel_tile_box(blocks, box));
+    kernel_local_enqueue(t, &t->thread->tile_volume->batch.lanes, part, type, cell, blocks,
+                         kernel_tile_box(blocks, box));
     return true;
 }
 
@@ -105,8 +106,8 @@ SIMD_INLINE bool kernel_tet_samples_fit(const kernel_frame *f)
 }
 
 /* Emits a sample that also lies in another cell as a fragment of its own. */
-static __attribute__((noinline, cold)) void kernel_tet_sample_apart(kernel_tile_trace *t, kernel_local_batch *b, int at,
-                                                                    float depth, float value)
+static __attribute__((noinline, cold)) void kernel_tet_sample_separate(kernel_tile_trace *t, kernel_local_batch *b,
+                                                                       int at, float depth, float value)
 {
     const int packet = at / SIMD_WIDTH;
     const kernel_interval cell = {0};
@@ -130,7 +131,7 @@ SIMD_INLINE void kernel_tet_samples_put(kernel_tile_trace *t, kernel_local_batch
         float *to = (float *)(void *)&b->packets[at[i] / SIMD_WIDTH].samples.value[b->lanes.volume][number[i]];
         to += at[i] % SIMD_WIDTH;
         if (__builtin_expect(*to == *to, 0))
-            kernel_tet_sample_apart(t, b, at[i], depth[i], values[i]);
+            kernel_tet_sample_separate(t, b, at[i], depth[i], values[i]);
         else
             *to = values[i];
     }
@@ -167,7 +168,7 @@ static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_t
         kernel_lane_rays_begin(&r, t, &b->lanes.rays, n);
         const vi at = r.at;
         r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, at)));
-        kernel_tet_rays_interval(&t->thread->tile_cells->placed, &r, &i);
+        kernel_tet_rays_interval(&t->thread->tile_cells->transformed, &r, &i);
         if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, at);
     }
     b->lanes.rays.count = 0;
@@ -256,7 +257,7 @@ SIMD_INLINE int kernel_tile_window_samples(const kernel_tile_volume *v, const ke
 {
     enum { LEAST = 8 };
     const int most = p->frame->job->sample_group, least = most < LEAST ? most : LEAST;
-    const float wanted = kernel_depth_wanted(&v->depth, kernel_sample_t(p, first)[0]) * p->sample_inverse[0];
+    const float wanted = kernel_depth_next_window(&v->depth, kernel_sample_t(p, first)[0]) * p->sample_inverse[0];
     return wanted < (float)most ? wanted < (float)least ? least : (int)wanted + 1 : most;
 }
 

@@ -154,8 +154,8 @@ static int collect_cuts(const render_transfer *t, double tolerance, kernel_real 
 {
     int count = cut_ramps(t, tolerance, cuts), active = 0;
     for (int i = 0; i < t->colour_count - 1; i = next_entry(t, i, tolerance))
-        entries[active++] = (kept_entry){i, render_entry_place(t, i)};
-    entries[active++] = (kept_entry){t->colour_count - 1, render_entry_place(t, t->colour_count - 1)};
+        entries[active++] = (kept_entry){i, render_entry_position(t, i)};
+    entries[active++] = (kept_entry){t->colour_count - 1, render_entry_position(t, t->colour_count - 1)};
     for (int i = 0; i < active; i++) cuts[count++] = (kernel_real)entries[i].place;
     for (int i = 0; i < t->opacity_count; i++) cuts[count++] = (kernel_real)render_domain_of(t, t->opacity_values[i]);
     qsort(cuts, (size_t)count, sizeof *cuts, compare_cuts);
@@ -362,24 +362,24 @@ static void range_of_light(const render_transfer *t, float *low, float *high)
  * A field error d changes the light by T d g per unit distance, g = s' (c - b) + s c' in each channel, where the light
  * b from behind lies between the minimum and maximum of light. g is linear in b, so that over a range of values its
  * variation is largest at one of these two. For the alpha channel, g = s'. */
-enum { SWING_KINDS = 7 };
+enum { VARIATION_KINDS = 7 };
 
-typedef struct value_swing {
-    double low[SWING_KINDS], high[SWING_KINDS];
+typedef struct value_variation {
+    double low[VARIATION_KINDS], high[VARIATION_KINDS];
     double extinction;
-} value_swing;
+} value_variation;
 
-static void widen_swing(value_swing *swing, int kind, double low, double high)
+static void widen_variation(value_variation *variation, int kind, double low, double high)
 {
-    swing->low[kind] = fmin(swing->low[kind], fmax(low, -1e30));
-    swing->high[kind] = fmax(swing->high[kind], fmin(high, 1e30));
+    variation->low[kind] = fmin(variation->low[kind], fmax(low, -1e30));
+    variation->high[kind] = fmax(variation->high[kind], fmin(high, 1e30));
 }
 
 /* Widens the ranges of a by those of b. Comparisons are used because fmin() and fmax() are function calls, of which a
  * frame would need 200,000. */
-static void unite_swings(value_swing *a, const value_swing *b)
+static void unite_variations(value_variation *a, const value_variation *b)
 {
-    for (int kind = 0; kind < SWING_KINDS; kind++) {
+    for (int kind = 0; kind < VARIATION_KINDS; kind++) {
         a->low[kind] = b->low[kind] < a->low[kind] ? b->low[kind] : a->low[kind];
         a->high[kind] = b->high[kind] > a->high[kind] ? b->high[kind] : a->high[kind];
     }
@@ -387,7 +387,8 @@ static void unite_swings(value_swing *a, const value_swing *b)
 }
 
 /* Widens the swing by the piece's bounds between two of its values. behind: the minimum and maximum of light. */
-static void swing_in_piece(value_swing *swing, const kernel_piece *p, double from, double to, const double behind[2])
+static void variation_in_piece(value_variation *variation, const kernel_piece *p, double from, double to,
+                               const double behind[2])
 {
     kernel_bound b = {.extinction_low = 1e30f};
     const bool falls = p->entry[KERNEL_PIECE_SLOPE] < 0;
@@ -397,9 +398,9 @@ static void swing_in_piece(value_swing *swing, const kernel_piece *p, double fro
     /* Minimum and maximum of the slope of the extinction, with its sign. */
     const double fall = falls ? -steepness[1] : steepness[0], rise = falls ? -steepness[0] : steepness[1];
     const double least = (double)b.extinction_low, most = (double)b.extinction_high;
-    swing->extinction = fmax(most, swing->extinction);
-    widen_swing(swing, 0, fall, rise);
-    for (int kind = 1; kind < SWING_KINDS; kind++) {
+    variation->extinction = fmax(most, variation->extinction);
+    widen_variation(variation, 0, fall, rise);
+    for (int kind = 1; kind < VARIATION_KINDS; kind++) {
         const int channel = (kind - 1) / 2;
         const double slope = (double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + channel];
         const double first = (double)p->entry[KERNEL_PIECE_COLOUR + channel] - behind[kind % 2];
@@ -407,53 +408,57 @@ static void swing_in_piece(value_swing *swing, const kernel_piece *p, double fro
         const double corners[4] = {fall * c0, fall * c1, rise * c0, rise * c1};
         const double low = fmin(fmin(corners[0], corners[1]), fmin(corners[2], corners[3]));
         const double high = fmax(fmax(corners[0], corners[1]), fmax(corners[2], corners[3]));
-        widen_swing(swing, kind, low + fmin(least * slope, most * slope), high + fmax(least * slope, most * slope));
+        widen_variation(variation, kind, low + fmin(least * slope, most * slope),
+                        high + fmax(least * slope, most * slope));
     }
 }
 
 /* Computes the bounds over a bin, a little beyond its ends; the first and the last bin include everything beyond them.
  * No piece before `piece` may reach the bin; returns the first piece that reaches the next bin. */
-static int swing_in_bin(const kernel_pieces *t, int bin, int piece, const double behind[2], value_swing *swing)
+static int variation_in_bin(const kernel_pieces *t, int bin, int piece, const double behind[2],
+                            value_variation *variation)
 {
-    const double width = 1 / (double)t->swing_inverse, begin = (double)t->bin_low + (bin - 1e-3) * width;
+    const double width = 1 / (double)t->variation_inverse, begin = (double)t->bin_low + (bin - 1e-3) * width;
     const double low = bin > 0 ? begin : -(double)endless;
-    const double high = bin + 1 < KERNEL_SWING_BINS ? begin + 1.002 * width : (double)endless;
-    swing->extinction = 0;
-    for (int kind = 0; kind < SWING_KINDS; kind++) swing->low[kind] = INFINITY, swing->high[kind] = -INFINITY;
+    const double high = bin + 1 < KERNEL_VARIATION_BINS ? begin + 1.002 * width : (double)endless;
+    variation->extinction = 0;
+    for (int kind = 0; kind < VARIATION_KINDS; kind++)
+        variation->low[kind] = INFINITY, variation->high[kind] = -INFINITY;
     while (piece + 1 < t->count && (double)t->pieces[piece].entry[KERNEL_PIECE_HIGH] < low) piece++;
     for (int i = piece; i < t->count && (double)t->pieces[i].entry[KERNEL_PIECE_LOW] <= high; i++) {
         const double from = fmax(low, (double)t->pieces[i].entry[KERNEL_PIECE_LOW]);
         const double to = fmin(high, (double)t->pieces[i].entry[KERNEL_PIECE_HIGH]);
-        swing_in_piece(swing, &t->pieces[i], from, to, behind);
+        variation_in_piece(variation, &t->pieces[i], from, to, behind);
     }
     return piece;
 }
 
-static void sum_up_swing(const value_swing *s, double contrast, kernel_swing *out)
+static void sum_up_variation(const value_variation *s, double contrast, kernel_light_variation *out)
 {
-    double swing = 0, cost = 0;
-    for (int kind = 0; kind < SWING_KINDS; kind++) {
-        swing = fmax(swing, s->high[kind] - s->low[kind]);
+    double variation = 0, cost = 0;
+    for (int kind = 0; kind < VARIATION_KINDS; kind++) {
+        variation = fmax(variation, s->high[kind] - s->low[kind]);
         cost = fmax(cost, fmax(-s->low[kind], s->high[kind]));
     }
-    *out = (kernel_swing){.swing = (float)fmin(swing * (1 + rounding), 1e30),
-                          .cost = (float)fmin(cost * (1 + rounding), 1e30),
-                          .extinction = (float)s->extinction,
-                          .steepness = (float)fmin(fmax(-s->low[0], s->high[0]) * contrast, 1e30)};
+    *out = (kernel_light_variation){.variation = (float)fmin(variation * (1 + rounding), 1e30),
+                                    .cost = (float)fmin(cost * (1 + rounding), 1e30),
+                                    .extinction = (float)s->extinction,
+                                    .steepness = (float)fmin(fmax(-s->low[0], s->high[0]) * contrast, 1e30)};
 }
 
 /* Fills the table of bounds by the class of a range's width and its first bin. Wherever in its first bin a range of
  * this class begins, it ends in bin `wanted` or before it. */
-static void fill_swings(kernel_pieces *out, const double behind[2])
+static void fill_variations(kernel_pieces *out, const double behind[2])
 {
-    value_swing bins[KERNEL_SWING_BINS];
-    for (int i = 0, piece = 0; i < KERNEL_SWING_BINS; i++) piece = swing_in_bin(out, i, piece, behind, &bins[i]);
-    for (int first = 0; first < KERNEL_SWING_BINS; first++) {
-        value_swing all = bins[first];
-        for (int width = 0, last = first; width < KERNEL_SWING_WIDTHS; width++) {
+    value_variation bins[KERNEL_VARIATION_BINS];
+    for (int i = 0, piece = 0; i < KERNEL_VARIATION_BINS; i++)
+        piece = variation_in_bin(out, i, piece, behind, &bins[i]);
+    for (int first = 0; first < KERNEL_VARIATION_BINS; first++) {
+        value_variation all = bins[first];
+        for (int width = 0, last = first; width < KERNEL_VARIATION_WIDTHS; width++) {
             const int wanted = first + (int)ceil(ldexp(1 + 0.25 * (width % 4 + 1), width / 4)) - 1;
-            for (; last < wanted && last + 1 < KERNEL_SWING_BINS; last++) unite_swings(&all, &bins[last + 1]);
-            sum_up_swing(&all, behind[1] - behind[0], &out->swings[width * KERNEL_SWING_BINS + first]);
+            for (; last < wanted && last + 1 < KERNEL_VARIATION_BINS; last++) unite_variations(&all, &bins[last + 1]);
+            sum_up_variation(&all, behind[1] - behind[0], &out->variations[width * KERNEL_VARIATION_BINS + first]);
         }
     }
 }
@@ -500,15 +505,15 @@ insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, 
     return base_fail(error, INSITU_ERROR_MEMORY, "no memory for a transfer function of %d colours", t->colour_count);
 }
 
-insitu_status render_swings_build(kernel_pieces *pieces, const render_transfer *t, base_error *error)
+insitu_status render_variations_build(kernel_pieces *pieces, const render_transfer *t, base_error *error)
 {
     float low, high;
     range_of_light(t, &low, &high);
-    pieces->swings = base_calloc(KERNEL_SWING_WIDTHS * KERNEL_SWING_BINS, sizeof *pieces->swings);
-    if (!pieces->swings)
+    pieces->variations = base_calloc(KERNEL_VARIATION_WIDTHS * KERNEL_VARIATION_BINS, sizeof *pieces->variations);
+    if (!pieces->variations)
         return base_fail(error, INSITU_ERROR_MEMORY, "no memory for the bounds of a transfer function");
-    pieces->swing_inverse = (float)((double)pieces->bin_inverse * KERNEL_SWING_BINS / KERNEL_PIECE_BINS);
-    fill_swings(pieces, (const double[]){(double)low, (double)high});
+    pieces->variation_inverse = (float)((double)pieces->bin_inverse * KERNEL_VARIATION_BINS / KERNEL_PIECE_BINS);
+    fill_variations(pieces, (const double[]){(double)low, (double)high});
     return INSITU_OK;
 }
 
@@ -517,8 +522,8 @@ void render_pieces_free(kernel_pieces *pieces)
     if (pieces->preintegral) base_free(pieces->preintegral->entries);
     base_free(pieces->preintegral);
     base_free(pieces->pieces);
-    base_free(pieces->swings);
+    base_free(pieces->variations);
     pieces->preintegral = NULL;
     pieces->pieces = NULL;
-    pieces->swings = NULL;
+    pieces->variations = NULL;
 }

@@ -12,7 +12,7 @@
 insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error);
 /* Adds the bounds that decide how segments of hexes, wedges and pyramids are divided in lanes
  * (kernel_local_segments.h). */
-insitu_status render_swings_build(kernel_pieces *pieces, const render_transfer *t, base_error *error);
+insitu_status render_variations_build(kernel_pieces *pieces, const render_transfer *t, base_error *error);
 /* Adds the table of sums for preintegration. max_error: error allowed in the light of a ray whose length in the cells
  * is at most `reach` unit distances. */
 insitu_status render_preintegral_build(kernel_pieces *pieces, const render_transfer *t, double max_error, double reach,

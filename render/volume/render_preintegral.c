@@ -193,7 +193,7 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
     const double units[2] = {fmax(total[0], 1e-30) / most_units, fmax(total[1], 1e-30) / most_units};
     for (int i = 0; i < out->bin_count + 2; i++) {
         const bin_sums *bin = &bins[i];
-        kernel_pre_entry *e = &out->entries[i];
+        kernel_preint_entry *e = &out->entries[i];
         for (int n = 0; n < CHANNELS; n++) {
             const int32_t begin = (int32_t)(before[n] / units[n > 0]);
             before[n] += bin->sum[n];
@@ -203,9 +203,9 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
         e->colour = pack_colour(bin, contrast);
         /* a bin without extinction has no rounding */
         const double rounding = 2 * (units[0] * contrast + units[1]) / width;
-        e->rough = (float)fmin((bin->high - bin->low) * 2 * contrast + bin->high * colour_change(bin) +
-                                   (bin->high > 0 ? rounding : 0),
-                               1e30);
+        e->table_error = (float)fmin((bin->high - bin->low) * 2 * contrast + bin->high * colour_change(bin) +
+                                         (bin->high > 0 ? rounding : 0),
+                                     1e30);
         change = fmax(change, colour_change(bin));
     }
     out->depth_unit = (float)(units[0] / width);
@@ -223,7 +223,7 @@ static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
         double slope = 0;
         for (int i = 0; i < t->colour_count; i++) {
             const bool is_last = i == t->colour_count - 1;
-            const double width = is_last ? 1 : render_entry_place(t, i + 1) - render_entry_place(t, i);
+            const double width = is_last ? 1 : render_entry_position(t, i + 1) - render_entry_position(t, i);
             const double change = is_last ? 0 : (double)t->colours[3 * i + 3 + c] - (double)t->colours[3 * i + c];
             bend = fmax(bend, fabs(change / width - slope));
             closest = fmin(closest, width);

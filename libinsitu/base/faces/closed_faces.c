@@ -25,24 +25,24 @@ bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell)
 
 size_t closed_faces_lay_out(closed_faces *c, char *room)
 {
-    base_carving at = {room, 0};
+    base_arena at = {room, 0};
     const size_t faces = (size_t)c->face_count, entries = (size_t)c->entry_count, table = (size_t)c->table_size;
-    c->first_entries = base_carve(&at, (faces + 1) * sizeof(int));
-    c->entry_vertices = base_carve(&at, entries * sizeof(int));
-    c->face_of = base_carve(&at, entries * sizeof(int));
-    c->edge_of = base_carve(&at, entries * sizeof(int));
-    c->vertices = base_carve(&at, entries * sizeof *c->vertices);
-    c->piece = base_carve(&at, faces * sizeof(int));
-    c->orientation = base_carve(&at, faces * sizeof(int));
-    c->stack = base_carve(&at, faces * sizeof(int));
-    c->piece_volume = base_carve(&at, faces * sizeof(double));
-    c->seen = base_carve(&at, table * sizeof *c->seen);
-    c->seen_number = base_carve(&at, table * sizeof(int));
-    c->edges = base_carve(&at, 2 * table * sizeof *c->edges);
-    c->triangles = base_carve(&at, entries * sizeof *c->triangles);
-    c->corners = base_carve(&at, entries * sizeof *c->corners);
-    c->cuts = base_carve(&at, entries * sizeof *c->cuts);
-    c->polygon = base_carve(&at, polygon_work_bytes((int)entries));
+    c->first_entries = base_arena_alloc(&at, (faces + 1) * sizeof(int));
+    c->entry_vertices = base_arena_alloc(&at, entries * sizeof(int));
+    c->face_of = base_arena_alloc(&at, entries * sizeof(int));
+    c->edge_of = base_arena_alloc(&at, entries * sizeof(int));
+    c->vertices = base_arena_alloc(&at, entries * sizeof *c->vertices);
+    c->piece = base_arena_alloc(&at, faces * sizeof(int));
+    c->orientation = base_arena_alloc(&at, faces * sizeof(int));
+    c->stack = base_arena_alloc(&at, faces * sizeof(int));
+    c->piece_volume = base_arena_alloc(&at, faces * sizeof(double));
+    c->seen = base_arena_alloc(&at, table * sizeof *c->seen);
+    c->seen_number = base_arena_alloc(&at, table * sizeof(int));
+    c->edges = base_arena_alloc(&at, 2 * table * sizeof *c->edges);
+    c->triangles = base_arena_alloc(&at, entries * sizeof *c->triangles);
+    c->corners = base_arena_alloc(&at, entries * sizeof *c->corners);
+    c->cuts = base_arena_alloc(&at, entries * sizeof *c->cuts);
+    c->polygon = base_arena_alloc(&at, polygon_work_bytes((int)entries));
     return at.used;
 }
 
@@ -135,7 +135,7 @@ static void orient_piece(closed_faces *c, int first)
     c->piece_count++;
 }
 
-void closed_faces_turn(closed_faces *c)
+void closed_faces_orient(closed_faces *c)
 {
     closed_edges_empty(c);
     c->piece_count = 0;
@@ -172,7 +172,7 @@ static void add_triangle(closed_faces *c, int face, const int corners[3])
     if (t.vertex[0] != t.vertex[1] && t.vertex[1] != t.vertex[2]) c->triangles[c->triangle_count++] = t;
 }
 
-void closed_faces_cut(closed_faces *c, const double (*positions)[3])
+void closed_faces_triangulate(closed_faces *c, const double (*positions)[3])
 {
     c->triangle_count = 0;
     for (int face = 0; face < c->face_count; face++) {
@@ -180,7 +180,7 @@ void closed_faces_cut(closed_faces *c, const double (*positions)[3])
         if (count < 3) continue;
         for (int i = 0; i < count; i++)
             memcpy(c->corners[i], positions[c->entry_vertices[first + i]], sizeof c->corners[i]);
-        polygon_cut((const double(*)[3])c->corners, count, c->polygon, c->cuts);
+        polygon_triangulate((const double(*)[3])c->corners, count, c->polygon, c->cuts);
         for (int i = 0; i + 2 < count; i++) add_triangle(c, face, c->cuts[i]);
     }
 }
@@ -245,7 +245,7 @@ static bool is_cavity(const closed_faces *c, const double (*positions)[3], int p
     return inside;
 }
 
-void closed_faces_turn_outward(closed_faces *c, const double (*positions)[3], const double centre[3])
+void closed_faces_orient_outward(closed_faces *c, const double (*positions)[3], const double centre[3])
 {
     for (int i = 0; i < c->piece_count; i++) c->piece_volume[i] = 0;
     for (int i = 0; i < c->triangle_count; i++) {

@@ -33,8 +33,8 @@ typedef struct closed_faces {
     int *entry_vertices; /* vertex number of each entry */
     int *face_of;        /* face of each entry */
     int64_t *vertices;   /* index in the grid of each numbered vertex */
-    /* 1 or -1 per face: whether it is reversed; after closed_faces_turn_outward(), 1 if the face's vertices run around
-     * the outward normal */
+    /* 1 or -1 per face: whether it is reversed; after closed_faces_orient_outward(), 1 if the face's vertices run
+     * around the outward normal */
     int *orientation;
     int *piece; /* number of the connected piece to which each face belongs */
     closed_triangle *triangles;
@@ -61,14 +61,14 @@ size_t closed_faces_lay_out(closed_faces *c, char *room);
 void closed_faces_read(closed_faces *c, const grid *g, int64_t cell);
 
 /* Orients the faces of each piece consistently with the first face in the list. */
-void closed_faces_turn(closed_faces *c);
+void closed_faces_orient(closed_faces *c);
 
 /* Cuts the faces into triangles (polygon.h). positions are indexed by vertex number. A triangle that has the same
  * vertex at two corners has no area and is left out. */
-void closed_faces_cut(closed_faces *c, const double (*positions)[3]);
+void closed_faces_triangulate(closed_faces *c, const double (*positions)[3]);
 
 /* Computes the volumes of the triangles, and orients the pieces outward. */
-void closed_faces_turn_outward(closed_faces *c, const double (*positions)[3], const double centre[3]);
+void closed_faces_orient_outward(closed_faces *c, const double (*positions)[3], const double centre[3]);
 
 /* Returns whether the face is intersected as a bilinear patch: it has four vertices, and none of its corners is
  * concave. Any other face is intersected as its triangles. */

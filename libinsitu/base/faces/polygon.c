@@ -253,7 +253,7 @@ static void cut_ears(polygon_work *w)
     add_fan(w, first);
 }
 
-void polygon_cut(const double (*corners)[3], int count, void *room, int (*triangles)[3])
+void polygon_triangulate(const double (*corners)[3], int count, void *room, int (*triangles)[3])
 {
     polygon_work w = divide_work(count, room, triangles);
     double normal[3];

@@ -305,18 +305,18 @@ void session_take_lattice(session_mesh *mesh)
         out->cells[axis] = l->cells[axis];
         out->drawn_first[axis] = has_all ? 0 : l->interior_first[axis];
         out->drawn_end[axis] = has_all ? cells[axis] : l->interior_end[axis];
-        out->axes[axis] = (grid_axis){own->axis_coordinates[axis], vertices[axis], &out->by_vertex, axis};
+        out->axes[axis] = (grid_axis){own->axis_coordinates[axis], vertices[axis], &out->vertex_numbering, axis};
     }
     compute_packed_strides(vertices, packed);
-    out->by_vertex = make_numbering(are_all_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
+    out->vertex_numbering = make_numbering(are_all_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
     /* The axis without cells comes last, so that the first four corners are a quad's. */
     const int last = l->cells[0] ? l->cells[1] ? 2 : 1 : 0, axes[3] = {last == 0, last == 2 ? 1 : 2, last};
     for (int i = 0; i < 8; i++) {
-        out->corner[i] = 0;
-        for (int n = 0; n < 3; n++) out->corner[i] += hex[i][n] * out->by_vertex.stride[axes[n]];
+        out->corner_offsets[i] = 0;
+        for (int n = 0; n < 3; n++) out->corner_offsets[i] += hex[i][n] * out->vertex_numbering.stride[axes[n]];
     }
     compute_packed_strides(cells, packed);
-    out->by_cell = make_numbering(are_all_zero(l->cell_strides) ? packed : l->cell_strides, cells);
+    out->cell_numbering = make_numbering(are_all_zero(l->cell_strides) ? packed : l->cell_strides, cells);
     out->cell_count = cells[0] * cells[1] * cells[2];
     out->has_ghosts = !has_all || out->cell_count != mesh->given.cell_count;
 }
@@ -355,7 +355,7 @@ insitu_status session_make_axes(session_mesh *mesh, base_error *error)
                              mesh->label, (long long)count, axis_name[axis]);
         session_fill_axis(l, axis, places);
         own->axis_coordinates[axis] = places;
-        own->cells.axes[axis].places = places;
+        own->cells.axes[axis].axis_coordinates = places;
         own->bytes += count * (int64_t)sizeof *places;
         for (int64_t n = 0; n < count; n++)
             if (!isfinite(places[n]))

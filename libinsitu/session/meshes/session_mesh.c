@@ -13,22 +13,22 @@ bool session_is_aligned(const insitu_array *array)
     return array->stride_bytes % size == 0 && (uintptr_t)array->data % (uintptr_t)size == 0;
 }
 
-static grid_odd find_odd_type(const insitu_array *array)
+static grid_unusual_type find_odd_type(const insitu_array *array)
 {
     const bool is_aligned = session_is_aligned(array);
     switch (array->type) {
-    case INSITU_FLOAT32: return is_aligned ? GRID_NOT_ODD : GRID_ODD_FLOAT32;
-    case INSITU_FLOAT64: return is_aligned ? GRID_NOT_ODD : GRID_ODD_FLOAT64;
-    case INSITU_INT32: return is_aligned ? GRID_NOT_ODD : GRID_ODD_INT32;
-    case INSITU_INT64: return is_aligned ? GRID_NOT_ODD : GRID_ODD_INT64;
-    case INSITU_UINT8: return GRID_ODD_UINT8;
-    case INSITU_INT8: return GRID_ODD_INT8;
-    case INSITU_INT16: return GRID_ODD_INT16;
-    case INSITU_UINT16: return GRID_ODD_UINT16;
-    case INSITU_UINT32: return GRID_ODD_UINT32;
-    case INSITU_UINT64: return GRID_ODD_UINT64;
+    case INSITU_FLOAT32: return is_aligned ? GRID_USUAL_TYPE : GRID_UNUSUAL_FLOAT32;
+    case INSITU_FLOAT64: return is_aligned ? GRID_USUAL_TYPE : GRID_UNUSUAL_FLOAT64;
+    case INSITU_INT32: return is_aligned ? GRID_USUAL_TYPE : GRID_UNUSUAL_INT32;
+    case INSITU_INT64: return is_aligned ? GRID_USUAL_TYPE : GRID_UNUSUAL_INT64;
+    case INSITU_UINT8: return GRID_UNUSUAL_UINT8;
+    case INSITU_INT8: return GRID_UNUSUAL_INT8;
+    case INSITU_INT16: return GRID_UNUSUAL_INT16;
+    case INSITU_UINT16: return GRID_UNUSUAL_UINT16;
+    case INSITU_UINT32: return GRID_UNUSUAL_UINT32;
+    case INSITU_UINT64: return GRID_UNUSUAL_UINT64;
     }
-    return GRID_NOT_ODD;
+    return GRID_USUAL_TYPE;
 }
 
 grid_array session_grid_array(const insitu_array *array)
@@ -38,8 +38,8 @@ grid_array session_grid_array(const insitu_array *array)
     out.data = array->data;
     out.stride = array->stride_bytes ? array->stride_bytes : session_type_size(array->type);
     out.is_wide = session_type_size(array->type) == 8;
-    out.odd = (unsigned char)find_odd_type(array);
-    out.is_integer = out.odd || array->type == INSITU_INT32 || array->type == INSITU_INT64;
+    out.unusual_type = (unsigned char)find_odd_type(array);
+    out.is_integer = out.unusual_type || array->type == INSITU_INT32 || array->type == INSITU_INT64;
     return out;
 }
 
@@ -62,8 +62,8 @@ grid_array session_offset_array(const insitu_mesh *mesh, const insitu_array *arr
 {
     grid_array out = session_index_array(mesh, array);
     if (!mesh->open_offsets) return out;
-    out.open_count = count;
-    out.open_end = entries;
+    out.implied_end_count = count;
+    out.implied_end = entries;
     return out;
 }
 
@@ -184,7 +184,7 @@ void session_drop_axes(session_lattice *lattice)
     for (int axis = 0; axis < 3; axis++) {
         base_free(lattice->axis_coordinates[axis]);
         lattice->axis_coordinates[axis] = NULL;
-        lattice->cells.axes[axis].places = NULL;
+        lattice->cells.axes[axis].axis_coordinates = NULL;
     }
     lattice->bytes = 0;
 }

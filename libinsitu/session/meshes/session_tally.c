@@ -295,14 +295,14 @@ static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t e
     const grid_lattice *l = g->lattice;
     lane_cells alike = {.g = g, .type = g->cell_type, .first = cell, .count = 1};
     const int along = grid_lattice_row_axis(l);
-    if (along < 0 || g->vertex_count > INT32_MAX || !grid_lattice_draws(l, cell)) return alike;
-    const int64_t left = l->drawn_end[along] - grid_index_along(&l->by_cell, along, cell);
-    const int64_t count = left < end - cell ? left : end - cell, step = l->by_vertex.stride[along];
+    if (along < 0 || g->vertex_count > INT32_MAX || !grid_lattice_is_drawn(l, cell)) return alike;
+    const int64_t left = l->drawn_end[along] - grid_index_along(&l->cell_numbering, along, cell);
+    const int64_t count = left < end - cell ? left : end - cell, step = l->vertex_numbering.stride[along];
     int64_t first = grid_lattice_first(l, cell);
     alike.count = count < ROW_CELLS ? count : ROW_CELLS;
     for (int64_t n = 0; n < alike.count; n++, first += step)
         for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++)
-            row->vertices[n * GRID_MAX_CELL_VERTICES + i] = (int32_t)(first + l->corner[i]);
+            row->vertices[n * GRID_MAX_CELL_VERTICES + i] = (int32_t)(first + l->corner_offsets[i]);
     row->cells = *g;
     row->cells.lattice = NULL;
     row->cells.connectivity =
@@ -357,7 +357,7 @@ typedef struct axis_lengths {
 
 static axis_lengths measure_axis(const grid_lattice *l, int axis)
 {
-    const double *at = l->axes[axis].places + l->drawn_first[axis];
+    const double *at = l->axes[axis].axis_coordinates + l->drawn_first[axis];
     const int64_t count = l->drawn_end[axis] - l->drawn_first[axis];
     axis_lengths out = {.lower = at[0], .upper = at[0]};
     for (int64_t n = 0; n < count && l->cells[axis]; n++) {
@@ -415,7 +415,8 @@ static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int6
         tally_point(&t, box.lower);
         tally_point(&t, box.upper);
         for (int axis = 0; axis < 3; axis++) {
-            const double *at = g->lattice->axes[axis].places + grid_index_along(&g->lattice->by_cell, axis, cell);
+            const double *at =
+                g->lattice->axes[axis].axis_coordinates + grid_index_along(&g->lattice->cell_numbering, axis, cell);
             volume *= g->lattice->cells[axis] ? at[1] - at[0] : 0;
         }
         t.flat_count += volume == 0;

@@ -246,7 +246,7 @@ static void mark_covered_cells(const session_mesh *mesh, const int64_t lower[3],
                                unsigned char *covered)
 {
     const insitu_lattice *l = mesh->given.lattice;
-    const int64_t *strides = mesh->lattice.cells.by_cell.stride;
+    const int64_t *strides = mesh->lattice.cells.cell_numbering.stride;
     int64_t from[3], to[3];
     for (int axis = 0; axis < 3; axis++) {
         from[axis] = lower[axis] - (l->cells[axis] ? l->first[axis] : 0);
@@ -345,10 +345,10 @@ static void find_neighbour_centre(const session_mesh *mesh, const session_level_
     const session_cell_faces faces = session_faces_of_cell(&mesh->cells, face->cell);
     const session_face_loop loop = session_face_of(&faces, face->face);
     for (int axis = 0; axis < 3; axis++) {
-        const int64_t index = grid_index_along(&l->by_cell, axis, face->cell);
+        const int64_t index = grid_index_along(&l->cell_numbering, axis, face->cell);
         int64_t least = INT64_MAX, most = 0;
         for (int64_t i = 0; i < loop.size; i++) {
-            const int64_t at = grid_index_along(&l->by_vertex, axis, session_face_vertex(&loop, i));
+            const int64_t at = grid_index_along(&l->vertex_numbering, axis, session_face_vertex(&loop, i));
             least = at < least ? at : least;
             most = at > most ? at : most;
         }

@@ -283,7 +283,7 @@ static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], 
     const int64_t first = w->cell_count;
     double common[3], own[3];
     corner_loop loop;
-    polygon_cut((const double(*)[3])p->positions, p->count, p->work_memory, p->triangles);
+    polygon_triangulate((const double(*)[3])p->positions, p->count, p->work_memory, p->triangles);
     find_polygon_normal(p, inside);
     const bool is_shared = find_common_apex(p, common);
     const int64_t apex = is_shared ? add_vertex(w, common, p->vertices[p->triangles[0][0]], -1) : -1;

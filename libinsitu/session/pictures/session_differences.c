@@ -19,14 +19,14 @@
 
 enum {
     ROUND_HITS = 1 << 18,
-    REQUEST_WORDS = sizeof(render_waiting_hit) / 8,
-    ANSWER_WORDS = sizeof(render_samples_about) / 8
+    REQUEST_WORDS = sizeof(render_pending_hit) / 8,
+    ANSWER_WORDS = sizeof(render_difference_samples) / 8
 };
 
 typedef struct differing {
     MPI_Comm comm;
     const render_job *job;
-    render_waiting_list *list;
+    render_pending_list *list;
     int rank, ranks;
     int64_t round_hits, rounds; /* number of hits per round, and number of rounds on all ranks */
     /* Ranks that may have samples for any of this rank's hits, and their boxes. */
@@ -35,7 +35,7 @@ typedef struct differing {
     render_box *boxes;
     /* The hits of the current round and their samples. */
     int64_t first, count;
-    render_samples_about *samples;
+    render_difference_samples *samples;
     int64_t *requested_hits; /* hits for which samples are requested, in the order of the message */
 } differing;
 
@@ -109,7 +109,7 @@ static bool write_requests(differing *d, session_mail *out)
     int64_t requests = 0;
     for (int n = 0; n < d->near_count; n++)
         for (int64_t i = 0; i < d->count; i++) {
-            const render_waiting_hit *hit = &d->list->items[d->first + i];
+            const render_pending_hit *hit = &d->list->items[d->first + i];
             if (!render_differences_meet(d->job, hit, &d->boxes[d->near_ranks[n]])) continue;
             if (requests == capacity) {
                 capacity += capacity / 2 + 1024;
@@ -136,8 +136,8 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
     out->words = base_alloc((size_t)(out->total + 1) * sizeof *out->words);
     if (!out->counts || !out->words) return false;
     for (int r = 0; r < d->ranks; r++) out->counts[r] = in->counts[r] / REQUEST_WORDS * ANSWER_WORDS;
-    render_differences_sample(d->job, (const render_waiting_hit *)(const void *)in->words,
-                              (render_samples_about *)(void *)out->words, count, error);
+    render_differences_sample(d->job, (const render_pending_hit *)(const void *)in->words,
+                              (render_difference_samples *)(void *)out->words, count, error);
     return true;
 }
 
@@ -155,7 +155,7 @@ static insitu_status exchange_round(differing *d, base_error *error)
         for (int64_t i = 0; i < sent_requests.total / REQUEST_WORDS; i++)
             render_differences_merge(
                 &d->samples[d->requested_hits[i]],
-                (const render_samples_about *)(const void *)(received_answers.words + i * ANSWER_WORDS));
+                (const render_difference_samples *)(const void *)(received_answers.words + i * ANSWER_WORDS));
     session_mail_free(&sent_requests);
     session_mail_free(&received_requests);
     session_mail_free(&sent_answers);
@@ -223,8 +223,8 @@ insitu_status session_differ_fragments(MPI_Comm comm, const render_job *job, fra
     d.round_hits = session_mail_round(d.ranks, ROUND_HITS);
     const insitu_status status = compute_differences(&d, fragments, error);
     base_free(d.list->items);
-    base_free(d.list->looks);
-    *d.list = (render_waiting_list){0};
+    base_free(d.list->shadings);
+    *d.list = (render_pending_list){0};
     *ms += 1e3 * (MPI_Wtime() - start);
     return status;
 }

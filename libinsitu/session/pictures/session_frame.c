@@ -53,7 +53,7 @@ static insitu_status trace_fragments(const session_frame_target *t, const render
 {
     int ranks = 1;
     MPI_Comm_size(t->comm, &ranks);
-    render_waiting waiting = {0};
+    render_pending_hits waiting = {0};
     render_job traced = *job;
     traced.waiting = ranks > 1 && render_has_differences(job) ? &waiting : NULL;
     if (job->part_count > 0 && !error->status) render_frame(&traced, fragments, rendered, error);
@@ -137,10 +137,10 @@ static insitu_status update_turn_pixels(const session_frame_target *t, int64_t f
 /* The order in which a picture's pixels are drawn in turns. Pixels are ordered by squares, so that the rays of a packet
  * are neighbours. Consecutive squares are far apart (their numbers are multiples of the golden ratio of the number of
  * squares), so that each turn contains a similar fraction of dense regions. */
-typedef struct turn_order {
+typedef struct set_row_major_strides {
     int width, height, squares_per_row; /* size of the picture in pixels, and number of squares in a row of squares */
     int64_t squares, stride;            /* number of squares, and step from one square to the next in the order */
-} turn_order;
+} set_row_major_strides;
 
 enum { SQUARE = 16 };
 
@@ -154,9 +154,9 @@ static int64_t greatest_divisor(int64_t a, int64_t b)
     return a;
 }
 
-static turn_order make_turn_order(const image *out)
+static set_row_major_strides make_turn_order(const image *out)
 {
-    turn_order order = {out->width, out->height, (out->width + SQUARE - 1) / SQUARE, 0, 0};
+    set_row_major_strides order = {out->width, out->height, (out->width + SQUARE - 1) / SQUARE, 0, 0};
     order.squares = (int64_t)order.squares_per_row * ((out->height + SQUARE - 1) / SQUARE);
     order.stride = (int64_t)(0.618 * (double)order.squares) + 1;
     while (greatest_divisor(order.stride, order.squares) > 1) order.stride++;
@@ -164,7 +164,7 @@ static turn_order make_turn_order(const image *out)
 }
 
 /* Returns the k-th pixel of the order, or -1 if it is outside of the picture. */
-static int64_t turn_order_pixel(const turn_order *order, int64_t k)
+static int64_t turn_order_pixel(const set_row_major_strides *order, int64_t k)
 {
     const int64_t square = k / (SQUARE * SQUARE) % order->squares * order->stride % order->squares;
     const int64_t x = square % order->squares_per_row * SQUARE + k % SQUARE;
@@ -177,7 +177,7 @@ static int64_t turn_order_pixel(const turn_order *order, int64_t k)
 static int64_t take_turn_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
                                 unsigned char *taken)
 {
-    const turn_order order = make_turn_order(out);
+    const set_row_major_strides order = make_turn_order(out);
     const int64_t end = order.squares * SQUARE * SQUARE;
     memset(taken, 0, pixel_set_bytes((int64_t)out->width * out->height));
     for (; first < end && most > 0; first++) {

@@ -166,7 +166,7 @@ insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_s
 {
     const size_t most = (size_t)mesh->scalar_count;
     grid_field *fields = base_calloc(most, sizeof *fields);
-    mmbvh_wish *wishes = base_calloc(most, sizeof *wishes);
+    mmbvh_query *wishes = base_calloc(most, sizeof *wishes);
     int64_t *unusable = base_calloc(most, sizeof *unusable);
     insitu_status status = INSITU_ERROR_MEMORY;
     if (fields && wishes && unusable) {
@@ -175,7 +175,7 @@ insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_s
             const session_scalar *s = &mesh->scalars[i];
             if (!s->needs_ranges) continue;
             fields[count] = session_scalar_field(mesh, s);
-            wishes[count] = (mmbvh_wish){&fields[count], s->interval_count, s->intervals};
+            wishes[count] = (mmbvh_query){&fields[count], s->interval_count, s->intervals};
             count++;
         }
         const mmbvh_options options = {.threads = threads};

@@ -153,7 +153,7 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_
     int64_t most = 0;
     for (int i = 0; i < sums->part_count; i++) {
         session_sum_part *part = &sums->parts[i];
-        const mmbvh_wish wish = {part->fields, item->value_count, item->values};
+        const mmbvh_query wish = {part->fields, item->value_count, item->values};
         const int64_t vertices = part->mesh->cells.vertex_count;
         int64_t unusable;
         part->key_indices = base_alloc((size_t)(vertices ? vertices : 1) * sizeof *part->key_indices);

@@ -287,7 +287,7 @@ static session_gradient_basis make_gradient_basis(const session_vertex_sums *sum
 static bool make_polynomials(const session_vertex_sums *sums, session_sum_part *part)
 {
     bool is_polynomial = part->mesh->topology.is_split;
-    for (int f = 0; f < sums->field_count; f++) is_polynomial = is_polynomial && !part->fields[f].own;
+    for (int f = 0; f < sums->field_count; f++) is_polynomial = is_polynomial && !part->fields[f].source_cells;
     if (!is_polynomial) return true;
     part->polynomials = base_calloc(1, sizeof *part->polynomials);
     return part->polynomials && session_polynomials_create(part->mesh, part->polynomials);

@@ -79,7 +79,7 @@ static uint64_t find_checksum(const session_mesh *mesh, const session_scalar *sc
 {
     const grid_field field = session_scalar_field(mesh, scalar);
     const uint64_t sum = sum_field(0, mesh, &field, threads);
-    return field.own ? sum_field(sum, mesh, field.own, threads) : sum;
+    return field.source_cells ? sum_field(sum, mesh, field.source_cells, threads) : sum;
 }
 
 static uint64_t sample_field(uint64_t sum, const session_mesh *mesh, const grid_field *field)
@@ -100,7 +100,7 @@ static uint64_t find_sample(const session_mesh *mesh, const session_scalar *scal
 {
     const grid_field field = session_scalar_field(mesh, scalar);
     const uint64_t sum = sample_field(1, mesh, &field);
-    return field.own ? sample_field(sum, mesh, field.own) : sum;
+    return field.source_cells ? sample_field(sum, mesh, field.source_cells) : sum;
 }
 
 /* Warns if values have changed in place although the caller declared them unchanged: trees then contain ranges of the

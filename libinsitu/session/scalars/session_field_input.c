@@ -288,7 +288,7 @@ static void set_value_array(session_field *field, const insitu_field *given)
     /* the other components are not aligned, so that the values must be read as unaligned ones */
     values.stride_bytes = field->component_stride;
     const grid_array other = session_grid_array(&values);
-    field->values.odd = other.odd;
+    field->values.unusual_type = other.unusual_type;
     field->values.is_integer = other.is_integer;
 }
 
@@ -299,7 +299,8 @@ static void set_value_arrays(const session_mesh *mesh, session_field *field, con
 {
     const bool has_index = is_by_index(mesh, given), was_apart = field->given.components != NULL;
     if (is_other || field->has_index != has_index || field->given.corner_row != given->corner_row ||
-        field->given.values.type != given->values.type || field->values.odd || field->component_arrays || was_apart)
+        field->given.values.type != given->values.type || field->values.unusual_type || field->component_arrays ||
+        was_apart)
         session_drop_copy(field);
     field->has_index = has_index;
     field->is_copy_stale = field->is_copy_stale || is_stale;

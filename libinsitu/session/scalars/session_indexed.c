@@ -38,7 +38,7 @@ static indexed_values make_indexed_values(const session_mesh *mesh, const sessio
     indexed_values out = {.index = session_grid_array(&given->index),
                           .values = {.values = field->values,
                                      .component_stride = field->component_stride,
-                                     .apart = field->component_arrays,
+                                     .component_arrays = field->component_arrays,
                                      .component_count = given->component_count},
                           .keeps_type = session_is_plain_copy(field),
                           .row_length = 1,

@@ -73,7 +73,7 @@ bool session_is_copied(const session_mesh *mesh, const session_field *field)
 
 bool session_is_plain_copy(const session_field *field)
 {
-    return !field->component_arrays && !field->values.odd;
+    return !field->component_arrays && !field->values.unusual_type;
 }
 
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field)
@@ -99,7 +99,7 @@ grid_field session_given_field(const session_mesh *mesh, int index, int componen
         if (component >= 0)
             out.values = field->component_arrays[component];
         else
-            out.apart = field->component_arrays;
+            out.component_arrays = field->component_arrays;
         return out;
     }
     if (!session_is_plain_copy(field)) out.values = (grid_array){.is_wide = true};
@@ -129,7 +129,7 @@ grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *
         .values = {.data = (const char *)scalar->vertex_values, .stride = (int64_t)sizeof(double), .is_wide = true},
         .component_stride = (int64_t)sizeof(double),
         .component_count = 1,
-        .own = scalar->original_values.is_cell_centred ? &scalar->original_values : NULL};
+        .source_cells = scalar->original_values.is_cell_centred ? &scalar->original_values : NULL};
 }
 
 session_scalar *session_add_scalar(session_mesh *mesh)

@@ -109,9 +109,9 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_buffer *room
     room->vertex_count = c.vertex_count;
     if (!c.vertex_count) return 0;
     read_positions(g, &c, places);
-    closed_faces_turn(&c);
-    closed_faces_cut(&c, positions);
-    closed_faces_turn_outward(&c, positions, origin);
+    closed_faces_orient(&c);
+    closed_faces_triangulate(&c, positions);
+    closed_faces_orient_outward(&c, positions, origin);
     double volume = 0;
     for (int i = 0; i < c.triangle_count; i++)
         if (!closed_face_is_patch(&c, c.triangles[i].face, positions)) volume += c.triangles[i].volume;

@@ -1,8 +1,8 @@
 /* Tets, one a lane, placed for a tile and given their lines: the operations of kernel_cell_move(), kernel_cell_order()
  * and kernel_tet_lines(), and so the same bits, for as many tets at once as a vector has lanes. Vertices are put in
  * order first, so that all else comes in order. What is computed in double is computed in two halves. */
-#ifndef RENDER_KERNEL_PLACED_H
-#define RENDER_KERNEL_PLACED_H
+#ifndef RENDER_KERNEL_TRANSFORMED_TETS_H
+#define RENDER_KERNEL_TRANSFORMED_TETS_H
 
 #include <math.h>
 #include <string.h>
@@ -17,62 +17,63 @@
 #include "simd.h"
 
 /* The data of a kernel_cell for one tet per lane; the caller sets f. */
-typedef struct kernel_placed {
-    kernel_whole world[3][4], values[4]; /* coordinates and values as the caller of the library passed them */
+typedef struct kernel_transformed_tets {
+    kernel_wide_doubles world[3][4], values[4]; /* coordinates and values as the caller of the library passed them */
     vf at[3][4], f[4];
     vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
     vf doubt, least[4];
     vi vertex[4];
-} kernel_placed;
+} kernel_transformed_tets;
 
 /* A vertex of each lane's tet while the vertices are sorted: coordinates and vertex index. */
 typedef struct kernel_ordered {
-    kernel_taken at[3];
+    kernel_raw_numbers at[3];
     vi vertex;
 } kernel_ordered;
 
 /* Exchanges a and b in the lanes in which b is before a in the order of coordinates. */
 SIMD_INLINE void kernel_ordered_swap(bool is_narrow, kernel_ordered *a, kernel_ordered *b)
 {
-    const vm before = kernel_taken_before(is_narrow, b->at, a->at);
+    const vm before = kernel_raw_before(is_narrow, b->at, a->at);
     const vi was = a->vertex;
-    for (int axis = 0; axis < 3; axis++) kernel_taken_swap(is_narrow, before, &a->at[axis], &b->at[axis]);
+    for (int axis = 0; axis < 3; axis++) kernel_raw_swap(is_narrow, before, &a->at[axis], &b->at[axis]);
     a->vertex = vi_select(before, b->vertex, was);
     b->vertex = vi_select(before, was, b->vertex);
 }
 
 /* Reads the vertices and sorts them by coordinates. It is a bubble sort, which only exchanges neighbours that differ;
  * so vertices with equal coordinates keep their order. */
-SIMD_INLINE void kernel_ordered_fetch(kernel_placed *out, const kernel_arrays *p, bool is_narrow,
+SIMD_INLINE void kernel_ordered_fetch(kernel_transformed_tets *out, const kernel_arrays *p, bool is_narrow,
                                       int32_t (*const vertices)[SIMD_WIDTH])
 {
     kernel_ordered spots[4];
     for (int i = 0; i < 4; i++) {
         memcpy(&spots[i].vertex, vertices[i], sizeof spots[i].vertex);
-        kernel_arrays_place(p, is_narrow, spots[i].vertex, spots[i].at);
+        kernel_arrays_positions(p, is_narrow, spots[i].vertex, spots[i].at);
     }
     for (int last = 3; last > 0; last--)
         for (int i = 0; i < last; i++) kernel_ordered_swap(is_narrow, &spots[i], &spots[i + 1]);
     for (int i = 0; i < 4; i++) {
         out->vertex[i] = spots[i].vertex;
-        out->values[i] = kernel_numbers_take(&p->values, spots[i].vertex);
-        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_taken_whole(is_narrow, &spots[i].at[a]);
+        out->values[i] = kernel_numbers_gather(&p->values, spots[i].vertex);
+        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_raw_to_double(is_narrow, &spots[i].at[a]);
     }
 }
 
-SIMD_INLINE void kernel_placed_spots(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile)
+SIMD_INLINE void kernel_transformed_positions(kernel_transformed_tets *out, const kernel_frame *f,
+                                              const kernel_tile *tile)
 {
     for (int i = 0; i < 4; i++) {
-        const kernel_whole *const world[3] = {&out->world[0][i], &out->world[1][i], &out->world[2][i]};
+        const kernel_wide_doubles *const world[3] = {&out->world[0][i], &out->world[1][i], &out->world[2][i]};
         vf at[3];
-        kernel_lanes_place(f, tile, world, at);
+        kernel_lanes_transform(f, tile, world, at);
         for (int a = 0; a < 3; a++) out->at[a][i] = at[a];
     }
 }
 
 /* Computes the edge functions, and for each face the least sum of weights that is accurate enough
  * (kernel_least_weight()). */
-SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile)
+SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const kernel_frame *f, const kernel_tile *tile)
 {
     vf size[4], at[4][3], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];
     for (int i = 0; i < 4; i++) {
@@ -84,11 +85,11 @@ SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, 
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         vf line[3];
         kernel_lanes_line(f, at[i], at[j], line);
-        kernel_lanes_line_blur(line, tile->radius, at[i], at[j], &error[n], &extent[n]);
+        kernel_lanes_line_error(line, tile->radius, at[i], at[j], &error[n], &extent[n]);
         out->c[n] = line[0];
         out->cu[n] = line[1];
         out->cv[n] = line[2];
-        out->bound[n] = kernel_lanes_doubt(size[i], size[j]);
+        out->bound[n] = kernel_lanes_edge_error(size[i], size[j]);
         out->doubt = vf_max(out->doubt, out->bound[n]);
     }
     for (int n = 0; n < 4; n++) {
@@ -100,44 +101,45 @@ SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, 
 
 /* Fetches, sorts and transforms `count` tets, given their vertex indices by vertex and lane. The remaining lanes get
  * the vertices of the first tet. */
-static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, const kernel_arrays *p,
-                                                        const kernel_frame *f, const kernel_tile *tile,
-                                                        int32_t vertices[4][SIMD_WIDTH], int count)
+static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_tets *out, const kernel_arrays *p,
+                                                            const kernel_frame *f, const kernel_tile *tile,
+                                                            int32_t vertices[4][SIMD_WIDTH], int count)
 {
     for (int i = 0; i < 4; i++)
         for (int n = count; n < SIMD_WIDTH; n++) vertices[i][n] = vertices[i][0];
-    if (p->has_narrow_places)
+    if (p->has_narrow_positions)
         kernel_ordered_fetch(out, p, true, vertices);
     else
         kernel_ordered_fetch(out, p, false, vertices);
-    kernel_placed_spots(out, f, tile);
-    kernel_placed_lines(out, f, tile);
+    kernel_transformed_positions(out, f, tile);
+    kernel_transformed_lines(out, f, tile);
 }
 
 /* Copies the tet in lane n, with all that rays need of a tet in float32. */
-SIMD_INLINE void kernel_placed_cell(const kernel_placed *placed, int n, kernel_cell *c)
+SIMD_INLINE void kernel_transformed_tets_cell(const kernel_transformed_tets *transformed, int n, kernel_cell *c)
 {
     c->type = GRID_TET;
     c->count = 4;
-    c->is_finite = c->is_placed = c->has_lines = true;
+    c->is_finite = c->is_transformed = c->has_lines = true;
     for (int i = 0; i < 4; i++) {
-        c->x[i] = placed->at[0][i][n];
-        c->y[i] = placed->at[1][i][n];
-        c->z[i] = placed->at[2][i][n];
-        c->f[i] = placed->f[i][n];
-        c->least[i] = placed->least[i][n];
+        c->x[i] = transformed->at[0][i][n];
+        c->y[i] = transformed->at[1][i][n];
+        c->z[i] = transformed->at[2][i][n];
+        c->f[i] = transformed->f[i][n];
+        c->least[i] = transformed->least[i][n];
     }
     for (int i = 0; i < KERNEL_TET_EDGES; i++)
-        c->lines[i] = (kernel_line){placed->c[i][n], placed->cu[i][n], placed->cv[i][n], placed->bound[i][n]};
-    c->doubt = placed->doubt[n];
+        c->lines[i] =
+            (kernel_line){transformed->c[i][n], transformed->cu[i][n], transformed->cv[i][n], transformed->bound[i][n]};
+    c->doubt = transformed->doubt[n];
 }
 
 /* Sets the cell's places and values in double. */
-SIMD_INLINE void kernel_placed_exactly(const kernel_placed *placed, int n, kernel_cell *c)
+SIMD_INLINE void kernel_transformed_tets_double(const kernel_transformed_tets *transformed, int n, kernel_cell *c)
 {
     for (int i = 0; i < 4; i++) {
-        c->values[i] = kernel_whole_lane(&placed->values[i], n);
-        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_whole_lane(&placed->world[a][i], n);
+        c->values[i] = kernel_wide_doubles_lane(&transformed->values[i], n);
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_wide_doubles_lane(&transformed->world[a][i], n);
     }
 }
 

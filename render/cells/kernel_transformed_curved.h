@@ -1,10 +1,10 @@
 /* Hexes, wedges or pyramids, one a lane, placed for a tile, with lines for the triangles among their faces: the
- * operations of kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and kernel_curved_lines(), and so the
- * same bits, for as many cells of one type at once as a vector has lanes. Vertices are turned into the order of
+ * operations of kernel_cell_relative(), kernel_transform_in_tile(), kernel_cell_order() and kernel_curved_lines(), and
+ * so the same bits, for as many cells of one type at once as a vector has lanes. Vertices are turned into the order of
  * coordinates first, so that all else comes in order. What is computed in double is computed in two halves. A
  * function's type is a constant where it is called from, so that its loops have known lengths. */
-#ifndef RENDER_KERNEL_PLACED_CURVED_H
-#define RENDER_KERNEL_PLACED_CURVED_H
+#ifndef RENDER_KERNEL_TRANSFORMED_CURVED_H
+#define RENDER_KERNEL_TRANSFORMED_CURVED_H
 
 #include <math.h>
 #include <string.h>
@@ -31,7 +31,7 @@ typedef struct kernel_triangle_lines {
 } kernel_triangle_lines;
 
 /* Cells of one type in lanes. */
-typedef struct kernel_placed_curved {
+typedef struct kernel_transformed_curved {
     float at[4][8][SIMD_WIDTH]; /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex */
     /* Per face, a word that lists its corners, four bits each, in the order of kernel_quad_corners() or
      * kernel_triangle_order(). */
@@ -40,10 +40,10 @@ typedef struct kernel_placed_curved {
     kernel_triangle_lines triangles[KERNEL_MAX_TRIANGLES];
     /* least sum of weights of each triangle that is accurate enough (kernel_triangle_least()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
-    /* The following members are used only by kernel_placed_curved_cell(), which extracts one lane's cell. */
-    kernel_whole world[3][8];
+    /* The following members are used only by kernel_transformed_curved_cell(), which extracts one lane's cell. */
+    kernel_wide_doubles world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
-} kernel_placed_curved;
+} kernel_transformed_curved;
 
 /* Returns the number of a type's first triangular face; its other triangles follow in the shape. */
 SIMD_INLINE int kernel_first_triangle(int type)
@@ -55,7 +55,7 @@ SIMD_INLINE int kernel_first_triangle(int type)
 
 /* Returns of[corner][lane] for each ray: a number of vertex (or face) `corner` of the cell in `lane`, which has `count`
  * of them. With 16 lanes, permutations of all rows are faster than a gather; with 8 they are slower. */
-SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi lane, vi corner)
+SIMD_INLINE vf kernel_curved_gather_vertex(const float (*of)[SIMD_WIDTH], int count, vi lane, vi corner)
 {
     if (SIMD_WIDTH < 16) return vf_gather(of[0], corner * SIMD_WIDTH + lane);
     const vi in_two = lane | (corner & 1) * SIMD_WIDTH;
@@ -63,7 +63,7 @@ SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi l
     vf four[4], two[2];
     for (int i = 0; 2 * i < count; i++)
         four[i] = 2 * i + 1 < count ? vf_permute_pair(vf_load(of[2 * i]), vf_load(of[2 * i + 1]), in_two)
-                                    : kernel_take(of[2 * i], lane);
+                                    : kernel_gather_lane(of[2 * i], lane);
     for (int i = 0; 4 * i < count; i++)
         two[i] = 4 * i + 2 < count ? vf_select(second, four[2 * i + 1], four[2 * i]) : four[2 * i];
     return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];
@@ -72,11 +72,11 @@ SIMD_INLINE vf kernel_curved_pick(const float (*of)[SIMD_WIDTH], int count, vi l
 /* ---- order of vertices ---- */
 
 /* The vertices of each lane's cell while they are permuted: coordinates, rank and vertex index. */
-typedef struct kernel_turned_curved {
-    kernel_taken at[8][3];
+typedef struct kernel_sorted_curved {
+    kernel_raw_numbers at[8][3];
     vf rank[8];
     vi vertex[8];
-} kernel_turned_curved;
+} kernel_sorted_curved;
 
 SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
 {
@@ -85,10 +85,10 @@ SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
     *b = vf_select(lanes, was, *b);
 }
 
-SIMD_INLINE void kernel_turned_swap(kernel_turned_curved *h, bool is_narrow, vm lanes, int i, int j)
+SIMD_INLINE void kernel_sorted_curved_swap(kernel_sorted_curved *h, bool is_narrow, vm lanes, int i, int j)
 {
     const vi was = h->vertex[i];
-    for (int a = 0; a < 3; a++) kernel_taken_swap(is_narrow, lanes, &h->at[i][a], &h->at[j][a]);
+    for (int a = 0; a < 3; a++) kernel_raw_swap(is_narrow, lanes, &h->at[i][a], &h->at[j][a]);
     kernel_vf_swap(lanes, &h->rank[i], &h->rank[j]);
     h->vertex[i] = vi_select(lanes, h->vertex[j], was);
     h->vertex[j] = vi_select(lanes, was, h->vertex[j]);
@@ -96,13 +96,13 @@ SIMD_INLINE void kernel_turned_swap(kernel_turned_curved *h, bool is_narrow, vm 
 
 /* Computes each vertex's rank in the order of coordinates; vertices with equal coordinates are ranked in their given
  * order. */
-SIMD_INLINE void kernel_turned_rank(kernel_turned_curved *h, bool is_narrow, int count)
+SIMD_INLINE void kernel_sorted_curved_rank(kernel_sorted_curved *h, bool is_narrow, int count)
 {
     const vf zero = vf_set(0), one = vf_set(1);
     for (int i = 0; i < count; i++) h->rank[i] = vf_set((float)i);
     for (int i = 0; i < count; i++)
         for (int j = i + 1; j < count; j++) {
-            const vf after = vf_select(kernel_taken_before(is_narrow, h->at[j], h->at[i]), one, zero);
+            const vf after = vf_select(kernel_raw_before(is_narrow, h->at[j], h->at[i]), one, zero);
             h->rank[i] += after;
             h->rank[j] -= after;
         }
@@ -110,7 +110,7 @@ SIMD_INLINE void kernel_turned_rank(kernel_turned_curved *h, bool is_narrow, int
 
 /* Permutes a hex's vertices: the smallest comes first, then the axes are ordered by the ranks of its three
  * neighbours. */
-SIMD_INLINE void kernel_turned_hex(kernel_turned_curved *h, bool is_narrow)
+SIMD_INLINE void kernel_sorted_curved_hex(kernel_sorted_curved *h, bool is_narrow)
 {
     /* vertex number for the bits of its reference coordinates x, y, z */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -122,59 +122,59 @@ SIMD_INLINE void kernel_turned_hex(kernel_turned_curved *h, bool is_narrow)
     }
     for (int a = 0; a < 3; a++)
         for (int b = 0; b < 8; b++)
-            if (!(b >> a & 1)) kernel_turned_swap(h, is_narrow, turn[a], vertex[b], vertex[b | 1 << a]);
+            if (!(b >> a & 1)) kernel_sorted_curved_swap(h, is_narrow, turn[a], vertex[b], vertex[b | 1 << a]);
     for (int k = 0; k < 3; k++) {
         /* sorting network of three: compares axes 0 and 1, 1 and 2, 0 and 1 */
         const int at = k == 1, low = 1 << at, high = 2 << at, other = 7 & ~(low | high);
         const vm swap = vf_lt(h->rank[(int)vertex[high]], h->rank[(int)vertex[low]]);
-        kernel_turned_swap(h, is_narrow, swap, vertex[low], vertex[high]);
-        kernel_turned_swap(h, is_narrow, swap, vertex[low | other], vertex[high | other]);
+        kernel_sorted_curved_swap(h, is_narrow, swap, vertex[low], vertex[high]);
+        kernel_sorted_curved_swap(h, is_narrow, swap, vertex[low | other], vertex[high | other]);
     }
 }
 
 /* Permutes a wedge's vertices: the smallest comes first, then its smaller neighbour in its triangle. */
-SIMD_INLINE void kernel_turned_wedge(kernel_turned_curved *h, bool is_narrow)
+SIMD_INLINE void kernel_sorted_curved_wedge(kernel_sorted_curved *h, bool is_narrow)
 {
     vm over = vm_none();
     for (int i = 3; i < 6; i++) over = vm_or(over, vf_eq(h->rank[i], vf_set(0)));
-    for (int i = 0; i < 3; i++) kernel_turned_swap(h, is_narrow, over, i, i + 3);
+    for (int i = 0; i < 3; i++) kernel_sorted_curved_swap(h, is_narrow, over, i, i + 3);
     for (int i = 1; i < 3; i++) {
         const vm first = vf_eq(h->rank[i], vf_set(0));
-        kernel_turned_swap(h, is_narrow, first, 0, i);
-        kernel_turned_swap(h, is_narrow, first, 3, i + 3);
+        kernel_sorted_curved_swap(h, is_narrow, first, 0, i);
+        kernel_sorted_curved_swap(h, is_narrow, first, 3, i + 3);
     }
     const vm swap = vf_lt(h->rank[2], h->rank[1]);
-    kernel_turned_swap(h, is_narrow, swap, 1, 2);
-    kernel_turned_swap(h, is_narrow, swap, 4, 5);
+    kernel_sorted_curved_swap(h, is_narrow, swap, 1, 2);
+    kernel_sorted_curved_swap(h, is_narrow, swap, 4, 5);
 }
 
 /* Permutes a pyramid's vertices: the smallest vertex of the base comes first, then its smaller neighbour in the base;
  * the apex stays last. */
-SIMD_INLINE void kernel_turned_pyramid(kernel_turned_curved *h, bool is_narrow)
+SIMD_INLINE void kernel_sorted_curved_pyramid(kernel_sorted_curved *h, bool is_narrow)
 {
     const vf least = vf_min(vf_min(h->rank[0], h->rank[1]), vf_min(h->rank[2], h->rank[3]));
     const vm second = vf_eq(h->rank[1], least), third = vf_eq(h->rank[2], least), fourth = vf_eq(h->rank[3], least);
-    kernel_turned_swap(h, is_narrow, second, 0, 1);
-    kernel_turned_swap(h, is_narrow, second, 2, 3);
-    kernel_turned_swap(h, is_narrow, third, 0, 2);
-    kernel_turned_swap(h, is_narrow, fourth, 0, 3);
-    kernel_turned_swap(h, is_narrow, fourth, 1, 2);
-    kernel_turned_swap(h, is_narrow, vf_lt(h->rank[3], h->rank[1]), 1, 3);
+    kernel_sorted_curved_swap(h, is_narrow, second, 0, 1);
+    kernel_sorted_curved_swap(h, is_narrow, second, 2, 3);
+    kernel_sorted_curved_swap(h, is_narrow, third, 0, 2);
+    kernel_sorted_curved_swap(h, is_narrow, fourth, 0, 3);
+    kernel_sorted_curved_swap(h, is_narrow, fourth, 1, 2);
+    kernel_sorted_curved_swap(h, is_narrow, vf_lt(h->rank[3], h->rank[1]), 1, 3);
 }
 
-SIMD_INLINE void kernel_turned_turn(kernel_turned_curved *h, bool is_narrow, int type)
+SIMD_INLINE void kernel_sorted_curved_sort(kernel_sorted_curved *h, bool is_narrow, int type)
 {
     if (kernel_is_box(type))
-        kernel_turned_hex(h, is_narrow);
+        kernel_sorted_curved_hex(h, is_narrow);
     else if (kernel_is_prism(type))
-        kernel_turned_wedge(h, is_narrow);
+        kernel_sorted_curved_wedge(h, is_narrow);
     else
-        kernel_turned_pyramid(h, is_narrow);
+        kernel_sorted_curved_pyramid(h, is_narrow);
 }
 
 /* Returns the lanes with an edge of length zero: a face has collapsed (kernel_quad_collapses()), or a triangle has an
  * edge without length. */
-SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_curved *h, bool is_narrow, int type)
+SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_curved *h, bool is_narrow, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vm out = vm_none();
@@ -182,7 +182,7 @@ SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_curved *h, bool is_na
         const int a = shape->edges[n][0], b = shape->edges[n][1];
         vm same = vm_all_lanes();
         for (int axis = 0; axis < 3; axis++)
-            same = vm_and(same, kernel_taken_eq(is_narrow, &h->at[a][axis], &h->at[b][axis]));
+            same = vm_and(same, kernel_raw_eq(is_narrow, &h->at[a][axis], &h->at[b][axis]));
         out = vm_or(out, same);
     }
     return out;
@@ -190,25 +190,25 @@ SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_curved *h, bool is_na
 
 /* Reads the vertices and permutes them into canonical order; stores vertex indices, coordinates and ranks. Returns the
  * lanes with an edge of length zero. */
-SIMD_INLINE vm kernel_turned_fetch(kernel_placed_curved *out, const kernel_arrays *p, bool is_narrow, int type,
-                                   int32_t (*const vertices)[SIMD_WIDTH], vf rank[8])
+SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const kernel_arrays *p, bool is_narrow,
+                                          int type, int32_t (*const vertices)[SIMD_WIDTH], vf rank[8])
 {
     const int count = grid_type_vertices(type);
-    kernel_turned_curved h;
+    kernel_sorted_curved h;
     for (int i = 0; i < count; i++) {
         memcpy(&h.vertex[i], vertices[i], sizeof h.vertex[i]);
-        kernel_arrays_place(p, is_narrow, h.vertex[i], h.at[i]);
+        kernel_arrays_positions(p, is_narrow, h.vertex[i], h.at[i]);
     }
-    kernel_turned_rank(&h, is_narrow, count);
-    kernel_turned_turn(&h, is_narrow, type);
+    kernel_sorted_curved_rank(&h, is_narrow, count);
+    kernel_sorted_curved_sort(&h, is_narrow, type);
     for (int i = 0; i < count; i++) {
         const vi own_rank = vi_from_vf(h.rank[i]);
-        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_taken_whole(is_narrow, &h.at[i][a]);
+        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_raw_to_double(is_narrow, &h.at[i][a]);
         rank[i] = h.rank[i];
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
         memcpy(out->vertex[i], &h.vertex[i], sizeof h.vertex[i]);
     }
-    return kernel_turned_collapsed(&h, is_narrow, type);
+    return kernel_sorted_curved_collapsed(&h, is_narrow, type);
 }
 
 /* ---- edge functions ---- */
@@ -267,31 +267,31 @@ SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposi
 }
 
 /* The edges' lines with their bounds, each from the shape's first vertex to its second, and the errors and extents of
- * kernel_blur. */
+ * kernel_edge_error. */
 typedef struct kernel_lanes_lines {
     vf line[KERNEL_CURVED_EDGES][4], error[KERNEL_CURVED_EDGES], extent[KERNEL_CURVED_EDGES];
 } kernel_lanes_lines;
 
-SIMD_INLINE void kernel_lanes_lines_of(const kernel_placed_curved *placed, const kernel_frame *f,
+SIMD_INLINE void kernel_lanes_lines_of(const kernel_transformed_curved *transformed, const kernel_frame *f,
                                        const kernel_tile *tile, int type, kernel_lanes_lines *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf at[8][3], size[8];
     for (int i = 0; i < grid_type_vertices(type); i++) {
-        for (int a = 0; a < 3; a++) at[i][a] = vf_load(placed->at[a][i]);
+        for (int a = 0; a < 3; a++) at[i][a] = vf_load(transformed->at[a][i]);
         size[i] = kernel_lanes_size(f, tile, at[i]);
     }
     for (int n = 0; n < shape->edge_count; n++) {
         const int i = shape->edges[n][0], j = shape->edges[n][1];
         kernel_lanes_line(f, at[i], at[j], out->line[n]);
-        kernel_lanes_line_blur(out->line[n], tile->radius, at[i], at[j], &out->error[n], &out->extent[n]);
-        out->line[n][3] = kernel_lanes_doubt(size[i], size[j]);
+        kernel_lanes_line_error(out->line[n], tile->radius, at[i], at[j], &out->error[n], &out->extent[n]);
+        out->line[n][3] = kernel_lanes_edge_error(size[i], size[j]);
     }
 }
 
 /* Stores a triangle's corners in the order, its edges' lines, and the least sum of weights that is good enough. */
-SIMD_INLINE void kernel_placed_triangle(kernel_placed_curved *out, int type, int face, const vf rank[8],
-                                        const kernel_lanes_lines *lines)
+SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int type, int face, const vf rank[8],
+                                             const kernel_lanes_lines *lines)
 {
     const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
     const signed char(*sides)[2] = kernel_cell_shape(type)->faces[face].sides;
@@ -321,15 +321,15 @@ SIMD_INLINE void kernel_placed_triangle(kernel_placed_curved *out, int type, int
 }
 
 /* Computes the faces' corners, and the triangles' lines. */
-SIMD_INLINE void kernel_placed_faces(kernel_placed_curved *out, const kernel_frame *f, const kernel_tile *tile,
-                                     int type, const vf rank[8])
+SIMD_INLINE void kernel_transformed_faces(kernel_transformed_curved *out, const kernel_frame *f,
+                                          const kernel_tile *tile, int type, const vf rank[8])
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     kernel_lanes_lines lines;
     if (kernel_has_triangles(type)) kernel_lanes_lines_of(out, f, tile, type, &lines);
     for (int face = 0; face < shape->face_count; face++) {
         if (kernel_has_triangles(type) && shape->faces[face].count == 3) {
-            kernel_placed_triangle(out, type, face, rank, &lines);
+            kernel_transformed_triangle(out, type, face, rank, &lines);
             continue;
         }
         const vi word = kernel_curved_quad_word(shape->faces[face].vertices, rank);
@@ -339,50 +339,51 @@ SIMD_INLINE void kernel_placed_faces(kernel_placed_curved *out, const kernel_fra
 
 /* ---- whole cells ---- */
 
-SIMD_INLINE vm kernel_place_curved_of(kernel_placed_curved *out, const kernel_arrays *p, const kernel_frame *f,
-                                      const kernel_tile *tile, int32_t vertices[8][SIMD_WIDTH],
-                                      const double isovalues[SIMD_WIDTH], int type)
+SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, const kernel_arrays *p,
+                                               const kernel_frame *f, const kernel_tile *tile,
+                                               int32_t vertices[8][SIMD_WIDTH], const double isovalues[SIMD_WIDTH],
+                                               int type)
 {
     const int count = grid_type_vertices(type);
-    kernel_whole values[8];
+    kernel_wide_doubles values[8];
     vf relative[8], rank[8];
-    const vm collapsed = p->has_narrow_places ? kernel_turned_fetch(out, p, true, type, vertices, rank)
-                                              : kernel_turned_fetch(out, p, false, type, vertices, rank);
+    const vm collapsed = p->has_narrow_positions ? kernel_sorted_curved_fetch(out, p, true, type, vertices, rank)
+                                                 : kernel_sorted_curved_fetch(out, p, false, type, vertices, rank);
     for (int i = 0; i < count; i++) {
-        const kernel_whole *world[3];
+        const kernel_wide_doubles *world[3];
         vi vertex;
         vf at[3];
         memcpy(&vertex, out->vertex[i], sizeof vertex);
-        values[i] = kernel_numbers_take(&p->values, vertex);
+        values[i] = kernel_numbers_gather(&p->values, vertex);
         for (int a = 0; a < 3; a++) world[a] = &out->world[a][i];
-        kernel_lanes_place(f, tile, world, at);
+        kernel_lanes_transform(f, tile, world, at);
         for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);
     }
     kernel_lanes_relative(values, count, isovalues, relative);
     for (int i = 0; i < count; i++) vf_store(out->at[3][i], relative[i]);
-    kernel_placed_faces(out, f, tile, type, rank);
+    kernel_transformed_faces(out, f, tile, type, rank);
     return collapsed;
 }
 
 /* Fetches, permutes and transforms cells of one type, given their vertex indices by vertex and lane. Returns the lanes
  * with an edge of length zero. */
-static __attribute__((noinline)) vm kernel_place_curved(kernel_placed_curved *out, const kernel_arrays *p,
-                                                        const kernel_frame *f, const kernel_tile *tile,
-                                                        int32_t vertices[8][SIMD_WIDTH],
-                                                        const double isovalues[SIMD_WIDTH], int type)
+static __attribute__((noinline)) vm kernel_transform_curved(kernel_transformed_curved *out, const kernel_arrays *p,
+                                                            const kernel_frame *f, const kernel_tile *tile,
+                                                            int32_t vertices[8][SIMD_WIDTH],
+                                                            const double isovalues[SIMD_WIDTH], int type)
 {
-    return KERNEL_OF_TYPE(type, kernel_place_curved_of, out, p, f, tile, vertices, isovalues);
+    return KERNEL_OF_TYPE(type, kernel_transform_curved_of_type, out, p, f, tile, vertices, isovalues);
 }
 
 /* ---- extracting one cell ---- */
 
 /* Copies the cell in lane n, without lines. */
-static __attribute__((noinline)) void kernel_placed_curved_cell(const kernel_placed_curved *h, int type, int n,
-                                                                kernel_cell *c)
+static __attribute__((noinline)) void kernel_transformed_curved_cell(const kernel_transformed_curved *h, int type,
+                                                                     int n, kernel_cell *c)
 {
     c->type = type;
     c->count = grid_type_vertices(type);
-    c->is_finite = c->is_placed = true;
+    c->is_finite = c->is_transformed = true;
     c->has_lines = c->has_normal = false;
     for (int i = 0; i < c->count; i++) {
         c->x[i] = h->at[0][i][n];
@@ -390,7 +391,7 @@ static __attribute__((noinline)) void kernel_placed_curved_cell(const kernel_pla
         c->z[i] = h->at[2][i][n];
         c->f[i] = h->at[3][i][n];
         c->rank[i] = h->rank[i][n];
-        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_whole_lane(&h->world[a][i], n);
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_wide_doubles_lane(&h->world[a][i], n);
     }
 }
 
