@@ -165,7 +165,7 @@ static void forms_draw_their_images(void **state)
     (void)state;
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++)
         for (int with_corners = 0; with_corners <= formed_has_corners(form); with_corners++) {
-            const char *scene = with_corners ? formed_torn_scene : formed_scene;
+            const char *scene = with_corners ? formed_corner_scene : formed_scene;
             const mirror *by = &mirrors[form % 2];
             formed_mesh m;
             formed_create(form, SIDE, own_rank, rank_count, &m);
@@ -341,7 +341,7 @@ static void derived_fields_are_those_of_the_source(void **state)
     char before[MOST_TEXT];
     snprintf(before, sizeof before, "%sfields: {g: {gradient: f, component: x}, h: f * f}\n", mirrors[0].text);
     insitu_session *session = open_text(MPI_COMM_WORLD, before, scene);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     for (int cycle = 0; cycle < 2; cycle++) {
         for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] *= cycle ? 1.5 : 1;
         everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
@@ -349,7 +349,7 @@ static void derived_fields_are_those_of_the_source(void **state)
         double *values[2] = {values_of(session, "g", in.part.vertex_count),
                              values_of(session, "h", in.part.vertex_count)};
         insitu_session *alone = open_text(MPI_COMM_WORLD, before + strlen(mirrors[0].text), scene);
-        everywhere(hand_over(alone, &in) == INSITU_OK);
+        everywhere(submit(alone, &in) == INSITU_OK);
         drawn of_alone = step_drawn(alone, cycle);
         double *expected = values_of(alone, "g", in.part.vertex_count);
         everywhere(memcmp(values[0], expected, (size_t)in.part.vertex_count * sizeof *expected) == 0);
@@ -413,14 +413,14 @@ static void steps_follow_what_changes(void **state)
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session = open_text(MPI_COMM_WORLD, by->text, all_layers);
     insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 0, "the first step");
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     const session_mesh *its_image = session_find_image(&session->meshes, mesh, 1);
     const int64_t stamp = its_image->coordinates_stamp;
 
     in.mesh.changed = in.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 1, "nothing new");
     everywhere(session_find_image(&session->meshes, mesh, 1) == its_image && its_image->coordinates_stamp == stamp);
 
@@ -444,11 +444,11 @@ static void steps_follow_what_changes(void **state)
 
     in.part.ghosts[0] = 1;
     in.mesh.changed = in.field.changed = INSITU_CHANGED_ALL;
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 5, "a ghost");
 
     everywhere(insitu_set_mesh(session, "m", NULL) == INSITU_OK && session->meshes.count == 0);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     expect_step(session, blocks, &in, by, 6, "the mesh removed and set again");
     insitu_destroy(&session);
     insitu_destroy(&blocks);
@@ -466,7 +466,7 @@ static void edits_of_the_scene_mirror_and_unmirror(void **state)
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
     insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     for (int i = 0; i < 6; i++) {
         const mirror *by = order[i] < 0 ? &none : &mirrors[order[i]];
         snprintf(text, sizeof text, "%s# %d\n%s", by->text, i, all_layers);
@@ -490,9 +490,9 @@ static void faults_are_those_of_the_given_mesh(void **state)
     for (int cycle = 0; cycle < 2; cycle++) {
         const double good = in.part.coordinates[4];
         if (own_rank == rank_count - 1) in.part.coordinates[4] = (double)NAN;
-        everywhere(hand_over(session, &in) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK);
         insitu_status status = insitu_step(session, cycle, 0);
-        told_everywhere(session, status, INSITU_ERROR_MESH, "mesh \"m\": cell",
+        reported_everywhere(session, status, INSITU_ERROR_MESH, "mesh \"m\": cell",
                         "vertex 1 has a coordinate that is not");
         in.part.coordinates[4] = good;
         if (cycle) continue;
@@ -503,7 +503,7 @@ static void faults_are_those_of_the_given_mesh(void **state)
         wrong.count--;
         everywhere(insitu_set_field(session, "m", &wrong) == INSITU_ERROR_FIELD);
         status = insitu_step(session, cycle, 0);
-        told_everywhere(session, status, INSITU_ERROR_FIELD, "mesh \"m\": field \"f\"");
+        reported_everywhere(session, status, INSITU_ERROR_FIELD, "mesh \"m\": field \"f\"");
         everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
         expect_step(session, blocks, &in, by, cycle, "a mended field");
     }
@@ -595,7 +595,7 @@ static void numbers_are_of_the_given_cells(void **state)
     insitu_session *session =
         open_text(MPI_COMM_WORLD, mirrors[2].text,
                   "statistics: [{field: f, path: mirror.csv}]\nimages:\n" LAYERS("a", "[{surface: {}}]"));
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     drawn a = step_drawn(session, 0);
     const insitu_report *report = insitu_last_report(session);
     char words[100];
@@ -618,7 +618,7 @@ static void what_is_hardly_meant_is_warned_of(void **state)
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
     insitu_session *session =
         open_text(MPI_COMM_WORLD, "meshes:\n  m: {mirror: {y: 0.5}}\n  plate: {mirror: z}\n", surface_layers);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     drawn a = step_drawn(session, 0);
     const char *warnings = insitu_last_report(session)->warnings;
     everywhere(strstr(warnings,

@@ -137,8 +137,8 @@ static void alike_colour_bars_are_drawn_once(void **state)
         if (status) fprintf(stderr, "%s\n", insitu_error(NULL));
         assert_int_equal(status, INSITU_OK);
         for (int cycle = 0; cycle < 2; cycle++) {
-            forget_pictures();
-            assert_int_equal(hand_over(session, &in), INSITU_OK);
+            discard_pictures();
+            assert_int_equal(submit(session, &in), INSITU_OK);
             assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
             everywhere(own_rank != 0 || are_placed(sides[i % 2], is_shared));
             const char *told =
@@ -148,7 +148,7 @@ static void alike_colour_bars_are_drawn_once(void **state)
         insitu_destroy(&session);
     }
     input_free(&in);
-    forget_pictures();
+    discard_pictures();
 }
 
 int main(int argc, char **argv)

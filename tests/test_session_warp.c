@@ -106,7 +106,7 @@ static void forms_draw_their_moved_meshes(void **state)
     (void)state;
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++)
         for (int with_corners = 0; with_corners <= formed_has_corners(form); with_corners++) {
-            const char *scene = with_corners ? formed_torn_scene : formed_scene;
+            const char *scene = with_corners ? formed_corner_scene : formed_scene;
             formed_mesh m;
             warped w;
             formed_create(form, SIDE, own_rank, rank_count, &m);
@@ -375,12 +375,12 @@ static void steps_compute_only_what_has_changed(void **state)
     make_field(&in.mesh, 3, &w);
     insitu_session *session = open_text(MPI_COMM_WORLD, WARP, all_layers);
     insitu_session *plain = open_text(MPI_COMM_WORLD, "", all_layers);
-    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     expect_step(session, plain, &in, scale, &w, 0, "the first step");
     const stamps first = stamps_of(session);
 
     in.mesh.changed = in.field.changed = INSITU_CHANGED_NOTHING;
-    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     expect_step(session, plain, &in, scale, &w, 1, "the same values again");
     everywhere(stamps_of(session).coordinates == first.coordinates);
 
@@ -403,7 +403,7 @@ static void steps_compute_only_what_has_changed(void **state)
     expect_step(session, plain, &in, scale, &w, 4, "other coordinates");
 
     in.mesh.changed = in.field.changed = INSITU_CHANGED_ALL;
-    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     expect_step(session, plain, &in, scale, &w, 5, "everything anew");
     insitu_destroy(&session);
     insitu_destroy(&plain);
@@ -421,7 +421,7 @@ static void edits_of_the_scene_warp_and_unwarp(void **state)
     make_field(&in.mesh, 3, &w);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
     insitu_session *plain = open_text(MPI_COMM_WORLD, "", all_layers);
-    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     static const double factors[] = {0, 0.3, -0.2, 0, 0.3};
     for (int i = 0; i < 5; i++) {
         snprintf(text, sizeof text, "meshes: {m: {warp: {field: u, scale: %g}}}\n%s", factors[i], all_layers);
@@ -448,7 +448,7 @@ static void copies_and_gradients_are_reported(void **state)
         open_text(MPI_COMM_WORLD, WARP,
                   "fields: {g: {gradient: f, component: x}}\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: "
                                                                                     "g}}}]"));
-    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     drawn a = step_drawn(session, 0);
     const insitu_report *report = insitu_last_report(session);
     snprintf(words, sizeof words, "where the scene's warp moves them: %lld bytes",
@@ -490,7 +490,7 @@ static void statistics_are_of_the_warped_mesh(void **state)
     insitu_session *session = open_text(MPI_COMM_WORLD, WARP,
                                         "statistics: [{field: f, path: warp.csv}]\nimages:\n" LAYERS(
                                             "a", "[{surface: {}}]\n    when: {field: f, above: 1e30}"));
-    everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &w.field) == INSITU_OK);
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     insitu_destroy(&session);
     read_file("warp.csv", sizeof text, text);
@@ -598,14 +598,14 @@ static void faults_are_told_with_line_and_key(void **state)
         u.values.data = values;
         if (own_rank == rank_count - 1 && faults[i].spoil) faults[i].spoil(&u, &in.mesh);
         for (int cycle = 0; cycle < 2; cycle++) { /* told in each step until it is mended */
-            everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &u) == INSITU_OK);
-            forget_pictures();
+            everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &u) == INSITU_OK);
+            discard_pictures();
             const insitu_status status = insitu_step(session, cycle, 0);
             everywhere(status != INSITU_OK && caught_count == 0);
-            told_everywhere(session, status, status, faults[i].words[0], faults[i].words[1]);
+            reported_everywhere(session, status, status, faults[i].words[0], faults[i].words[1]);
         }
         const insitu_field good = w.field;
-        everywhere(hand_over(session, &in) == INSITU_OK && insitu_set_field(session, "m", &good) == INSITU_OK);
+        everywhere(submit(session, &in) == INSITU_OK && insitu_set_field(session, "m", &good) == INSITU_OK);
         if (faults[i].spoil) {
             drawn a = step_drawn(session, 2);
             everywhere(own_rank != 0 || a.count == 2);
@@ -627,7 +627,7 @@ static void names_of_no_mesh_are_warned_of(void **state)
     input_create(&in, TEST_TETS, SIDE, TEST_BLOCK, own_rank, rank_count);
     snprintf(text, sizeof text, "%s\nmeshes:\n  plate: {warp: u}\n", surface_layers);
     assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, text, &session), INSITU_OK);
-    everywhere(hand_over(session, &in) == INSITU_OK);
+    everywhere(submit(session, &in) == INSITU_OK);
     drawn a = step_drawn(session, 0);
     everywhere(strstr(insitu_last_report(session)->warnings, "meshes.plate (line ") != NULL);
     free_drawn(&a);

@@ -35,7 +35,7 @@ void place_of(const insitu_mesh *mesh, int64_t vertex, double out[3])
 drawn step_drawn(insitu_session *session, int cycle)
 {
     drawn out = {0};
-    forget_pictures();
+    discard_pictures();
     const insitu_status status = insitu_step(session, cycle, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     everywhere(status == INSITU_OK);
@@ -102,7 +102,7 @@ drawn draw_formed(insitu_session *session, const formed_mesh *m, const insitu_me
 {
     formed_mesh own = *m;
     own.mesh = *mesh;
-    everywhere(formed_hand_over(session, &own, with_corners) == INSITU_OK);
+    everywhere(formed_submit(session, &own, with_corners) == INSITU_OK);
     if (u) everywhere(insitu_set_field(session, "m", u) == INSITU_OK);
     drawn out = step_drawn(session, 0);
     insitu_destroy(&session);

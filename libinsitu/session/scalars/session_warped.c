@@ -77,7 +77,7 @@ static session_displacement read_displacement(const scene_warp *warp, const sess
     const session_field *field = &mesh->fields[index];
     const grid_field values = {.values = field->values,
                                .component_stride = field->component_stride,
-                               .apart = field->component_arrays,
+                               .component_arrays = field->component_arrays,
                                .component_count = field->given.component_count};
     session_displacement out = {.field = index,
                                 .key = hash_displacement(warp, field),
