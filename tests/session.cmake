@@ -128,7 +128,7 @@ add_executable(test_order_interpolation test_order_interpolation.c test_mesh_ord
 target_link_libraries(test_order_interpolation PRIVATE insitu_quick_flags insitu_internal PkgConfig::CMOCKA)
 add_test(NAME order_interpolation COMMAND test_order_interpolation)
 set_tests_properties(order_interpolation PROPERTIES TIMEOUT 60)
-foreach(name order order_cells order_normals order_faults)
+foreach(name order order_cells order_normals order_faults order_finer)
   insitu_session_program(test_session_${name})
   target_sources(test_session_${name} PRIVATE test_mesh_order.c)
   insitu_add_mpi_test(session_${name} test_session_${name} 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})

@@ -264,8 +264,9 @@ bool session_polynomials_create(const session_mesh *mesh, session_polynomials *o
     *out = (session_polynomials){.rows = session_rows_of(mesh),
                                  .first_pieces = mesh->topology.first_pieces,
                                  .cell_count = mesh->given.cell_count,
-                                 .order = mesh->given.vertex_order};
-    session_list_kinds(mesh, &out->rows);
+                                 .order = mesh->given.vertex_order,
+                                 .are_equispaced = mesh->finer.parts > 0};
+    session_list_kinds(&out->rows);
     out->kinds = base_calloc((size_t)out->rows.kind_count * 2, sizeof *out->kinds);
     bool is_made = out->kinds != NULL;
     for (int i = 0; i < out->rows.kind_count && is_made; i++) {
@@ -319,7 +320,7 @@ const session_derivatives *session_derivatives_of(const session_polynomials *pol
     const int kind = session_kind_of(&polynomials->rows, cell);
     const session_nodes *of = &polynomials->rows.kinds[kind].nodes;
     const session_derivatives *equispaced = &polynomials->kinds[2 * kind], *lobatto = equispaced + 1;
-    if (!has_two_spacings(of)) return equispaced;
+    if (polynomials->are_equispaced || !has_two_spacings(of)) return equispaced;
     const double between = 0.5 * (equispaced->first_segment + lobatto->first_segment);
     return mean_end_segment(of, polynomials->order, positions, stride) < between ? lobatto : equispaced;
 }

@@ -34,6 +34,7 @@ typedef struct session_polynomials {
     const int64_t *first_pieces; /* same as session_topology.first_pieces */
     int64_t cell_count;          /* number of the caller's cells */
     insitu_vertex_order order;
+    bool are_equispaced;        /* set if the nodes of no cell are Gauss-Lobatto points */
     session_derivatives *kinds; /* for each kind, the derivatives for equispaced nodes, then those for Gauss-Lobatto */
 } session_polynomials;
 
