@@ -94,7 +94,7 @@ static int listed_count(insitu_cell_type type)
 /* Weights of the corners, for each node. */
 typedef struct node_weights {
     int count;
-    double of[200][8];
+    double of[216][8];
 } node_weights;
 
 static void list_nodes(const order_kind *kind, node_weights *out)

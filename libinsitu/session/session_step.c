@@ -21,6 +21,7 @@
 #include "session_events.h"
 #include "session_files.h"
 #include "session_filled.h"
+#include "session_finer.h"
 #include "session_guard.h"
 #include "session_indexed.h"
 #include "session_joints.h"
@@ -39,9 +40,11 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Reads the edited scene, and drops everything that was created for images of the old one. */
-static void reload_scene(insitu_session *s)
+/* Reads the edited scene, and drops everything that was created for images of the old one. Cells count as changed if
+ * they are split otherwise. */
+static void reload_scene(insitu_session *s, session_changes *changes)
 {
+    const int pieces = s->scene_file.scene.finer_pieces;
     session_writer_drain(&s->writer);
     /* waits for pictures that are being written, so that the old scene is no longer used */
     session_writer_collect(&s->writer, &s->report);
@@ -60,6 +63,10 @@ static void reload_scene(insitu_session *s)
         session_drop_scalars(s->meshes.items[i]);
         session_drop_derived(s->meshes.items[i]);
     }
+    if (s->scene_file.scene.finer_pieces == pieces) return;
+    session_end_finer(&s->meshes);
+    s->meshes.are_cells_changed = s->meshes.are_names_changed = true;
+    changes->are_cells_changed = changes->are_names_changed = true;
 }
 
 /* Selects kernels that every rank has. Two instruction sets differ in roundings, so that volumes would overlap at a
@@ -154,6 +161,17 @@ static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed
     return status;
 }
 
+/* Reads cells of higher order as finer ones, if the scene says so. Collective. */
+static insitu_status refine_cells(insitu_session *s, base_error *error)
+{
+    const int pieces = s->scene_file.scene.finer_pieces;
+    bool is_any = false;
+    if (pieces < 2) return INSITU_OK;
+    const insitu_status status =
+        session_make_finer(&s->meshes, &s->catalogue, pieces, &s->team, &s->report, &is_any, error);
+    return status || !is_any ? status : session_check_meshes(&s->meshes, &s->team, error);
+}
+
 /* Checks the changed contents of meshes, and updates the catalogue. Meshes and fields with faults are put aside:
  * *refused is the first fault. Collective. */
 static insitu_status update_meshes(insitu_session *s, const session_changes *changes, base_error *refused,
@@ -169,7 +187,9 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     if (!refused->status) *refused = reason;
     const bool of_names = changes->are_names_changed || refused->status || s->catalogue.has_faults;
     if (are_cells_changed) session_forget_homes(&s->catalogue);
+    if (scene->finer_pieces > 1) session_drop_ids(&s->meshes);
     insitu_status status = list_meshes(s, of_names, changes->are_names_shared && !refused->status, error);
+    if (are_cells_changed && !status) status = refine_cells(s, error);
     if (are_cells_changed && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
     if ((are_cells_changed || of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
@@ -253,12 +273,12 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
 }
 
 /* Performs all phases of a step after the first reduction; draws images if any are due. */
-static insitu_status run_phases(insitu_session *s, const session_changes *changes, const session_guard *guard,
+static insitu_status run_phases(insitu_session *s, session_changes *changes, const session_guard *guard,
                                 base_error *error)
 {
     s->report.public_report.time = changes->time;
     if (changes->is_scene_changed) {
-        reload_scene(s);
+        reload_scene(s, changes);
         s->news.is_new = true;
     }
     if (s->team.rank == 0) s->report.public_report.write_ms += session_writer_begin(&s->writer, &s->scene_file.scene);

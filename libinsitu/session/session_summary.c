@@ -108,12 +108,13 @@ static void report_field(session_report *out, copied_reasons *copied, const sess
     const int64_t copied_bytes = mesh->fields[index].has_borrowed_copy ? 0 : mesh->fields[index].copy_bytes;
     add_copied(copied, copied_bytes, "field \"%s\" %s", field->name,
                mesh->fields[index].is_derived ? "derived from others"
+               : mesh->finer.parts            ? "in finer cells of higher order"
                : field->index.data            ? "by its index"
                : field->corner_row            ? "in rows of corners"
                                               : "at the corners of a torn mesh");
     if (is_field_in_use(mesh, index) && !mesh->source)
         out->public_report.bytes_borrowed +=
-            value_bytes(field) + array_bytes(&field->index, session_count_field_positions(&mesh->given, field)) +
+            value_bytes(field) + array_bytes(&field->index, session_count_field_positions(&mesh->original, field)) +
             patch_bytes(field);
 }
 
@@ -170,6 +171,7 @@ static void report_topology(session_report *out, copied_reasons *copied, const s
     add_copied(copied, mesh->mirrored.bytes, "coordinates of its mirror images");
     add_copied(copied, mesh->warp.bytes, "coordinates of its vertices where the scene's warp moves them");
     if (mesh->covered) add_copied(copied, mesh->given.cell_count, "flags of cells that finer blocks cover");
+    add_copied(copied, mesh->finer.bytes, "nodes of finer cells, with %d pieces between two nodes", mesh->finer.parts);
     add_copied(copied, mesh->torn.bytes, "vertices of each cell's own, for fields with values at corners");
 }
 

@@ -49,6 +49,7 @@ void session_report_free(session_report *report);
 
 typedef enum session_warning_kind {
     WARNING_ORDER,       /* the vertices of cells seem not to be in VTK's order, judged by the cells' volumes */
+    WARNING_FINER,       /* cells of higher order are not split as finely as the scene says */
     WARNING_ISOVALUE,    /* an isovalue lies outside of the range of its field */
     WARNING_TRANSPARENT, /* a volume layer is transparent for all values of its field */
     WARNING_THRESHOLD,   /* no cell is within a threshold */

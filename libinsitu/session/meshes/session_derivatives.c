@@ -45,9 +45,9 @@ static double legendre_slope(int p, double x, double *curvature)
     return slope;
 }
 
-/* Computes the positions of the p + 1 nodes between 0 and 1. Gauss-Lobatto points are the ends and the roots of the
+/* Gauss-Lobatto points are the ends and the roots of the
  * derivative of Legendre's polynomial, found by Newton's method from Chebyshev's points. */
-static void place_nodes(int p, bool is_lobatto, double out[MOST_NODES_OF_LINE])
+void session_place_nodes(int p, bool is_lobatto, double out[MOST_NODES_OF_LINE])
 {
     for (int i = 0; i <= p; i++) {
         double x = -cos(acos(-1) * i / p), curvature;
@@ -63,7 +63,7 @@ static void derive_lines(term_list *list, bool is_lobatto)
 {
     const int p = list->of->order;
     double x[MOST_NODES_OF_LINE] = {0}, products[MOST_NODES_OF_LINE] = {0};
-    place_nodes(p, is_lobatto, x);
+    session_place_nodes(p, is_lobatto, x);
     list->out->first_segment = x[1];
     for (int i = 0; i <= p; i++) {
         products[i] = 1;
@@ -97,8 +97,7 @@ static void derive_products(term_list *list)
 
 /* ---- terms ----------------------------------------------------------------------------------------------------- */
 
-/* Finds the directions from a missing node to the nodes around it. Returns their number. */
-static int find_directions(int type, const int at[3], int directions[3][3])
+int session_missing_directions(int type, const int at[3], int directions[3][3])
 {
     int count = 0;
     memset(directions, 0, 9 * sizeof directions[0][0]);
@@ -126,7 +125,7 @@ static void store_term(term_list *list, int position, double weight)
 static void add_missing_term(term_list *list, const int at[3], double weight)
 {
     int directions[3][3], step[3];
-    const int count = find_directions(list->of->type, at, directions);
+    const int count = session_missing_directions(list->of->type, at, directions);
     for (int n = 0; n < (count == 3 ? 27 : 9); n++) {
         int zeros = 0, node[3] = {at[0], at[1], at[2]};
         for (int d = 0, rest = n; d < count; d++, rest /= 3) {
@@ -265,8 +264,9 @@ bool session_polynomials_create(const session_mesh *mesh, session_polynomials *o
     *out = (session_polynomials){.rows = session_rows_of(mesh),
                                  .first_pieces = mesh->topology.first_pieces,
                                  .cell_count = mesh->given.cell_count,
-                                 .order = mesh->given.vertex_order};
-    session_list_kinds(mesh, &out->rows);
+                                 .order = mesh->given.vertex_order,
+                                 .are_equispaced = mesh->finer.parts > 0};
+    session_list_kinds(&out->rows);
     out->kinds = base_calloc((size_t)out->rows.kind_count * 2, sizeof *out->kinds);
     bool is_made = out->kinds != NULL;
     for (int i = 0; i < out->rows.kind_count && is_made; i++) {
@@ -320,7 +320,7 @@ const session_derivatives *session_derivatives_of(const session_polynomials *pol
     const int kind = session_kind_of(&polynomials->rows, cell);
     const session_nodes *of = &polynomials->rows.kinds[kind].nodes;
     const session_derivatives *equispaced = &polynomials->kinds[2 * kind], *lobatto = equispaced + 1;
-    if (!has_two_spacings(of)) return equispaced;
+    if (polynomials->are_equispaced || !has_two_spacings(of)) return equispaced;
     const double between = 0.5 * (equispaced->first_segment + lobatto->first_segment);
     return mean_end_segment(of, polynomials->order, positions, stride) < between ? lobatto : equispaced;
 }

@@ -21,12 +21,20 @@ bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order
                               session_derivatives *out);
 void session_drop_derivatives(session_derivatives *derivatives);
 
+/* Computes the positions of the p + 1 nodes of an edge from 0 to 1. */
+void session_place_nodes(int p, bool is_lobatto, double out[NODES_MOST_ORDER + 1]);
+
+/* Finds the directions from a node that a serendipity cell lacks to the nodes around it. Returns their number: 2 at the
+ * middle of a face, 3 at that of a hex. */
+int session_missing_directions(int type, const int at[3], int directions[3][3]);
+
 /* The polynomials of all cells of a mesh whose cells are split. */
 typedef struct session_polynomials {
     session_rows rows;
     const int64_t *first_pieces; /* same as session_topology.first_pieces */
     int64_t cell_count;          /* number of the caller's cells */
     insitu_vertex_order order;
+    bool are_equispaced;        /* set if the nodes of no cell are Gauss-Lobatto points */
     session_derivatives *kinds; /* for each kind, the derivatives for equispaced nodes, then those for Gauss-Lobatto */
 } session_polynomials;
 

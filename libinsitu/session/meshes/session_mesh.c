@@ -179,6 +179,14 @@ void session_drop_torn(session_torn *torn)
     *torn = (session_torn){0};
 }
 
+void session_drop_finer(session_finer *finer)
+{
+    base_free(finer->coordinates);
+    base_free(finer->offsets);
+    base_free(finer->types);
+    *finer = (session_finer){0};
+}
+
 void session_drop_axes(session_lattice *lattice)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -368,6 +376,7 @@ static void drop_cells(session_mesh *mesh)
     drop_derived_data(mesh);
     session_drop_warp(mesh);
     session_drop_mirrored(&mesh->mirrored);
+    session_drop_finer(&mesh->finer);
     session_drop_axes(&mesh->lattice);
     session_drop_conformed(&mesh->conformed);
     base_free(mesh->covered);

@@ -179,6 +179,23 @@ typedef struct session_torn {
     int64_t bytes;
 } session_torn;
 
+enum { SESSION_FINER_COUNTS = 36 };
+
+/* Nodes of a finer lattice in cells of higher order, at which their polynomials are evaluated (session_finer.h). The
+ * coordinates are a copy reported to the user. */
+typedef struct session_finer {
+    bool is_counted; /* set if `counts` are those of the current cells */
+    int64_t counts[SESSION_FINER_COUNTS];
+    int parts;         /* number of parts of each edge between two nodes; 0: session_mesh.given is the caller's mesh */
+    bool is_lobatto;   /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
+    insitu_mesh nodal; /* the caller's mesh with copies in place of the arrays that cannot be read in place */
+    insitu_mesh fine;  /* same as session_mesh.given: cells with separate nodes in lexicographic order */
+    double *coordinates; /* 3 per node */
+    int64_t *offsets;    /* NULL if all cells have the same type and order */
+    unsigned char *types;
+    int64_t bytes;
+} session_finer;
+
 /* A structured block of cells. */
 typedef struct session_lattice {
     insitu_lattice given; /* given.lattice of the mesh points to it, or is NULL if the mesh is not structured */
@@ -260,11 +277,13 @@ typedef struct session_mesh {
     session_mirrored mirrored;
     char *label;          /* name for messages: "m", or "m[17]" for block 17 */
     insitu_mesh original; /* the caller's description */
-    /* the description with copies in place of the arrays that cannot be read in place, and of moved coordinates */
+    /* the description with copies in place of the arrays that cannot be read in place, and of moved coordinates, or the
+     * cells of finer lattices */
     insitu_mesh given;
     session_conformed conformed;
     session_topology topology;
     session_torn torn;
+    session_finer finer;
     session_lattice lattice;
     session_warp warp;
     /* One byte per cell, read in place of `ghosts`: set for ghosts and for cells that finer blocks cover
@@ -437,6 +456,7 @@ void session_drop_gradients(session_scalar *scalar);
 void session_drop_tree(session_mesh *mesh);
 void session_drop_topology(session_topology *topology);
 void session_drop_torn(session_torn *torn);
+void session_drop_finer(session_finer *finer);
 void session_drop_axes(session_lattice *lattice);
 void session_drop_conformed(session_conformed *conformed);
 void session_drop_fields(session_mesh *mesh);

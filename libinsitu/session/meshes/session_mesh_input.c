@@ -357,15 +357,26 @@ static unsigned find_description_changes(const session_mesh *mesh, const insitu_
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
+/* Reads the finer lattices again in place of the caller's new description, unless they no longer fit it. */
+static void keep_finer(session_mesh *mesh, unsigned changed)
+{
+    if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) session_drop_finer(&mesh->finer);
+    if (!mesh->finer.parts) return;
+    mesh->finer.nodal = mesh->given;
+    mesh->given = mesh->finer.fine;
+}
+
 void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error)
 {
     unsigned changed = given->changed;
     if (!mesh->is_given || has_other_shape(&mesh->original, given)) changed = INSITU_CHANGED_ALL;
     const bool drops_fields = changed & INSITU_CHANGED_TOPOLOGY;
-    const bool had_ids = mesh->given.vertex_ids.data, had_levels = session_has_levels(&mesh->given);
+    const bool had_ids = mesh->original.vertex_ids.data, had_levels = session_has_levels(&mesh->given);
     changed |= find_description_changes(mesh, given);
-    if (changed & INSITU_CHANGED_GEOMETRY && mesh->topology.depends_on_coordinates) changed |= INSITU_CHANGED_TOPOLOGY;
+    if (changed & INSITU_CHANGED_GEOMETRY && (mesh->topology.depends_on_coordinates || mesh->finer.parts))
+        changed |= INSITU_CHANGED_TOPOLOGY;
     if (session_conform_mesh(mesh, given, changed, error)) return;
+    keep_finer(mesh, changed);
     if (drops_fields) {
         session_drop_fields(mesh);
         meshes->are_names_changed = true;

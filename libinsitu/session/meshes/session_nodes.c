@@ -54,6 +54,18 @@ int64_t session_node_count(int type, int order)
     return count_complete_nodes(session_corner_type(type), order);
 }
 
+int session_lagrange_type(int corner_type)
+{
+    for (int i = 0; i < (int)(sizeof lagrange_types / sizeof lagrange_types[0]); i++)
+        if (lagrange_types[i] == corner_type) return INSITU_LAGRANGE_TRIANGLE + i;
+    return GRID_NO_TYPE;
+}
+
+session_nodes session_complete_nodes(int corner_type, int order)
+{
+    return (session_nodes){corner_type, order, (int)count_complete_nodes(corner_type, order), true, true};
+}
+
 bool session_nodes_of(int type, int64_t count, session_nodes *out)
 {
     const int corners = session_corner_type(type);

@@ -26,6 +26,12 @@ bool session_is_lagrange(int type);
 /* Returns whether cells of the type, which must not be linear, can have `count` nodes, and stores their description. */
 bool session_nodes_of(int type, int64_t count, session_nodes *out);
 
+/* Returns the type INSITU_LAGRANGE_* with the same corners as the linear type, or GRID_NO_TYPE if there is none. */
+int session_lagrange_type(int corner_type);
+
+/* Describes the cell of a linear type's shape that has all nodes of the lattice of the order. */
+session_nodes session_complete_nodes(int corner_type, int order);
+
 /* Returns the number of nodes of a cell of the type and order, or 0 if there is no such cell. Order 0 stands for the
  * order of a type that has only one. */
 int64_t session_node_count(int type, int order);

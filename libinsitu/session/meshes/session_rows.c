@@ -1,12 +1,16 @@
 #include "session_rows.h"
 
+session_rows session_given_rows(const insitu_mesh *given)
+{
+    const int64_t nodes = session_cell_nodes(given), row = given->connectivity_row;
+    return (session_rows){.cells = session_given_grid(given), .nodes_per_cell = nodes, .row_stride = row ? row : nodes};
+}
+
 session_rows session_rows_of(const session_mesh *mesh)
 {
-    const int64_t nodes = session_cell_nodes(&mesh->given), row = mesh->given.connectivity_row;
-    return (session_rows){.cells = session_given_grid(&mesh->given),
-                          .nodes_per_cell = nodes,
-                          .row_stride = row ? row : nodes,
-                          .is_torn = mesh->torn.is_torn};
+    session_rows rows = session_given_rows(&mesh->given);
+    rows.is_torn = mesh->torn.is_torn;
+    return rows;
 }
 
 int session_find_kind(const session_rows *rows, int type, int64_t count)
@@ -16,9 +20,9 @@ int session_find_kind(const session_rows *rows, int type, int64_t count)
     return -1;
 }
 
-void session_list_kinds(const session_mesh *mesh, session_rows *rows)
+void session_list_kinds(session_rows *rows)
 {
-    const int64_t cells = rows->cells.offsets.data ? mesh->given.cell_count : 1;
+    const int64_t cells = rows->cells.offsets.data ? rows->cells.cell_count : 1;
     int last_type = -1;
     int64_t last_size = -1;
     for (int64_t cell = 0; cell < cells && rows->kind_count < ROWS_MOST_KINDS; cell++) {

@@ -24,6 +24,8 @@ typedef struct session_rows {
 
 /* Describes the rows of a mesh whose description is valid. There are no kinds yet. */
 session_rows session_rows_of(const session_mesh *mesh);
+/* Describes the rows of a description that is valid, without regard to torn meshes. There are no kinds yet. */
+session_rows session_given_rows(const insitu_mesh *given);
 
 static inline int64_t session_row_first(const session_rows *rows, int64_t cell)
 {
@@ -64,6 +66,6 @@ static inline int session_kind_of(const session_rows *rows, int64_t cell)
 }
 
 /* Lists the kinds of all cells. They must have been split before, so that their types are valid. */
-void session_list_kinds(const session_mesh *mesh, session_rows *rows);
+void session_list_kinds(session_rows *rows);
 
 #endif

@@ -44,7 +44,7 @@ static const char *describe_centring(insitu_centring centring)
  * whether it is given. */
 static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 {
-    return field->index.data || (field->index.type && session_count_field_positions(&mesh->given, field) == 0);
+    return field->index.data || (field->index.type && session_count_field_positions(&mesh->original, field) == 0);
 }
 
 /* Checks a field each of whose components is given as a separate array. */
@@ -63,7 +63,7 @@ static insitu_status check_component_arrays(const insitu_field *field, int64_t c
 
 static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_field *field, base_error *error)
 {
-    const int64_t places = session_count_field_positions(&mesh->given, field);
+    const int64_t places = session_count_field_positions(&mesh->original, field);
     const bool has_index = is_by_index(mesh, field), has_rows = field->corner_row != 0;
     if (field->count < 0 || (!has_index && (has_rows ? field->count < places : field->count != places)))
         return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,
@@ -139,7 +139,7 @@ static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *p
     const bool has_vertices = patch->connectivity.data != NULL;
     const insitu_status status = check_patch_arrays(patch, components, error);
     if (status || !patch->count) return status;
-    if (!mesh->given.cell_count)
+    if (!mesh->original.cell_count)
         return base_fail(error, INSITU_ERROR_FIELD, "has %lld faces, and the mesh has no cells",
                          (long long)patch->count);
     if (has_vertices && patch->faces.data)
@@ -150,11 +150,11 @@ static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *p
         return base_fail(error, INSITU_ERROR_FIELD,
                          "has %lld connectivity indices, no multiple of its %lld faces, and no offsets",
                          (long long)patch->connectivity_count, (long long)patch->count);
-    const int64_t faces = session_face_count(&mesh->given);
+    const int64_t faces = session_face_count(&mesh->original);
     if (!has_vertices && !faces)
         return base_fail(error, INSITU_ERROR_FIELD,
                          "names faces by their numbers, but the mesh has none: give their vertices");
-    const long long base = mesh->given.index_base, last = faces - 1 + base;
+    const long long base = mesh->original.index_base, last = faces - 1 + base;
     if (!has_vertices && !patch->faces.data &&
         (patch->first_face < base || patch->first_face > last || patch->count - 1 > last - patch->first_face))
         return base_fail(error, INSITU_ERROR_FIELD,
@@ -171,7 +171,7 @@ static insitu_status check_patches(const session_mesh *mesh, const insitu_field 
     if (field->patch_count && field->centring != INSITU_CELL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "has patches, and its centring %d is not cells (%d)",
                          (int)field->centring, (int)INSITU_CELL);
-    if (field->patch_count && session_corner_type((int)mesh->given.cell_type) != GRID_NO_TYPE)
+    if (field->patch_count && session_corner_type((int)mesh->original.cell_type) != GRID_NO_TYPE)
         return base_fail(error, INSITU_ERROR_FIELD, "has patches, and the mesh has cells of higher order");
     for (int i = 0; i < field->patch_count; i++) {
         base_error what = {0};
@@ -198,7 +198,7 @@ static insitu_status check_field(const session_mesh *mesh, const insitu_field *f
         return base_fail(error, INSITU_ERROR_ARGUMENT, "component_count is %d", field->component_count);
     if (field->changed & ~(unsigned)INSITU_CHANGED_ALL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", field->changed);
-    insitu_status status = check_corners(&mesh->given, field, error);
+    insitu_status status = check_corners(&mesh->original, field, error);
     if (!status && field->fill) return check_fill(field, error);
     if (!status) status = check_field_arrays(mesh, field, error);
     if (!status) status = check_patches(mesh, field, error);

@@ -9,6 +9,7 @@
 #include "region.h"
 #include "session_agree.h"
 #include "session_field_input.h"
+#include "session_finer.h"
 #include "session_nodes.h"
 #include "session_scalars.h"
 #include "session_torn.h"
@@ -40,18 +41,18 @@ static indexed_values make_indexed_values(const session_mesh *mesh, const sessio
                                      .component_stride = field->component_stride,
                                      .component_arrays = field->component_arrays,
                                      .component_count = given->component_count},
-                          .keeps_type = session_is_plain_copy(field),
+                          .keeps_type = session_is_plain_copy(mesh, field),
                           .row_length = 1,
                           .used_length = 1,
                           .count = given->count,
                           .position_count =
                               given->centring == INSITU_CELL ? mesh->cells.cell_count : session_vertex_count(mesh)};
-    out.index.base = mesh->given.index_base;
+    out.index.base = mesh->original.index_base;
     if (given->centring == INSITU_VERTEX && mesh->torn.is_torn) out.mesh = mesh;
     if (given->centring == INSITU_CELL) out.parents = mesh->topology.parents;
     if (given->corner_row) {
         out.row_length = given->corner_row;
-        out.used_length = session_cell_nodes(&mesh->given);
+        out.used_length = session_cell_nodes(&mesh->original);
     }
     return out;
 }
@@ -88,11 +89,10 @@ static bool copy_tuple(const indexed_values *v, int64_t place, char *out)
 }
 
 static insitu_status describe_fault(const session_mesh *mesh, const session_field *field, const indexed_values *v,
-                                    int64_t place, base_error *error)
+                                    int64_t entry, base_error *error)
 {
     static const char *const words[] = {"vertex", "cell", "corner"};
     const insitu_centring centring = field->given.centring;
-    const int64_t entry = find_value_entry(v, place);
     const long long base = v->index.base, number = centring == INSITU_VERTEX ? entry + base : entry;
     return base_fail(error, INSITU_ERROR_FIELD,
                      "mesh \"%s\": field \"%s\": the index of %s %lld is %lld, outside %lld..%lld (index_base is "
@@ -118,9 +118,51 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
             if (!copy_tuple(&v, place, field->copy) && place < bad) bad = place;
         region_leave();
     }
-    if (bad < v.position_count) return describe_fault(mesh, field, &v, bad, error);
+    if (bad < v.position_count) return describe_fault(mesh, field, &v, find_value_entry(&v, bad), error);
     field->is_copy_stale = false;
     return INSITU_OK;
+}
+
+/* Reads the tuple at a vertex or a corner of the caller's cells. */
+static void read_node(const void *of, int64_t position, double *tuple)
+{
+    const indexed_values *v = of;
+    const int64_t entry = find_value_entry(v, position);
+    const int64_t at = v->index.data ? grid_array_index(&v->index, entry) : entry;
+    for (int i = 0; i < v->values.component_count; i++) {
+        const grid_array from = grid_field_component(&v->values, i);
+        tuple[i] = grid_array_number(&from, at);
+    }
+}
+
+/* Returns an error for the first vertex or corner of the caller whose index is out of range. */
+static insitu_status check_index(const session_mesh *mesh, const session_field *field, const indexed_values *v,
+                                 base_error *error)
+{
+    const bool at_vertices = field->given.centring == INSITU_VERTEX;
+    const int64_t count = at_vertices ? mesh->original.vertex_count : session_corner_count(&mesh->original);
+    for (int64_t place = 0; place < count && v->index.data; place++) {
+        const int64_t entry = find_value_entry(v, place), at = grid_array_index(&v->index, entry);
+        if (at < 0 || at >= v->count) return describe_fault(mesh, field, v, entry, error);
+    }
+    return INSITU_OK;
+}
+
+/* Computes the values of the cells' polynomials at the nodes of finer lattices. */
+static insitu_status interpolate_values(const session_mesh *mesh, session_field *field, int threads, base_error *error)
+{
+    const indexed_values v = make_indexed_values(mesh, field);
+    const session_node_values values = {&v, field->given.centring == INSITU_CORNER, v.values.component_count,
+                                        read_node};
+    const int64_t bytes = v.position_count * v.values.component_count * (int64_t)sizeof(double);
+    insitu_status status = check_index(mesh, field, &v, error);
+    if (status) return status;
+    if (!field->copy) field->copy = base_alloc((size_t)(bytes ? bytes : 1));
+    if (!field->copy) return session_fail_for_memory(error, bytes, "a field's values in finer cells");
+    field->copy_bytes = bytes;
+    status = session_interpolate_values(mesh, &values, threads, (double *)(void *)field->copy, error);
+    field->is_copy_stale = status != INSITU_OK;
+    return status;
 }
 
 /* Updates the copy of a field's values if it is stale. If it is used for recentred scalars, the cells' own values are
@@ -129,7 +171,8 @@ static insitu_status update_copy(session_mesh *mesh, int index, int threads, bas
 {
     session_field *field = &mesh->fields[index];
     if (!session_is_copied(mesh, field) || field->is_derived || !field->is_copy_stale) return INSITU_OK;
-    const insitu_status status = copy_values(mesh, field, threads, error);
+    const insitu_status status = session_is_interpolated(mesh, field) ? interpolate_values(mesh, field, threads, error)
+                                                                      : copy_values(mesh, field, threads, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)
             mesh->scalars[i].original_values = session_given_field(mesh, index, mesh->scalars[i].component);

@@ -66,14 +66,20 @@ bool session_is_recentred(const scene_field *field, insitu_centring centring, bo
 bool session_is_copied(const session_mesh *mesh, const session_field *field)
 {
     if (field->has_index || field->is_derived) return true;
+    if (mesh->finer.parts) return true;
     if (field->given.centring == INSITU_VERTEX) return mesh->torn.is_torn;
     if (field->given.centring == INSITU_CELL) return mesh->topology.is_split;
     return field->given.corner_row && field->given.corner_row != session_cell_nodes(&mesh->given);
 }
 
-bool session_is_plain_copy(const session_field *field)
+bool session_is_interpolated(const session_mesh *mesh, const session_field *field)
 {
-    return !field->component_arrays && !field->values.unusual_type;
+    return mesh->finer.parts && field->given.centring != INSITU_CELL && !field->is_derived;
+}
+
+bool session_is_plain_copy(const session_mesh *mesh, const session_field *field)
+{
+    return !field->component_arrays && !field->values.unusual_type && !session_is_interpolated(mesh, field);
 }
 
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field)
@@ -102,7 +108,7 @@ grid_field session_given_field(const session_mesh *mesh, int index, int componen
             out.component_arrays = field->component_arrays;
         return out;
     }
-    if (!session_is_plain_copy(field)) out.values = (grid_array){.is_wide = true};
+    if (!session_is_plain_copy(mesh, field)) out.values = (grid_array){.is_wide = true};
     out.component_stride = out.values.is_wide ? 8 : 4;
     out.values.data = field->copy;
     out.values.stride = out.component_stride * out.component_count;

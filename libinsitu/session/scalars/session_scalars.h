@@ -33,9 +33,13 @@ grid_field session_given_field(const session_mesh *mesh, int field, int componen
  * corners. */
 bool session_is_copied(const session_mesh *mesh, const session_field *field);
 
+/* Returns whether the copy has the values of the cells' polynomials at the nodes of finer lattices. */
+bool session_is_interpolated(const session_mesh *mesh, const session_field *field);
+
 /* Returns whether a copy contains the values in their own type. Otherwise it contains doubles: components in separate
- * arrays may have different types, and other values may be integers or not aligned. */
-bool session_is_plain_copy(const session_field *field);
+ * arrays may have different types, other values may be integers or not aligned, and polynomials are evaluated in
+ * double. */
+bool session_is_plain_copy(const session_mesh *mesh, const session_field *field);
 
 /* Finds the field's values as given by the caller, without creating a scalar. Returns false if the mesh does not have
  * the field. */

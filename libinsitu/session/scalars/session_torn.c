@@ -165,7 +165,9 @@ insitu_status session_tear_meshes(session_meshes *meshes, const session_catalogu
 {
     for (int m = 0; m < meshes->count && !error->status; m++) {
         session_mesh *mesh = meshes->items[m];
-        if (mesh->is_given) update_torn_mesh(meshes, mesh, is_named_in_scene(mesh, scene), team->threads, error);
+        /* the nodes of finer lattices are each cell's own anyway */
+        const bool is_torn = !mesh->finer.parts && is_named_in_scene(mesh, scene);
+        if (mesh->is_given) update_torn_mesh(meshes, mesh, is_torn, team->threads, error);
     }
     return has_corners(catalogue) ? session_agree(team->comm, error) : INSITU_OK;
 }

@@ -175,6 +175,7 @@ static insitu_status convert_images(const scene_document *d, const scene_file *i
 static insitu_status convert_file(const scene_document *d, const scene_file *in, scene *out)
 {
     out->threads = in->threads ? *in->threads : 0;
+    out->finer_pieces = in->finer_pieces ? *in->finer_pieces : 1;
     out->tree = in->tree ? (scene_tree)*in->tree : SCENE_TREE_AUTO;
     out->schedule = in->schedule ? (scene_schedule)*in->schedule : SCENE_SCHEDULE_AUTO;
     out->writing = in->writing ? (scene_writing)*in->writing : SCENE_WRITE_BEHIND;

@@ -584,6 +584,7 @@ typedef struct scene {
     int derived_count;      /* number of derived fields, 0 .. SCENE_MAX_DERIVED */
     scene_derived *derived; /* derived fields; each comes after the fields from which it is derived */
     int threads;            /* number of threads per rank; 0: the cores of the node, shared among its ranks */
+    int finer_pieces;       /* number of pieces along an edge between two nodes of a cell of higher order, 1 .. 8 */
     scene_tree tree;
     scene_schedule schedule;
     scene_writing writing;

@@ -472,6 +472,13 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
               "picture if it is larger. A picture that cannot be written is then an error of the next step, or of "    \
               "`insitu_destroy`, which waits for all pictures.",                                                       \
       .default_text = "`background`")                                                                                  \
+    X(CYAML_FIELD_INT_PTR("finer_pieces", OPTIONAL, scene_file, finer_pieces),                                         \
+      .help = "Cells of higher order are drawn as linear pieces. This is the number of pieces along an edge between "  \
+              "two neighbouring nodes. With 1, the corners of pieces are the cells' own nodes. With more, the cells' " \
+              "polynomials are also evaluated between the nodes, and surfaces come closer to the polynomial's: with "  \
+              "twice as many pieces, their error is divided by 4. Memory and time grow with the number of pieces. "    \
+              "See [Cells of higher order](high_order.md#finer-pieces). Linear cells are not affected.",               \
+      .default_text = "`1`", .low = 1, .high = 8)                                                                      \
     X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, SCENE_MAX_IMAGES),             \
       .help = "The images to draw. If three or more frames of a step show the same isosurface, they can share the "    \
               "search for its cells. The isosurface must be opaque, with one colour per value and normals by "         \

@@ -1,0 +1,379 @@
+/* All weights are products of those of a line, a triangle and a tet, which are applied one after the other:
+ *
+ *     hex        line along i, then j, then k
+ *     quad       line along i, then j
+ *     wedge      triangle in each layer, then line along k
+ *     tet        tet
+ *     triangle   triangle
+ *
+ * A sum has other bits in another order of its terms. So nodes on a face are computed again, from the face's nodes
+ * alone, with axes that follow from the positions of the face's corners: the first is the corner that is first in the
+ * order of coordinates, and the first axis leads to the next of the corners beside it. Nodes on an edge are then
+ * computed from the edge's nodes alone, from the end that is first, and corners are copied. All cells at a face or an
+ * edge do the same, on any rank.
+ *
+ * Each sum is that of differences from its first value, so that a constant is reproduced to the bit. */
+#include "session_interpolation.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_derivatives.h"
+#include "vector3.h"
+
+/* The corners, faces and edges of a type of cell. Faces of three corners end with -1. */
+typedef struct cell_shape {
+    int corner_count, face_count, edge_count;
+    signed char corners[8][3]; /* places in a lattice of order 1 */
+    signed char faces[6][4], edges[12][2];
+} cell_shape;
+
+static const cell_shape triangle_shape = {
+    3, 1, 3, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2, -1}}, {{0, 1}, {1, 2}, {2, 0}}};
+static const cell_shape quad_shape = {
+    4, 1, 4, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2, 3}}, {{0, 1}, {1, 2}, {2, 3}, {3, 0}}};
+static const cell_shape tet_shape = {4,
+                                     4,
+                                     6,
+                                     {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                                     {{0, 1, 2, -1}, {0, 1, 3, -1}, {1, 2, 3, -1}, {2, 0, 3, -1}},
+                                     {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}}};
+static const cell_shape wedge_shape = {6,
+                                       5,
+                                       9,
+                                       {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}},
+                                       {{0, 1, 2, -1}, {3, 4, 5, -1}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}},
+                                       {{0, 1}, {1, 2}, {2, 0}, {3, 4}, {4, 5}, {5, 3}, {0, 3}, {1, 4}, {2, 5}}};
+static const cell_shape hex_shape = {
+    8,
+    6,
+    12,
+    {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}},
+    {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}},
+    {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}}};
+
+static const cell_shape *find_shape(int type)
+{
+    switch (type) {
+    case GRID_TRIANGLE: return &triangle_shape;
+    case GRID_QUAD: return &quad_shape;
+    case GRID_TET: return &tet_shape;
+    case GRID_WEDGE: return &wedge_shape;
+    default: return &hex_shape;
+    }
+}
+
+static int find_index(const session_nodes *of, const int at[3])
+{
+    return session_node_index(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
+}
+
+/* ---- weights --------------------------------------------------------------------------------------------------- */
+
+static void weigh_line(int p, int parts, bool is_lobatto, double *out)
+{
+    double x[NODES_MOST_ORDER + 1];
+    session_place_nodes(p, is_lobatto, x);
+    for (int r = 0; r <= parts * p; r++)
+        for (int i = 0; i <= p; i++) {
+            const double at = (double)r / (parts * p);
+            double weight = 1;
+            for (int m = 0; m <= p; m++) weight *= m == i ? 1 : (at - x[m]) / (x[i] - x[m]);
+            out[r * (p + 1) + i] = weight;
+        }
+}
+
+/* Computes B_n(t) of session_derivatives.c. */
+static double find_product(int n, double t)
+{
+    double value = 1;
+    for (int m = 0; m < n; m++) value = value * (t - m) / (m + 1);
+    return value;
+}
+
+/* Computes the weights of a triangle or, with many layers, a tet. */
+static void weigh_simplex(int p, int parts, bool is_tet, double *out)
+{
+    const int fine = parts * p;
+    for (int k = 0; k <= (is_tet ? fine : 0); k++)
+        for (int j = 0; j <= fine - k; j++)
+            for (int i = 0; i <= fine - k - j; i++)
+                for (int c = 0; c <= (is_tet ? p : 0); c++)
+                    for (int b = 0; b <= p - c; b++)
+                        for (int a = 0; a <= p - c - b; a++)
+                            *out++ = find_product(a, (double)i / parts) * find_product(b, (double)j / parts) *
+                                     find_product(c, (double)k / parts) *
+                                     find_product(p - a - b - c, (double)(fine - i - j - k) / parts);
+}
+
+static size_t count_weights(int type, int p, int parts)
+{
+    return (size_t)session_complete_nodes(type, parts * p).count * (size_t)session_complete_nodes(type, p).count;
+}
+
+static bool make_weights(const session_nodes *of, int parts, bool is_lobatto, session_interpolation *out)
+{
+    const int p = of->order;
+    const bool is_box = of->type == GRID_HEX || of->type == GRID_QUAD, is_tet = of->type == GRID_TET;
+    out->line = base_alloc((size_t)(parts * p + 1) * (size_t)(p + 1) * sizeof *out->line);
+    if (!is_box) out->triangle = base_alloc(count_weights(GRID_TRIANGLE, p, parts) * sizeof *out->triangle);
+    if (is_tet) out->tet = base_alloc(count_weights(GRID_TET, p, parts) * sizeof *out->tet);
+    if (!out->line || (!is_box && !out->triangle) || (is_tet && !out->tet)) return false;
+    weigh_line(p, parts, is_lobatto && is_box, out->line);
+    if (!is_box) weigh_simplex(p, parts, false, out->triangle);
+    if (is_tet) weigh_simplex(p, parts, true, out->tet);
+    return true;
+}
+
+static void find_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
+{
+    const cell_shape *shape = find_shape(of->type);
+    const int p = of->order;
+    for (int k = 0; k <= p; k++)
+        for (int j = 0; j <= p; j++)
+            for (int i = 0; i <= p; i++)
+                if (session_is_node(of, i, j, k))
+                    out->positions[find_index(&out->complete, (const int[]){i, j, k})] =
+                        session_node_index(of, order, i, j, k);
+    for (int c = 0; c < shape->corner_count; c++) {
+        const signed char *at = shape->corners[c];
+        out->corners[c] = session_node_index(of, order, p * at[0], p * at[1], p * at[2]);
+    }
+}
+
+bool session_make_interpolation(const session_nodes *of, insitu_vertex_order order, int parts, bool is_lobatto,
+                                session_interpolation *out)
+{
+    *out = (session_interpolation){.of = *of,
+                                   .complete = session_complete_nodes(of->type, of->order),
+                                   .fine = session_complete_nodes(of->type, parts * of->order)};
+    out->positions = base_alloc((size_t)out->complete.count * sizeof *out->positions);
+    if (!out->positions || !make_weights(of, parts, is_lobatto, out)) return false;
+    find_positions(of, order, out);
+    return true;
+}
+
+void session_drop_interpolation(session_interpolation *interpolation)
+{
+    base_free(interpolation->positions);
+    base_free(interpolation->line);
+    base_free(interpolation->triangle);
+    base_free(interpolation->tet);
+    *interpolation = (session_interpolation){0};
+}
+
+/* ---- one cell -------------------------------------------------------------------------------------------------- */
+
+/* A cell in the making. */
+typedef struct cell_job {
+    const session_interpolation *of;
+    const cell_shape *shape;
+    const double (*corners)[3];
+    int size;        /* number of components */
+    double *lattice; /* tuples at the nodes of the complete lattice, in lexicographic order */
+    double *spare[2];
+    double *out;
+} cell_job;
+
+size_t session_interpolation_room(const session_interpolation *of, int components)
+{
+    return ((size_t)of->complete.count + 2 * (size_t)of->fine.count) * (size_t)components;
+}
+
+/* Multiplies each of `outer` arrays of columns x inner numbers with a matrix of rows x columns. */
+static void apply(const double *matrix, int rows, int columns, int outer, int inner, const double *in, double *out)
+{
+    for (int o = 0; o < outer; o++, in += columns * inner)
+        for (int r = 0; r < rows; r++, out += inner) {
+            for (int s = 0; s < inner; s++) out[s] = 0;
+            for (int c = 0; c < columns; c++)
+                for (int s = 0; s < inner; s++) out[s] += matrix[r * columns + c] * (in[c * inner + s] - in[s]);
+            for (int s = 0; s < inner; s++) out[s] += in[s];
+        }
+}
+
+static double value_beside(const cell_job *job, const int at[3], const int step[3], int component)
+{
+    const int node[3] = {at[0] + step[0], at[1] + step[1], at[2] + step[2]};
+    return job->lattice[find_index(&job->of->complete, node) * job->size + component];
+}
+
+/* Returns the sum of values on both sides of a node. */
+static double sum_pair(const cell_job *job, const int at[3], const int step[3], int component)
+{
+    const int back[3] = {-step[0], -step[1], -step[2]};
+    return value_beside(job, at, step, component) + value_beside(job, at, back, component);
+}
+
+/* Returns the value at the middle of a face of a serendipity cell. The sums do not depend on the order of axes. */
+static double middle_of_face(const cell_job *job, const int at[3], const int a[3], const int b[3], int component)
+{
+    const int sum[3] = {a[0] + b[0], a[1] + b[1], a[2] + b[2]}, difference[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+    return 0.5 * (sum_pair(job, at, a, component) + sum_pair(job, at, b, component)) -
+           0.25 * (sum_pair(job, at, sum, component) + sum_pair(job, at, difference, component));
+}
+
+static double middle_of_hex(const cell_job *job, const int at[3], int component)
+{
+    double edges = 0, corners = 0;
+    for (int n = 0; n < 27; n++) {
+        const int step[3] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
+        const int zeros = (step[0] == 0) + (step[1] == 0) + (step[2] == 0);
+        if (zeros == 1) edges += value_beside(job, at, step, component);
+        if (zeros == 0) corners += value_beside(job, at, step, component);
+    }
+    return 0.25 * (edges - corners);
+}
+
+static void fill_missing(const cell_job *job, const int at[3])
+{
+    int directions[3][3];
+    const int count = session_missing_directions(job->of->of.type, at, directions);
+    double *out = job->lattice + find_index(&job->of->complete, at) * job->size;
+    for (int c = 0; c < job->size; c++)
+        out[c] = count == 3 ? middle_of_hex(job, at, c) : middle_of_face(job, at, directions[0], directions[1], c);
+}
+
+/* Puts the tuples into lexicographic order, and adds those that a serendipity cell lacks. */
+static void fill_lattice(const cell_job *job, const double *tuples)
+{
+    const session_interpolation *of = job->of;
+    const size_t bytes = (size_t)job->size * sizeof *tuples;
+    for (int n = 0; n < of->complete.count; n++)
+        if (of->positions[n] < of->of.count)
+            memcpy(job->lattice + n * job->size, tuples + of->positions[n] * job->size, bytes);
+    for (int n = 0; n < 27 && !of->of.is_complete; n++) {
+        const int at[3] = {n % 3, n / 3 % 3, n / 9};
+        if (session_is_node(&of->of, at[0], at[1], at[2]) &&
+            of->positions[find_index(&of->complete, at)] >= of->of.count)
+            fill_missing(job, at);
+    }
+}
+
+/* Computes all fine nodes from the lattice of the cell. */
+static void fill_inside(const cell_job *job)
+{
+    const session_interpolation *of = job->of;
+    const int c = of->of.order + 1, r = of->fine.order + 1, size = job->size;
+    const int triangle = c * (c + 1) / 2, triangles = r * (r + 1) / 2;
+    double *a = job->spare[0], *b = job->spare[1];
+    switch (of->of.type) {
+    case GRID_TRIANGLE: apply(of->triangle, triangles, triangle, 1, size, job->lattice, job->out); break;
+    case GRID_TET: apply(of->tet, of->fine.count, of->complete.count, 1, size, job->lattice, job->out); break;
+    case GRID_WEDGE:
+        apply(of->triangle, triangles, triangle, c, size, job->lattice, a);
+        apply(of->line, r, c, 1, triangles * size, a, job->out);
+        break;
+    case GRID_QUAD:
+        apply(of->line, r, c, c, size, job->lattice, a);
+        apply(of->line, r, c, 1, r * size, a, job->out);
+        break;
+    default:
+        apply(of->line, r, c, c * c, size, job->lattice, a);
+        apply(of->line, r, c, c, r * size, a, b);
+        apply(of->line, r, c, 1, r * r * size, b, job->out);
+    }
+}
+
+/* A corner and two steps from it along a face of a lattice of order 1; no second step on edges. */
+typedef struct face_axes {
+    int count; /* of the face's corners */
+    const signed char *origin, *along, *across;
+} face_axes;
+
+/* Returns the index of a node of a face. */
+static int find_face_node(const session_nodes *of, const face_axes *axes, int i, int j)
+{
+    int at[3];
+    for (int a = 0; a < 3; a++)
+        at[a] = axes->origin[a] * of->order + i * (axes->along[a] - axes->origin[a]) +
+                j * (axes->across[a] - axes->origin[a]);
+    return find_index(of, at);
+}
+
+/* Copies tuples between a lattice and an array of the face's nodes. */
+static void copy_face(const session_nodes *of, const face_axes *axes, int size, bool is_read, double *lattice,
+                      double *face)
+{
+    const int p = of->order;
+    const size_t bytes = (size_t)size * sizeof *face;
+    for (int j = 0; j <= (axes->count > 2 ? p : 0); j++)
+        for (int i = 0; i <= (axes->count == 3 ? p - j : p); i++, face += size) {
+            double *node = lattice + find_face_node(of, axes, i, j) * size;
+            memcpy(is_read ? face : node, is_read ? node : face, bytes);
+        }
+}
+
+static void fill_face(const cell_job *job, const face_axes *axes)
+{
+    const session_interpolation *of = job->of;
+    const int c = of->of.order + 1, r = of->fine.order + 1, size = job->size;
+    double *a = job->spare[0], *b = job->spare[1];
+    copy_face(&of->complete, axes, size, true, job->lattice, a);
+    if (axes->count == 3) {
+        apply(of->triangle, r * (r + 1) / 2, c * (c + 1) / 2, 1, size, a, b);
+    } else {
+        apply(of->line, r, c, axes->count == 4 ? c : 1, size, a, b);
+        if (axes->count == 4) apply(of->line, r, c, 1, r * size, b, a);
+    }
+    copy_face(&of->fine, axes, size, false, job->out, axes->count == 4 ? a : b);
+}
+
+static bool is_before(const cell_job *job, int a, int b)
+{
+    return vector3_compare(job->corners[a], job->corners[b]) < 0;
+}
+
+/* Chooses the axes of a face by the positions of its corners. */
+static face_axes choose_axes(const cell_job *job, const signed char *face)
+{
+    const int count = face[3] < 0 ? 3 : 4;
+    int first = 0;
+    for (int n = 1; n < count; n++)
+        if (is_before(job, face[n], face[first])) first = n;
+    int along = face[(first + 1) % count], across = face[(first + count - 1) % count];
+    if (is_before(job, across, along)) {
+        const int swapped = along;
+        along = across;
+        across = swapped;
+    }
+    const signed char(*at)[3] = job->shape->corners;
+    return (face_axes){count, at[(int)face[first]], at[along], at[across]};
+}
+
+static void fill_edge(const cell_job *job, const signed char ends[2])
+{
+    const int first = is_before(job, ends[1], ends[0]);
+    const signed char *origin = job->shape->corners[(int)ends[first]];
+    fill_face(job, &(face_axes){2, origin, job->shape->corners[(int)ends[!first]], origin});
+}
+
+static void copy_corner(const cell_job *job, int corner)
+{
+    const session_interpolation *of = job->of;
+    const signed char *at = job->shape->corners[corner];
+    const face_axes axes = {1, at, at, at};
+    memcpy(job->out + find_face_node(&of->fine, &axes, 0, 0) * job->size,
+           job->lattice + find_face_node(&of->complete, &axes, 0, 0) * job->size, (size_t)job->size * sizeof *job->out);
+}
+
+void session_interpolate(const session_interpolation *of, const double (*corners)[3], int components,
+                         const double *tuples, double *room, double *out)
+{
+    cell_job job = {.of = of,
+                    .shape = find_shape(of->of.type),
+                    .corners = corners,
+                    .size = components,
+                    .lattice = room,
+                    .out = out};
+    job.spare[0] = room + of->complete.count * components;
+    job.spare[1] = job.spare[0] + of->fine.count * components;
+    fill_lattice(&job, tuples);
+    fill_inside(&job);
+    for (int f = 0; f < job.shape->face_count; f++) {
+        const face_axes axes = choose_axes(&job, job.shape->faces[f]);
+        fill_face(&job, &axes);
+    }
+    for (int e = 0; e < job.shape->edge_count; e++) fill_edge(&job, job.shape->edges[e]);
+    for (int c = 0; c < job.shape->corner_count; c++) copy_corner(&job, c);
+}

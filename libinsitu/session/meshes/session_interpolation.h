@@ -1,0 +1,38 @@
+/* The values of a cell's polynomial at the nodes of a finer lattice. */
+#ifndef SESSION_INTERPOLATION_H
+#define SESSION_INTERPOLATION_H
+
+#include <stddef.h>
+
+#include "session_nodes.h"
+
+/* The interpolation in one kind of cell. */
+typedef struct session_interpolation {
+    session_nodes of;       /* the cell's own nodes */
+    session_nodes complete; /* all nodes of the lattice of the cell's order */
+    session_nodes fine;     /* the nodes of the finer lattice, which are equispaced */
+    int *positions;         /* for each node of `complete`, in lexicographic order, its position in the cell's row; at
+                               least of.count if a serendipity cell lacks it */
+    int corners[8];         /* position of each corner in the cell's row; corners are in VTK's order */
+    double *line;           /* weights on an edge: its fine nodes x its nodes */
+    double *triangle, *tet; /* weights of triangles and tets; NULL if the type of cell has none */
+} session_interpolation;
+
+/* Finds the interpolation in cells other than pyramids to a lattice of order parts * of->order, which must be at most
+ * NODES_MOST_ORDER. order: that of the nodes in the cell's row. is_lobatto: nodes along the axes of hexes and quads are
+ * Gauss-Lobatto points; otherwise they are equispaced. Returns false if memory runs out; the caller must drop *out in
+ * any case. */
+bool session_make_interpolation(const session_nodes *of, insitu_vertex_order order, int parts, bool is_lobatto,
+                                session_interpolation *out);
+void session_drop_interpolation(session_interpolation *interpolation);
+
+/* Returns the number of doubles that session_interpolate() needs as working memory. */
+size_t session_interpolation_room(const session_interpolation *of, int components);
+
+/* Computes tuples at the fine nodes, in lexicographic order, from those at the cell's nodes, in the order of its row.
+ * corners: the positions of the corners, by which a tuple on a face or an edge gets the same bits from all cells that
+ * have the face or the edge. room: working memory. */
+void session_interpolate(const session_interpolation *of, const double (*corners)[3], int components,
+                         const double *tuples, double *room, double *out);
+
+#endif

@@ -1,0 +1,261 @@
+/* The values of cells' polynomials between their nodes, against closed forms: on straight cells, those of any
+ * polynomial that the cell has. A cell that is described from another corner and along other axes has the same bits on
+ * all faces.
+ */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "session_interpolation.h"
+#include "test_mesh_order.h"
+
+enum { MOST_POWER = 4, MOST_NODES = 17 * 17 * 17 };
+
+static double nothing(const double p[3])
+{
+    return p[0];
+}
+
+static bool is_pyramid(const order_kind *kind)
+{
+    return strstr(kind->name, "pyramid") != NULL;
+}
+
+/* ---- closed forms ------------------------------------------------------------------------------------------------ */
+
+static double monomial(const double at[3], const int powers[3])
+{
+    double value = 1;
+    for (int a = 0; a < 3; a++) value *= pow(at[a] + 0.3 + 0.1 * a, powers[a]);
+    return value;
+}
+
+/* Which monomials the cell's polynomials contain. */
+static bool is_in_space(const session_nodes *of, const int q[3])
+{
+    const int p = of->order, plane = q[0] + q[1];
+    switch (of->type) {
+    case GRID_TET: return plane + q[2] <= p;
+    case GRID_WEDGE:
+        return of->is_complete ? plane <= p && q[2] <= p : (plane <= 2 && q[2] <= 1) || (plane <= 1 && q[2] <= 2);
+    default:
+        if (of->is_complete) return q[0] <= p && q[1] <= p && q[2] <= p;
+        return q[0] <= 2 && q[1] <= 2 && q[2] <= 2 && (q[0] == 2) + (q[1] == 2) + (q[2] == 2) <= 1;
+    }
+}
+
+/* Sums of at most 125 terms, in three turns, each rounded by 1e-16 of weights up to 2 times powers of up to 1.8^12. */
+#define ROUNDING 1e-11
+
+/* Interpolates places and a monomial, and checks both: places lie on the finer lattice of the straight cell. */
+static void check_monomial(const session_interpolation *of, const double (*places)[3], const int powers[3],
+                           const char *name)
+{
+    static double tuples[MOST_NODES][4], fine[MOST_NODES][4], room[3 * 4 * MOST_NODES];
+    static const int corner_of_axis[2][3] = {{1, 2, 3}, {1, 3, 4}}; /* tets and wedges; hexes */
+    double corners[8][3], worst = 0;
+    const int p = of->fine.order, is_hex = of->of.type == GRID_HEX;
+    for (int c = 0; c < grid_type_vertices(of->of.type); c++)
+        memcpy(corners[c], places[of->corners[c]], sizeof corners[c]);
+    for (int n = 0; n < of->of.count; n++) {
+        memcpy(tuples[n], places[n], sizeof places[n]);
+        tuples[n][3] = monomial(places[n], powers);
+    }
+    assert_true(session_interpolation_room(of, 4) <= sizeof room / sizeof room[0]);
+    session_interpolate(of, (const double(*)[3])corners, 4, tuples[0], room, fine[0]);
+    for (int k = 0; k <= p; k++)
+        for (int j = 0; j <= p; j++)
+            for (int i = 0; i <= p; i++) {
+                if (!session_is_node(&of->fine, i, j, k)) continue;
+                const double *at = fine[session_node_index(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, i, j, k)];
+                const int steps[3] = {i, j, k};
+                for (int a = 0; a < 3; a++) {
+                    double place = corners[0][a];
+                    for (int axis = 0; axis < 3; axis++)
+                        place += (corners[corner_of_axis[is_hex][axis]][a] - corners[0][a]) * steps[axis] / p;
+                    worst = fmax(worst, fabs(at[a] - place));
+                }
+                worst = fmax(worst, fabs(at[3] - monomial(at, powers)));
+            }
+    if (!(worst < ROUNDING)) fprintf(stderr, "%s, to order %d: a value is off by %g\n", name, p, worst);
+    assert_true(worst < ROUNDING);
+}
+
+/* Moves nodes that are equispaced in a cube of [-1, 1]^3 to Gauss-Lobatto points of order 4. */
+static void place_lobatto(order_mesh *mesh)
+{
+    const double of4[5] = {-1, -sqrt(3. / 7), 0, sqrt(3. / 7), 1};
+    for (int64_t i = 0; i < 3 * mesh->vertex_count; i++)
+        mesh->coordinates[i] = of4[lround((mesh->coordinates[i] + 1) * 2)];
+}
+
+/* Every cell of a cube. */
+static void check_kind(const order_kind *kind, int parts, bool is_lobatto)
+{
+    order_mesh mesh;
+    session_nodes nodes;
+    session_interpolation of;
+    double(*places)[3] = malloc(200 * sizeof *places);
+    order_mesh_create(kind, 1, 0, nothing, 0, 1, &mesh);
+    if (is_lobatto) place_lobatto(&mesh);
+    assert_true(session_nodes_of((int)kind->type, mesh.nodes, &nodes));
+    if (kind->order == 1) nodes.order = 1;
+    assert_true(session_make_interpolation(&nodes, kind->layout, parts, is_lobatto, &of));
+    for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
+        for (int n = 0; n < mesh.nodes; n++)
+            memcpy(places[n], mesh.coordinates + 3 * mesh.connectivity[cell * mesh.nodes + n], sizeof places[n]);
+        for (int i = 0; i < (MOST_POWER + 1) * (MOST_POWER + 1) * (MOST_POWER + 1); i++) {
+            const int powers[3] = {i % (MOST_POWER + 1), i / (MOST_POWER + 1) % (MOST_POWER + 1),
+                                   i / (MOST_POWER + 1) / (MOST_POWER + 1)};
+            if (is_in_space(&nodes, powers)) check_monomial(&of, (const double(*)[3])places, powers, kind->name);
+        }
+    }
+    session_drop_interpolation(&of);
+    order_mesh_free(&mesh);
+    free(places);
+}
+
+static void polynomials_are_reproduced(void **state)
+{
+    (void)state;
+    for (int k = 0; k < order_kind_count; k++)
+        for (int parts = 2; parts <= 4 && !is_pyramid(&order_kinds[k]); parts++)
+            check_kind(&order_kinds[k], parts, false);
+    check_kind(&(order_kind){"hex 4, Gauss-Lobatto", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4}, 3, true);
+}
+
+/* ---- turned cells ------------------------------------------------------------------------------------------------ */
+
+/* Stores the permutation of this number of `count` things. */
+static void permute(int number, int count, int out[4])
+{
+    for (int n = 0; n < count; n++) out[n] = n;
+    for (int n = 0; n < count; n++) {
+        const int from = n + number % (count - n), taken = out[from];
+        for (int m = from; m > n; m--) out[m] = out[m - 1];
+        out[n] = taken;
+        number /= count - n;
+    }
+}
+
+static int count_turns(int type)
+{
+    return type == GRID_HEX ? 48 : type == GRID_TET ? 24 : 12;
+}
+
+/* Finds where a node of a lattice of order p is if the cell is described in one of the ways in which it can be. */
+static void turn(int type, int number, int p, const int at[3], int out[3])
+{
+    int order[4];
+    if (type == GRID_HEX) {
+        permute(number / 8, 3, order);
+        for (int a = 0; a < 3; a++) out[a] = number >> a & 1 ? p - at[order[a]] : at[order[a]];
+        return;
+    }
+    const bool is_tet = type == GRID_TET;
+    const int rest = p - at[0] - at[1], b[4] = {at[0], at[1], is_tet ? at[2] : rest, rest - at[2]};
+    permute(is_tet ? number : number / 2, is_tet ? 4 : 3, order);
+    for (int a = 0; a < 3; a++) out[a] = b[order[a]];
+    if (!is_tet) out[2] = number % 2 ? p - at[2] : at[2];
+}
+
+static bool is_on_face(int type, int p, const int at[3])
+{
+    const bool at_first = at[0] == 0 || at[1] == 0 || at[2] == 0;
+    if (type == GRID_HEX) return at_first || at[0] == p || at[1] == p || at[2] == p;
+    if (type == GRID_TET) return at_first || at[0] + at[1] + at[2] == p;
+    return at_first || at[2] == p || at[0] + at[1] == p;
+}
+
+static double random_number(void)
+{
+    return rand() / (RAND_MAX + 1.0);
+}
+
+/* Compares the fine nodes of a cell with those of the same cell as it is turned. */
+static void check_turn(const session_interpolation *of, insitu_vertex_order order, int number, const char *name)
+{
+    static double tuples[2][200][4], fine[2][MOST_NODES][4], room[3 * 4 * MOST_NODES];
+    const int type = of->of.type, p = of->of.order, r = of->fine.order;
+    int wrong = 0, turned[3];
+    for (int i = 0; i < (p + 1) * (p + 1) * (p + 1); i++) {
+        const int at[3] = {i % (p + 1), i / (p + 1) % (p + 1), i / (p + 1) / (p + 1)};
+        if (!session_is_node(&of->of, at[0], at[1], at[2])) continue;
+        turn(type, number, p, at, turned);
+        const int from = session_node_index(&of->of, order, at[0], at[1], at[2]);
+        const int to = session_node_index(&of->of, order, turned[0], turned[1], turned[2]);
+        if (from >= of->of.count) continue;
+        for (int c = 0; c < 4; c++) tuples[0][from][c] = tuples[1][to][c] = random_number();
+    }
+    for (int side = 0; side < 2; side++) {
+        double corners[8][3];
+        for (int c = 0; c < grid_type_vertices(type); c++)
+            memcpy(corners[c], tuples[side][of->corners[c]], sizeof corners[c]);
+        session_interpolate(of, (const double(*)[3])corners, 4, tuples[side][0], room, fine[side][0]);
+    }
+    for (int i = 0; i < (r + 1) * (r + 1) * (r + 1); i++) {
+        const int at[3] = {i % (r + 1), i / (r + 1) % (r + 1), i / (r + 1) / (r + 1)};
+        if (!session_is_node(&of->fine, at[0], at[1], at[2])) continue;
+        turn(type, number, r, at, turned);
+        const double *a = fine[0][session_node_index(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2])];
+        const double *b =
+            fine[1][session_node_index(&of->fine, INSITU_ORDER_LEXICOGRAPHIC, turned[0], turned[1], turned[2])];
+        if (is_on_face(type, r, at)) wrong += memcmp(a, b, sizeof fine[0][0]) != 0;
+        for (int c = 0; c < 4; c++) wrong += !(fabs(a[c] - b[c]) < 1e-12);
+    }
+    if (wrong) fprintf(stderr, "%s, turned in way %d: %d values differ\n", name, number, wrong);
+    assert_int_equal(wrong, 0);
+}
+
+static void turned_cells_have_the_same_bits_on_faces(void **state)
+{
+    (void)state;
+    for (int k = 0; k < order_kind_count; k++) {
+        const order_kind *kind = &order_kinds[k];
+        session_nodes nodes;
+        session_interpolation of;
+        if (is_pyramid(kind) || kind->order == 1) continue;
+        assert_true(session_nodes_of((int)kind->type, session_node_count((int)kind->type, kind->order), &nodes));
+        for (int way = 0; way < 4; way++) {
+            const bool is_lobatto = way % 2;
+            assert_true(session_make_interpolation(&nodes, kind->layout, 2 + way / 2, is_lobatto, &of));
+            for (int n = 0; n < count_turns(nodes.type); n++) check_turn(&of, kind->layout, n, kind->name);
+            session_drop_interpolation(&of);
+        }
+    }
+}
+
+/* Constants have the same bits at all nodes, so that flat outer faces stay flat. */
+static void constants_are_exact(void **state)
+{
+    (void)state;
+    static double values[200], fine[MOST_NODES], room[3 * MOST_NODES], corners[8][3];
+    for (int k = 0; k < order_kind_count; k++) {
+        const order_kind *kind = &order_kinds[k];
+        session_nodes nodes;
+        session_interpolation of;
+        if (is_pyramid(kind) || kind->order == 1) continue;
+        assert_true(session_nodes_of((int)kind->type, session_node_count((int)kind->type, kind->order), &nodes));
+        assert_true(session_make_interpolation(&nodes, kind->layout, 3, false, &of));
+        for (int n = 0; n < nodes.count; n++) values[n] = 0.1;
+        session_interpolate(&of, (const double(*)[3])corners, 1, values, room, fine);
+        for (int n = 0; n < of.fine.count && nodes.is_complete; n++) assert_true(fine[n] == 0.1);
+        session_drop_interpolation(&of);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(polynomials_are_reproduced),
+        cmocka_unit_test(turned_cells_have_the_same_bits_on_faces),
+        cmocka_unit_test(constants_are_exact),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
