@@ -227,7 +227,7 @@ static void scene_image_keys_are_read(void **state)
     assert_int_equal(s.threads, 3);
     assert_int_equal(s.tree, SCENE_TREE_PARTIAL);
     assert_int_equal(s.writing, SCENE_WRITE_IN_STEP);
-    assert_int_equal(s.finer_pieces, 3);
+    assert_int_equal(s.finer_pieces, 1);
     assert_int_equal(s.schedule, SCENE_SCHEDULE_RADIX);
     assert_int_equal(s.image_count, 3 + 4 * 2 * 3 * 2 + 2);
     const scene_image *image = &s.images[0];
