@@ -5,10 +5,9 @@ set(INSITU_TEST_ENVIRONMENT
   OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none
   OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_base_warn_component_unused=0)
 
-# Ranks that wait sleep (sleeping_yield.c): beside other work tests take a third of the time or less, on idle cores a
-# third more. LD_PRELOAD cannot name a path with a blank or a colon, and AddressSanitizer wants
-# to be the first library: its programs have the function within them (cmake/asan.cmake).
-option(INSITU_TEST_SLEEPING "Let the ranks of tests sleep while they wait, for machines that are busy with other work")
+# With INSITU_TEST_SLEEPING, ranks that wait sleep (sleeping_yield.c). Tests then take a third of the time or less beside
+# other work, and a third more on idle cores. LD_PRELOAD cannot name a path that has a blank or a colon. AddressSanitizer
+# must be the first library, so its programs contain the function (cmake/asan.cmake).
 if(INSITU_TEST_SLEEPING AND NOT CMAKE_PROJECT_INCLUDE AND NOT PROJECT_BINARY_DIR MATCHES "[ :]")
   add_library(sleeping_yield MODULE ${CMAKE_CURRENT_SOURCE_DIR}/sleeping_yield.c)
   set_target_properties(sleeping_yield PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
