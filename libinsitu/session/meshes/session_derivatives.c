@@ -45,8 +45,8 @@ static double legendre_slope(int p, double x, double *curvature)
     return slope;
 }
 
-/* Gauss-Lobatto points are the ends and the roots of the
- * derivative of Legendre's polynomial, found by Newton's method from Chebyshev's points. */
+/* Gauss-Lobatto points are the ends and the roots of the derivative of Legendre's polynomial, found by Newton's method
+ * from Chebyshev's points. */
 void session_place_nodes(int p, bool is_lobatto, double out[MOST_NODES_OF_LINE])
 {
     for (int i = 0; i <= p; i++) {
@@ -253,8 +253,7 @@ void session_drop_derivatives(session_derivatives *derivatives)
 
 /* ---- all cells ------------------------------------------------------------------------------------------------- */
 
-/* Returns whether both spacings must be distinguished. */
-static bool has_two_spacings(const session_nodes *of)
+bool session_has_two_spacings(const session_nodes *of)
 {
     return of->order > 2 && (of->type == GRID_HEX || of->type == GRID_QUAD);
 }
@@ -272,7 +271,7 @@ bool session_polynomials_create(const session_mesh *mesh, session_polynomials *o
     for (int i = 0; i < out->rows.kind_count && is_made; i++) {
         const session_nodes *of = &out->rows.kinds[i].nodes;
         is_made = session_make_derivatives(of, out->order, false, &out->kinds[2 * i]);
-        if (is_made && has_two_spacings(of))
+        if (is_made && session_has_two_spacings(of))
             is_made = session_make_derivatives(of, out->order, true, &out->kinds[2 * i + 1]);
     }
     return is_made;
@@ -320,7 +319,7 @@ const session_derivatives *session_derivatives_of(const session_polynomials *pol
     const int kind = session_kind_of(&polynomials->rows, cell);
     const session_nodes *of = &polynomials->rows.kinds[kind].nodes;
     const session_derivatives *equispaced = &polynomials->kinds[2 * kind], *lobatto = equispaced + 1;
-    if (polynomials->are_equispaced || !has_two_spacings(of)) return equispaced;
+    if (polynomials->are_equispaced || !session_has_two_spacings(of)) return equispaced;
     const double between = 0.5 * (equispaced->first_segment + lobatto->first_segment);
     return mean_end_segment(of, polynomials->order, positions, stride) < between ? lobatto : equispaced;
 }

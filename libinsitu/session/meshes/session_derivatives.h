@@ -21,6 +21,10 @@ bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order
                               session_derivatives *out);
 void session_drop_derivatives(session_derivatives *derivatives);
 
+/* Returns whether the nodes may be Gauss-Lobatto points that differ from equispaced ones: hexes and quads of order 3
+ * and more. */
+bool session_has_two_spacings(const session_nodes *of);
+
 /* Computes the positions of the p + 1 nodes of an edge from 0 to 1. */
 void session_place_nodes(int p, bool is_lobatto, double out[NODES_MOST_ORDER + 1]);
 

@@ -237,12 +237,6 @@ void session_drop_ids(const session_meshes *meshes)
     }
 }
 
-/* Returns whether both spacings of nodes along its axes are possible. */
-static bool may_be_lobatto(const session_nodes *of)
-{
-    return of->order > 2 && (of->type == GRID_HEX || of->type == GRID_QUAD);
-}
-
 static void count_spacings(const session_polynomials *of, int64_t counts[SESSION_FINER_COUNTS], double (*places)[3])
 {
     for (int64_t cell = 0; cell < of->cell_count; cell++) {
@@ -250,7 +244,7 @@ static void count_spacings(const session_polynomials *of, int64_t counts[SESSION
         const session_nodes *nodes = &of->rows.kinds[kind].nodes;
         const int64_t first = session_row_first(&of->rows, cell);
         counts[PYRAMIDS] += nodes->type == GRID_PYRAMID;
-        if (!may_be_lobatto(nodes)) continue;
+        if (!session_has_two_spacings(nodes)) continue;
         for (int n = 0; n < nodes->count; n++)
             grid_vertex(&of->rows.cells, session_row_vertex(&of->rows, first + n), places[n]);
         counts[session_derivatives_of(of, cell, places[0], 3) == &of->kinds[2 * kind] ? EQUISPACED : LOBATTO]++;

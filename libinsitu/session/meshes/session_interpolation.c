@@ -19,49 +19,8 @@
 
 #include "memory.h"
 #include "session_derivatives.h"
+#include "session_shape.h"
 #include "vector3.h"
-
-/* The corners, faces and edges of a type of cell. Faces of three corners end with -1. */
-typedef struct cell_shape {
-    int corner_count, face_count, edge_count;
-    signed char corners[8][3]; /* places in a lattice of order 1 */
-    signed char faces[6][4], edges[12][2];
-} cell_shape;
-
-static const cell_shape triangle_shape = {
-    3, 1, 3, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2, -1}}, {{0, 1}, {1, 2}, {2, 0}}};
-static const cell_shape quad_shape = {
-    4, 1, 4, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2, 3}}, {{0, 1}, {1, 2}, {2, 3}, {3, 0}}};
-static const cell_shape tet_shape = {4,
-                                     4,
-                                     6,
-                                     {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
-                                     {{0, 1, 2, -1}, {0, 1, 3, -1}, {1, 2, 3, -1}, {2, 0, 3, -1}},
-                                     {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}}};
-static const cell_shape wedge_shape = {6,
-                                       5,
-                                       9,
-                                       {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}},
-                                       {{0, 1, 2, -1}, {3, 4, 5, -1}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}},
-                                       {{0, 1}, {1, 2}, {2, 0}, {3, 4}, {4, 5}, {5, 3}, {0, 3}, {1, 4}, {2, 5}}};
-static const cell_shape hex_shape = {
-    8,
-    6,
-    12,
-    {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}},
-    {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}},
-    {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}}};
-
-static const cell_shape *find_shape(int type)
-{
-    switch (type) {
-    case GRID_TRIANGLE: return &triangle_shape;
-    case GRID_QUAD: return &quad_shape;
-    case GRID_TET: return &tet_shape;
-    case GRID_WEDGE: return &wedge_shape;
-    default: return &hex_shape;
-    }
-}
 
 static int find_index(const session_nodes *of, const int at[3])
 {
@@ -127,7 +86,7 @@ static bool make_weights(const session_nodes *of, int parts, bool is_lobatto, se
 
 static void find_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
 {
-    const cell_shape *shape = find_shape(of->type);
+    const session_shape *shape = session_shape_of(of->type);
     const int p = of->order;
     for (int k = 0; k <= p; k++)
         for (int j = 0; j <= p; j++)
@@ -167,7 +126,7 @@ void session_drop_interpolation(session_interpolation *interpolation)
 /* A cell in the making. */
 typedef struct cell_job {
     const session_interpolation *of;
-    const cell_shape *shape;
+    const session_shape *shape;
     const double (*corners)[3];
     int size;        /* number of components */
     double *lattice; /* tuples at the nodes of the complete lattice, in lexicographic order */
@@ -361,7 +320,7 @@ void session_interpolate(const session_interpolation *of, const double (*corners
                          const double *tuples, double *room, double *out)
 {
     cell_job job = {.of = of,
-                    .shape = find_shape(of->of.type),
+                    .shape = session_shape_of(of->of.type),
                     .corners = corners,
                     .size = components,
                     .lattice = room,

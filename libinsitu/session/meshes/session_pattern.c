@@ -20,6 +20,7 @@
 
 #include "memory.h"
 #include "session_cell_order.h"
+#include "session_shape.h"
 
 /* ---- listed pieces --------------------------------------------------------------------------------------------- */
 
@@ -121,70 +122,40 @@ static void list_pieces(const pattern_list *list)
 
 /* ---- serendipity cells ----------------------------------------------------------------------------------------- */
 
-/* Edges in VTK's order of their midpoints, and faces; -1 marks the end. */
-typedef struct corner_shape {
-    int type;
-    signed char edges[12][2], faces[6][4];
-} corner_shape;
-
-static const corner_shape shapes[] = {
-    {GRID_HEX,
-     {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}},
-     {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}},
-    {GRID_WEDGE,
-     {{0, 1}, {1, 2}, {2, 0}, {3, 4}, {4, 5}, {5, 3}, {0, 3}, {1, 4}, {2, 5}, {-1, -1}},
-     {{0, 2, 1, -1}, {3, 4, 5, -1}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}, {-1}}},
-    {GRID_PYRAMID,
-     {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 4}, {1, 4}, {2, 4}, {3, 4}, {-1, -1}},
-     {{0, 3, 2, 1}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}, {-1}}},
-    {GRID_QUAD, {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {-1, -1}}, {{0, 1, 2, 3}, {-1}}},
-};
-
-static int count_edges(const corner_shape *shape)
+static int find_midpoint(const session_shape *shape, int a, int b)
 {
-    int count = 0;
-    while (count < 12 && shape->edges[count][0] >= 0) count++;
-    return count;
-}
-
-static int find_midpoint(const corner_shape *shape, int a, int b)
-{
-    for (int e = 0; e < 12; e++)
+    for (int e = 0; e < shape->edge_count; e++)
         if ((shape->edges[e][0] == a && shape->edges[e][1] == b) ||
             (shape->edges[e][0] == b && shape->edges[e][1] == a))
-            return grid_type_vertices(shape->type) + e;
+            return shape->corner_count + e;
     return -1;
 }
 
 /* Adds the polygon that cuts off a corner: the midpoints of the edges at the corner. */
-static void add_cut(session_pattern *out, const corner_shape *shape, int corner)
+static void add_cut(session_pattern *out, const session_shape *shape, int corner)
 {
     pattern_polygon *cut = &out->polygons[out->polygon_count++];
     *cut = (pattern_polygon){.corner = corner};
-    for (int e = 0; e < count_edges(shape); e++)
+    for (int e = 0; e < shape->edge_count; e++)
         if (shape->edges[e][0] == corner || shape->edges[e][1] == corner)
-            cut->nodes[cut->count++] = grid_type_vertices(shape->type) + e;
+            cut->nodes[cut->count++] = shape->corner_count + e;
 }
 
-/* Returns the coordinates of a node in the straight reference cell of edge 2. */
-static void reference_position(const corner_shape *shape, int node, double out[3])
+/* Returns the coordinates of a node in a straight cell: the lattice of order 1, in which the top of a pyramid is above
+ * its first corner. */
+static void reference_position(const session_shape *shape, int node, double out[3])
 {
-    static const signed char hex[8][3] = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0},
-                                          {0, 0, 2}, {2, 0, 2}, {2, 2, 2}, {0, 2, 2}};
-    static const signed char wedge[6][3] = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}, {2, 0, 2}, {0, 2, 2}};
-    static const signed char pyramid[5][3] = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {1, 1, 2}};
-    const signed char(*of)[3] = shape->type == GRID_WEDGE ? wedge : shape->type == GRID_PYRAMID ? pyramid : hex;
-    const int corners = grid_type_vertices(shape->type);
+    const int corners = shape->corner_count;
     const int a = node < corners ? node : shape->edges[node - corners][0];
     const int b = node < corners ? node : shape->edges[node - corners][1];
-    for (int axis = 0; axis < 3; axis++) out[axis] = 0.5 * (of[a][axis] + of[b][axis]);
+    for (int axis = 0; axis < 3; axis++) out[axis] = 0.5 * (shape->corners[a][axis] + shape->corners[b][axis]);
 }
 
 /* Orients the polygon counterclockwise as seen from outside the polyhedron that the polygons bound. */
-static void orient_outwards(const corner_shape *shape, pattern_polygon *p)
+static void orient_outwards(const session_shape *shape, pattern_polygon *p)
 {
     double a[3], b[3], c[3], middle[3] = {0, 0, 0}, volume = 0;
-    const int corners = grid_type_vertices(shape->type);
+    const int corners = shape->corner_count;
     for (int n = 0; n < corners; n++) {
         reference_position(shape, n, a);
         for (int axis = 0; axis < 3; axis++) middle[axis] += a[axis] / corners;
@@ -207,11 +178,10 @@ static void orient_outwards(const corner_shape *shape, pattern_polygon *p)
 
 static void find_polygons(session_pattern *out, insitu_vertex_order order)
 {
-    const corner_shape *shape = shapes;
-    while (shape->type != out->nodes.type) shape++;
-    const int corners = grid_type_vertices(shape->type);
+    const session_shape *shape = session_shape_of(out->nodes.type);
+    const int corners = shape->corner_count;
     for (int c = 0; c < corners; c++) add_cut(out, shape, c);
-    for (int f = 0; f < 6 && shape->faces[f][0] >= 0; f++) {
+    for (int f = 0; f < shape->face_count; f++) {
         pattern_polygon *face = &out->polygons[out->polygon_count++];
         *face = (pattern_polygon){.corner = -1, .count = shape->faces[f][3] < 0 ? 3 : 4};
         for (int n = 0; n < face->count; n++)
@@ -222,7 +192,7 @@ static void find_polygons(session_pattern *out, insitu_vertex_order order)
         if (p->count > 2 && shape->type != GRID_QUAD) orient_outwards(shape, p);
         for (int n = 0; n < p->count; n++) p->nodes[n] = session_quadratic_index(&out->nodes, order, p->nodes[n]);
     }
-    out->midpoint_count = count_edges(shape);
+    out->midpoint_count = shape->edge_count;
     for (int e = 0; e < out->midpoint_count; e++)
         out->midpoints[e] = session_quadratic_index(&out->nodes, order, corners + e);
 }

@@ -2,25 +2,9 @@
 
 #include "memory.h"
 #include "session_cell_faces.h"
+#include "session_shape.h"
 
 /* ---- one kind -------------------------------------------------------------------------------------------------- */
-
-/* The corners of cells as nodes of the lattice of order 1 (session_node_index()). */
-static const signed char boxes[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
-                                        {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
-static const signed char prisms[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
-static const signed char pyramids[5][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}};
-
-static const signed char *corner_of(int type, int corner)
-{
-    switch (type) {
-    case GRID_TRIANGLE:
-    case GRID_TET: /* its first four corners are those of a prism */
-    case GRID_WEDGE: return prisms[corner];
-    case GRID_PYRAMID: return pyramids[corner];
-    default: return boxes[corner];
-    }
-}
 
 static const session_face_table *faces_of(int type)
 {
@@ -31,11 +15,12 @@ static const session_face_table *faces_of(int type)
 /* Returns whether a node of the lattice lies in the plane of the face. */
 static bool is_on_face(const session_nodes *of, const signed char face[4], const int node[3])
 {
+    const session_shape *shape = session_shape_of(of->type);
     int a[3], b[3], c[3];
     for (int axis = 0; axis < 3; axis++) {
-        const int begin = corner_of(of->type, face[0])[axis];
-        a[axis] = corner_of(of->type, face[1])[axis] - begin;
-        b[axis] = corner_of(of->type, face[2])[axis] - begin;
+        const int begin = shape->corners[(int)face[0]][axis];
+        a[axis] = shape->corners[(int)face[1]][axis] - begin;
+        b[axis] = shape->corners[(int)face[2]][axis] - begin;
         c[axis] = node[axis] - begin * of->order;
     }
     return (a[1] * b[2] - a[2] * b[1]) * c[0] + (a[2] * b[0] - a[0] * b[2]) * c[1] +
@@ -46,10 +31,11 @@ static bool is_on_face(const session_nodes *of, const signed char face[4], const
 static void list_rim(const session_nodes *of, insitu_vertex_order order, const signed char face[4], int *count,
                      int *nodes)
 {
+    const session_shape *shape = session_shape_of(of->type);
     const int corners = face[3] < 0 ? 3 : 4;
     *count = 0;
     for (int n = 0; n < corners; n++) {
-        const signed char *from = corner_of(of->type, face[n]), *to = corner_of(of->type, face[(n + 1) % corners]);
+        const signed char *from = shape->corners[(int)face[n]], *to = shape->corners[(int)face[(n + 1) % corners]];
         int at[3];
         for (int step = 0; step < of->order; step++) {
             for (int axis = 0; axis < 3; axis++) at[axis] = from[axis] * of->order + (to[axis] - from[axis]) * step;

@@ -1,0 +1,49 @@
+#include "session_shape.h"
+
+#include "grid.h"
+
+static const session_shape triangle = {
+    GRID_TRIANGLE, 3, 3, 1, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1}, {1, 2}, {2, 0}}, {{0, 1, 2, -1}}};
+static const session_shape quad = {
+    GRID_QUAD, 4, 4, 1, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1}, {1, 2}, {2, 3}, {3, 0}}, {{0, 1, 2, 3}}};
+static const session_shape tet = {GRID_TET,
+                                  4,
+                                  6,
+                                  4,
+                                  {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                                  {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}},
+                                  {{0, 1, 3, -1}, {1, 2, 3, -1}, {2, 0, 3, -1}, {0, 2, 1, -1}}};
+static const session_shape pyramid = {GRID_PYRAMID,
+                                      5,
+                                      8,
+                                      5,
+                                      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}},
+                                      {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 4}, {1, 4}, {2, 4}, {3, 4}},
+                                      {{0, 3, 2, 1}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}}};
+static const session_shape wedge = {GRID_WEDGE,
+                                    6,
+                                    9,
+                                    5,
+                                    {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}},
+                                    {{0, 1}, {1, 2}, {2, 0}, {3, 4}, {4, 5}, {5, 3}, {0, 3}, {1, 4}, {2, 5}},
+                                    {{0, 2, 1, -1}, {3, 4, 5, -1}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}}};
+static const session_shape hex = {
+    GRID_HEX,
+    8,
+    12,
+    6,
+    {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}},
+    {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}},
+    {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}};
+
+const session_shape *session_shape_of(int type)
+{
+    switch (type) {
+    case GRID_TRIANGLE: return &triangle;
+    case GRID_QUAD: return &quad;
+    case GRID_TET: return &tet;
+    case GRID_PYRAMID: return &pyramid;
+    case GRID_WEDGE: return &wedge;
+    default: return &hex;
+    }
+}
