@@ -11,18 +11,11 @@ bool session_takes_vector(const scene_derived *derived)
     return derived->kind != SCENE_EXPRESSION && derived->kind != SCENE_GRADIENT_OF && derived->input_count == 1;
 }
 
-int session_find_derived(const scene *scene, const char *name)
-{
-    for (int i = 0; i < scene->derived_count && name; i++)
-        if (strcmp(scene->derived[i].name, name) == 0) return i;
-    return -1;
-}
-
 /* ---- needed fields -------------------------------------------------------------------------------------------- */
 
 static uint64_t derived_field_bit(const scene *scene, const scene_field *field)
 {
-    const int derived = session_find_derived(scene, field->name);
+    const int derived = scene_find_derived(scene, field->name);
     return derived < 0 ? 0 : (uint64_t)1 << derived;
 }
 

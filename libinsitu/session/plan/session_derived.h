@@ -26,7 +26,4 @@ void session_mark_sources(const scene *scene, uint64_t needed, const session_mes
 /* Returns whether the field is computed from one vector, by the gradients of its components. */
 bool session_takes_vector(const scene_derived *derived);
 
-/* Returns the index of a field among the scene's derived fields; -1 if it is not one of them. */
-int session_find_derived(const scene *scene, const char *name);
-
 #endif

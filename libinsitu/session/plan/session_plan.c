@@ -88,7 +88,7 @@ static void write_suggestion(const session_catalogue *catalogue, const char *nam
 static insitu_status refuse_missing_input(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
     char names[NAMES_SIZE], meant[300];
-    const int number = session_find_derived(basis->scene, field->name);
+    const int number = scene_find_derived(basis->scene, field->name);
     const scene_derived *derived = number < 0 ? NULL : &basis->scene->derived[number];
     if (!derived) return INSITU_OK;
     for (int k = 0; k < derived->input_count; k++) {

@@ -10,11 +10,11 @@
 #include "session_field_input.h"
 #include "session_mirror.h"
 #include "session_scalars.h"
+#include "session_warped.h"
 
 enum { ALL_AXES = 7 };
 
-/* ---- fields ---------------------------------------------------------------------------------------------------------
- */
+/* ---- fields ------------------------------------------------------------------------------------------------------ */
 
 /* The fill function of an image's field: gives the values of the source's field, which is filled already. */
 static insitu_status take_filled(void *of_image, insitu_field *field)
@@ -108,8 +108,7 @@ void session_share_derived(const session_meshes *meshes, const char *name)
         if (meshes->items[i]->source && meshes->items[i]->is_given) share_derived_field(meshes->items[i], name);
 }
 
-/* ---- images ---------------------------------------------------------------------------------------------------------
- */
+/* ---- images ------------------------------------------------------------------------------------------------------ */
 
 static void update_image(const scene_mirror *mirror, session_meshes *meshes, session_mesh *source, int axes,
                          int threads, base_error *error)
@@ -137,8 +136,7 @@ void session_update_mirrors(const scene *scene, session_meshes *meshes, int thre
     meshes->are_names_changed = are_names_changed;
 }
 
-/* ---- warnings -------------------------------------------------------------------------------------------------------
- */
+/* ---- warnings ---------------------------------------------------------------------------------------------------- */
 
 /* The bounds of the caller's parts for which a mirror stands, over all ranks: minima and negated maxima. */
 enum { ENDS = 6 };
@@ -160,12 +158,7 @@ static void find_ends(const scene_mirror *mirror, const scene *scene, const sess
 static void warn_of_mirror(const scene_mirror *mirror, const double ends[ENDS], const session_catalogue *catalogue,
                            session_report *report)
 {
-    bool is_any = false;
-    for (int m = 0; m < catalogue->mesh_count; m++)
-        is_any = is_any || scene_name_stands_for(mirror->mesh, catalogue->meshes[m].name);
-    session_warn(report, &(session_warning){WARNING_MESH, NULL, mirror->mesh, 1}, !is_any,
-                 "meshes.%s (line %d of the scene): no mesh has this name: nothing is mirrored", mirror->mesh,
-                 mirror->line);
+    session_warn_of_absent_mesh(mirror->mesh, mirror->line, SESSION_MIRROR, catalogue, report);
     for (int axis = 0; axis < 3; axis++) {
         const double plane = mirror->planes[axis], below = plane - ends[axis], above = -ends[3 + axis] - plane;
         /* vertices near the plane may be on its other side by rounding */

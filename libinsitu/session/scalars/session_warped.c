@@ -28,18 +28,11 @@ static bool is_of_shells(const insitu_mesh *mesh)
     return session_may_be_plane(mesh) && (!mesh->coordinates[2].data || !mesh->cell_types.data);
 }
 
-static bool is_derived(const scene *scene, const char *name)
-{
-    bool is_any = false;
-    for (int i = 0; i < scene->derived_count; i++) is_any = is_any || strcmp(scene->derived[i].name, name) == 0;
-    return is_any;
-}
-
 static insitu_status check_field(const warp_step *step, const scene_warp *warp, const session_mesh *mesh, int index,
                                  base_error *error)
 {
     static const char *const centrings[] = {"vertices", "cells", "corners of cells"};
-    if (is_derived(step->scene, warp->field))
+    if (scene_find_derived(step->scene, warp->field) >= 0)
         return REFUSE(step, warp, error,
                       "\"%s\" is derived by the scene, expected a field that the simulation gives mesh \"%s\"",
                       warp->field, mesh->label);
@@ -132,12 +125,15 @@ void session_update_warps(const scene *scene, const char *scene_path, session_me
 
 /* ---- warnings ---------------------------------------------------------------------------------------------------- */
 
-static bool stands_for_any(const scene_warp *warp, const session_catalogue *catalogue)
+void session_warn_of_absent_mesh(const char *name, int line, session_transform transform,
+                                 const session_catalogue *catalogue, session_report *report)
 {
     bool is_any = false;
     for (int m = 0; m < catalogue->mesh_count; m++)
-        is_any = is_any || scene_name_stands_for(warp->mesh, catalogue->meshes[m].name);
-    return is_any;
+        is_any = is_any || scene_name_stands_for(name, catalogue->meshes[m].name);
+    session_warn(report, &(session_warning){WARNING_MESH, NULL, name, (int)transform}, !is_any,
+                 "meshes.%s (line %d of the scene): no mesh has this name: nothing is %s", name, line,
+                 transform == SESSION_WARP ? "warped" : "mirrored");
 }
 
 /* Warns of the first derived field on the mesh that depends on gradients. */
@@ -156,12 +152,8 @@ static void warn_of_gradients(const scene *scene, const session_catalogue_mesh *
 
 void session_check_warps(const scene *scene, const session_catalogue *catalogue, session_report *report)
 {
-    for (int i = 0; i < scene->warp_count; i++) {
-        const scene_warp *warp = &scene->warps[i];
-        session_warn(report, &(session_warning){WARNING_MESH, NULL, warp->mesh, 0}, !stands_for_any(warp, catalogue),
-                     "meshes.%s (line %d of the scene): no mesh has this name: nothing is warped", warp->mesh,
-                     warp->line);
-    }
+    for (int i = 0; i < scene->warp_count; i++)
+        session_warn_of_absent_mesh(scene->warps[i].mesh, scene->warps[i].line, SESSION_WARP, catalogue, report);
     for (int m = 0; m < catalogue->mesh_count && scene->warp_count; m++)
         warn_of_gradients(scene, &catalogue->meshes[m], report);
 }

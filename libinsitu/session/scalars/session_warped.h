@@ -14,4 +14,11 @@ void session_update_warps(const scene *scene, const char *scene_path, session_me
 /* Warns of entries of the scene that stand for no mesh, and of gradients on warped meshes. Local. */
 void session_check_warps(const scene *scene, const session_catalogue *catalogue, session_report *report);
 
+/* What the scene does to a mesh. */
+typedef enum session_transform { SESSION_WARP = 0, SESSION_MIRROR } session_transform;
+
+/* Warns if no rank has a mesh for which this name of the scene stands. Local. */
+void session_warn_of_absent_mesh(const char *name, int line, session_transform transform,
+                                 const session_catalogue *catalogue, session_report *report);
+
 #endif

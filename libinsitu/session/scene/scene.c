@@ -202,13 +202,18 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
     return field->mesh_count == 0;
 }
 
+/* Returns whether the name stands for the mesh, and is longer than the one that was found before, if any. */
+static bool is_nearer(const char *name, const char *found, const char *mesh)
+{
+    return scene_name_stands_for(name, mesh) && (!found || strlen(name) > strlen(found));
+}
+
 const scene_warp *scene_find_warp(const scene *s, const char *mesh)
 {
     const scene_warp *found = NULL;
     for (int i = 0; i < s->warp_count; i++) {
         const scene_warp *warp = &s->warps[i];
-        if (!scene_name_stands_for(warp->mesh, mesh)) continue;
-        if (!found || strlen(warp->mesh) > strlen(found->mesh)) found = warp;
+        if (is_nearer(warp->mesh, found ? found->mesh : NULL, mesh)) found = warp;
     }
     return found;
 }
@@ -218,8 +223,7 @@ const scene_mirror *scene_find_mirror(const scene *s, const char *mesh)
     const scene_mirror *found = NULL;
     for (int i = 0; i < s->mirror_count; i++) {
         const scene_mirror *mirror = &s->mirrors[i];
-        if (!scene_name_stands_for(mirror->mesh, mesh)) continue;
-        if (!found || strlen(mirror->mesh) > strlen(found->mesh)) found = mirror;
+        if (is_nearer(mirror->mesh, found ? found->mesh : NULL, mesh)) found = mirror;
     }
     return found;
 }

@@ -618,6 +618,9 @@ const scene_parameter *scene_find_parameter(const scene *s, const char *name);
  * parameters. */
 void scene_list_parameters(const scene *s, const char *name, char *words, size_t size);
 
+/* Returns the index of a field among the scene's derived fields; -1 if it is not one of them. */
+int scene_find_derived(const scene *s, const char *name);
+
 /* Returns the warp of the mesh of this name, or NULL if the mesh is drawn as it is. If several entries stand for the
  * mesh, this is the one with the longest name. */
 const scene_warp *scene_find_warp(const scene *s, const char *mesh);

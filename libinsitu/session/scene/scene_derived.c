@@ -171,9 +171,9 @@ static insitu_status convert_derived(const scene_document *d, const char *path, 
 
 /* ---- dependencies between derived fields ------------------------------------------------------------------------- */
 
-static int find_derived(const scene *s, const char *name)
+int scene_find_derived(const scene *s, const char *name)
 {
-    for (int i = 0; i < s->derived_count; i++)
+    for (int i = 0; i < s->derived_count && name; i++)
         if (strcmp(s->derived[i].name, name) == 0) return i;
     return -1;
 }
@@ -210,7 +210,7 @@ static insitu_status visit_field(search *w, int at)
         if (w->path[i] == at) return refuse_cycle(w, i);
     w->path[w->length++] = at;
     for (int i = 0; i < field->input_count && !status; i++) {
-        const int source = find_derived(w->s, field->inputs[i].name);
+        const int source = scene_find_derived(w->s, field->inputs[i].name);
         if (source >= 0) status = visit_field(w, source);
     }
     w->length--;
@@ -233,7 +233,7 @@ static insitu_status sort_fields(const scene_document *d, scene *s)
         scene_derived *field = &s->derived[i];
         field->made_by = base_calloc((size_t)field->input_count, sizeof *field->made_by);
         if (!field->made_by) return scene_fail_for_memory(d);
-        for (int k = 0; k < field->input_count; k++) field->made_by[k] = find_derived(s, field->inputs[k].name);
+        for (int k = 0; k < field->input_count; k++) field->made_by[k] = scene_find_derived(s, field->inputs[k].name);
     }
     return status;
 }
