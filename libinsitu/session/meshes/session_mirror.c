@@ -17,8 +17,7 @@ static bool is_mirrored(const session_mesh *image, int axis)
     return image->mirror_axes >> axis & 1;
 }
 
-/* ---- coordinates by vertex ----------------------------------------------------------------------------------------
- */
+/* ---- coordinates by vertex --------------------------------------------------------------------------------------- */
 
 /* Returns the axes along which the image has coordinates of its own: those along which it is mirrored, or all of the
  * source's if these are not packed in an array for each axis. */
@@ -72,8 +71,7 @@ static bool mirror_vertices(session_mesh *image, int threads)
     return true;
 }
 
-/* ---- coordinates along a lattice's axes -----------------------------------------------------------------------------
- */
+/* ---- coordinates along a lattice's axes -------------------------------------------------------------------------- */
 
 static bool mirror_lattice(session_mesh *image)
 {
@@ -91,8 +89,7 @@ static bool mirror_lattice(session_mesh *image)
     return true;
 }
 
-/* ---- the image ------------------------------------------------------------------------------------------------------
- */
+/* ---- the image --------------------------------------------------------------------------------------------------- */
 
 /* Describes the lattice without levels of refinement: the flags of covered cells are the source's. */
 static void describe_lattice(session_mesh *image, insitu_mesh *out)

@@ -56,15 +56,24 @@ static void end(session_montage *m)
     *m = (session_montage){0};
 }
 
+/* Returns a row of the picture that is in the place. */
+static float *row_of(const insitu_place *place, int y)
+{
+    return place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x);
+}
+
+static size_t row_size(int width)
+{
+    return 4 * (size_t)width * sizeof(float);
+}
+
 /* Keeps a picture without its decorations in its panel, and a copy of them. */
 static insitu_status keep_panel(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
                                 const session_decorations *decorations, base_error *error)
 {
     const insitu_place place = find_place(of, m, panel);
-    const size_t row = 4 * (size_t)picture->width;
     for (int y = 0; y < picture->height; y++)
-        memcpy(place.rgba + 4 * ((ptrdiff_t)(place.y + y) * place.width + place.x), picture->rgba + (ptrdiff_t)row * y,
-               row * sizeof *place.rgba);
+        memcpy(row_of(&place, y), picture->rgba + 4 * (ptrdiff_t)picture->width * y, row_size(picture->width));
     m->panels[panel] = session_copy_decorations(decorations);
     return m->panels[panel] ? INSITU_OK : fail_for_memory(of, error);
 }
@@ -88,8 +97,7 @@ insitu_status session_add_panel(session_montages *montages, const scene *scene, 
     return session_place_image(picture, &place, error);
 }
 
-/* ---- shared colour bars -------------------------------------------------------------------------------------------
- */
+/* ---- shared colour bars ------------------------------------------------------------------------------------------ */
 
 /* Returns the decorations of the first panel that has a picture, if all panels have the same bars, or else NULL. */
 static const session_decorations *find_shared(const scene_montage *of, const session_montage *m)
@@ -111,10 +119,8 @@ static insitu_status decorate_panel(const scene_montage *of, session_montage *m,
     const insitu_image picture = {
         .width = of->width, .height = of->height, .rgba = buffer, .decorations = &decorations};
     const insitu_place place = find_place(of, m, panel);
-    const size_t row = 4 * (size_t)of->width;
     for (int y = 0; y < of->height; y++)
-        memcpy(buffer + (ptrdiff_t)row * y, place.rgba + 4 * ((ptrdiff_t)(place.y + y) * place.width + place.x),
-               row * sizeof *buffer);
+        memcpy(buffer + 4 * (ptrdiff_t)of->width * y, row_of(&place, y), row_size(of->width));
     if (!has_bars) decorations.bar_count = 0;
     return session_place_image(&picture, &place, error);
 }
@@ -151,8 +157,7 @@ static insitu_status finish_panels(const scene_montage *of, session_montage *m, 
     return status || !shared ? status : draw_strip(of, m, shared, error);
 }
 
-/* ---- files --------------------------------------------------------------------------------------------------------
- */
+/* ---- files ------------------------------------------------------------------------------------------------------- */
 
 insitu_status session_write_montages(session_montages *montages, const scene *scene, base_error *error)
 {
