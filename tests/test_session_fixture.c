@@ -309,6 +309,50 @@ bool same_pictures(const caught_picture *a, const caught_picture *b)
     return same_bytes(a->samples, b->samples, a->first ? (size_t)a->first[pixels] * sizeof *a->samples : 0);
 }
 
+drawn take_drawn(void)
+{
+    drawn out = {0};
+    for (; out.count < caught_count; out.count++) {
+        assert_true(out.count < MOST_DRAWN);
+        out.pictures[out.count] = caught[out.count];
+    }
+    caught_count = 0;
+    return out;
+}
+
+void free_drawn(drawn *d)
+{
+    for (int i = 0; i < d->count; i++) free_caught(&d->pictures[i]);
+    *d = (drawn){0};
+}
+
+bool same_drawn(const drawn *a, const drawn *b)
+{
+    bool is_same = a->count == b->count;
+    for (int i = 0; i < a->count && is_same; i++) {
+        is_same = same_pictures(&a->pictures[i], &b->pictures[i]);
+        if (!is_same) fprintf(stderr, "picture %d differs\n", i);
+    }
+    return is_same;
+}
+
+drawn step_drawn(insitu_session *session, int cycle)
+{
+    discard_pictures();
+    const insitu_status status = insitu_step(session, cycle, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    everywhere(status == INSITU_OK);
+    return take_drawn();
+}
+
+double last_number(const char *text, int column)
+{
+    const char *line = text, *end;
+    while ((end = strchr(line, '\n')) && end[1]) line = end + 1;
+    for (; column > 0 && line; column--) line = strchr(line, ',') ? strchr(line, ',') + 1 : NULL;
+    return line ? strtod(line, NULL) : NAN;
+}
+
 double colour_difference(const caught_picture *a, const caught_picture *b)
 {
     double worst = a->width == b->width && a->height == b->height ? 0 : (double)INFINITY;

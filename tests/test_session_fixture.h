@@ -139,6 +139,25 @@ caught_picture draw_scene(MPI_Comm comm, const char *scene, const session_input 
 /* Tells whether all that was caught has the same bits but the path. */
 bool same_pictures(const caught_picture *a, const caught_picture *b);
 
+/* All pictures of a step. */
+enum { MOST_DRAWN = 8 };
+typedef struct drawn {
+    int count;
+    caught_picture pictures[MOST_DRAWN];
+} drawn;
+
+/* The pictures caught on rank 0, from now on the caller's; on other ranks none. */
+drawn take_drawn(void);
+void free_drawn(drawn *d);
+/* Returns whether all pictures have the same bits, and reports the first that does not. */
+bool same_drawn(const drawn *a, const drawn *b);
+/* Takes a step, which must succeed on all ranks, and its pictures. */
+drawn step_drawn(insitu_session *session, int cycle);
+
+/* Returns the number in this column, counted from 0, of the last line of a table whose columns are parted by commas;
+ * NAN if there is none. */
+double last_number(const char *text, int column);
+
 /* The largest difference of a colour's or the opacity's; infinite if the pictures have other sizes. */
 double colour_difference(const caught_picture *a, const caught_picture *b);
 

@@ -15,8 +15,7 @@
 
 enum { SIDE = 3, MOST_TEXT = 1 << 13, MOST_IMAGES = 8 };
 
-/* ---- images by hand -------------------------------------------------------------------------------------------------
- */
+/* ---- images by hand ---------------------------------------------------------------------------------------------- */
 
 /* The planes of a mirror, and the text of the scene for it. */
 typedef struct mirror {
@@ -238,8 +237,7 @@ static void blocks_draw_their_images(void **state)
     }
 }
 
-/* ---- levels of refinement -----------------------------------------------------------------------------------------
- */
+/* ---- levels of refinement ---------------------------------------------------------------------------------------- */
 
 enum { COARSE = 4, FINE = 4 };
 
@@ -297,8 +295,7 @@ static void levels_draw_their_images(void **state)
     expect_same(&pictures[0], &pictures[1], "levels of refinement");
 }
 
-/* ---- partitions and derived fields ----------------------------------------------------------------------------------
- */
+/* ---- partitions and derived fields ------------------------------------------------------------------------------- */
 
 static void any_partition_draws_one_picture(void **state)
 {
@@ -370,25 +367,7 @@ static void derived_fields_are_those_of_the_source(void **state)
     input_free(&in);
 }
 
-/* ---- steps ----------------------------------------------------------------------------------------------------------
- */
-
-typedef struct filled_values {
-    const double *values;
-    int64_t count;
-    int calls;
-} filled_values;
-
-static insitu_status fill(void *data, insitu_field *field)
-{
-    filled_values *f = data;
-    int one = 1, ranks = 0;
-    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD); /* ends only where all ranks call it */
-    f->calls += ranks == rank_count;
-    field->count = f->count;
-    field->values = (insitu_array){f->values, INSITU_FLOAT64, 0};
-    return INSITU_OK;
-}
+/* ---- steps ------------------------------------------------------------------------------------------------------- */
 
 /* A step of the mirrored session draws what the blocks draw in another one that has taken the same steps. */
 static void expect_step(insitu_session *session, insitu_session *blocks, const session_input *in, const mirror *by,
@@ -493,7 +472,7 @@ static void faults_are_those_of_the_given_mesh(void **state)
         everywhere(submit(session, &in) == INSITU_OK);
         insitu_status status = insitu_step(session, cycle, 0);
         reported_everywhere(session, status, INSITU_ERROR_MESH, "mesh \"m\": cell",
-                        "vertex 1 has a coordinate that is not");
+                            "vertex 1 has a coordinate that is not");
         in.part.coordinates[4] = good;
         if (cycle) continue;
         everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
@@ -512,8 +491,7 @@ static void faults_are_those_of_the_given_mesh(void **state)
     input_free(&in);
 }
 
-/* ---- with a warp, and filled fields ---------------------------------------------------------------------------------
- */
+/* ---- with a warp, and filled fields ------------------------------------------------------------------------------ */
 
 static void warped_meshes_are_mirrored_after_the_warp(void **state)
 {
@@ -523,12 +501,12 @@ static void warped_meshes_are_mirrored_after_the_warp(void **state)
     const int64_t count = 3 * in.part.vertex_count;
     double *u = test_calloc((size_t)count + 1, sizeof *u);
     for (int64_t i = 0; i < count; i++) u[i] = i % 3 ? 0.3 * sin(3 * in.part.coordinates[i - i % 3]) : 0;
-    filled_values values = {u, in.part.vertex_count, 0};
+    filled_values values = {{u, INSITU_FLOAT64, 0}, in.part.vertex_count, 0};
     insitu_field field;
     insitu_field_defaults(&field);
     field.name = "u";
     field.component_count = 3;
-    field.fill = fill;
+    field.fill = give_values;
     field.fill_data = &values;
     static const char scene[] =
         "threads: 1\nimages:\n" LAYERS("a", "[{surface: {colour_by: {field: u, component: y}}}]")
@@ -553,11 +531,11 @@ static void filled_fields_are_made_once(void **state)
     (void)state;
     session_input in;
     input_create(&in, TEST_MIXED, SIDE, TEST_BLOCK, own_rank, rank_count);
-    filled_values values = {in.part.values, in.part.vertex_count, 0};
+    filled_values values = {{in.part.values, INSITU_FLOAT64, 0}, in.part.vertex_count, 0};
     insitu_field field;
     insitu_field_defaults(&field);
     field.name = "f";
-    field.fill = fill;
+    field.fill = give_values;
     field.fill_data = &values;
     insitu_session *session = open_text(MPI_COMM_WORLD, mirrors[0].text, all_layers);
     insitu_session *blocks = open_text(MPI_COMM_WORLD, "", all_layers);
@@ -573,17 +551,7 @@ static void filled_fields_are_made_once(void **state)
     input_free(&in);
 }
 
-/* ---- numbers and warnings -------------------------------------------------------------------------------------------
- */
-
-/* Returns the number in this column of the last line. */
-static double last_number(const char *text, int column)
-{
-    const char *line = text, *end;
-    while ((end = strchr(line, '\n')) && end[1]) line = end + 1;
-    for (; column > 0 && line; column--) line = strchr(line, ',') ? strchr(line, ',') + 1 : NULL;
-    return line ? strtod(line, NULL) : NAN;
-}
+/* ---- numbers and warnings ---------------------------------------------------------------------------------------- */
 
 static void numbers_are_of_the_given_cells(void **state)
 {

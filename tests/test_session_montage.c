@@ -89,8 +89,7 @@ static void files_that_cannot_be_written_are_reported(void **state)
     discard_pictures();
 }
 
-/* ---- shared colour bars -------------------------------------------------------------------------------------------
- */
+/* ---- shared colour bars ------------------------------------------------------------------------------------------ */
 
 /* Two pictures with colour bars on a side, of ranges up to 1 and to `high`, in one row. */
 static void write_bars(char text[2048], const char *side, const char *high)

@@ -40,27 +40,6 @@ static const char cell_scene[] =
 
 /* ---- drawing ---------------------------------------------------------------------------------------------------- */
 
-enum { MOST_IMAGES = 4 };
-
-typedef struct drawn {
-    int count;
-    caught_picture pictures[MOST_IMAGES];
-} drawn;
-
-static void free_drawn(drawn *d)
-{
-    for (int i = 0; i < d->count; i++) free_caught(&d->pictures[i]);
-    *d = (drawn){0};
-}
-
-static drawn take_drawn(void)
-{
-    drawn out = {.count = caught_count};
-    for (int i = 0; i < out.count; i++) out.pictures[i] = caught[i];
-    caught_count = 0;
-    return out;
-}
-
 static bool step_ok(insitu_session *session, int cycle)
 {
     discard_pictures();
@@ -83,13 +62,6 @@ static drawn draw(MPI_Comm comm, const char *scene, const order_mesh *mesh, cons
     const drawn out = take_drawn();
     insitu_destroy(&session);
     return out;
-}
-
-static bool same_drawn(const drawn *a, const drawn *b)
-{
-    bool is_same = a->count == b->count;
-    for (int i = 0; i < a->count && is_same; i++) is_same = same_pictures(&a->pictures[i], &b->pictures[i]);
-    return is_same;
 }
 
 /* Depth is float, of numbers up to 6, after a few operations of the same precision. */

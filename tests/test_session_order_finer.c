@@ -48,31 +48,7 @@ static bool is_finer(const order_kind *kind)
 
 /* ---- drawing ----------------------------------------------------------------------------------------------------- */
 
-enum { MOST_IMAGES = 4, VOLUME = 3 };
-
-typedef struct drawn {
-    int count;
-    caught_picture pictures[MOST_IMAGES];
-} drawn;
-
-static void free_drawn(drawn *d)
-{
-    for (int i = 0; i < d->count; i++) free_caught(&d->pictures[i]);
-    *d = (drawn){0};
-}
-
-/* Takes a step, which is to be well, and its pictures. */
-static drawn step(insitu_session *session, int cycle)
-{
-    discard_pictures();
-    const insitu_status status = insitu_step(session, cycle, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    everywhere(status == INSITU_OK);
-    drawn out = {.count = caught_count};
-    for (int i = 0; i < out.count; i++) out.pictures[i] = caught[i];
-    caught_count = 0;
-    return out;
-}
+enum { VOLUME = 3 };
 
 static insitu_session *open_with(MPI_Comm comm, const char *scene, const order_mesh *mesh)
 {
@@ -85,16 +61,9 @@ static insitu_session *open_with(MPI_Comm comm, const char *scene, const order_m
 static drawn draw(MPI_Comm comm, const char *scene, const order_mesh *mesh)
 {
     insitu_session *session = open_with(comm, scene, mesh);
-    drawn out = step(session, 0);
+    drawn out = step_drawn(session, 0);
     insitu_destroy(&session);
     return out;
-}
-
-static bool are_same(const drawn *a, const drawn *b)
-{
-    bool are = a->count == b->count;
-    for (int i = 0; i < a->count && are; i++) are = same_pictures(&a->pictures[i], &b->pictures[i]);
-    return are;
 }
 
 /* ---- the sphere -------------------------------------------------------------------------------------------------- */
@@ -307,7 +276,7 @@ static void other_descriptions_draw_the_same(void **state)
         if (other == 2) changed.field.count = entries;
         if (other == 2) changed.field.values = (insitu_array){corners, INSITU_FLOAT64, 0};
         drawn pictures = draw(MPI_COMM_WORLD, FINER("2") ALL, &changed);
-        everywhere(own_rank || are_same(&plain, &pictures));
+        everywhere(own_rank || same_drawn(&plain, &pictures));
         free_drawn(&pictures);
     }
     free_drawn(&plain);
@@ -326,7 +295,8 @@ static void an_index_out_of_range_is_told(void **state)
     index[3] = mesh.vertex_count;
     mesh.field.index = (insitu_array){index, INSITU_INT64, 0};
     insitu_session *session = open_with(MPI_COMM_WORLD, FINER("2") SPHERE, &mesh);
-    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "field \"f\"", "the index of vertex 3");
+    reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "field \"f\"",
+                        "the index of vertex 3");
     insitu_destroy(&session);
     order_mesh_free(&mesh);
     free(index);
@@ -339,7 +309,7 @@ static void cells_are_counted_as_the_caller_gave_them(void **state)
     order_mesh mesh;
     order_mesh_create(&hex_20, 2, 0.05, wavy, own_rank, rank_count, &mesh);
     insitu_session *session = open_with(MPI_COMM_WORLD, FINER("3") SPHERE, &mesh);
-    drawn pictures = step(session, 0);
+    drawn pictures = step_drawn(session, 0);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->cells == mesh.cell_count && report->cells_inverted == 0 && report->cells_flat == 0);
     everywhere(mesh.cell_count == 0 || strstr(report->copied_why, "with 3 pieces between two nodes") != NULL);
@@ -364,7 +334,7 @@ static void mixed_cells_draw_the_same(void **state)
     mesh.mesh.offsets = (insitu_array){offsets, INSITU_INT64, 0};
     mesh.mesh.cell_types = (insitu_array){types, INSITU_UINT8, 0};
     drawn mixed = draw(MPI_COMM_WORLD, FINER("3") ALL, &mesh);
-    everywhere(own_rank || are_same(&plain, &mixed));
+    everywhere(own_rank || same_drawn(&plain, &mixed));
     free_drawn(&plain);
     free_drawn(&mixed);
     order_mesh_free(&mesh);
@@ -380,7 +350,7 @@ static void check_change(int change)
     order_mesh mesh;
     order_mesh_create(&hex_20, 2, 0.05, wavy, own_rank, rank_count, &mesh);
     insitu_session *session = open_with(MPI_COMM_WORLD, FINER("2") ALL, &mesh);
-    drawn first = step(session, 0);
+    drawn first = step_drawn(session, 0);
     const char *scene = change == SCENE ? FINER("3") ALL : change == NO_SCENE ? "images:\n" ALL : FINER("2") ALL;
     for (int64_t v = 0; v < mesh.vertex_count && change == VALUES; v++) mesh.values[v] *= 0.9;
     for (int64_t i = 0; i < 3 * mesh.vertex_count && change == NODES; i++) mesh.coordinates[i] *= 0.8;
@@ -388,9 +358,9 @@ static void check_change(int change)
     if (change == NODES) assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
     if (change == VALUES) assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);
     if (change >= SCENE) write_scene(scene);
-    drawn pictures = step(session, 1), fresh = draw(MPI_COMM_WORLD, scene, &mesh);
-    if (own_rank == 0 && !are_same(&pictures, &fresh)) fprintf(stderr, "change %d is not drawn\n", change);
-    everywhere(own_rank || (are_same(&pictures, &fresh) && !are_same(&pictures, &first)));
+    drawn pictures = step_drawn(session, 1), fresh = draw(MPI_COMM_WORLD, scene, &mesh);
+    if (own_rank == 0 && !same_drawn(&pictures, &fresh)) fprintf(stderr, "change %d is not drawn\n", change);
+    everywhere(own_rank || (same_drawn(&pictures, &fresh) && !same_drawn(&pictures, &first)));
     free_drawn(&first);
     free_drawn(&pictures);
     free_drawn(&fresh);
@@ -411,11 +381,11 @@ static void check_warning(const order_kind *kind, const char *scene, const char 
     order_mesh mesh;
     order_mesh_create(kind, 2, 0, sphere, own_rank, rank_count, &mesh);
     insitu_session *session = open_with(MPI_COMM_WORLD, scene, &mesh);
-    drawn pictures = step(session, 0);
+    drawn pictures = step_drawn(session, 0);
     everywhere(strstr(insitu_last_report(session)->warnings, words) != NULL);
     insitu_destroy(&session);
     drawn expected = draw(MPI_COMM_WORLD, as, &mesh);
-    everywhere(own_rank || are_same(&pictures, &expected));
+    everywhere(own_rank || same_drawn(&pictures, &expected));
     free_drawn(&pictures);
     free_drawn(&expected);
     order_mesh_free(&mesh);

@@ -98,8 +98,7 @@ static void free_warped(warped *w)
     *w = (warped){0};
 }
 
-/* ---- all forms ----------------------------------------------------------------------------------------------------
- */
+/* ---- all forms --------------------------------------------------------------------------------------------------- */
 
 static void forms_draw_their_moved_meshes(void **state)
 {
@@ -224,22 +223,6 @@ static void blocks_draw_their_moved_vertices(void **state)
 
 /* ---- layouts of the displacements ------------------------------------------------------------------------------- */
 
-typedef struct filled_values {
-    const warped *from;
-    int calls;
-} filled_values;
-
-static insitu_status fill(void *data, insitu_field *field)
-{
-    filled_values *f = data;
-    int one = 1, ranks = 0;
-    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD); /* ends only where all ranks call it */
-    f->calls += ranks == rank_count;
-    field->count = f->from->field.count;
-    field->values = f->from->field.values;
-    return INSITU_OK;
-}
-
 typedef enum layout { TUPLES, FLOATS, APART, BY_INDEX, FILLED, LAYOUTS } layout;
 
 /* Whole numbers, so that all types hold them; in arrays of `room`. */
@@ -275,8 +258,8 @@ static void lay_out(layout as, warped *w, void *room, int64_t *index, filled_val
         u->index = (insitu_array){index, INSITU_INT64, 0};
     }
     if (as != FILLED) return;
-    *values = (filled_values){w, 0};
-    u->fill = fill;
+    *values = (filled_values){u->values, u->count, 0};
+    u->fill = give_values;
     u->fill_data = values;
 }
 
@@ -315,8 +298,7 @@ static void displacements_are_read_in_any_layout(void **state)
     input_free(&in);
 }
 
-/* ---- partitions ---------------------------------------------------------------------------------------------------
- */
+/* ---- partitions -------------------------------------------------------------------------------------------------- */
 
 static void any_partition_draws_one_picture(void **state)
 {
@@ -463,15 +445,6 @@ static void copies_and_gradients_are_reported(void **state)
 }
 
 /* ---- statistics ------------------------------------------------------------------------------------------------- */
-
-/* Returns the number in this column of the last line. */
-static double last_number(const char *text, int column)
-{
-    const char *line = text, *end;
-    while ((end = strchr(line, '\n')) && end[1]) line = end + 1;
-    for (; column > 0 && line; column--) line = strchr(line, ',') ? strchr(line, ',') + 1 : NULL;
-    return line ? strtod(line, NULL) : NAN;
-}
 
 /* The cube of volume 8 is stretched by 1 + 0.3 along x. */
 static void statistics_are_of_the_warped_mesh(void **state)

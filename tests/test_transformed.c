@@ -32,37 +32,20 @@ void place_of(const insitu_mesh *mesh, int64_t vertex, double out[3])
     }
 }
 
-drawn step_drawn(insitu_session *session, int cycle)
+insitu_status give_values(void *filled, insitu_field *field)
 {
-    drawn out = {0};
-    discard_pictures();
-    const insitu_status status = insitu_step(session, cycle, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    everywhere(status == INSITU_OK);
-    for (; out.count < caught_count; out.count++) out.pictures[out.count] = caught[out.count];
-    caught_count = 0;
-    return out;
-}
-
-void free_drawn(drawn *d)
-{
-    for (int i = 0; i < d->count; i++) free_caught(&d->pictures[i]);
-    *d = (drawn){0};
-}
-
-static bool are_same(const drawn *a, const drawn *b)
-{
-    bool is_same = a->count == b->count;
-    for (int i = 0; i < a->count && is_same; i++) {
-        is_same = same_pictures(&a->pictures[i], &b->pictures[i]);
-        if (!is_same) fprintf(stderr, "picture %d differs\n", i);
-    }
-    return is_same;
+    filled_values *f = filled;
+    int one = 1, ranks = 0;
+    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD); /* ends only where all ranks call it */
+    f->calls += ranks == rank_count;
+    field->count = f->count;
+    field->values = f->values;
+    return INSITU_OK;
 }
 
 void expect_same(drawn *a, drawn *b, const char *what)
 {
-    const bool is_same = are_same(a, b), has_any = own_rank != 0 || a->count > 0;
+    const bool is_same = same_drawn(a, b), has_any = own_rank != 0 || a->count > 0;
     if (!is_same || !has_any) fprintf(stderr, "%s\n", what);
     everywhere(is_same && has_any);
     free_drawn(a);

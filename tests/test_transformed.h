@@ -8,16 +8,14 @@
 /* The place of a vertex by the description: by vertex, or along the axes of a lattice with packed strides. */
 void place_of(const insitu_mesh *mesh, int64_t vertex, double out[3]);
 
-enum { MOST_PICTURES = 8 };
+/* The data of give_values(), a fill function, which all ranks must call. calls: how often all did. */
+typedef struct filled_values {
+    insitu_array values;
+    int64_t count;
+    int calls;
+} filled_values;
 
-typedef struct drawn {
-    int count;
-    caught_picture pictures[MOST_PICTURES];
-} drawn;
-
-/* Takes a step, which is to be well, and its pictures. */
-drawn step_drawn(insitu_session *session, int cycle);
-void free_drawn(drawn *d);
+insitu_status give_values(void *filled, insitu_field *field);
 
 /* Compares, frees both, and tells where pictures of nothing were compared. */
 void expect_same(drawn *a, drawn *b, const char *what);
