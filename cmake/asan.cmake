@@ -15,8 +15,7 @@ add_compile_options(
 # Open MPI unloads its plugins before the process ends. LeakSanitizer then finds memory of theirs whose stack leads into
 # nowhere and cannot be told from ours; so no program unloads anything.
 file(WRITE ${CMAKE_BINARY_DIR}/keep_loaded.c "int dlclose(void *library);\nint dlclose(void *library) { return !library; }\n")
-add_library(keep_loaded OBJECT ${CMAKE_BINARY_DIR}/keep_loaded.c
-  $<$<BOOL:${INSITU_TEST_SLEEPING}>:${CMAKE_CURRENT_LIST_DIR}/../tests/sleeping_yield.c>)
+add_library(keep_loaded OBJECT ${CMAKE_BINARY_DIR}/keep_loaded.c ${CMAKE_CURRENT_LIST_DIR}/../tests/sleeping_yield.c)
 link_libraries($<BUILD_INTERFACE:$<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:$<TARGET_OBJECTS:keep_loaded>>>)
 
 # The longest tests take ten times as long here.

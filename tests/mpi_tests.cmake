@@ -5,10 +5,9 @@ set(INSITU_TEST_ENVIRONMENT
   OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none
   OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_base_warn_component_unused=0)
 
-# With INSITU_TEST_SLEEPING, ranks that wait sleep (sleeping_yield.c). Tests then take a third of the time or less beside
-# other work, and a third more on idle cores. LD_PRELOAD cannot name a path that has a blank or a colon. AddressSanitizer
-# must be the first library, so its programs contain the function (cmake/asan.cmake).
-if(INSITU_TEST_SLEEPING AND NOT CMAKE_PROJECT_INCLUDE AND NOT PROJECT_BINARY_DIR MATCHES "[ :]")
+# Ranks sleep while others keep the cores busy (sleeping_yield.c). LD_PRELOAD cannot name a path that has a blank or a colon.
+# AddressSanitizer must be the first library, so its programs contain the function (cmake/asan.cmake).
+if(NOT CMAKE_PROJECT_INCLUDE AND NOT PROJECT_BINARY_DIR MATCHES "[ :]")
   add_library(sleeping_yield MODULE ${CMAKE_CURRENT_SOURCE_DIR}/sleeping_yield.c)
   set_target_properties(sleeping_yield PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
   list(APPEND INSITU_TEST_ENVIRONMENT LD_PRELOAD=$<TARGET_FILE:sleeping_yield>)

@@ -1,8 +1,10 @@
-/* sched_yield() for the ranks of tests, which are more than the cores: after a few calls that yield, each sleeps.
+/* sched_yield() for the ranks of tests, which are more than the cores: a rank sleeps while others keep the cores busy.
  *
  * A rank that waits for a message calls sched_yield() in a loop. Linux's EEVDF scheduler (since 6.6) lets such a rank
  * run again only after the slices of all busy processes, milliseconds after its message arrived: beside two busy
- * processes a test of many steps on 3 ranks took 115 to 155 s, and takes 16 to 22 s if its ranks sleep. */
+ * processes a test of many steps on 3 ranks took 115 to 155 s, and takes 16 to 22 s if its ranks sleep. On idle cores
+ * a call that yields returns at once, and sleeping would cost a third of the time. So each thread measures its calls
+ * that yield: after one that was slow, it sleeps in the calls that follow, and then measures again. */
 #define _GNU_SOURCE 1
 #include <sched.h>
 #include <sys/prctl.h>
@@ -10,18 +12,28 @@
 #include <time.h>
 #include <unistd.h>
 
+enum { SLEEP_NS = 20000, SLACK_NS = 1000, SLOW_NS = 100000, SLEEPS = 256 };
+
+static long long nanoseconds(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return time.tv_sec * 1000000000LL + time.tv_nsec;
+}
+
 __attribute__((visibility("default"))) int sched_yield(void)
 {
-    enum { FIRST_CALLS = 4, SLEEP_NS = 20000, SLACK_NS = 1000 };
-    static _Thread_local int calls;
-    if (calls < FIRST_CALLS) {
-        calls++;
-        return (int)syscall(SYS_sched_yield);
+    static _Thread_local int sleeps;
+    if (sleeps) {
+        sleeps--;
+        const struct timespec time = {0, SLEEP_NS};
+        return nanosleep(&time, NULL);
     }
-    if (calls == FIRST_CALLS) {
-        calls++;
+    const long long start = nanoseconds();
+    const int status = (int)syscall(SYS_sched_yield);
+    if (nanoseconds() - start > SLOW_NS) {
         prctl(PR_SET_TIMERSLACK, (unsigned long)SLACK_NS);
+        sleeps = SLEEPS;
     }
-    const struct timespec time = {0, SLEEP_NS};
-    return nanosleep(&time, NULL);
+    return status;
 }
