@@ -18,7 +18,7 @@ insitu_session_program(test_session_faces)
 insitu_add_mpi_test(session_faces test_session_faces 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_recentre)
-insitu_add_mpi_test(session_recentre test_session_recentre 1 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_recentre test_session_recentre 1 2 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_lattice)
 insitu_add_mpi_test(session_lattice test_session_lattice 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})

@@ -15,6 +15,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_hash.h"
+#include "session_keys.h"
 
 /* ---- a rank's table as text ---------------------------------------------------------------------------------- */
 
@@ -566,7 +567,8 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
 /* ---- homes ----------------------------------------------------------------------------------------------------- */
 
 /* Computes hashes of the stamps at which the cells and the coordinates of this rank's parts of a mesh last changed; 0
- * if this rank has no part. */
+ * if this rank has no part. The hashes of all ranks are added up. They are mixed, because a stamp that changes in one
+ * bit otherwise raises the hash of one rank by what it lowers that of another, so that the sum remains the same. */
 static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2])
 {
     bool has_any = false;
@@ -581,7 +583,7 @@ static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2]
         session_hash_bytes(&hashes[0], &part->cells_stamp, sizeof part->cells_stamp);
         session_hash_bytes(&hashes[1], &part->coordinates_stamp, sizeof part->coordinates_stamp);
     }
-    if (!has_any) hashes[0] = hashes[1] = 0;
+    for (int k = 0; k < 2; k++) hashes[k] = has_any ? session_mix_bits(hashes[k]) : 0;
 }
 
 /* Sums up, over the ranks, hashes of the stamps at which each mesh last changed. */
