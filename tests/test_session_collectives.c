@@ -83,6 +83,10 @@ static const counted_scene scenes[] = {
      "      - volume: {field: f, map: viridis, range: [-1, 1], opacity: [[0, 0], [1, 0.5]], unit_distance: 1}\n", 6},
     /* Where the plane lies in the cells. */
     {"slice", "      - slice: {field: f, range: [-1, 1], planes: [{normal: [1, 2, 3]}]}\n", 7},
+    /* The extremes; whether cells with a volume count, and six digits. */
+    {"slice by its extremes", "      - slice: {field: f, planes: [{normal: [1, 2, 3]}]}\n", 8},
+    {"slice by percentiles", "      - slice: {field: f, range: {percentile: [2, 98]}, planes: [{normal: [1, 2, 3]}]}\n",
+     14},
     /* Which faces are stale; whether there is room for their values. */
     {"outer surface", "      - surface: {colour_by: {field: f, range: [-1, 1]}}\n", 8},
     /* Which values are stale; values to their homes, and means back. */

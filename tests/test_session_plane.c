@@ -1,6 +1,6 @@
 /* Plane runs: triangles, quads and polygons in the plane of x and y, handed over without z. Their pictures are the
  * colour map of the field, pixel by pixel in closed form, with no camera and no material in the scene, and the same to
- * the bit on any ranks. Statistics weigh cells by their area. */
+ * the bit on any ranks. Statistics, conditions and percentiles weigh cells by their area. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -422,7 +422,23 @@ static void statistics_weigh_shells_by_area(void **state)
     }
 }
 
-/* The mean by area is 2; by cells it is not, as one quad is made three times as wide. */
+/* Width of a column of quads when the last one is made seven times as wide as the others. */
+static double column_width(int i)
+{
+    return i == NX - 1 ? 1.75 : 0.25;
+}
+
+/* Makes the plate's last column wider; its bounds stay the same. */
+static void widen_column(plate *p)
+{
+    for (int n = 0; n < MAX_VERTICES; n++) {
+        const int i = n % (NX + 1);
+        p->xy[2 * n] = i == NX ? right : column_width(0) * i;
+        p->f[n] = linear(p->xy[2 * n], p->xy[2 * n + 1]);
+    }
+}
+
+/* The mean by area is 2; by cells it is not, as one column is wider. */
 static void conditions_weigh_shells_by_area(void **state)
 {
     (void)state;
@@ -434,11 +450,7 @@ static void conditions_weigh_shells_by_area(void **state)
                  {IMAGE("    when: {field: f, of: maximum, above: 5.9}\n", MAP_OF("f")), 1}};
     plate part;
     make_plate(QUADS, own_rank, rank_count, &part);
-    for (int n = 0; n < MAX_VERTICES; n++) { /* the same plate by columns of other widths */
-        const int i = n % (NX + 1);
-        part.xy[2 * n] = i == NX ? right : 0.25 * i;
-        part.f[n] = linear(part.xy[2 * n], part.xy[2 * n + 1]);
-    }
+    widen_column(&part);
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(cases[k].when), &part, false);
         everywhere(insitu_last_report(session)->images == cases[k].images);
@@ -446,11 +458,46 @@ static void conditions_weigh_shells_by_area(void **state)
     }
 }
 
-/* Beside a cell with a volume shells do not count: the numbers are those of the tet alone. */
-static void shells_beside_solids_do_not_count(void **state)
+/* The least value of squares that a percentage of the area does not exceed. */
+static int percentile_by_area(double percent)
+{
+    enum { LEAST = -1, GREATEST = 5 };
+    for (int value = LEAST; value < GREATEST; value++) {
+        double area = 0;
+        for (int n = 0; n < NX * NY; n++)
+            if (value_of_square(n % NX, n / NX) <= value) area += column_width(n % NX) * top / NY;
+        if (area >= percent / 100 * right * top) return value;
+    }
+    return GREATEST;
+}
+
+/* No percentage is that of whole squares, so that rounding does not matter. */
+static void percentiles_weigh_shells_by_area(void **state)
 {
     (void)state;
-    static char text[MOST];
+    static const int percents[][2] = {{10, 90}, {37, 60}};
+    for (plate_kind kind = 0; kind < PLATE_KINDS; kind++)
+        for (int i = 0; i < 2; i++) {
+            char by_area[600], fixed[600];
+            const int *p = percents[i];
+            snprintf(by_area, sizeof by_area,
+                     IMAGE("", "{surface: {colour_by: {field: c, range: {percentile: [%d, %d]}}}}"), p[0], p[1]);
+            snprintf(fixed, sizeof fixed, IMAGE("", "{surface: {colour_by: {field: c, range: [%d, %d]}}}"),
+                     percentile_by_area(p[0]), percentile_by_area(p[1]));
+            plate part;
+            make_plate(kind, own_rank, rank_count, &part);
+            widen_column(&part);
+            caught_picture found = draw(MPI_COMM_WORLD, write_scene(by_area), &part, false);
+            caught_picture truth = draw(MPI_COMM_WORLD, write_scene(fixed), &part, false);
+            everywhere(own_rank != 0 || are_same(&found, &truth));
+            free_caught(&found);
+            free_caught(&truth);
+        }
+}
+
+/* A tet with the values 0 to 3, and a triangle beside it with larger ones, on the last rank. */
+static void set_tet_and_triangle(insitu_session *session)
+{
     static const double places[3][5] = {{0, 1, 0, 0, 3}, {0, 0, 1, 0, 3}, {0, 0, 0, 1, 0}};
     static const double values[5] = {0, 1, 2, 3, 100};
     static const int connectivity[7] = {0, 1, 2, 3, 1, 2, 4}, offsets[3] = {0, 4, 7};
@@ -465,11 +512,23 @@ static void shells_beside_solids_do_not_count(void **state)
     mesh.connectivity_count = has_cells ? 7 : 0;
     mesh.connectivity = (insitu_array){connectivity, INSITU_INT32, 0};
     mesh.offsets = (insitu_array){offsets, INSITU_INT32, 0};
-    if (own_rank == 0) unlink("mixed.csv");
-    insitu_session *session =
-        open_session(MPI_COMM_WORLD, write_scene(NEVER "statistics: [{field: f, path: mixed.csv}]\n"));
     assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_OK);
     set_field(session, "f", INSITU_VERTEX, mesh.vertex_count, 1, values);
+}
+
+/* Beside a cell with a volume shells do not count: the numbers are those of the tet alone. */
+static void shells_beside_solids_do_not_count(void **state)
+{
+    (void)state;
+    static const char scene[] = "images:\n  - name: a\n    size: [120, 50]\n    layers:\n"
+                                "      - surface: {colour_by: {field: f, range: {percentile: [0, 100]}}}\n"
+                                "    decorations: {colour_bar: true}\n    outputs: [{path: a.png}]\n"
+                                "statistics: [{field: f, path: mixed.csv}]\n";
+    static char text[MOST];
+    if (own_rank == 0) unlink("mixed.csv");
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    discard_pictures();
+    set_tet_and_triangle(session);
     const insitu_status status = insitu_step(session, 0, 0);
     everywhere(status == INSITU_OK);
     insitu_destroy(&session);
@@ -477,6 +536,11 @@ static void shells_beside_solids_do_not_count(void **state)
     everywhere(own_rank != 0 ||
                (strstr(text, ",volume,") && number_at(text, 2) == 1 && is_near(number_at(text, 3), 1.0 / 6) &&
                 number_at(text, 5) == 3 && is_near(number_at(text, 6), 1.5)));
+    caught_picture picture = pop_caught_picture();
+    const bool is_of_tet = own_rank != 0 || strcmp(picture.bars, "f: 1.5\n") == 0;
+    if (!is_of_tet) fprintf(stderr, "%s", picture.bars);
+    everywhere(is_of_tet);
+    free_caught(&picture);
 }
 
 /* ---- the whole ------------------------------------------------------------------------------------------------ */
@@ -498,6 +562,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(solids_need_z),
                                        cmocka_unit_test(statistics_weigh_shells_by_area),
                                        cmocka_unit_test(conditions_weigh_shells_by_area),
+                                       cmocka_unit_test(percentiles_weigh_shells_by_area),
                                        cmocka_unit_test(shells_beside_solids_do_not_count)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -1,8 +1,12 @@
 /* Percentiles are computed digit by digit. Values are doubles, mapped to integers in the same order. A pass considers
- * the values whose leading bits are those found so far, and counts them by the next 11 bits; the sum of all ranks'
- * counts determines the digit of the wanted value. Six passes find all 64 bits, and so the exact value instead of an
- * estimate, for any partition. From the third pass on few values are left: a pass stores them, and the next ones do not
- * read cells. */
+ * the values whose leading bits are those found so far, and adds up their weights by the next 11 bits; the sum of all
+ * ranks' weights determines the digit of the wanted value. Six passes find all 64 bits, and so the exact value instead
+ * of an estimate, for any partition. From the third pass on few values are left: a pass stores them, and the next ones
+ * do not read cells.
+ *
+ * Each cell with a volume has the weight 1. If only shells count, their weights are their areas. Weights are integers,
+ * so that their sums are the same in any order: an area is a fraction of the largest one, times 2^28 and rounded, so
+ * that 2^35 cells can be added and the error of each cell is at most 2^-29 of the largest one. */
 #include "session_ranges.h"
 
 #include <math.h>
@@ -13,6 +17,7 @@
 #include "session_distances.h"
 #include "session_region.h"
 #include "session_scalars.h"
+#include "session_volume.h"
 
 /* ---- minimum and maximum --------------------------------------------------------------------------------------- */
 
@@ -75,20 +80,27 @@ static uint64_t known_bits_mask(int pass)
 /* This rank's values that the last pass has considered, unsorted; they are stored if there are at most MOST_KEPT. */
 enum { MOST_KEPT = 4096, FIRST_KEPT = 2 };
 
+typedef struct weighted_value {
+    uint64_t order; /* the value, mapped to an integer in the same order (order_from_value()) */
+    int64_t weight;
+} weighted_value;
+
 typedef struct kept_values {
-    int count;                  /* number of values; MOST_KEPT + 1: there are more */
-    uint64_t orders[MOST_KEPT]; /* the values, mapped to integers in the same order (order_from_value()) */
+    int count; /* number of values; MOST_KEPT + 1: there are more */
+    weighted_value values[MOST_KEPT];
 } kept_values;
 
 typedef struct digit_count {
     uint64_t known_bits[2]; /* known leading bits of the low and the high percentile; the other bits are 0 */
     int pass;               /* number of the current pass, from 0; each pass determines one more digit */
     bool is_positive;       /* set if only positive values count */
+    bool is_of_shells;      /* set if only shells count; otherwise only cells with a volume do */
+    double largest_area;    /* area of the largest shell that counts */
     bool is_kept;           /* set if the stored values are read instead of cells */
     kept_values kept;
 } digit_count;
 
-static void keep_value(uint64_t order, kept_values *kept)
+static void keep_value(const weighted_value *value, kept_values *kept)
 {
     int at;
 #pragma omp atomic read
@@ -96,21 +108,36 @@ static void keep_value(uint64_t order, kept_values *kept)
     if (at > MOST_KEPT) return;
 #pragma omp atomic capture
     at = kept->count++;
-    if (at < MOST_KEPT) kept->orders[at] = order;
+    if (at < MOST_KEPT) kept->values[at] = *value;
 }
 
-/* Counts a value by its next digit, for each percentile whose known leading bits it has. Returns whether it was counted
- * for any. */
-static bool count_value(const digit_count *of, uint64_t order, int64_t counts[2 * DIGITS])
+/* Adds the weight of a value by its next digit, for each percentile whose known leading bits it has. Returns whether it
+ * was added for any. */
+static bool count_value(const digit_count *of, const weighted_value *value, int64_t counts[2 * DIGITS])
 {
     const uint64_t known = known_bits_mask(of->pass);
     bool is_counted = false;
     for (int end = 0; end < 2; end++) {
-        if ((order & known) != of->known_bits[end]) continue;
-        counts[end * DIGITS + (int)((order & ~known) >> pass_shift(of->pass))]++;
+        if ((value->order & known) != of->known_bits[end]) continue;
+        counts[end * DIGITS + (int)((value->order & ~known) >> pass_shift(of->pass))] += value->weight;
         is_counted = true;
     }
     return is_counted;
+}
+
+/* Stores the middle of a cell's values. Returns false if the cell is not seen or its values do not count. */
+static bool find_middle(const digit_count *of, const grid *g, const grid_field *field, int64_t cell, double *middle)
+{
+    if (!grid_is_seen(g, cell)) return false;
+    const fetch_range range = fetch_any_cell_range(g, field, cell);
+    *middle = 0.5 * range.low + 0.5 * range.high;
+    return range.is_finite && (!of->is_positive || *middle > 0);
+}
+
+static int64_t find_weight(const digit_count *of, const grid *g, int64_t cell)
+{
+    if (!of->is_of_shells) return 1;
+    return of->largest_area > 0 ? llrint(session_shell_area(g, cell) / of->largest_area * 0x1p28) : 0;
 }
 
 static void count_cells(const session_mesh *mesh, const session_scalar *scalar, int threads, digit_count *of,
@@ -123,12 +150,10 @@ static void count_cells(const session_mesh *mesh, const session_scalar *scalar, 
         region_enter();
 #pragma omp for schedule(static) reduction(+ : counts[:2 * DIGITS]) nowait
         for (int64_t cell = 0; cell < g->cell_count; cell++) {
-            if (!grid_is_seen(g, cell)) continue;
-            const fetch_range range = fetch_any_cell_range(g, &field, cell);
-            const double middle = 0.5 * range.low + 0.5 * range.high;
-            if (!range.is_finite || (of->is_positive && !(middle > 0))) continue;
-            const uint64_t order = order_from_value(middle);
-            if (count_value(of, order, counts) && of->pass >= FIRST_KEPT) keep_value(order, &of->kept);
+            double middle;
+            if (grid_is_shell(g, cell) != of->is_of_shells || !find_middle(of, g, &field, cell, &middle)) continue;
+            const weighted_value value = {order_from_value(middle), find_weight(of, g, cell)};
+            if (count_value(of, &value, counts) && of->pass >= FIRST_KEPT) keep_value(&value, &of->kept);
         }
         region_leave();
     }
@@ -137,7 +162,7 @@ static void count_cells(const session_mesh *mesh, const session_scalar *scalar, 
 static void count_own_digits(const session_meshes *meshes, const session_team *team, const scene_field *field,
                              digit_count *of, int64_t counts[2 * DIGITS])
 {
-    for (int i = 0; i < of->kept.count && of->is_kept; i++) count_value(of, of->kept.orders[i], counts);
+    for (int i = 0; i < of->kept.count && of->is_kept; i++) count_value(of, &of->kept.values[i], counts);
     if (of->is_kept) return;
     of->kept.count = 0;
     for (int i = 0; i < meshes->count; i++) {
@@ -157,13 +182,63 @@ static insitu_status count_digits(const session_meshes *meshes, const session_te
                              "MPI_Allreduce");
 }
 
-/* Returns the digit of the value with this rank in the order; *rank becomes its rank among the values with this
- * digit. */
+/* Entries of the reduction by minimum that finds which cells count: -1 if a cell with a volume does, otherwise 0; and
+ * the negated area of the largest shell, which is not looked for if a cell with a volume was found before. */
+enum { SOLID, AREA, KINDS };
+
+static void find_own_kind(const session_mesh *mesh, const session_scalar *scalar, int threads, const digit_count *of,
+                          double least[KINDS])
+{
+    const grid *g = &mesh->cells;
+    const grid_field field = session_scalar_field(mesh, scalar);
+#pragma omp parallel num_threads(session_region_threads(threads, g->cell_count))
+    {
+        region_enter();
+#pragma omp for schedule(static) reduction(min : least[:KINDS]) nowait
+        for (int64_t cell = 0; cell < g->cell_count; cell++) {
+            double middle;
+            if (least[SOLID] < 0 || !find_middle(of, g, &field, cell, &middle)) continue;
+            if (grid_is_shell(g, cell))
+                least[AREA] = fmin(least[AREA], -session_shell_area(g, cell));
+            else
+                least[SOLID] = -1;
+        }
+        region_leave();
+    }
+}
+
+/* Finds whether cells with a volume count or only shells. */
+static insitu_status find_kind(const session_meshes *meshes, const session_team *team, const scene_field *field,
+                               digit_count *of, base_error *error)
+{
+    double least[KINDS] = {0, 0};
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
+        const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
+        if (scalar) find_own_kind(mesh, scalar, team->threads, of, least);
+    }
+    const insitu_status status = session_check_mpi(
+        error, MPI_Allreduce(MPI_IN_PLACE, least, KINDS, MPI_DOUBLE, MPI_MIN, team->comm), "MPI_Allreduce");
+    of->is_of_shells = least[SOLID] == 0;
+    of->largest_area = -least[AREA];
+    return status;
+}
+
+/* Returns the digit of the value with this rank in the order, in units of weight; *rank becomes its rank among the
+ * values with this digit. */
 static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
 {
     int digit = 0;
     while (digit + 1 < DIGITS && *rank >= counts[digit]) *rank -= counts[digit++];
     return digit;
+}
+
+/* Returns the rank of the value that is not exceeded by percent of the total weight. The total may be larger than the
+ * integers that a double can represent. */
+static int64_t find_rank(double percent, int64_t total)
+{
+    const int64_t rank = (int64_t)fmax(ceil(percent / 100 * (double)total), 1) - 1;
+    return rank < total ? rank : total - 1;
 }
 
 static insitu_status find_percentiles(const session_meshes *meshes, const session_team *team, const scene_field *field,
@@ -172,19 +247,19 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
     const double percent[2] = {map->range.low, map->range.high};
     int64_t counts[2 * DIGITS], total = 0, ranks[2] = {0, 0};
     digit_count of = {.is_positive = map->scale == SCENE_LOG};
-    for (of.pass = 0; of.pass < PASSES; of.pass++) {
-        const insitu_status status = count_digits(meshes, team, field, &of, counts, error);
-        if (status) return status;
+    insitu_status status = find_kind(meshes, team, field, &of, error);
+    for (of.pass = 0; of.pass < PASSES && !status; of.pass++) {
+        status = count_digits(meshes, team, field, &of, counts, error);
         for (int i = 0; i < DIGITS && of.pass == 0; i++) total += counts[i];
         for (int end = 0; end < 2; end++) {
-            if (of.pass == 0) ranks[end] = (int64_t)fmax(ceil(percent[end] / 100 * (double)total), 1) - 1;
+            if (of.pass == 0) ranks[end] = find_rank(percent[end], total);
             const int digit = find_digit(counts + (ptrdiff_t)end * DIGITS, &ranks[end]);
             of.known_bits[end] |= (uint64_t)digit << pass_shift(of.pass);
         }
     }
     *low = total ? value_from_order(of.known_bits[0]) : INFINITY;
     *high = total ? value_from_order(of.known_bits[1]) : -INFINITY;
-    return INSITU_OK;
+    return status;
 }
 
 /* ---- all sources of ranges ------------------------------------------------------------------------------------- */

@@ -71,8 +71,10 @@ static const scene_form percentile_forms[] = {
 #define RANGE_KEYS(X)                                                                                                  \
     X(CYAML_FIELD_IGNORE("percentile", REQUIRED),                                                                      \
       .help = "Two percentages, low < high. The range begins at the value that is not exceeded by the first "          \
-              "percentage of the cells' values, and ends at the value for the second percentage. Each cell counts "    \
-              "once, with the middle between its least and greatest value. The range is the same on any partition.",   \
+              "percentage of the cells' values, and ends at the value for the second percentage. The value of a cell " \
+              "is the middle between its least and greatest value. Each cell counts once. If the field is only on "    \
+              "triangles, quads and polygons, they are weighted by their area. If it is also on cells with a volume, " \
+              "only those cells count. The range is the same on any partition.",                                       \
       TAKES(percentile_forms))
 DEFINE_MAPPING(range, "range", RANGE_KEYS);
 

@@ -139,16 +139,18 @@ static bool read_vertices(const grid *g, int64_t cell, volume_buffer *room)
     return true;
 }
 
-static double shell_area(const grid *g, int64_t cell, volume_buffer *room)
+double session_shell_area(const grid *g, int64_t cell)
 {
-    double first[3], last[3], next[3], sum[3] = {0, 0, 0};
-    if (!read_vertices(g, cell, room)) return NAN;
-    grid_vertex(g, room->vertices[0], first);
-    for (int i = 1; i < room->vertex_count; i++) {
-        double place[3];
-        grid_vertex(g, room->vertices[i], place);
+    double first[3], last[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
+    grid_walk walk = grid_walk_cell(g, cell);
+    int64_t vertex;
+    if (!grid_walk_next(&walk, &vertex)) return 0;
+    grid_vertex(g, vertex, first);
+    while (grid_walk_next(&walk, &vertex)) {
+        double place[3], next[3];
+        grid_vertex(g, vertex, place);
         subtract(place, first, next);
-        for (int a = 0; a < 3 && i > 1; a++) {
+        for (int a = 0; a < 3; a++) {
             const int b = (a + 1) % 3, c = (a + 2) % 3;
             sum[a] += last[b] * next[c] - last[c] * next[b];
         }
@@ -162,7 +164,7 @@ double session_cell_volume(const grid *g, int64_t cell, volume_buffer *room)
     double points[GRID_MAX_CELL_VERTICES][3];
     const int type = grid_cell_type(g, cell);
     room->vertex_count = 0;
-    if (grid_is_shell_type(type)) return shell_area(g, cell, room);
+    if (grid_is_shell_type(type)) return read_vertices(g, cell, room) ? session_shell_area(g, cell) : NAN;
     if (type == GRID_POLYHEDRON) return polyhedron_volume(g, cell, room);
     room->vertices = room->corners;
     room->vertex_count = grid_cell_vertices(g, cell, room->corners);

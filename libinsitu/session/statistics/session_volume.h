@@ -18,10 +18,13 @@ typedef struct volume_buffer {
 
 void session_volume_free(volume_buffer *room);
 
-/* Returns the unsigned volume of a valid cell of any shape. Quads are bilinear patches; other faces of polyhedra, and
- * their concave quads, are divided into triangles. For a shell, returns the area projected along the mean normal, which
- * for a flat shell is its whole area, whether it is convex or not. Returns NaN if memory runs out, which is possible
- * only for a polyhedron or polygon that is larger than all before. */
+/* Returns the unsigned volume of a valid cell of any shape, and the area of a shell. Quads are bilinear patches; other
+ * faces of polyhedra, and their concave quads, are divided into triangles. Returns NaN if memory runs out, which is
+ * possible only for a polyhedron or polygon that is larger than all before. */
 double session_cell_volume(const grid *g, int64_t cell, volume_buffer *room);
+
+/* Returns the area of a shell, projected along the mean normal. For a flat shell this is its whole area, whether it is
+ * convex or not. */
+double session_shell_area(const grid *g, int64_t cell);
 
 #endif
