@@ -72,19 +72,27 @@ static insitu_status keep_panel(const scene_montage *of, session_montage *m, int
                                 const session_decorations *decorations, base_error *error)
 {
     const insitu_place place = find_place(of, m, panel);
+    m->panels[panel] = session_copy_decorations(decorations);
+    if (!m->panels[panel]) return fail_for_memory(of, error);
     for (int y = 0; y < picture->height; y++)
         memcpy(row_of(&place, y), picture->rgba + 4 * (ptrdiff_t)picture->width * y, row_size(picture->width));
-    m->panels[panel] = session_copy_decorations(decorations);
-    return m->panels[panel] ? INSITU_OK : fail_for_memory(of, error);
+    return INSITU_OK;
+}
+
+static insitu_status add_picture(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
+                                 const session_decorations *decorations, base_error *error)
+{
+    if (of->shares_bars) return keep_panel(of, m, panel, picture, decorations, error);
+    const insitu_place place = find_place(of, m, panel);
+    return session_place_image(picture, &place, error);
 }
 
 insitu_status session_add_panel(session_montages *montages, const scene *scene, const scene_image *image,
                                 const scene_output *output, const insitu_image *picture,
                                 const session_decorations *decorations, char *path, base_error *error)
 {
-    const scene_montage *of = &scene->montages[output->montage];
     const int panel = output->first_panel + image->variant.view;
-    const insitu_status status = begin_montage(montages, scene, output->montage, error);
+    insitu_status status = begin_montage(montages, scene, output->montage, error);
     if (status) {
         base_free(path);
         return status;
@@ -92,9 +100,9 @@ insitu_status session_add_panel(session_montages *montages, const scene *scene, 
     session_montage *m = &montages->items[output->montage];
     base_free(m->path);
     m->path = path;
-    if (of->shares_bars) return keep_panel(of, m, panel, picture, decorations, error);
-    const insitu_place place = find_place(of, m, panel);
-    return session_place_image(picture, &place, error);
+    status = add_picture(&scene->montages[output->montage], m, panel, picture, decorations, error);
+    m->has_picture = m->has_picture || !status;
+    return status;
 }
 
 /* ---- shared colour bars ------------------------------------------------------------------------------------------ */
@@ -164,7 +172,7 @@ insitu_status session_write_montages(session_montages *montages, const scene *sc
     for (int i = 0; i < montages->count; i++) {
         session_montage *m = &montages->items[i];
         const scene_montage *of = &scene->montages[i];
-        if (!m->rgba) continue;
+        if (!m->has_picture) continue;
         const insitu_image whole = {.width = width_of(of), .height = of->height * of->rows, .rgba = m->rgba};
         base_error reason = {0};
         const insitu_image_format format = of->format == SCENE_PNG16 ? INSITU_PNG16 : INSITU_PNG8;

@@ -15,8 +15,9 @@
 #include "session_decorations.h"
 
 typedef struct session_montage {
-    float *rgba; /* the whole picture, with the size set in the scene; NULL: no panel of this step has been drawn yet */
-    char *path;  /* path of the file for this step */
+    float *rgba;      /* the whole picture, with the size set in the scene; NULL: it has not been allocated yet */
+    char *path;       /* path of the file for this step */
+    bool has_picture; /* set if a picture of this step is in it; otherwise no file is written */
     /* If colour bars are shared: the decorations of each panel, a copy, with which the panel is drawn when those of all
      * panels are known; until then rgba has the panel without them. NULL: the panel has no picture in this step */
     session_decorations **panels;
