@@ -9,6 +9,7 @@
 #include "failing_heap.h"
 #include "memory.h"
 #include "test_session_fixture.h"
+#include "text_file.h"
 
 /* Distance between the allocations that are tried, as the command line gives it; 0: the default. */
 static int given_stride;
@@ -342,6 +343,18 @@ typedef struct edit_state {
     picture_set before, after;
 } edit_state;
 
+/* report.json is written after all ranks have agreed on the status of a step. So the next step, which draws all the
+ * same, returns the error of an earlier one that could not write it, and the one after that is well. */
+static void next_step_draws(insitu_session *session, const picture_set *expected)
+{
+    discard_pictures();
+    const insitu_status status = insitu_step(session, 1, 0);
+    const char *words = status ? "cycle 1: cinema: memory.cdb/report.json: cannot be written" : "";
+    reported_everywhere(session, status, status ? INSITU_ERROR_MEMORY : INSITU_OK, words);
+    at_allocation(own_rank != 0 || (are_of(expected) && caught_count == expected->count));
+    if (status) step_draws(session, expected);
+}
+
 /* A step in which the edit is not taken says so, and the next one takes it. */
 static bool edit_fails_cleanly(const scenery *s, const failure *f, void *state)
 {
@@ -357,7 +370,7 @@ static bool edit_fails_cleanly(const scenery *s, const failure *f, void *state)
     const bool is_taken = are_of(&t->after);
     at_allocation(own_rank != 0 || is_taken || are_of(&t->before));
     at_allocation(own_rank != 0 || is_taken || status != INSITU_OK || *insitu_last_report(session)->warnings);
-    step_draws(session, &t->after);
+    next_step_draws(session, &t->after);
     insitu_destroy(&session);
     return is_over;
 }
@@ -379,6 +392,49 @@ static void failing_edit_is_reported_and_taken_later(void **context)
     scenery_free(&s);
 }
 
+/* ---- files of text ---------------------------------------------------------------------------------------------- */
+
+enum { TEXT_LINES = 1000, TEXT_BYTES = 9 * TEXT_LINES };
+
+static void write_many_lines(text_output *out, const void *what)
+{
+    (void)what;
+    for (int i = 0; i < TEXT_LINES; i++) {
+        text_print(out, "%07.1f", i + 0.5);
+        text_add(out, ",\n", 2);
+    }
+}
+
+/* Tells whether the file, and nothing but it, has all lines. */
+static bool has_many_lines(const char *path)
+{
+    static char expected[TEXT_BYTES + 1], text[TEXT_BYTES + 2];
+    for (int i = 0; i < TEXT_LINES; i++) snprintf(expected + (ptrdiff_t)9 * i, 10, "%07.1f,\n", i + 0.5);
+    read_file(path, sizeof text, text);
+    return strcmp(text, expected) == 0;
+}
+
+/* A file is either the whole text, or what it was before, and then the failure is one of memory. */
+static void failing_texts_are_whole_or_not_written(void **context)
+{
+    (void)context;
+    static const char path[] = "text.csv", before[] = "before\n";
+    char text[sizeof before + 1];
+    bool is_well = true;
+    if (!heap_can_fail()) skip();
+    for (int64_t n = 1, asked = n; asked >= n && own_rank == 0; n++) {
+        file_failure failure;
+        put_file(path, before);
+        heap_start_failing(n, false);
+        const bool is_written = text_file_replace(path, write_many_lines, NULL, &failure);
+        asked = heap_stop_failing();
+        read_file(path, sizeof text, text);
+        is_well =
+            is_well && (is_written ? has_many_lines(path) : failure.is_out_of_memory && strcmp(text, before) == 0);
+    }
+    everywhere(is_well);
+}
+
 int main(int argc, char **argv)
 {
     given_stride = argc > 2 ? atoi(argv[2]) : 0;
@@ -387,6 +443,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(failing_first_step_is_the_same_picture_or_an_error),
         cmocka_unit_test(failing_creation_opens_the_session_or_none),
         cmocka_unit_test(failing_edit_is_reported_and_taken_later),
+        cmocka_unit_test(failing_texts_are_whole_or_not_written),
     };
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -1,7 +1,11 @@
 #include "text_file.h"
 
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "memory.h"
 
 bool c_locale_enter(c_locale *numbers)
 {
@@ -16,35 +20,59 @@ void c_locale_leave(c_locale *numbers)
     freelocale(numbers->number_locale);
 }
 
-/* Calls write() with a stream into memory, with numbers in the C locale. The caller must free *text with free(). */
-static bool print(text_writer *write, const void *what, char **text, size_t *size)
+/* ---- texts in memory ------------------------------------------------------------------------------------------- */
+
+/* Ensures that there is space for `more` more bytes and a NUL. */
+static bool reserve(text_output *out, size_t more)
 {
-    c_locale numbers;
-    *text = NULL;
-    if (!c_locale_enter(&numbers)) return false;
-    FILE *stream = open_memstream(text, size);
-    if (stream) write(stream, what);
-    const bool is_written = stream && !ferror(stream);
-    const bool is_closed = stream && fclose(stream) == 0;
-    c_locale_leave(&numbers);
-    if (is_written && is_closed) return true;
-    free(*text);
-    *text = NULL;
-    return false;
+    if (out->is_incomplete) return false;
+    if (out->size + more < out->capacity) return true;
+    const size_t capacity = 2 * (out->size + more) + 256;
+    char *bytes = base_realloc(out->bytes, capacity);
+    out->is_incomplete = !bytes;
+    if (!bytes) return false;
+    out->bytes = bytes;
+    out->capacity = capacity;
+    return true;
 }
+
+void text_add(text_output *out, const char *bytes, size_t count)
+{
+    if (!reserve(out, count)) return;
+    memcpy(out->bytes + out->size, bytes, count);
+    out->size += count;
+    out->bytes[out->size] = '\0';
+}
+
+void text_print(text_output *out, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    const int length = vsnprintf(NULL, 0, format, arguments);
+    va_end(arguments);
+    out->is_incomplete = out->is_incomplete || length < 0;
+    if (!reserve(out, length < 0 ? 0 : (size_t)length)) return;
+    va_start(arguments, format);
+    vsnprintf(out->bytes + out->size, (size_t)length + 1, format, arguments);
+    va_end(arguments);
+    out->size += (size_t)length;
+}
+
+/* ---- files ------------------------------------------------------------------------------------------------------ */
 
 typedef bool file_writer(const char *path, const char *bytes, size_t size, file_failure *failure);
 
 static bool print_to(const char *path, text_writer *write, const void *what, file_writer *put, file_failure *failure)
 {
-    char *text;
-    size_t size;
-    if (!print(write, what, &text, &size)) {
-        *failure = (file_failure){.is_out_of_memory = true, .reason = "cannot allocate memory"};
-        return false;
+    c_locale numbers;
+    text_output out = {.is_incomplete = !c_locale_enter(&numbers)};
+    if (!out.is_incomplete) {
+        write(&out, what);
+        c_locale_leave(&numbers);
     }
-    const bool is_put = put(path, text, size, failure);
-    free(text);
+    *failure = (file_failure){.is_out_of_memory = true, .reason = "cannot allocate memory"};
+    const bool is_put = !out.is_incomplete && put(path, out.bytes ? out.bytes : "", out.size, failure);
+    base_free(out.bytes);
     return is_put;
 }
 

@@ -5,7 +5,6 @@
 #include <locale.h>
 #include <stdbool.h>
 #include <stddef.h>
-#include <stdio.h>
 
 #include "file.h"
 
@@ -17,7 +16,18 @@ typedef struct c_locale {
 bool c_locale_enter(c_locale *numbers);
 void c_locale_leave(c_locale *numbers);
 
-typedef void text_writer(FILE *file, const void *what);
+/* A text that is being written in memory; it begins as {0}. A stream of the C library (open_memstream) would not do,
+ * because it drops what it has no memory for without an error. */
+typedef struct text_output {
+    char *bytes; /* the text and a NUL, allocated by base_alloc(); NULL: nothing has been added */
+    size_t size, capacity;
+    bool is_incomplete; /* set if memory ran out; nothing more is added then */
+} text_output;
+
+void text_add(text_output *out, const char *bytes, size_t count);
+void text_print(text_output *out, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+typedef void text_writer(text_output *out, const void *what);
 
 /* Replaces a file as file_replace() does; its text is the output of write(), with numbers in the C locale. */
 bool text_file_replace(const char *path, text_writer *write, const void *what, file_failure *failure);

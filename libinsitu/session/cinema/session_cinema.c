@@ -223,29 +223,29 @@ static bool must_escape(unsigned char byte)
     return byte == '"' || byte == '\\' || byte < 0x20;
 }
 
-static void write_script_line(FILE *file, const char *line, size_t size)
+static void write_script_line(text_output *out, const char *line, size_t size)
 {
     for (size_t at = 0, end; at < size; at = end) {
         for (end = at; end < size && !must_escape((unsigned char)line[end]);) end++;
         if (end > at)
-            fwrite(line + at, 1, end - at, file);
+            text_add(out, line + at, end - at);
         else
-            fprintf(file, "\\x%02x", (unsigned)(unsigned char)line[end++]);
+            text_print(out, "\\x%02x", (unsigned)(unsigned char)line[end++]);
     }
 }
 
 /* Writes the lines as a list of strings, which is the argument of a function of the page. */
-static void write_script(FILE *file, const void *what)
+static void write_script(text_output *out, const void *what)
 {
     const session_table *t = what;
-    fputs("cinemaTable([\n", file);
+    text_print(out, "cinemaTable([\n");
     for (size_t at = 0, size; at < t->size; at += size + 1) {
         size = (size_t)((const char *)memchr(t->text + at, '\n', t->size - at) - (t->text + at));
-        fputc('"', file);
-        write_script_line(file, t->text + at, size);
-        fputs("\",\n", file);
+        text_add(out, "\"", 1);
+        write_script_line(out, t->text + at, size);
+        text_add(out, "\",\n", 3);
     }
-    fputs("]);\n", file);
+    text_print(out, "]);\n");
 }
 
 typedef bool table_writer(const session_table *t, const char *path, file_failure *failure);

@@ -34,13 +34,12 @@ static bool reserve_text(session_text *text, size_t bytes)
     return true;
 }
 
-bool session_text_append(session_text *text, const char *bytes, size_t count)
+/* Appends bytes and a NUL, for which there must be space. */
+static void append_text(session_text *text, const char *bytes, size_t count)
 {
-    if (!reserve_text(text, count + 1)) return false;
     memcpy(text->data + text->size, bytes, count);
     text->size += count;
     text->data[text->size] = '\0';
-    return true;
 }
 
 void session_text_add(session_text *text, const char *format, ...)
@@ -54,8 +53,8 @@ void session_text_add(session_text *text, const char *format, ...)
     base_escape(line, sizeof line);
     const size_t size = strlen(line);
     if (!reserve_text(text, size + 2)) return;
-    if (text->size) session_text_append(text, "\n", 1);
-    session_text_append(text, line, size);
+    if (text->size) append_text(text, "\n", 1);
+    append_text(text, line, size);
 }
 
 static const char *text_of(const session_text *text)

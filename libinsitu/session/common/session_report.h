@@ -33,9 +33,6 @@ typedef struct session_report {
 /* Adds a line of formatted text. */
 void session_text_add(session_text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/* Appends bytes unchanged, followed by a NUL. Returns false if memory runs out; the text is then unchanged. */
-bool session_text_append(session_text *text, const char *bytes, size_t count);
-
 /* Initializes all texts as empty. No memory is allocated. Local. */
 void session_report_create(session_report *report);
 

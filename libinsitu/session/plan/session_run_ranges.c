@@ -131,15 +131,15 @@ static insitu_status read_ranges(session_image_ranges *ranges, base_error *error
     return status;
 }
 
-static void write_lines(FILE *file, const void *what)
+static void write_lines(text_output *out, const void *what)
 {
     const session_image_ranges *ranges = what;
-    fprintf(file, "# The widest ranges of the run so far. Delete this file to begin anew.\n");
+    text_print(out, "# The widest ranges of the run so far. Delete this file to begin anew.\n");
     for (int i = 0; i < ranges->count; i++) {
         const session_run_range *r = &ranges->items[i];
         if (r->low <= r->high)
-            fprintf(file, "%s %d %d %.17g %.17g %s\n", r->kind, r->number, r->field->component, r->low, r->high,
-                    r->field->name);
+            text_print(out, "%s %d %d %.17g %.17g %s\n", r->kind, r->number, r->field->component, r->low, r->high,
+                       r->field->name);
     }
 }
 

@@ -1,6 +1,7 @@
 #include "session_statistics_file.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "memory.h"
@@ -43,23 +44,23 @@ static int count_needed_digits(double low, double high)
     return share > 0 && share < 1 ? (int)fmin(OF_THE_WIDTH + floor(-log10(share)), MOST) : OF_THE_WIDTH;
 }
 
-static void write_line(FILE *file, const new_lines *n)
+static void write_line(text_output *out, const new_lines *n)
 {
     const session_statistics *v = n->values;
     const int digits = count_needed_digits(v->minimum, v->maximum), of_bins = count_needed_digits(v->low, v->high);
-    fprintf(file, "%lld,%.9g,%lld,%.9g,%.*g,%.*g,%.*g,%.9g", (long long)n->cycle, n->time, (long long)v->cell_count,
-            v->volume, digits, v->minimum, digits, v->maximum, digits, v->mean, v->deviation);
-    if (v->bin_count) fprintf(file, ",%.*g,%.*g", of_bins, v->low, of_bins, v->high);
-    for (int bin = 0; bin < v->bin_count; bin++) fprintf(file, ",%.9g", v->bin_fractions[bin]);
-    fputc('\n', file);
+    text_print(out, "%lld,%.9g,%lld,%.9g,%.*g,%.*g,%.*g,%.9g", (long long)n->cycle, n->time, (long long)v->cell_count,
+               v->volume, digits, v->minimum, digits, v->maximum, digits, v->mean, v->deviation);
+    if (v->bin_count) text_print(out, ",%.*g,%.*g", of_bins, v->low, of_bins, v->high);
+    for (int bin = 0; bin < v->bin_count; bin++) text_print(out, ",%.9g", v->bin_fractions[bin]);
+    text_add(out, "\n", 1);
 }
 
-static void write_lines(FILE *file, const void *what)
+static void write_lines(text_output *out, const void *what)
 {
     const new_lines *n = what;
-    fprintf(file, "%s\n", n->header);
-    if (n->kept_bytes) fwrite(n->kept_text, 1, n->kept_bytes, file);
-    write_line(file, n);
+    text_print(out, "%s\n", n->header);
+    if (n->kept_bytes) text_add(out, n->kept_text, n->kept_bytes);
+    write_line(out, n);
 }
 
 /* Stores an error for the file and returns its status. what is "read" or "written". */
@@ -97,9 +98,9 @@ static insitu_status begin_file(const char *path, new_lines *lines, base_error *
     return status;
 }
 
-static void write_last(FILE *file, const void *what)
+static void write_last(text_output *out, const void *what)
 {
-    write_line(file, what);
+    write_line(out, what);
 }
 
 insitu_status session_write_statistics(const char *path, bool is_first, int64_t cycle, double time,
