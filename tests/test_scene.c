@@ -970,7 +970,7 @@ static const struct bad_file {
     {10, "      - isosurface: {field: f, values: [1], material: {shininess: 0}}", 10, {"material.shininess: \"0\""}},
     {10, "      - isosurface: {field: f, values: [1], mesh: }", 10, {"isosurface.mesh: nothing", "a text of 1 to 255"}},
     {10, "      - isosurface: {field: f, values: [1], mesh: []}", 10, {"mesh: a list", "a list of 1 to 64 of them"}},
-    {11, "      - volume: {field: f, mesh: [a, [b]]}", 11, {"volume.mesh: a list", "a list of 1 to 64 of them"}},
+    {11, "      - volume: {field: f, mesh: [a, [b]]}", 11, {"volume.mesh[1]: a list", "a text of 1 to 255"}},
     {11, "      - volume: {field: f, mesh: {a: b}}", 11, {"volume.mesh: a mapping", "a list of 1 to 64 of them"}},
     {10, "      - isosurface: {field: f, values: [1], interpolate: cell}", 10, {"interpolate: cell is not", "vertex"}},
     {11, "      - volume: {field: f, interpolate: face}", 11, {"interpolate: \"face\"", "one of cell, vertex"}},

@@ -524,16 +524,21 @@ static void write_item_path(const scene_document *d, const char *path, const yam
         snprintf(out, path_size, "%s[%d]", path, index);
 }
 
+static insitu_status fail_for_count(const scene_document *d, const char *path, int count,
+                                    const cyaml_schema_value_t *value, const scene_key *key)
+{
+    char expected[SCENE_WORDS_SIZE];
+    scene_value_words(value, key, expected);
+    return scene_fail_at_key(d, path, "", "a list of %d is not allowed, expected %s", count, expected);
+}
+
 static insitu_status check_list(scene_document *d, const char *path, const yaml_node_t *node,
                                 const cyaml_schema_value_t *value, const scene_key *key, void *to)
 {
     if (node->type != YAML_SEQUENCE_NODE) return fail_for_value(d, path, node, value, key);
     const int count = count_items(node);
-    if ((uint32_t)count < value->sequence.min || (uint32_t)count > value->sequence.max) {
-        char expected[SCENE_WORDS_SIZE];
-        scene_value_words(value, key, expected);
-        return scene_fail_at_key(d, path, "", "a list of %d is not allowed, expected %s", count, expected);
-    }
+    if ((uint32_t)count < value->sequence.min || (uint32_t)count > value->sequence.max)
+        return fail_for_count(d, path, count, value, key);
     if (!allocate_values(d, value, count, &to)) return scene_fail_for_memory(d);
     insitu_status status = INSITU_OK;
     for (int i = 0; i < count && status == INSITU_OK; i++) {
@@ -550,13 +555,18 @@ static insitu_status check_list(scene_document *d, const char *path, const yaml_
 static insitu_status check_names(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
-    const bool is_list = node->type == YAML_SEQUENCE_NODE;
-    const int count = is_list ? count_items(node) : 1;
-    bool is_right = count >= 1 && count <= SCENE_MAX_NAMES;
-    for (int i = 0; i < count && is_right; i++)
-        is_right =
-            is_scalar_right(is_list ? find_node_by_index(d, node->data.sequence.items.start[i]) : node, value, key);
-    return is_right ? INSITU_OK : fail_for_value(d, path, node, value, key);
+    static const cyaml_schema_value_t one = {CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char, 1, SCENE_NAME_BYTES)};
+    if (node->type != YAML_SEQUENCE_NODE)
+        return is_scalar_right(node, value, key) ? INSITU_OK : fail_for_value(d, path, node, value, key);
+    const int count = count_items(node);
+    if (count < 1 || count > SCENE_MAX_NAMES) return fail_for_count(d, path, count, value, key);
+    for (int i = 0; i < count; i++) {
+        const yaml_node_t *item = find_node_by_index(d, node->data.sequence.items.start[i]);
+        char item_path[path_size];
+        snprintf(item_path, sizeof item_path, "%s[%d]", path, i);
+        if (!is_scalar_right(item, value, key)) return fail_for_value(d, item_path, item, &one, key);
+    }
+    return INSITU_OK;
 }
 
 static bool accepts_node(const cyaml_schema_value_t *value, const yaml_node_t *node)
