@@ -224,6 +224,35 @@ static void grids_number_their_cells(void **state)
     scene_free(&s);
 }
 
+/* Frames are a four-hundredth of 480 pixels wide, and the margins beside them a fiftieth of them, rounded up. */
+static void insets_lie_over_the_corners_of_grids(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good("images:\n- name: a\n  size: [320, 240]\n  layers: [{volume: {field: p}}]\n"
+               "  outputs: [{path: \"all_{cycle:04}.png\", grid: [3, 2]}]\n"
+               "- name: b\n  size: [100, 80]\n  sweep: {fields: [p, r]}\n  layers: [{volume: {field: p}}]\n"
+               "  outputs: [{path: \"b_{field}.png\", grid: [1, 1]}]\n"
+               "- name: c\n  size: [90, 70]\n  sweep: {fields: [p, r]}\n  layers: [{volume: {field: p}}]\n"
+               "  outputs: [{path: \"b_{field}.png\", inset: bottom_left}]\n"
+               "- name: d\n  size: [90, 70]\n  layers: [{volume: {field: p}}]\n"
+               "  outputs: [{path: \"all_{cycle}.png\", inset: top_right}, {path: all_1.png}]\n",
+               &s);
+    assert_int_equal(s.image_count, 6);
+    assert_int_equal(s.montage_count, 3);
+    assert_true(s.montages[0].frame_width == 2 && s.montages[0].inset_margin == 12);
+    assert_true(s.montages[0].panel_count == 1 && s.montages[0].insets == 1 << SCENE_TOP_RIGHT);
+    for (int i = 1; i < 3; i++) {
+        const scene_output *output = &s.images[i + 2].outputs[0];
+        assert_true(s.montages[i].panel_count == 1 && s.montages[i].insets == 1 << SCENE_BOTTOM_LEFT);
+        assert_true(output->montage == i && output->is_inset && output->corner == SCENE_BOTTOM_LEFT);
+        assert_int_equal(output->first_panel, 1);
+    }
+    assert_true(s.images[5].outputs[0].montage == 0 && s.images[5].outputs[0].first_panel == 6);
+    assert_true(s.images[5].outputs[1].montage == -1 && !s.images[5].outputs[1].is_inset);
+    scene_free(&s);
+}
+
 /* Words of 0.03 of the height: 0.03 * 24 * 9 = 6.48 pixels; of 0.1: 21.6. */
 static void strips_of_bars_are_as_wide_as_words_need(void **state)
 {
@@ -338,6 +367,7 @@ int main(void)
         cmocka_unit_test(sweeps_make_each_combination_once),
         cmocka_unit_test(sweeps_go_through_planes),
         cmocka_unit_test(grids_number_their_cells),
+        cmocka_unit_test(insets_lie_over_the_corners_of_grids),
         cmocka_unit_test(strips_of_bars_are_as_wide_as_words_need),
         cmocka_unit_test(databases_have_the_columns_of_their_images),
         cmocka_unit_test(paths_go_through_their_places_and_stay_at_the_ends),

@@ -1,4 +1,5 @@
-/* Pictures side by side: each cell has the bits of the picture that a file of its own gets, on any ranks. */
+/* Pictures side by side and over corners: each has the bits of the picture that a file of its own gets, on any ranks.
+ */
 #include <stdio.h>
 #include <string.h>
 
@@ -150,10 +151,80 @@ static void alike_colour_bars_are_drawn_once(void **state)
     discard_pictures();
 }
 
+/* ---- insets ------------------------------------------------------------------------------------------------------ */
+
+static const char inset_scene[] = "images:\n"
+                                  "  - name: a\n    size: [32, 24]\n"
+                                  "    layers: [{isosurface: {field: f, values: [0.1]}}]\n"
+                                  "    outputs: [{path: whole.png, grid: [2, 1]}, {path: a.png}]\n"
+                                  "  - name: b\n    size: [32, 24]\n    layers: [{slice: {field: f}}]\n"
+                                  "    outputs: [{path: whole.png, grid: [2, 1]}, {path: b.png}]\n"
+                                  "  - name: c\n    size: [10, 8]\n    camera: {automatic: {zoom: 3}}\n"
+                                  "    layers: [{slice: {field: f}}]\n"
+                                  "    outputs: [{path: c.png}, {path: whole.png, inset: top_right}]\n"
+                                  "  - name: d\n    size: [6, 20]\n    every: 2\n    layers: [{surface: {}}]\n"
+                                  "    outputs: [{path: d.png}, {path: whole.png, inset: bottom_left}]\n";
+
+/* Insets are two pixels from the edges, of which the nearer one to them is their frame. */
+enum { MARGIN = 2, FRAME = 1 };
+
+typedef struct inset_place {
+    const caught_picture *picture; /* NULL: there is none */
+    int x, y;
+} inset_place;
+
+/* Returns the pixel that an inset, or its frame, has at a place; NULL if the place is outside. */
+static const float *inset_pixel(const inset_place *inset, int x, int y)
+{
+    static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1};
+    const caught_picture *p = inset->picture;
+    const int column = x - inset->x, row = y - inset->y;
+    if (!p || column < -FRAME || row < -FRAME || column >= p->width + FRAME || row >= p->height + FRAME) return NULL;
+    const bool is_in = column >= 0 && row >= 0 && column < p->width && row < p->height;
+    return is_in ? p->rgba + 4 * ((ptrdiff_t)row * p->width + column) : grey;
+}
+
+/* On rank 0, after a step: with_d tells whether the fourth image was due. */
+static bool has_insets(bool with_d)
+{
+    const caught_picture *whole = find("whole.png"), *cells[2] = {find("a.png"), find("b.png")};
+    const inset_place insets[2] = {{find("c.png"), 2 * WIDTH - 10 - MARGIN, MARGIN},
+                                   {find("d.png"), MARGIN, HEIGHT - 20 - MARGIN}};
+    if (!whole || !cells[0] || !cells[1] || !insets[0].picture || (insets[1].picture != NULL) != with_d) return false;
+    bool is_well = whole->width == 2 * WIDTH && whole->height == HEIGHT;
+    for (int y = 0; y < HEIGHT && is_well; y++)
+        for (int x = 0; x < 2 * WIDTH; x++) {
+            const float *expected = inset_pixel(&insets[0], x, y);
+            if (!expected) expected = inset_pixel(&insets[1], x, y);
+            if (!expected) expected = cells[x / WIDTH]->rgba + 4 * ((ptrdiff_t)y * WIDTH + x % WIDTH);
+            is_well = is_well && memcmp(whole->rgba + 4 * ((ptrdiff_t)y * 2 * WIDTH + x), expected, 16) == 0;
+        }
+    return is_well;
+}
+
+static void insets_cover_corners(void **state)
+{
+    (void)state;
+    session_input in;
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(inset_scene));
+    for (int cycle = 0; cycle < 2; cycle++) {
+        discard_pictures();
+        assert_int_equal(submit(session, &in), INSITU_OK);
+        assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
+        everywhere(!strstr(insitu_last_report(session)->warnings, "overwr") || cycle > 0);
+        everywhere(own_rank != 0 || has_insets(cycle % 2 == 0));
+    }
+    insitu_destroy(&session);
+    input_free(&in);
+    discard_pictures();
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(cells_have_the_pictures_of_a_step),
                                        cmocka_unit_test(files_that_cannot_be_written_are_reported),
+                                       cmocka_unit_test(insets_cover_corners),
                                        cmocka_unit_test(alike_colour_bars_are_drawn_once)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

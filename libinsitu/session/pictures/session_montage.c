@@ -16,9 +16,14 @@ static int width_of(const scene_montage *montage)
     return montage->width * montage->columns + montage->bar_width;
 }
 
+static int height_of(const scene_montage *montage)
+{
+    return montage->height * montage->rows;
+}
+
 static int64_t count_pixels(const scene_montage *montage)
 {
-    return (int64_t)width_of(montage) * montage->height * montage->rows;
+    return (int64_t)width_of(montage) * height_of(montage);
 }
 
 /* Returns the place of a panel. */
@@ -27,6 +32,17 @@ static insitu_place find_place(const scene_montage *of, const session_montage *m
     const int left = of->are_bars_left ? of->bar_width : 0;
     return (insitu_place){m->rgba, width_of(of), left + panel % of->columns * of->width,
                           panel / of->columns * of->height};
+}
+
+/* Returns the place of an inset of the picture's size. */
+static insitu_place find_inset_place(const scene_montage *of, const session_montage *m, scene_anchor corner,
+                                     const insitu_image *picture)
+{
+    const bool is_right = corner == SCENE_TOP_RIGHT || corner == SCENE_BOTTOM_RIGHT;
+    const bool is_low = corner == SCENE_BOTTOM_LEFT || corner == SCENE_BOTTOM_RIGHT;
+    const int x = of->inset_margin, y = of->inset_margin;
+    return (insitu_place){m->rgba, width_of(of), is_right ? width_of(of) - x - picture->width : x,
+                          is_low ? height_of(of) - y - picture->height : y};
 }
 
 /* Allocates the whole picture, which is transparent at first. */
@@ -79,9 +95,32 @@ static insitu_status keep_panel(const scene_montage *of, session_montage *m, int
     return INSITU_OK;
 }
 
-static insitu_status add_picture(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
-                                 const session_decorations *decorations, base_error *error)
+/* Draws the frame around an inset, in a grey that differs from dark and light backgrounds. */
+static void draw_frame(const scene_montage *of, const insitu_place *place, const insitu_image *picture)
 {
+    static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1}; /* half of sRGB's range */
+    const int frame = of->frame_width;
+    for (int y = -frame; y < picture->height + frame; y++)
+        for (int x = -frame; x < picture->width + frame; x++) {
+            const bool is_inside = x >= 0 && x < picture->width && y >= 0 && y < picture->height;
+            if (!is_inside) memcpy(row_of(place, y) + 4 * x, grey, sizeof grey);
+        }
+}
+
+/* Lays a picture over a corner of the panels. */
+static insitu_status add_inset(const scene_montage *of, session_montage *m, scene_anchor corner,
+                               const insitu_image *picture, base_error *error)
+{
+    const insitu_place place = find_inset_place(of, m, corner, picture);
+    const insitu_status status = session_place_image(picture, &place, error);
+    if (!status) draw_frame(of, &place, picture);
+    return status;
+}
+
+static insitu_status add_picture(const scene_montage *of, session_montage *m, const scene_output *output, int panel,
+                                 const insitu_image *picture, const session_decorations *decorations, base_error *error)
+{
+    if (output->is_inset) return add_inset(of, m, output->corner, picture, error);
     if (of->shares_bars) return keep_panel(of, m, panel, picture, decorations, error);
     const insitu_place place = find_place(of, m, panel);
     return session_place_image(picture, &place, error);
@@ -100,7 +139,7 @@ insitu_status session_add_panel(session_montages *montages, const scene *scene, 
     session_montage *m = &montages->items[output->montage];
     base_free(m->path);
     m->path = path;
-    status = add_picture(&scene->montages[output->montage], m, panel, picture, decorations, error);
+    status = add_picture(&scene->montages[output->montage], m, output, panel, picture, decorations, error);
     m->has_picture = m->has_picture || !status;
     return status;
 }
@@ -137,7 +176,7 @@ static insitu_status decorate_panel(const scene_montage *of, session_montage *m,
 static insitu_status draw_strip(const scene_montage *of, session_montage *m, const session_decorations *shared,
                                 base_error *error)
 {
-    const int height = of->height * of->rows;
+    const int height = height_of(of);
     insitu_decorations decorations = shared->background;
     memcpy(decorations.colour, shared->decorations.colour, sizeof decorations.colour);
     decorations.size = shared->decorations.size / of->rows;
@@ -173,7 +212,7 @@ insitu_status session_write_montages(session_montages *montages, const scene *sc
         session_montage *m = &montages->items[i];
         const scene_montage *of = &scene->montages[i];
         if (!m->has_picture) continue;
-        const insitu_image whole = {.width = width_of(of), .height = of->height * of->rows, .rgba = m->rgba};
+        const insitu_image whole = {.width = width_of(of), .height = height_of(of), .rgba = m->rgba};
         base_error reason = {0};
         const insitu_image_format format = of->format == SCENE_PNG16 ? INSITU_PNG16 : INSITU_PNG8;
         if (of->shares_bars) finish_panels(of, m, &reason);

@@ -1,8 +1,8 @@
-/* Montages, which are several pictures side by side in one file (outputs with a grid).
+/* Montages, which are several pictures side by side in one file (outputs with a grid), and insets over their corners.
  *
  * The writing thread receives a step's pictures one after the other. It draws the decorations of each and copies it
- * into its panel. After the last picture of the step, the whole picture is written. A panel whose picture is not due,
- * or could not be drawn, remains transparent.
+ * into its panel, or over a corner of the panels if it is an inset. After the last picture of the step, the whole
+ * picture is written. A panel whose picture is not due, or could not be drawn, remains transparent.
  *
  * If the panels share their colour bars, they are drawn after the last picture, because only then it is known whether
  * all bars are the same. If so, the panels are drawn without them, and the bars in a strip beside the panels. */
@@ -30,8 +30,8 @@ typedef struct session_montages {
     session_montage *items; /* one for each montage of the scene; NULL before the first picture */
 } session_montages;
 
-/* Draws the picture into its panel. decorations: those of the picture, or NULL. path is the path of the file; the
- * montage takes ownership of it. Local. */
+/* Draws the picture into its panel or as an inset. decorations: those of the picture, or NULL. path is the path of the
+ * file; the montage takes ownership of it. Local. */
 insitu_status session_add_panel(session_montages *montages, const scene *scene, const scene_image *image,
                                 const scene_output *output, const insitu_image *picture,
                                 const session_decorations *decorations, char *path, base_error *error);

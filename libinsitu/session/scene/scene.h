@@ -389,13 +389,16 @@ typedef struct scene_output {
     int database;         /* index of the database of the scene in which the picture is a row; -1: none */
     /* number of bytes of `path` that are the database's folder and its slash; 0 without a database */
     int folder_bytes;
-    int columns, rows; /* numbers of pictures side by side in one file; 0: the picture has a file of its own */
-    bool shares_bars;  /* set if colour bars that all these pictures have in common are drawn once, beside them */
-    int montage;       /* index of the scene's montage that contains the picture; -1: none */
-    int first_panel;   /* number of the panel that shows the first view */
+    /* numbers of pictures side by side in one file; 0: the picture is an inset or has a file of its own */
+    int columns, rows;
+    bool shares_bars;    /* set if colour bars that all these pictures have in common are drawn once, beside them */
+    bool is_inset;       /* set if the picture is laid over the panels of a montage */
+    scene_anchor corner; /* of an inset */
+    int montage;         /* index of the scene's montage that contains the picture; -1: none */
+    int first_panel;     /* number of the panel that shows the first view; for an inset behind that of the last panel */
 } scene_output;
 
-/* A file that contains several pictures side by side. */
+/* A file that contains several pictures side by side, and pictures over its corners. */
 typedef struct scene_montage {
     char *name; /* identifies the pictures that belong together: their path, expanded for one cycle and time */
     int columns, rows;
@@ -405,6 +408,9 @@ typedef struct scene_montage {
     bool shares_bars;   /* set if colour bars that all pictures have in common are drawn beside them */
     int bar_width;      /* width in pixels of the strip for these bars; 0 without shares_bars */
     bool are_bars_left; /* set if the strip is left of the pictures, otherwise it is right of them */
+    int frame_width;    /* width in pixels of the frames of insets */
+    int inset_margin;   /* distance in pixels of insets from the edges of the file, including their frames */
+    unsigned insets;    /* a bit for each corner (scene_anchor) that has an inset */
 } scene_montage;
 
 /* A Cinema database by Spec D: a folder of pictures, and a table that describes them. */

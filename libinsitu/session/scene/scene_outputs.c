@@ -201,19 +201,23 @@ static insitu_status convert_deep(const scene_document *d, const char *path, con
     return INSITU_OK;
 }
 
-static insitu_status convert_grid(const scene_document *d, const char *path, const scene_file_output *in,
-                                  scene_output *out)
+/* Converts the keys by which several pictures share a file. */
+static insitu_status convert_place(const scene_document *d, const char *path, const scene_file_output *in,
+                                   scene_output *out)
 {
+    const char *key = in->inset ? "inset" : "grid";
     out->montage = -1;
     out->shares_bars = in->shared_bars && *in->shared_bars;
     if (!in->grid && out->shares_bars)
         return scene_fail_at_key(d, path, "shared_bars", "given without grid, expected beside it");
-    if (!in->grid) return INSITU_OK;
-    if (out->format == SCENE_EXR)
-        return scene_fail_at_key(d, path, "grid", "given for an EXR, expected for a PNG only");
-    if (in->cinema) return scene_fail_at_key(d, path, "grid", "given beside cinema, expected one of the two");
-    out->columns = in->grid[0];
-    out->rows = in->grid[1];
+    if (!in->grid && !in->inset) return INSITU_OK;
+    if (in->grid && in->inset) return scene_fail_at_key(d, path, "inset", "given beside grid, expected one of the two");
+    if (out->format == SCENE_EXR) return scene_fail_at_key(d, path, key, "given for an EXR, expected for a PNG only");
+    if (in->cinema) return scene_fail_at_key(d, path, key, "given beside cinema, expected one of the two");
+    out->columns = in->grid ? in->grid[0] : 0;
+    out->rows = in->grid ? in->grid[1] : 0;
+    out->is_inset = in->inset != NULL;
+    out->corner = in->inset ? (scene_anchor)*in->inset : SCENE_TOP_LEFT;
     return INSITU_OK;
 }
 
@@ -228,7 +232,7 @@ static insitu_status convert_output(const scene_document *d, const char *path, c
     if (out->has_data && out->format != SCENE_EXR)
         return scene_fail_at_key(d, path, "data", "given for a PNG, expected for an EXR only");
     status = convert_deep(d, path, in, out);
-    if (!status) status = convert_grid(d, path, in, out);
+    if (!status) status = convert_place(d, path, in, out);
     if (status) return status;
     out->has_decorations = in->decorations ? *in->decorations : out->format != SCENE_EXR;
     if (out->shares_bars && !(out->has_decorations && image->decorations.has_bars))

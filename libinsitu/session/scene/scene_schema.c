@@ -18,6 +18,10 @@ static const cyaml_strval_t anchor_words[] = {{"top_left", SCENE_TOP_LEFT},   {"
                                               {"top_right", SCENE_TOP_RIGHT}, {"left", SCENE_LEFT},
                                               {"right", SCENE_RIGHT},         {"bottom_left", SCENE_BOTTOM_LEFT},
                                               {"bottom", SCENE_BOTTOM},       {"bottom_right", SCENE_BOTTOM_RIGHT}};
+static const cyaml_strval_t corner_words[] = {{"top_left", SCENE_TOP_LEFT},
+                                              {"top_right", SCENE_TOP_RIGHT},
+                                              {"bottom_left", SCENE_BOTTOM_LEFT},
+                                              {"bottom_right", SCENE_BOTTOM_RIGHT}};
 static const cyaml_strval_t side_words[] = {{"left", SCENE_LEFT}, {"right", SCENE_RIGHT}};
 static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"world", SCENE_FRAME_WORLD}};
 
@@ -206,6 +210,13 @@ DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
               "empty, and a warning says so. All pictures must set the same value, and each image needs a "            \
               "`colour_bar`.",                                                                                         \
       .default_text = "`false`")                                                                                       \
+    X(CHOICE("inset", scene_file_output, inset, corner_words),                                                         \
+      .help = "Lays the picture, with a grey frame, over a corner of the PNG that earlier outputs with the same file " \
+              "and a `grid` make: for example a second image with a closer view. For a single picture below it, use "  \
+              "`grid: [1, 1]`. The picture covers what is below it. It must leave space on all sides for its frame "   \
+              "and a margin of a fiftieth of the file's height. Each corner may have one inset. All outputs of the "   \
+              "file with a `grid` come before the insets. Not allowed if the file has `shared_bars`.",                 \
+      .default_text = "none")                                                                                          \
     X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
       .help = "Bits per channel of a PNG: 8 or 16. EXR always has 32-bit floats: R, G, B (linear, times A), A, and "   \
               "the depth, Z.",                                                                                         \

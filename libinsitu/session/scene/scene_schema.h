@@ -219,7 +219,8 @@ typedef struct scene_file_output {
     char *path, *cinema;
     int *grid; /* numbers of columns and rows of a montage */
     bool *shared_bars;
-    int *bits; /* bits per channel of a PNG file: 8 or 16 */
+    int *inset; /* corner at which the picture is laid over others (scene_anchor) */
+    int *bits;  /* bits per channel of a PNG file: 8 or 16 */
     bool *decorations, *data, *deep;
 } scene_file_output;
 

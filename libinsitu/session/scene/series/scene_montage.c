@@ -1,6 +1,6 @@
-/* Converts outputs with a grid, and finds which pictures are panels of one file. Panels are numbered in the order in
+/* Finds which pictures are panels of one file, and which are insets over them. Panels are numbered in the order in
  * which pictures are drawn: images in the order of the scene, each image's sweep in its order, and for each of these
- * the views of its orbit. */
+ * the views of its orbit. Insets are drawn after the panels, so that none is covered. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -33,14 +33,25 @@ static insitu_status check_views(const scene_document *d, const char *path, cons
  * is not wrapped, and its borders (adaptors/image/layout.cpp). */
 static const double bar_strip = 9;
 
-/* Returns the index of the montage of this name, which is added if there is none yet; -1 if memory ran out. */
-static int find_montage(scene *s, const scene_image *image, const scene_output *output, char *name)
+/* Width of the frames of insets, and their distance from the edges of the file, as shares of its height. */
+static const double inset_frame = 1 / 400.0, inset_distance = 1 / 50.0;
+
+/* Returns the index of the montage of this name; -1: there is none. */
+static int find_montage(const scene *s, const char *name)
 {
-    for (int i = 0; i < s->montage_count; i++)
-        if (strcmp(s->montages[i].name, name) == 0) {
-            base_free(name);
-            return i;
-        }
+    int found = s->montage_count - 1;
+    while (found >= 0 && strcmp(s->montages[found].name, name) != 0) found--;
+    return found;
+}
+
+/* Returns the index of the montage of this name, which is added if there is none yet; -1 if memory ran out. */
+static int find_or_add_montage(scene *s, const scene_image *image, const scene_output *output, char *name)
+{
+    const int found = find_montage(s, name), height = image->height * output->rows;
+    if (found >= 0) {
+        base_free(name);
+        return found;
+    }
     scene_montage *items = base_realloc(s->montages, (size_t)(s->montage_count + 1) * sizeof *items);
     if (!items) {
         base_free(name);
@@ -55,8 +66,10 @@ static int find_montage(scene *s, const scene_image *image, const scene_output *
                                               .format = output->format,
                                               .shares_bars = output->shares_bars,
                                               .are_bars_left = image->decorations.bar_anchor == SCENE_LEFT};
-    if (output->shares_bars)
-        items[s->montage_count].bar_width = (int)ceil(bar_strip * image->decorations.size * image->height);
+    scene_montage *m = &items[s->montage_count];
+    m->frame_width = (int)ceil(inset_frame * height);
+    m->inset_margin = m->frame_width + (int)ceil(inset_distance * height);
+    if (output->shares_bars) m->bar_width = (int)ceil(bar_strip * image->decorations.size * image->height);
     return s->montage_count++;
 }
 
@@ -78,33 +91,87 @@ static insitu_status check_panels(const scene_document *d, const char *path, con
         return scene_fail_at_key(d, path, "shared_bars",
                                  "is %s, and %s for the file's first picture, expected the same",
                                  output->shares_bars ? "true" : "false", m->shares_bars ? "true" : "false");
+    if (m->insets)
+        return scene_fail_at_key(d, path, "grid",
+                                 "follows an inset of the same file, expected before all insets of the file");
     if (m->panel_count > m->columns * m->rows)
         return scene_fail_at_key(d, path, "grid", "[%d, %d] has %d cells for %d pictures up to here, expected no fewer",
                                  m->columns, m->rows, m->columns * m->rows, m->panel_count);
     return INSITU_OK;
 }
 
-static insitu_status put_output_in_montage(const scene_document *d, scene *s, scene_image *image, int index)
+static insitu_status check_inset(const scene_document *d, const char *path, const scene_image *image,
+                                 const scene_output *output, const scene_montage *m)
 {
-    scene_output *output = &image->outputs[index];
-    char path[64], *name = output->columns ? name_at_sample(image, output, 0) : NULL;
+    const int most_width = m->width * m->columns - 2 * m->inset_margin;
+    const int most_height = m->height * m->rows - 2 * m->inset_margin;
+    if (image->camera.orbit.view_count)
+        return scene_fail_at_key(d, path, "inset", "given for an image with an orbit, expected for a single view");
+    if (m->shares_bars)
+        return scene_fail_at_key(d, path, "inset",
+                                 "given for a file with shared_bars: true, expected shared_bars: false there");
+    if (output->format != m->format)
+        return scene_fail_at_key(d, path, "bits", "differs from that of the file's first picture, expected the same");
+    if (m->insets >> output->corner & 1)
+        return scene_fail_at_key(d, path, "inset", "is the corner of another inset of the file, expected its own");
+    if (image->width > most_width || image->height > most_height)
+        return scene_fail_at_key(d, path, "inset", "this picture has %d x %d pixels, expected at most %d x %d",
+                                 image->width, image->height, most_width, most_height);
+    return INSITU_OK;
+}
+
+/* Puts an inset over the panels of the montage of this name. */
+static insitu_status put_inset(const scene_document *d, const char *path, scene *s, const scene_image *image,
+                               scene_output *output, const char *name)
+{
+    const int index = find_montage(s, name);
+    if (index < 0)
+        return scene_fail_at_key(d, path, "inset",
+                                 "no output before it has the file \"%.100s\" and a grid, expected one with both "
+                                 "(grid: [1, 1] for a single picture)",
+                                 output->path);
+    scene_montage *m = &s->montages[index];
+    const insitu_status status = check_inset(d, path, image, output, m);
+    if (status) return status;
+    output->montage = index;
+    output->first_panel = m->columns * m->rows;
+    m->insets |= 1U << output->corner;
+    return INSITU_OK;
+}
+
+/* Puts a picture, or all views of an orbit, into the next panels of the montage of this name. Takes ownership of the
+ * name. */
+static insitu_status put_panels(const scene_document *d, const char *path, scene *s, const scene_image *image,
+                                scene_output *output, char *name)
+{
     const int views =
         image->camera.orbit.view_count ? image->camera.orbit.view_count * image->camera.orbit.circle_count : 1;
-    output->montage = -1;
-    if (!output->columns) return INSITU_OK;
-    if (!name) return scene_fail_for_memory(d);
-    snprintf(path, sizeof path, "images[%d].outputs[%d]", image->variant.source, index);
     const insitu_status status = views > 1 ? check_views(d, path, image, output, name) : INSITU_OK;
     if (status) {
         base_free(name);
         return status;
     }
-    output->montage = find_montage(s, image, output, name);
+    output->montage = find_or_add_montage(s, image, output, name);
     if (output->montage < 0) return scene_fail_for_memory(d);
     scene_montage *m = &s->montages[output->montage];
     output->first_panel = m->panel_count;
     m->panel_count += views;
     return check_panels(d, path, image, output, m);
+}
+
+static insitu_status put_output_in_montage(const scene_document *d, scene *s, scene_image *image, int index)
+{
+    scene_output *output = &image->outputs[index];
+    char path[64];
+    output->montage = -1;
+    if (!output->columns && !output->is_inset) return INSITU_OK;
+    char *name = name_at_sample(image, output, 0);
+    if (!name) return scene_fail_for_memory(d);
+    snprintf(path, sizeof path, "images[%d].outputs[%d]", image->variant.source, index);
+    if (!output->is_inset) return put_panels(d, path, s, image, output, name);
+    const insitu_status status = put_inset(d, path, s, image, output, name);
+    base_free(name);
+    return status;
 }
 
 insitu_status scene_find_montages(const scene_document *d, scene *s)
