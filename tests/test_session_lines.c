@@ -1,5 +1,7 @@
 /* Contour lines of sessions: on every layer that has them, of fields at vertices, in cells and derived, the picture has
- * the same bits on all ranks as on one, and lines are seen in it. */
+ * the same bits on all ranks as on one, and lines are seen in it. On outer surfaces they are where the field's formula
+ * has them. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -108,6 +110,57 @@ static void lines_are_the_same_on_all_ranks(void **state)
         }
 }
 
+/* ---- outer surfaces ---------------------------------------------------------------------------------------------- */
+
+/* The share of a pixel that a line of a value covers on the front of the cube, z = 1, seen from there: the field is
+ * linear, and a pixel is `size` wide. */
+static double front_share(double x, double y, double size, double level)
+{
+    const double at[3] = {x, y, 1}, right[3] = {x + 1, y, 1}, up[3] = {x, y + 1, 1};
+    const double value = test_linear(at), slope = hypot(test_linear(right) - value, test_linear(up) - value);
+    return fmin(fmax(1.25 - fabs(value - level) / (slope * size), 0), 1);
+}
+
+/* Values in float are off by 1e-7, and the change of the field from one pixel to the next is 0.04. */
+static bool are_on_front(const caught_picture *picture)
+{
+    const double size = 2.4 / HEIGHT;
+    int hits = 0;
+    for (int p = 0; p < WIDTH * HEIGHT; p++) {
+        const double x = (p % WIDTH + 0.5 - WIDTH / 2.0) * size, y = (HEIGHT / 2.0 - p / WIDTH - 0.5) * size;
+        const double share = front_share(x, y, size, 0.1) + front_share(x, y, size, 0.9);
+        if (fmax(fabs(x), fabs(y)) > 1) continue;
+        hits += share > 0;
+        if (fabs((double)picture->rgba[4 * p] - share) < 1e-4) continue;
+        fprintf(stderr, "at (%g, %g): %g, expected %g\n", x, y, (double)picture->rgba[4 * p], share);
+        return false;
+    }
+    return hits > 100;
+}
+
+static void lines_on_outer_surfaces_are_in_their_places(void **state)
+{
+    (void)state;
+    const char *scene =
+        write_scene("images:\n  - name: a\n    size: [64, 48]\n"
+                    "    camera: {position: [0, 0, 5], focal: [0, 0, 0], projection: orthographic, "
+                    "height: 2.4}\n    layers:\n"
+                    "      - surface: {colour: black, material: {ambient: 1, diffuse: 0, specular: 0},\n"
+                    "          lines: {field: f, values: [0.1, 0.9], colour: white}}\n"
+                    "    outputs: [{path: a.exr}]\n");
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        session_input in;
+        input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+        for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] = test_linear(in.part.coordinates + 3 * v);
+        caught_picture picture = draw(MPI_COMM_WORLD, scene, &in);
+        const bool is_well = own_rank != 0 || are_on_front(&picture);
+        if (!is_well) fprintf(stderr, "%s\n", test_mesh_kind_name(kind));
+        everywhere(is_well);
+        free_caught(&picture);
+        input_free(&in);
+    }
+}
+
 static void meshes_without_the_field_are_reported(void **state)
 {
     (void)state;
@@ -144,6 +197,7 @@ static void meshes_without_the_field_are_reported(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(lines_are_the_same_on_all_ranks),
+                                       cmocka_unit_test(lines_on_outer_surfaces_are_in_their_places),
                                        cmocka_unit_test(meshes_without_the_field_are_reported)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -310,6 +310,62 @@ static void isosurfaces_are_contour_lines(void **state)
         }
 }
 
+/* The share of the pixel that the strip about the hyperbola x y = level covers, from points of the pixel: each is moved
+ * to the curve along the field's slope. */
+static double hyperbola_share(int pixel, double level)
+{
+    enum { POINTS = 16 };
+    const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
+    int inside = 0;
+    for (int i = 0; i < POINTS * POINTS; i++) {
+        double x, y;
+        place_of(pixel, &x, &y);
+        x += ((i % POINTS + 0.5) / POINTS - 0.5) * size;
+        y += ((i / POINTS + 0.5) / POINTS - 0.5) * size;
+        double px = x, py = y;
+        for (int step = 0; step < 4; step++) {
+            const double dx = py, dy = px, move = (px * py - level) / (dx * dx + dy * dy);
+            px -= move * dx;
+            py -= move * dy;
+        }
+        inside += hypot(px - x, py - y) <= 0.75 * size;
+    }
+    return (double)inside / (POINTS * POINTS);
+}
+
+/* Quads have the field x y exactly. A ramp of one pixel for lines of all directions is asked to be within 0.02 of the
+ * covered share, as the root of the mean square, and the sum to be within a hundredth of the width times the length. */
+static void curved_lines_cover_what_strips_do(void **state)
+{
+    (void)state;
+    const char *scene = write_scene(IMAGE("", "{isosurface: {field: f, values: [1, 3]}}"));
+    plate part;
+    make_plate(QUADS, own_rank, rank_count, &part);
+    for (int n = 0; n < MAX_VERTICES; n++) part.f[n] = part.xy[2 * n] * part.xy[2 * n + 1];
+    caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, false);
+    double squares = 0, drawn = 0, exact = 0;
+    int count = 0;
+    for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) {
+        const double border = 0.1; /* more than two pixels */
+        double x, y;
+        place_of(pixel, &x, &y);
+        if (x < border || x > right - border || y < border || y > top - border) continue;
+        const double is = (double)picture.rgba[4 * (ptrdiff_t)pixel + 3];
+        const double share = hyperbola_share(pixel, 1) + hyperbola_share(pixel, 3);
+        if (share == 0 && is == 0) continue;
+        squares += (is - share) * (is - share);
+        drawn += is;
+        exact += share;
+        count++;
+    }
+    const double rms = sqrt(squares / count);
+    const bool is_well = own_rank != 0 || (count > 100 && rms < 0.02 && fabs(drawn / exact - 1) < 0.01);
+    if (!is_well || getenv("TEST_LINES_SHOW"))
+        fprintf(stderr, "%d pixels, %g rms, width %g\n", count, rms, drawn / exact);
+    everywhere(is_well);
+    free_caught(&picture);
+}
+
 static void lines_beyond_the_field_are_reported(void **state)
 {
     (void)state;
@@ -557,6 +613,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(what_the_scene_says_comes_first),
                                        cmocka_unit_test(layers_that_show_nothing_are_reported),
                                        cmocka_unit_test(isosurfaces_are_contour_lines),
+                                       cmocka_unit_test(curved_lines_cover_what_strips_do),
                                        cmocka_unit_test(lines_beyond_the_field_are_reported),
                                        cmocka_unit_test(bars_say_what_they_show),
                                        cmocka_unit_test(solids_need_z),
