@@ -257,7 +257,8 @@ void discard_pictures(void)
 caught_picture pop_caught_picture(void)
 {
     caught_picture picture = {0};
-    if (own_rank == 0) picture = caught[0];
+    if (caught_count > 0) picture = caught[0];
+    for (int i = 1; i < caught_count; i++) free_caught(&caught[i]);
     caught_count = 0;
     return picture;
 }

@@ -124,7 +124,8 @@ extern int caught_count;
 void discard_pictures(void);
 void free_caught(caught_picture *picture);
 
-/* The first picture caught on rank 0, from now on the caller's, and the only one; on other ranks one of nothing. */
+/* Returns the first picture that this rank has caught, which the caller must free, and frees the others. Empty if the
+ * rank has caught none: pictures are written by rank 0 of a session. */
 caught_picture pop_caught_picture(void);
 
 /* Opens a session, hands the input over, and takes a step, which is to be well. */
