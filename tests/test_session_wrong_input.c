@@ -127,6 +127,18 @@ static void corrupt_type(const input_array *a, dice *d)
     a->array->type = (insitu_type)type;
 }
 
+/* Copies the array's memory to an address that is not a multiple of its elements' size. */
+static void unalign(const input_array *a)
+{
+    static char copies[ARRAYS][1 << 14];
+    static int next;
+    const int64_t size = size_of(a->truth.type), stride = a->truth.stride_bytes ? a->truth.stride_bytes : size;
+    const int64_t bytes = (a->count - 1) * stride + size;
+    if (size == 1 || stride < 0 || bytes >= (int64_t)sizeof copies[0]) return;
+    char *copy = copies[next++ % ARRAYS];
+    a->array->data = memcpy(copy + 1, a->truth.data, (size_t)bytes);
+}
+
 static void corrupt_array(formed_mesh *m, const formed_mesh *right, dice *d)
 {
     input_array arrays[ARRAYS];
@@ -137,9 +149,7 @@ static void corrupt_array(formed_mesh *m, const formed_mesh *right, dice *d)
     case 0: a->array->data = NULL; return;
     case 1: corrupt_stride(a, d); return;
     case 2: corrupt_type(a, d); return;
-    case 3:
-        if (size_of(a->truth.type) > 1) a->array->data = (const char *)a->truth.data + 1;
-        return;
+    case 3: unalign(a); return;
     default: corrupt_elements(a, d);
     }
 }
