@@ -621,6 +621,67 @@ static void blocks_that_do_not_fit_are_reported(void **state)
     free_blocks(&l, blocks);
 }
 
+/* A block of cubes that are 1 / of of a cell of the coarsest level, of which [-1, 1]^3 has 4^3; with the values of a
+ * plane z = 0.1 at 0.72. */
+static block make_nested(int of, int first, int cells)
+{
+    block out = {.vertex_count = (int64_t)(cells + 1) * (cells + 1) * (cells + 1),
+                 .cell_count = (int64_t)cells * cells * cells};
+    out.values = malloc((size_t)out.vertex_count * sizeof *out.values);
+    assert_non_null(out.values);
+    for (int axis = 0; axis < 3; axis++) {
+        out.lattice.cells[axis] = cells;
+        out.lattice.first[axis] = first;
+        out.lattice.refinement[axis] = of;
+        out.lattice.origin[axis] = -1;
+        out.lattice.spacing[axis] = 0.5 / of;
+    }
+    for (int64_t v = 0; v < out.vertex_count; v++)
+        out.values[v] = 0.72 - 0.1 - 1 + 0.5 / of * (double)(first + v / (cells + 1) / (cells + 1));
+    return out;
+}
+
+/* Counts the pixels that do not show the plane, which is 4.9 away. */
+static int count_holes(const caught_picture *picture)
+{
+    int holes = 0;
+    for (int pixel = 0; pixel < PIXELS && picture->rgba; pixel++)
+        holes += !(picture->rgba[4 * pixel + 3] > 0 && fabs((double)picture->depth[pixel] - 4.9) < 1e-5);
+    return holes;
+}
+
+/* The finest block begins in the middle of a cell of the coarsest level, which the level between them covers. Without
+ * that level it is an error. */
+static void levels_between_let_finer_ones_begin_within_a_cell(void **state)
+{
+    static const int of[3] = {1, 2, 4}, first[3] = {0, 2, 6}, cells[3] = {4, 4, 4};
+    const levels l = {.rank = own_rank, .ranks = rank_count};
+    (void)state;
+    for (int has_middle = 0; has_middle < 2; has_middle++) {
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+        block blocks[3];
+        bool is_set = true;
+        for (int i = 0; i < 3; i++) {
+            blocks[i] = make_nested(of[i], first[i], cells[i]);
+            if (i % rank_count == own_rank && (i != 1 || has_middle))
+                is_set = is_set && set_block(session, i, &l, &blocks[i], true);
+        }
+        everywhere(is_set);
+        if (has_middle) {
+            caught_picture picture = take_step(session, 0);
+            int64_t ghosts = insitu_last_report(session)->cells_ghost;
+            MPI_Allreduce(MPI_IN_PLACE, &ghosts, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+            everywhere(ghosts == 8 + 8 && (own_rank || count_holes(&picture) == 0));
+            free_caught(&picture);
+        } else {
+            reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "mesh \"m[0]\"", "block 2 of",
+                                "covers part of a cell");
+        }
+        insitu_destroy(&session);
+        for (int i = 0; i < 3; i++) free(blocks[i].values);
+    }
+}
+
 static int begin_tests(void **state)
 {
     (void)state;
@@ -629,9 +690,11 @@ static int begin_tests(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sphere_continues_across_levels),
-        cmocka_unit_test(outer_surfaces_have_no_wall_between_levels), cmocka_unit_test(levels_come_and_go),
-        cmocka_unit_test(blocks_beside_a_change_stay), cmocka_unit_test(blocks_that_do_not_fit_are_reported)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_sphere_continues_across_levels),
+                                       cmocka_unit_test(outer_surfaces_have_no_wall_between_levels),
+                                       cmocka_unit_test(levels_come_and_go),
+                                       cmocka_unit_test(blocks_beside_a_change_stay),
+                                       cmocka_unit_test(blocks_that_do_not_fit_are_reported),
+                                       cmocka_unit_test(levels_between_let_finer_ones_begin_within_a_cell)};
     return run_session_tests(argc, argv, tests, begin_tests, NULL);
 }

@@ -222,63 +222,144 @@ static int64_t floor_quotient(int64_t a, int64_t b)
     return a % b < 0 ? q - 1 : q;
 }
 
+/* Ranges of cells of a coarse box that a fine one overlaps. */
+typedef struct overlap {
+    int64_t lower[3], upper[3];             /* cells that it covers wholly or in part */
+    int64_t whole_lower[3], whole_upper[3]; /* cells that it covers wholly along each axis */
+    int cut_axis;                           /* an axis along which it covers some only in part, or -1 */
+} overlap;
+
 /* Computes which cells of the coarse box the fine one covers, as index ranges of the coarse level. Returns false if it
- * covers none. *misfit is the axis along which the fine box ends within a cell, or -1 if it does not. */
-static bool find_covered(const session_level_box *coarse, const session_level_box *fine, int64_t lower[3],
-                         int64_t upper[3], int *misfit)
+ * covers none. */
+static bool find_overlap(const session_level_box *coarse, const session_level_box *fine, overlap *out)
 {
-    *misfit = -1;
+    out->cut_axis = -1;
     for (int axis = 0; axis < 3; axis++) {
         const int64_t of = fine->refinement[axis], by = coarse->refinement[axis];
         /* in units of 1 / (of * by) of a cell of the coarsest level */
         const int64_t begin = fine->lower[axis] * by, end = fine->upper[axis] * by;
-        lower[axis] = floor_quotient(begin, of);
-        upper[axis] = -floor_quotient(-end, of);
-        if (lower[axis] * of != begin || upper[axis] * of != end) *misfit = axis;
-        if (lower[axis] < coarse->lower[axis]) lower[axis] = coarse->lower[axis];
-        if (upper[axis] > coarse->upper[axis]) upper[axis] = coarse->upper[axis];
-        if (lower[axis] >= upper[axis]) return false;
+        const int64_t first = coarse->lower[axis], last = coarse->upper[axis];
+        const int64_t lower = floor_quotient(begin, of), upper = -floor_quotient(-end, of);
+        out->lower[axis] = lower < first ? first : lower;
+        out->upper[axis] = upper > last ? last : upper;
+        if (out->lower[axis] >= out->upper[axis]) return false;
+        const int64_t whole_lower = -floor_quotient(-begin, of), whole_upper = floor_quotient(end, of);
+        out->whole_lower[axis] = whole_lower < first ? first : whole_lower;
+        out->whole_upper[axis] = whole_upper > last ? last : whole_upper;
+        if (out->whole_lower[axis] > out->lower[axis] || out->whole_upper[axis] < out->upper[axis])
+            out->cut_axis = axis;
     }
     return true;
 }
 
-static void mark_covered_cells(const session_mesh *mesh, const int64_t lower[3], const int64_t upper[3],
-                               unsigned char *covered)
+/* Bits of the bytes of covered cells, until cut cells have been resolved. */
+enum { IS_HIDDEN = 1, IS_CUT = 2 };
+
+/* Iterates over the rows of cells along i of an overlap. */
+typedef struct row_walk {
+    const session_mesh *mesh;
+    const overlap *cells;
+    int64_t j, k;
+    int64_t first; /* number of the row's first cell in the mesh */
+    bool is_whole; /* true if the fine box covers the row wholly along j and k */
+} row_walk;
+
+static row_walk walk_rows(const session_mesh *mesh, const overlap *cells)
 {
-    const insitu_lattice *l = mesh->given.lattice;
-    const int64_t *strides = mesh->lattice.cells.cell_numbering.stride;
-    int64_t from[3], to[3];
-    for (int axis = 0; axis < 3; axis++) {
-        from[axis] = lower[axis] - (l->cells[axis] ? l->first[axis] : 0);
-        to[axis] = upper[axis] - (l->cells[axis] ? l->first[axis] : 0);
+    return (row_walk){mesh, cells, cells->lower[1] - 1, cells->lower[2], 0, true};
+}
+
+static bool next_row(row_walk *w)
+{
+    const overlap *cells = w->cells;
+    const insitu_lattice *l = w->mesh->given.lattice;
+    const int64_t *strides = w->mesh->lattice.cells.cell_numbering.stride;
+    if (++w->j == cells->upper[1]) {
+        w->j = cells->lower[1];
+        w->k++;
     }
-    for (int64_t k = from[2]; k < to[2]; k++)
-        for (int64_t j = from[1]; j < to[1]; j++)
-            for (int64_t i = from[0]; i < to[0]; i++) covered[i * strides[0] + j * strides[1] + k * strides[2]] = 1;
+    const int64_t at[3] = {cells->lower[0], w->j, w->k};
+    w->first = 0;
+    for (int axis = 0; axis < 3; axis++) w->first += (at[axis] - (l->cells[axis] ? l->first[axis] : 0)) * strides[axis];
+    w->is_whole = w->j >= cells->whole_lower[1] && w->j < cells->whole_upper[1] && w->k >= cells->whole_lower[2] &&
+                  w->k < cells->whole_upper[2];
+    return w->k < cells->upper[2];
+}
+
+static void mark_cells(const session_mesh *mesh, const overlap *cells, unsigned char *covered)
+{
+    const int64_t stride = mesh->lattice.cells.cell_numbering.stride[0];
+    for (row_walk row = walk_rows(mesh, cells); next_row(&row);)
+        for (int64_t i = cells->lower[0]; i < cells->upper[0]; i++) {
+            const bool is_whole = row.is_whole && i >= cells->whole_lower[0] && i < cells->whole_upper[0];
+            covered[row.first + (i - cells->lower[0]) * stride] |= is_whole ? IS_HIDDEN : IS_CUT;
+        }
+}
+
+/* Returns whether a cell of the overlap is covered only in part. */
+static bool has_cut_cell(const session_mesh *mesh, const overlap *cells, const unsigned char *covered)
+{
+    const int64_t stride = mesh->lattice.cells.cell_numbering.stride[0];
+    for (row_walk row = walk_rows(mesh, cells); next_row(&row);)
+        for (int64_t i = 0; i < cells->upper[0] - cells->lower[0]; i++)
+            if (covered[row.first + i * stride] == IS_CUT) return true;
+    return false;
+}
+
+/* Iterates over the finer boxes that overlap a block. */
+typedef struct finer_walk {
+    const cover_search *search;
+    session_level_box box; /* of the block */
+    session_bin_walk bins;
+    const session_level_box *fine;
+    overlap cells;
+} finer_walk;
+
+static finer_walk walk_finer(const cover_search *s, const session_mesh *mesh)
+{
+    finer_walk w = {.search = s, .box = make_level_box(mesh, s->team->rank)};
+    double lower[3], upper[3];
+    find_box_bounds(&w.box, lower, upper);
+    w.bins = session_walk_bins(&s->finer_bins.bins, lower, upper, s->finer_bins.largest_half_width);
+    return w;
+}
+
+static bool next_finer(finer_walk *w)
+{
+    int64_t near;
+    while (session_next_binned(&w->bins, &near)) {
+        w->fine = &w->search->boxes[w->search->finer_bins.boxes[near]];
+        if (w->fine->mesh == w->box.mesh && is_finer(w->fine, &w->box) && find_overlap(&w->box, w->fine, &w->cells))
+            return true;
+    }
+    return false;
 }
 
 /* Finds the cells of the block that finer blocks cover. *out has one byte per cell, or is NULL if no cell is covered.
- * Returns false if memory runs out. */
-static bool find_covered_cells(const cover_search *s, session_mesh *mesh, unsigned char **out)
+ * *has_cuts receives whether a finer block covers cells in part. Returns false if memory runs out. */
+static bool find_covered_cells(const cover_search *s, const session_mesh *mesh, unsigned char **out, bool *has_cuts)
 {
-    const session_level_box box = make_level_box(mesh, s->team->rank);
-    double lower[3], upper[3];
-    int64_t near, first[3], end[3];
-    find_box_bounds(&box, lower, upper);
     *out = NULL;
-    mesh->misfit = (session_misfit){.exists = false};
-    session_bin_walk walk = session_walk_bins(&s->finer_bins.bins, lower, upper, s->finer_bins.largest_half_width);
-    while (session_next_binned(&walk, &near)) {
-        const session_level_box *fine = &s->boxes[s->finer_bins.boxes[near]];
-        int misfit;
-        if (fine->mesh != box.mesh || !is_finer(fine, &box) || !find_covered(&box, fine, first, end, &misfit)) continue;
-        if (misfit >= 0)
-            mesh->misfit = (session_misfit){true, misfit, fine->block, fine->refinement[misfit], (int)fine->rank};
+    *has_cuts = false;
+    for (finer_walk w = walk_finer(s, mesh); next_finer(&w);) {
         if (!*out) *out = base_calloc((size_t)mesh->given.cell_count + 1, 1);
         if (!*out) return false;
-        mark_covered_cells(mesh, first, end, *out);
+        *has_cuts = *has_cuts || w.cells.cut_axis >= 0;
+        mark_cells(mesh, &w.cells, *out);
     }
     return true;
+}
+
+/* Resolves the cells that a finer block covers in part. This is an error, unless another block covers them wholly: a
+ * block two levels finer may begin within a cell if the level between them lies there too. */
+static void resolve_cuts(const cover_search *s, session_mesh *mesh, unsigned char *covered)
+{
+    for (finer_walk w = walk_finer(s, mesh); next_finer(&w) && !mesh->misfit.exists;) {
+        const int axis = w.cells.cut_axis;
+        if (axis >= 0 && has_cut_cell(mesh, &w.cells, covered))
+            mesh->misfit = (session_misfit){true, axis, w.fine->block, w.fine->refinement[axis], (int)w.fine->rank};
+    }
+    for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) covered[cell] = covered[cell] != 0;
 }
 
 /* Adds the caller's own ghost flags. They may have to be read from a copy, which is filled here because it is not
@@ -292,14 +373,17 @@ static void add_caller_ghosts(session_mesh *mesh, int threads, unsigned char *co
     const grid g = {
         .ghosts = flags.data, .ghosts_stride = flags.stride, .ghosts_bytes = (int)session_type_size(ghosts->type)};
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++)
-        if (grid_is_flagged(&g, cell)) covered[cell] = 1;
+        if (grid_is_flagged(&g, cell)) covered[cell] |= IS_HIDDEN;
 }
 
 static bool update_block(const cover_search *s, session_meshes *meshes, session_mesh *mesh)
 {
     unsigned char *covered;
-    if (!find_covered_cells(s, mesh, &covered)) return false;
+    bool has_cuts;
+    mesh->misfit = (session_misfit){.exists = false};
+    if (!find_covered_cells(s, mesh, &covered, &has_cuts)) return false;
     if (covered) add_caller_ghosts(mesh, s->team->threads, covered);
+    if (has_cuts) resolve_cuts(s, mesh, covered);
     const bool is_same =
         !covered == !mesh->covered && (!covered || memcmp(covered, mesh->covered, (size_t)mesh->given.cell_count) == 0);
     if (!is_same) session_drop_cell_data(meshes, mesh);
