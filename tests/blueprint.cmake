@@ -2,7 +2,7 @@
 add_library(test_blueprint_fixture OBJECT conduit_stand_in.c test_blueprint_layouts.c)
 target_link_libraries(test_blueprint_fixture PUBLIC test_session_fixture PRIVATE insitu_quick_flags)
 
-foreach(test blueprint blueprint_faults)
+foreach(test blueprint blueprint_faults blueprint_levels)
   add_executable(test_${test} test_${test}.c)
   target_link_libraries(test_${test} PRIVATE
     insitu_blueprint_objects test_blueprint_fixture test_session_fixture insitu_quick_flags)

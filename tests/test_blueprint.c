@@ -160,38 +160,92 @@ static void adopt(conduit_node *parent, const char *path, conduit_node *child)
     conduit_node_destroy(child);
 }
 
-/* Two domains: of another height on each rank, and the second of other cells. */
-static void domains_are_meshes_of_their_own(void **state)
+/* The plain header's mesh as a block. */
+static bool submit_block(insitu_session *session, const char *name, int64_t number, const layout_case *layout)
 {
-    (void)state;
-    layout_case a, b;
-    layout_make(&layout_kinds[0], &a);
-    layout_make(&layout_kinds[16], &b);
-    const char *path = write_scene(scene);
-    insitu_session *session = open_session(MPI_COMM_WORLD, path);
-    everywhere(layout_submit(session, "grid/mesh/0", &a) == INSITU_OK);
-    everywhere(layout_submit(session, "grid/mesh/1", &b) == INSITU_OK);
-    step_is_good(session, 100);
-    caught_picture truth = pop_caught_picture();
-    insitu_destroy(&session);
+    insitu_mesh mesh = layout->mesh;
+    if (mesh.lattice) mesh.lattice = &layout->lattice;
+    bool is_set = insitu_set_block(session, name, number, &mesh) == INSITU_OK;
+    for (int i = 0; i < layout->field_count; i++)
+        is_set = is_set && insitu_set_block_field(session, name, number, &layout->fields[i]) == INSITU_OK;
+    return is_set;
+}
+
+/* Draws two domains, which the node then has. */
+static caught_picture draw_both(const char *path, layout_case *a, layout_case *b, insitu_blueprint_report *report)
+{
     conduit_node *both = conduit_node_create();
-    adopt(both, "domain_000000", a.node);
-    adopt(both, "domain_000001", b.node);
+    adopt(both, "domain_000000", a->node);
+    adopt(both, "domain_000001", b->node);
+    a->node = conduit_node_create();
+    b->node = conduit_node_create();
     doorway d = open_door(path);
     set_ok(&d, "grid", both);
     step_ok(&d);
-    caught_picture picture = pop_caught_picture();
-    const bool is_same = own_rank || same_pictures(&picture, &truth);
-    everywhere(is_same);
-    everywhere(insitu_blueprint_last_report(d.adaptor)->meshes == 2);
-    free_caught(&picture);
-    free_caught(&truth);
+    *report = *insitu_blueprint_last_report(d.adaptor);
     close_door(&d);
-    a.node = conduit_node_create();
-    b.node = conduit_node_create();
-    layout_free(&a);
-    layout_free(&b);
     conduit_node_destroy(both);
+    return pop_caught_picture();
+}
+
+/* A lattice and a list of cells become blocks of one mesh. With other fields the second is a mesh of its own. */
+static void domains_are_blocks_of_one_mesh(void **state)
+{
+    (void)state;
+    for (int has_same = 0; has_same < 2; has_same++) {
+        layout_case a, b;
+        insitu_blueprint_report report;
+        layout_make(&layout_kinds[0], &a);
+        layout_make(&layout_kinds[16], &b);
+        if (!has_same) {
+            b.field_count--;
+            stand_in_remove(b.node, "fields/vel");
+        }
+        const char *path = write_scene(has_same ? scene : scene_of_two);
+        insitu_session *session = open_session(MPI_COMM_WORLD, path);
+        everywhere(submit_block(session, "grid/mesh", 0, &a));
+        everywhere(has_same ? submit_block(session, "grid/mesh", 1, &b)
+                            : layout_submit(session, "grid/mesh/1", &b) == INSITU_OK);
+        step_is_good(session, 100);
+        caught_picture truth = pop_caught_picture();
+        insitu_destroy(&session);
+        caught_picture picture = draw_both(path, &a, &b, &report);
+        const bool is_same = own_rank || same_pictures(&picture, &truth);
+        everywhere(is_same);
+        everywhere(report.meshes == 2 && report.fields == (has_same ? 6 : 5));
+        free_caught(&picture);
+        free_caught(&truth);
+        layout_free(&a);
+        layout_free(&b);
+    }
+}
+
+/* A mesh that is one node, then a list of domains, then one node again. */
+static void a_mesh_becomes_blocks_and_a_whole_again(void **state)
+{
+    (void)state;
+    layout_case a;
+    layout_make(&layout_kinds[16], &a);
+    int64_t copied;
+    const char *path = write_scene(scene);
+    caught_picture truth = draw_plain(path, &a, &copied);
+    doorway d = open_door(path);
+    conduit_node *list = conduit_node_create(), *child = conduit_node_fetch(list, "domain_000000");
+    for (int step = 0; step < 4; step++) {
+        const bool is_list = step % 2;
+        if (is_list) stand_in_swap(child, a.node);
+        set_ok(&d, "", is_list ? list : a.node);
+        step_ok(&d);
+        if (is_list) stand_in_swap(child, a.node);
+        caught_picture picture = pop_caught_picture();
+        const bool is_same = own_rank || same_pictures(&picture, &truth);
+        everywhere(is_same);
+        free_caught(&picture);
+    }
+    close_door(&d);
+    conduit_node_destroy(list);
+    free_caught(&truth);
+    layout_free(&a);
 }
 
 /* A rank without domains, and then a mesh that ceases on all ranks. */
@@ -396,7 +450,8 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_layout_is_the_plain_header_s),
         cmocka_unit_test(what_the_header_says_is_not_copied),
-        cmocka_unit_test(domains_are_meshes_of_their_own),
+        cmocka_unit_test(domains_are_blocks_of_one_mesh),
+        cmocka_unit_test(a_mesh_becomes_blocks_and_a_whole_again),
         cmocka_unit_test(meshes_come_and_go),
         cmocka_unit_test(changes_are_found),
         cmocka_unit_test(cycles_are_counted),

@@ -8,13 +8,18 @@
 #include <string.h>
 
 #include "blueprint_hash.h"
+#include "blueprint_lattice.h"
 #include "blueprint_mesh.h"
 
-/* A mesh that was passed to the session. */
+/* A mesh or block that was passed to the session. */
 typedef struct known_mesh {
     char *name;
+    int64_t number;      /* number of the block, or WHOLE_MESH */
     int64_t step_number; /* value of the step counter when the mesh was last set */
-    uint64_t coordinate_hash, cell_hash, field_names_hash;
+    uint64_t name_hash, coordinate_hash, cell_hash, fields_hash;
+    insitu_mesh mesh;       /* as it was passed; mesh.lattice is not valid */
+    insitu_lattice lattice; /* as it was passed, if the mesh is a uniform block */
+    uniform_block uniform;
     owned_arrays owned;
 } known_mesh;
 
@@ -32,6 +37,8 @@ struct insitu_blueprint {
     int64_t cycle, last_cycle;
     bool has_time;
     double time;
+    named_lattices lattices; /* this rank's, when the ranks last agreed */
+    named_lattices common;   /* of the same meshes, on which all ranks agreed */
     insitu_blueprint_report report;
     char error[NODE_MESSAGE + 64];
 };
@@ -40,20 +47,35 @@ static _Thread_local char create_error[256];
 
 /* ---- known meshes ----------------------------------------------------------------------------------------------- */
 
-/* Finds a known mesh by its name. The search begins behind the one found last, because domains are set in the same
- * order every step, and there may be thousands. */
-static known_mesh *find_known_mesh(insitu_blueprint *adaptor, const char *name)
+/* Finds a known mesh by its name and number. The search begins behind the one found last, because domains are set in
+ * the same order every step, and there may be thousands. */
+static known_mesh *find_known_mesh(insitu_blueprint *adaptor, const char *name, int64_t number)
 {
     for (int i = 0; i < adaptor->known_count; i++) {
-        const int number = (adaptor->next_search + i) % adaptor->known_count;
-        if (strcmp(adaptor->known_meshes[number].name, name) != 0) continue;
-        adaptor->next_search = number + 1;
-        return &adaptor->known_meshes[number];
+        const int index = (adaptor->next_search + i) % adaptor->known_count;
+        known_mesh *known = &adaptor->known_meshes[index];
+        if (known->number != number || strcmp(known->name, name) != 0) continue;
+        adaptor->next_search = index + 1;
+        return known;
     }
     return NULL;
 }
 
-static known_mesh *add_known_mesh(insitu_blueprint *adaptor, const node *of, const char *name)
+/* Finds a block with cells that has been set for the next step, or returns NULL. The search goes back from the mesh
+ * that was set last, because the domains of a node have the same topologies. */
+static const known_mesh *find_pending_block(const insitu_blueprint *adaptor, const char *name)
+{
+    for (int i = 1; i <= adaptor->known_count; i++) {
+        const int index = (adaptor->next_search + adaptor->known_count - i) % adaptor->known_count;
+        const known_mesh *known = &adaptor->known_meshes[index];
+        if (known->step_number == adaptor->step_number && known->number != WHOLE_MESH && known->mesh.cell_count > 0 &&
+            strcmp(known->name, name) == 0)
+            return known;
+    }
+    return NULL;
+}
+
+static known_mesh *add_known_mesh(insitu_blueprint *adaptor, const node *of, const char *name, int64_t number)
 {
     known_mesh *known_meshes =
         realloc(adaptor->known_meshes, (size_t)(adaptor->known_count + 1) * sizeof *known_meshes);
@@ -63,14 +85,34 @@ static known_mesh *add_known_mesh(insitu_blueprint *adaptor, const node *of, con
         node_set_error(of, "", INSITU_ERROR_MEMORY, "no memory for a mesh's name");
         return NULL;
     }
-    adaptor->known_meshes[adaptor->known_count] = (known_mesh){.name = copy, .step_number = -1};
-    return &adaptor->known_meshes[adaptor->known_count++];
+    known_mesh *known = &known_meshes[adaptor->known_count++];
+    *known = (known_mesh){.name = copy, .number = number, .step_number = -1, .name_hash = blueprint_hash_text(name)};
+    adaptor->next_search = adaptor->known_count;
+    return known;
 }
 
-static void remove_known_mesh(insitu_blueprint *adaptor, int number)
+static mesh_target target_of(const insitu_blueprint *adaptor, const known_mesh *known)
 {
-    known_mesh *known = &adaptor->known_meshes[number];
-    insitu_set_mesh(adaptor->session, known->name, NULL);
+    return (mesh_target){adaptor->session, known->name, known->number};
+}
+
+/* Returns whether the whole mesh has been replaced by blocks of the same name. */
+static bool is_replaced_by_blocks(const insitu_blueprint *adaptor, const known_mesh *whole)
+{
+    for (int i = 0; i < adaptor->known_count; i++) {
+        const known_mesh *known = &adaptor->known_meshes[i];
+        if (known->number != WHOLE_MESH && known->step_number > whole->step_number &&
+            strcmp(known->name, whole->name) == 0)
+            return true;
+    }
+    return false;
+}
+
+static void remove_known_mesh(insitu_blueprint *adaptor, int index)
+{
+    known_mesh *known = &adaptor->known_meshes[index];
+    const mesh_target target = target_of(adaptor, known);
+    if (known->number != WHOLE_MESH || !is_replaced_by_blocks(adaptor, known)) blueprint_set_target(&target, NULL);
     owned_arrays_free(&known->owned);
     free(known->name);
     *known = adaptor->known_meshes[--adaptor->known_count];
@@ -97,17 +139,17 @@ static bool read_changes(const node *domain, unsigned *changed)
     return true;
 }
 
-/* Stores the hashes of the mesh's arrays and field names in *known, and returns the INSITU_CHANGED flags of those
- * that differ from the previous step. */
-static unsigned find_changes(const node *domain, const char *topology, const blueprint_mesh *mesh, known_mesh *known)
+/* Stores the hashes of the mesh's arrays and fields in *known, and returns the INSITU_CHANGED flags of those that
+ * differ from the previous step. */
+static unsigned find_changes(const node *domain, const blueprint_mesh *mesh, uint64_t fields_hash, known_mesh *known)
 {
     unsigned changed = 0;
     const bool is_stated = read_changes(domain, &changed);
     const known_mesh last = *known;
-    known->field_names_hash = blueprint_hash_field_names(domain, topology);
+    known->fields_hash = fields_hash;
     known->coordinate_hash = is_stated ? 0 : blueprint_hash_coordinates(&mesh->mesh);
     known->cell_hash = is_stated ? 0 : blueprint_hash_cells(&mesh->mesh);
-    if (last.step_number < 0 || last.field_names_hash != known->field_names_hash) return INSITU_CHANGED_ALL;
+    if (last.step_number < 0 || last.fields_hash != known->fields_hash) return INSITU_CHANGED_ALL;
     if (is_stated) return changed;
     return (last.cell_hash == known->cell_hash ? 0 : INSITU_CHANGED_TOPOLOGY) |
            (last.coordinate_hash == known->coordinate_hash ? 0 : INSITU_CHANGED_GEOMETRY);
@@ -127,35 +169,68 @@ static void reuse_owned_arrays(blueprint_mesh *mesh, known_mesh *known)
     known->owned = made;
 }
 
-/* Sets the mesh and its fields on the session. The known mesh takes over the arrays that the adaptor allocated. */
-static bool pass_mesh(insitu_blueprint *adaptor, const node *domain, const node *topology, blueprint_mesh *mesh,
-                      const char *name)
+/* Passes the mesh to the session. The known mesh takes over the arrays that the adaptor allocated. A uniform block is
+ * placed on the lattice on which the ranks agreed in the last step, which is usually that of the next step too. */
+static insitu_status set_known_mesh(insitu_blueprint *adaptor, blueprint_mesh *mesh, known_mesh *known)
 {
-    known_mesh *known = find_known_mesh(adaptor, name);
-    if (!known) known = add_known_mesh(adaptor, topology, name);
+    const mesh_target target = target_of(adaptor, known);
+    bool is_level;
+    known->uniform = uniform_block_of(mesh);
+    if (known->uniform.exists)
+        mesh->lattice =
+            uniform_block_place(&known->uniform, named_lattices_find(&adaptor->common, known->name_hash), &is_level);
+    const insitu_status status = blueprint_set_target(&target, &mesh->mesh);
+    owned_arrays_free(&known->owned);
+    known->owned = mesh->owned;
+    known->mesh = mesh->mesh;
+    known->lattice = mesh->lattice;
+    known->step_number = adaptor->step_number;
+    return status;
+}
+
+/* Sets the mesh and its fields on the session. */
+static bool pass_mesh(insitu_blueprint *adaptor, const node *domain, const node *topology, blueprint_mesh *mesh,
+                      uint64_t fields_hash, const char *name, int64_t number)
+{
+    known_mesh *known = find_known_mesh(adaptor, name, number);
+    if (!known) known = add_known_mesh(adaptor, topology, name, number);
     if (!known) {
         owned_arrays_free(&mesh->owned);
         return false;
     }
-    mesh->mesh.changed = find_changes(domain, topology->name, mesh, known);
+    mesh->mesh.changed = find_changes(domain, mesh, fields_hash, known);
     if (!(mesh->mesh.changed & INSITU_CHANGED_TOPOLOGY)) reuse_owned_arrays(mesh, known);
-    const insitu_status status = insitu_set_mesh(adaptor->session, name, &mesh->mesh);
-    owned_arrays_free(&known->owned);
-    known->owned = mesh->owned;
-    known->step_number = adaptor->step_number;
+    const mesh_target target = target_of(adaptor, known);
+    const insitu_status status = set_known_mesh(adaptor, mesh, known);
     if (status) return node_set_error(topology, "", status, "%s", insitu_error(adaptor->session));
     adaptor->report.meshes++;
     adaptor->report.cells += mesh->mesh.cell_count;
-    return blueprint_set_fields(domain, topology->name, mesh, adaptor->session, name, &adaptor->report.fields);
+    return blueprint_set_fields(domain, topology->name, mesh, &target, &adaptor->report.fields);
 }
 
-static bool set_topology(insitu_blueprint *adaptor, const node *domain, const node *topology, const char *name)
+/* Sets a mesh, or a block of the mesh of this name. The blocks of a mesh must have the same fields. A block with other
+ * fields than the blocks before it becomes a mesh of its own, which has the number in its name. */
+static bool pass_block(insitu_blueprint *adaptor, const node *domain, const node *topology, blueprint_mesh *mesh,
+                       const char *name, int64_t number)
+{
+    char own_name[NODE_PATH + 32];
+    const uint64_t fields_hash = blueprint_hash_fields(domain, topology->name, mesh);
+    const known_mesh *other =
+        number == WHOLE_MESH || mesh->mesh.cell_count == 0 ? NULL : find_pending_block(adaptor, name);
+    if (!other || other->fields_hash == fields_hash)
+        return pass_mesh(adaptor, domain, topology, mesh, fields_hash, name, number);
+    snprintf(own_name, sizeof own_name, "%s/%lld", name, (long long)number);
+    return pass_mesh(adaptor, domain, topology, mesh, fields_hash, own_name, WHOLE_MESH);
+}
+
+static bool set_topology(insitu_blueprint *adaptor, const node *domain, const node *topology, const char *name,
+                         int64_t number)
 {
     blueprint_mesh mesh;
     bool is_read = blueprint_read_topology(domain, topology, &mesh);
     if (is_read && !mesh.is_left_out) is_read = blueprint_read_ghosts(domain, topology->name, &mesh);
     if (is_read && !mesh.is_left_out)
-        is_read = pass_mesh(adaptor, domain, topology, &mesh, name);
+        is_read = pass_block(adaptor, domain, topology, &mesh, name, number);
     else
         owned_arrays_free(&mesh.owned);
     blueprint_mesh_free_tables(&mesh);
@@ -181,7 +256,8 @@ static bool read_state(insitu_blueprint *adaptor, const node *domain)
     return true;
 }
 
-/* Sets all topologies of a domain. `number` is the domain's index on this rank, or -1 if there is only one domain. */
+/* Sets all topologies of a domain. `number` is the domain's index on this rank, or WHOLE_MESH if the node is a domain
+ * itself. */
 static bool set_domain(insitu_blueprint *adaptor, const node *domain, const char *name, int64_t number)
 {
     node topologies, topology;
@@ -191,10 +267,8 @@ static bool set_domain(insitu_blueprint *adaptor, const node *domain, const char
         return false;
     for (int64_t i = 0; i < node_child_count(&topologies); i++) {
         node_child(&topologies, i, &topology);
-        int length = snprintf(mesh, sizeof mesh, "%s%s%s", name, *name ? "/" : "", topology.name);
-        if (number >= 0 && length > 0 && length < NODE_PATH)
-            snprintf(mesh + length, sizeof mesh - (size_t)length, "/%lld", (long long)number);
-        if (!set_topology(adaptor, domain, &topology, mesh)) return false;
+        snprintf(mesh, sizeof mesh, "%s%s%s", name, *name ? "/" : "", topology.name);
+        if (!set_topology(adaptor, domain, &topology, mesh, number)) return false;
     }
     return true;
 }
@@ -202,7 +276,7 @@ static bool set_domain(insitu_blueprint *adaptor, const node *domain, const char
 static bool set_node(insitu_blueprint *adaptor, const char *name, const node *root)
 {
     node domain;
-    if (node_has(root, "coordsets") || node_has(root, "topologies")) return set_domain(adaptor, root, name, -1);
+    if (node_has(root, "coordsets") || node_has(root, "topologies")) return set_domain(adaptor, root, name, WHOLE_MESH);
     for (int64_t i = 0; i < node_child_count(root); i++) {
         node_child(root, i, &domain);
         if (!set_domain(adaptor, &domain, name, i)) return false;
@@ -249,18 +323,20 @@ static insitu_status mpi_failure(insitu_blueprint *adaptor)
     return fail(adaptor, INSITU_ERROR_MPI, "insitu_blueprint_step: MPI returned an error");
 }
 
-/* Computes the largest cycle and time over all ranks, and finds the lowest rank with an error, or -1. */
-static insitu_status reduce_state(insitu_blueprint *adaptor, int *failed_rank)
+/* Computes the largest cycle and time over all ranks, finds the lowest rank with an error, or -1, and whether the
+ * condition is true on any rank. */
+static insitu_status reduce_state(insitu_blueprint *adaptor, int *failed_rank, bool *condition)
 {
     int rank, ranks;
     if (MPI_Comm_rank(adaptor->comm, &rank) || MPI_Comm_size(adaptor->comm, &ranks)) return mpi_failure(adaptor);
-    int64_t whole[3] = {adaptor->log.status ? ranks - rank : 0, adaptor->has_cycle,
-                        adaptor->has_cycle ? adaptor->cycle : INT64_MIN};
+    int64_t whole[4] = {adaptor->log.status ? ranks - rank : 0, adaptor->has_cycle,
+                        adaptor->has_cycle ? adaptor->cycle : INT64_MIN, *condition};
     double real[2] = {adaptor->has_time, adaptor->has_time ? adaptor->time : -1e300};
-    if (MPI_Allreduce(MPI_IN_PLACE, whole, 3, MPI_INT64_T, MPI_MAX, adaptor->comm) ||
+    if (MPI_Allreduce(MPI_IN_PLACE, whole, 4, MPI_INT64_T, MPI_MAX, adaptor->comm) ||
         MPI_Allreduce(MPI_IN_PLACE, real, 2, MPI_DOUBLE, MPI_MAX, adaptor->comm))
         return mpi_failure(adaptor);
     *failed_rank = whole[0] ? ranks - (int)whole[0] : -1;
+    *condition = whole[3] != 0;
     adaptor->cycle = whole[1] ? whole[2] : adaptor->last_cycle + 1;
     adaptor->time = real[0] > 0 ? real[1] : (double)adaptor->cycle;
     return INSITU_OK;
@@ -285,20 +361,96 @@ static void remove_meshes_not_set(insitu_blueprint *adaptor)
         if (adaptor->known_meshes[i].step_number != adaptor->step_number) remove_known_mesh(adaptor, i);
 }
 
-insitu_status insitu_blueprint_step(insitu_blueprint *adaptor, const int64_t *cycle, const double *time)
+/* Lists the lattices of this rank's uniform blocks. If memory runs out, this is the step's error. */
+static named_lattices list_lattices(insitu_blueprint *adaptor)
+{
+    named_lattices list = {NULL, 0};
+    const node root = {adaptor->conduit, &adaptor->log, NULL, NULL, {0}};
+    bool has_memory = true;
+    for (int i = 0; i < adaptor->known_count && has_memory; i++) {
+        const known_mesh *known = &adaptor->known_meshes[i];
+        if (known->uniform.exists) has_memory = named_lattices_add(&list, known->name_hash, &known->uniform);
+    }
+    if (!has_memory) node_set_error(&root, "", INSITU_ERROR_MEMORY, "no memory for the lattices of blocks");
+    return list;
+}
+
+/* Lets the ranks agree on the lattices of their blocks. `list` is this rank's, and becomes the adaptor's. Collective.
+ */
+static insitu_status agree_on_lattices(insitu_blueprint *adaptor, named_lattices *list)
+{
+    named_lattices common;
+    if (!named_lattices_agree(adaptor->comm, list, &common))
+        return fail(adaptor, INSITU_ERROR_MEMORY, "insitu_blueprint_step: no memory for the lattices of blocks");
+    named_lattices_free(&adaptor->lattices);
+    named_lattices_free(&adaptor->common);
+    adaptor->lattices = *list;
+    adaptor->common = common;
+    *list = (named_lattices){NULL, 0};
+    return INSITU_OK;
+}
+
+static bool is_same_place(const insitu_lattice *a, const insitu_lattice *b)
+{
+    return memcmp(a->origin, b->origin, sizeof a->origin) == 0 && memcmp(a->first, b->first, sizeof a->first) == 0 &&
+           memcmp(a->refinement, b->refinement, sizeof a->refinement) == 0;
+}
+
+/* Sets those uniform blocks again that are on another lattice than in the last step. */
+static void place_blocks(insitu_blueprint *adaptor)
+{
+    for (int i = 0; i < adaptor->known_count; i++) {
+        known_mesh *known = &adaptor->known_meshes[i];
+        const node root = {adaptor->conduit, &adaptor->log, NULL, NULL, {0}};
+        const mesh_target target = target_of(adaptor, known);
+        bool is_level;
+        if (!known->uniform.exists) continue;
+        const insitu_lattice lattice =
+            uniform_block_place(&known->uniform, named_lattices_find(&adaptor->common, known->name_hash), &is_level);
+        if (!is_level)
+            node_report_left_out(&root, known->name,
+                                 "block %lld is on no level, because its spacing or position does not fit the coarsest "
+                                 "blocks: it covers no cells of theirs",
+                                 (long long)known->number);
+        if (is_same_place(&lattice, &known->lattice)) continue;
+        known->lattice = lattice;
+        known->mesh.lattice = &known->lattice;
+        known->mesh.changed = INSITU_CHANGED_NOTHING;
+        blueprint_set_target(&target, &known->mesh); /* insitu_step() returns an error of this call */
+    }
+}
+
+static void finish_report(insitu_blueprint *adaptor)
+{
+    adaptor->report.left_out = adaptor->log.left_out ? adaptor->log.left_out : "";
+    adaptor->report.copied_why = adaptor->log.copied_why ? adaptor->log.copied_why : "";
+    adaptor->report.bytes_copied = adaptor->log.bytes_copied;
+}
+
+/* Agrees with all ranks on errors, on the state and on the lattices of blocks. */
+static insitu_status agree_on_step(insitu_blueprint *adaptor)
 {
     int failed_rank;
+    named_lattices list = list_lattices(adaptor);
+    bool is_new = !named_lattices_are_same(&list, &adaptor->lattices);
+    insitu_status status = reduce_state(adaptor, &failed_rank, &is_new);
+    if (!status && failed_rank >= 0) status = share_error(adaptor, failed_rank);
+    if (!status && is_new) status = agree_on_lattices(adaptor, &list);
+    named_lattices_free(&list);
+    return status;
+}
+
+insitu_status insitu_blueprint_step(insitu_blueprint *adaptor, const int64_t *cycle, const double *time)
+{
     if (!adaptor) return INSITU_ERROR_ARGUMENT;
     if (!adaptor->has_pending_sets) insitu_blueprint_set(adaptor, "", NULL);
     adaptor->has_pending_sets = false;
     remove_meshes_not_set(adaptor);
     adaptor->step_number++;
-    adaptor->report.left_out = adaptor->log.left_out ? adaptor->log.left_out : "";
-    adaptor->report.copied_why = adaptor->log.copied_why ? adaptor->log.copied_why : "";
-    adaptor->report.bytes_copied = adaptor->log.bytes_copied;
-    insitu_status status = reduce_state(adaptor, &failed_rank);
+    insitu_status status = agree_on_step(adaptor);
+    if (!status) place_blocks(adaptor);
+    finish_report(adaptor);
     if (status) return status;
-    if (failed_rank >= 0) return share_error(adaptor, failed_rank);
     adaptor->last_cycle = cycle ? *cycle : adaptor->cycle;
     status = insitu_step(adaptor->session, adaptor->last_cycle, time ? *time : adaptor->time);
     return status ? fail(adaptor, status, insitu_error(adaptor->session)) : status;
@@ -347,6 +499,8 @@ void insitu_blueprint_destroy(insitu_blueprint **adaptor)
     while ((*adaptor)->known_count) remove_known_mesh(*adaptor, (*adaptor)->known_count - 1);
     MPI_Comm_free(&(*adaptor)->comm);
     node_log_free(&(*adaptor)->log);
+    named_lattices_free(&(*adaptor)->lattices);
+    named_lattices_free(&(*adaptor)->common);
     free((*adaptor)->known_meshes);
     free(*adaptor);
     *adaptor = NULL;

@@ -1,5 +1,6 @@
 /* Reads fields, including ghost flags. On a lattice all vertex arrays must have the same strides, and so must all cell
  * arrays: those of the topology for vertices, and those of the first element field for cells. */
+#include "blueprint_hash.h"
 #include "blueprint_mesh.h"
 
 #include <stdlib.h>
@@ -13,8 +14,9 @@ typedef struct blueprint_field {
     int64_t strides[3]; /* distance in tuples between neighbours along each axis of a lattice */
 } blueprint_field;
 
-/* The bits of vtkGhostType that hide a cell: duplicate, refined, hidden. Other bits only describe the cell. */
-enum { VTK_HIDDEN_BITS = 1 | 8 | 32 };
+/* The bits of vtkGhostType that hide a cell: duplicate, refined, hidden. Other bits only describe the cell. Refined
+ * cells are no ghost layer. */
+enum { VTK_HIDDEN_BITS = 1 | 8 | 32, VTK_LAYER_BITS = 1 | 32 };
 
 /* ---- which fields ----------------------------------------------------------------------------------------------- */
 
@@ -86,17 +88,6 @@ static bool next_field(field_walk *w)
         if (w->domain->log->status) return false;
     }
     return false;
-}
-
-uint64_t blueprint_hash_field_names(const node *domain, const char *topology)
-{
-    uint64_t sum = 0;
-    for (field_walk w = {.domain = domain, .topology = topology}; next_field(&w);) {
-        uint64_t hash = 14695981039346656037u;
-        for (const char *c = w.field.name; *c; c++) hash = (hash ^ (unsigned char)*c) * 1099511628211u;
-        sum += hash | 1;
-    }
-    return sum;
 }
 
 /* ---- strides of lattices ---------------------------------------------------------------------------------------- */
@@ -193,8 +184,61 @@ static unsigned char *make_flags(const node *of, blueprint_mesh *mesh, const ins
     return own;
 }
 
+/* Combines the flags of the cells in this range of indices by a bitwise or. */
+static int64_t combine_flags(const insitu_array *flags, const int64_t strides[3], const int64_t first[3],
+                             const int64_t end[3])
+{
+    int64_t any = 0;
+    for (int64_t k = first[2]; k < end[2]; k++)
+        for (int64_t j = first[1]; j < end[1]; j++)
+            for (int64_t i = first[0]; i < end[0]; i++)
+                any |= node_element(flags, i * strides[0] + j * strides[1] + k * strides[2]);
+    return any;
+}
+
+/* Finds the bounding box of the cells in which no bit of the mask is set. If there is none, the box is empty. */
+static void find_inner_cells(const insitu_array *flags, const int64_t strides[3], const int64_t counts[3], int64_t mask,
+                             int64_t first[3], int64_t end[3])
+{
+    int64_t at[3];
+    for (int axis = 0; axis < 3; axis++) {
+        first[axis] = counts[axis];
+        end[axis] = 0;
+    }
+    for (at[2] = 0; at[2] < counts[2]; at[2]++)
+        for (at[1] = 0; at[1] < counts[1]; at[1]++)
+            for (at[0] = 0; at[0] < counts[0]; at[0]++) {
+                if (node_element(flags, at[0] * strides[0] + at[1] * strides[1] + at[2] * strides[2]) & mask) continue;
+                for (int axis = 0; axis < 3; axis++) {
+                    if (at[axis] < first[axis]) first[axis] = at[axis];
+                    if (at[axis] >= end[axis]) end[axis] = at[axis] + 1;
+                }
+            }
+    for (int axis = 0; axis < 3 && end[0] == 0; axis++) first[axis] = end[axis] = counts[axis];
+}
+
+/* Returns which bits the flags of the cells have. The ghost layers around a block of a level, which have a bit of the
+ * mask, become those outside of the lattice's interior, and their flags do not count: a block covers the coarser cells
+ * below its interior, and must not cover those below its ghost layers. */
+static int64_t read_flag_bits(const insitu_array *flags, int64_t mask, blueprint_mesh *mesh)
+{
+    insitu_lattice *l = &mesh->lattice;
+    int64_t counts[3], first[3], end[3], any = 0;
+    if (!flags->data) return 0;
+    if (mesh->has_level) {
+        element_counts(mesh, true, counts);
+        find_inner_cells(flags, l->cell_strides, counts, mask, first, end);
+        memcpy(l->interior_first, first, sizeof first);
+        memcpy(l->interior_end, end, sizeof end);
+        return combine_flags(flags, l->cell_strides, first, end);
+    }
+    for (int64_t i = 0; i < mesh->mesh.cell_count; i++) any |= node_element(flags, i);
+    return any;
+}
+
 static bool set_ghost_flags(const blueprint_field *field, blueprint_mesh *mesh)
 {
+    const bool is_ascent = strcmp(field->field_node.name, "ascent_ghosts") == 0;
     node_array array;
     insitu_array flags;
     if (!node_read_array(&field->values_node, &array)) return false;
@@ -202,10 +246,9 @@ static bool set_ghost_flags(const blueprint_field *field, blueprint_mesh *mesh)
         return node_set_error(&field->values_node, "", INSITU_ERROR_FIELD,
                               "are no whole numbers, as flags of ghosts are");
     if (!read_component(&field->values_node, mesh, field, &flags)) return false;
-    int64_t any = 0;
-    for (int64_t i = 0; i < mesh->mesh.cell_count && flags.data; i++) any |= node_element(&flags, i);
+    const int64_t any = read_flag_bits(&flags, is_ascent ? -1 : VTK_LAYER_BITS, mesh);
     mesh->mesh.ghosts = any ? flags : (insitu_array){0};
-    if (strcmp(field->field_node.name, "ascent_ghosts") == 0 || !(any & ~(int64_t)VTK_HIDDEN_BITS)) return true;
+    if (is_ascent || !(any & ~(int64_t)VTK_HIDDEN_BITS)) return true;
     unsigned char *own = make_flags(&field->field_node, mesh, &flags, VTK_HIDDEN_BITS);
     if (!own) return false;
     node_report_copy(&field->field_node, "values", mesh->mesh.cell_count, "the flags that hide a cell");
@@ -273,7 +316,8 @@ static bool flag_covered_cells(const node *nestset, blueprint_mesh *mesh)
 static bool read_nestsets(const node *domain, const char *topology, blueprint_mesh *mesh)
 {
     node nestsets, nestset;
-    if (!mesh->mesh.lattice || !node_find(domain, "nestsets", &nestsets)) return true;
+    /* of blocks of levels, the session itself finds the covered cells */
+    if (!mesh->mesh.lattice || mesh->has_level || !node_find(domain, "nestsets", &nestsets)) return true;
     for (int64_t i = 0; i < node_child_count(&nestsets); i++) {
         node_child(&nestsets, i, &nestset);
         if (belongs_to(&nestset, topology) && !flag_covered_cells(&nestset, mesh)) return false;
@@ -317,8 +361,7 @@ static insitu_array *read_values(const blueprint_field *field, const blueprint_m
     return NULL;
 }
 
-static bool set_field(const blueprint_field *field, const blueprint_mesh *mesh, insitu_session *session,
-                      const char *name)
+static bool set_field(const blueprint_field *field, const blueprint_mesh *mesh, const mesh_target *target)
 {
     insitu_field given;
     int components;
@@ -333,26 +376,48 @@ static bool set_field(const blueprint_field *field, const blueprint_mesh *mesh, 
         given.values = values[0];
     else
         given.components = values;
-    const insitu_status status = insitu_set_field(session, name, &given);
+    const insitu_status status = target->number == WHOLE_MESH
+                                     ? insitu_set_field(target->session, target->name, &given)
+                                     : insitu_set_block_field(target->session, target->name, target->number, &given);
     free(values);
-    return !status || node_set_error(&field->field_node, "", status, "%s", insitu_error(session));
+    return !status || node_set_error(&field->field_node, "", status, "%s", insitu_error(target->session));
 }
 
-bool blueprint_set_fields(const node *domain, const char *topology, const blueprint_mesh *mesh, insitu_session *session,
-                          const char *name, int *count)
+/* Finds the next field that can be drawn on the mesh. Returns false behind the last field, or if a field is invalid. */
+static bool next_drawn_field(field_walk *w, const blueprint_mesh *mesh)
 {
-    for (field_walk w = {.domain = domain, .topology = topology, .reports_left_out = true}; next_field(&w);) {
-        if (is_ghosts(domain, w.field.name)) {
-            if (!w.field_found.is_element) node_report_left_out(&w.field, "values", "ghosts at vertices are not read");
-            continue;
-        }
-        if (!read_strides(mesh, &w.field_found)) return false;
-        if (!has_mesh_strides(mesh, &w.field_found)) {
-            node_report_left_out(&w.field, "strides", "has other strides than the %s of the topology",
-                                 w.field_found.is_element ? "other element fields" : "vertices");
-            continue;
-        }
-        if (!set_field(&w.field_found, mesh, session, name)) return false;
+    while (next_field(w)) {
+        blueprint_field *field = &w->field_found;
+        const bool is_flags = is_ghosts(w->domain, w->field.name);
+        if (is_flags && !field->is_element && w->reports_left_out)
+            node_report_left_out(&w->field, "values", "ghosts at vertices are not read");
+        if (is_flags) continue;
+        if (!read_strides(mesh, field)) return false;
+        if (has_mesh_strides(mesh, field)) return true;
+        if (w->reports_left_out)
+            node_report_left_out(&w->field, "strides", "has other strides than the %s of the topology",
+                                 field->is_element ? "other element fields" : "vertices");
+    }
+    return false;
+}
+
+uint64_t blueprint_hash_fields(const node *domain, const char *topology, const blueprint_mesh *mesh)
+{
+    uint64_t sum = 0;
+    for (field_walk w = {.domain = domain, .topology = topology}; next_drawn_field(&w, mesh);) {
+        const int64_t components = node_child_count(&w.field_found.values_node);
+        const uint64_t shape = 2 * (uint64_t)(components ? components : 1) + w.field_found.is_element;
+        sum += blueprint_mix_hash(blueprint_hash_text(w.field.name), shape);
+    }
+    return sum;
+}
+
+bool blueprint_set_fields(const node *domain, const char *topology, const blueprint_mesh *mesh,
+                          const mesh_target *target, int *count)
+{
+    for (field_walk w = {.domain = domain, .topology = topology, .reports_left_out = true};
+         next_drawn_field(&w, mesh);) {
+        if (!set_field(&w.field_found, mesh, target)) return false;
         ++*count;
     }
     return !domain->log->status;

@@ -7,10 +7,17 @@
 
 enum { LANES = 4 };
 
-static uint64_t mix_bits(uint64_t sum, uint64_t bits)
+uint64_t blueprint_mix_hash(uint64_t hash, uint64_t bits)
 {
-    const uint64_t product = (sum ^ bits) * 0x9e3779b97f4a7c15u;
+    const uint64_t product = (hash ^ bits) * 0x9e3779b97f4a7c15u;
     return product ^ product >> 29;
+}
+
+uint64_t blueprint_hash_text(const char *text)
+{
+    uint64_t hash = 14695981039346656037u;
+    for (const char *c = text; *c; c++) hash = (hash ^ (unsigned char)*c) * 1099511628211u;
+    return hash;
 }
 
 /* Hashes contiguous bytes in several independent lanes, because each multiplication depends on the previous one of its
@@ -20,12 +27,12 @@ static uint64_t hash_bytes(const char *data, int64_t bytes)
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
     for (; bytes >= (int64_t)sizeof words; bytes -= (int64_t)sizeof words, data += sizeof words) {
         memcpy(words, data, sizeof words);
-        for (int i = 0; i < LANES; i++) lanes[i] = mix_bits(lanes[i], words[i]);
+        for (int i = 0; i < LANES; i++) lanes[i] = blueprint_mix_hash(lanes[i], words[i]);
     }
     memset(words, 0, sizeof words);
     if (bytes > 0) memcpy(words, data, (size_t)bytes);
-    for (int i = 0; i < LANES; i++) lanes[i] = mix_bits(lanes[i], words[i]);
-    return mix_bits(mix_bits(lanes[0], lanes[1]), mix_bits(lanes[2], lanes[3]));
+    for (int i = 0; i < LANES; i++) lanes[i] = blueprint_mix_hash(lanes[i], words[i]);
+    return blueprint_mix_hash(blueprint_mix_hash(lanes[0], lanes[1]), blueprint_mix_hash(lanes[2], lanes[3]));
 }
 
 /* Same as hash_bytes(), for elements of a given size and stride. The function is inlined so that the size is a
@@ -36,27 +43,27 @@ static inline uint64_t hash_elements(const char *data, int64_t count, int64_t st
     int64_t i = 0;
     for (; i + LANES <= count; i += LANES) {
         for (int k = 0; k < LANES; k++) memcpy(&bits[k], data + (i + k) * stride, size);
-        for (int k = 0; k < LANES; k++) lanes[k] = mix_bits(lanes[k], bits[k]);
+        for (int k = 0; k < LANES; k++) lanes[k] = blueprint_mix_hash(lanes[k], bits[k]);
     }
     for (; i < count; i++) {
         memcpy(&bits[0], data + i * stride, size);
-        lanes[0] = mix_bits(lanes[0], bits[0]);
+        lanes[0] = blueprint_mix_hash(lanes[0], bits[0]);
     }
-    return mix_bits(mix_bits(lanes[0], lanes[1]), mix_bits(lanes[2], lanes[3]));
+    return blueprint_mix_hash(blueprint_mix_hash(lanes[0], lanes[1]), blueprint_mix_hash(lanes[2], lanes[3]));
 }
 
 static uint64_t hash_array(uint64_t sum, const insitu_array *array, int64_t count)
 {
-    if (!array->data) return mix_bits(sum, 0);
+    if (!array->data) return blueprint_mix_hash(sum, 0);
     const char *data = array->data;
     const int64_t size = node_type_bytes(array->type), stride = array->stride_bytes ? array->stride_bytes : size;
-    sum = mix_bits(mix_bits(sum, (uint64_t)count), (uint64_t)array->type);
-    if (stride == size) return mix_bits(sum, hash_bytes(data, count * size));
+    sum = blueprint_mix_hash(blueprint_mix_hash(sum, (uint64_t)count), (uint64_t)array->type);
+    if (stride == size) return blueprint_mix_hash(sum, hash_bytes(data, count * size));
     switch (size) {
-    case 1: return mix_bits(sum, hash_elements(data, count, stride, 1));
-    case 2: return mix_bits(sum, hash_elements(data, count, stride, 2));
-    case 4: return mix_bits(sum, hash_elements(data, count, stride, 4));
-    default: return mix_bits(sum, hash_elements(data, count, stride, 8));
+    case 1: return blueprint_mix_hash(sum, hash_elements(data, count, stride, 1));
+    case 2: return blueprint_mix_hash(sum, hash_elements(data, count, stride, 2));
+    case 4: return blueprint_mix_hash(sum, hash_elements(data, count, stride, 4));
+    default: return blueprint_mix_hash(sum, hash_elements(data, count, stride, 8));
     }
 }
 
@@ -83,7 +90,7 @@ uint64_t blueprint_hash_coordinates(const insitu_mesh *mesh)
         uint64_t bits[2];
         memcpy(&bits[0], &mesh->lattice->origin[axis], sizeof bits[0]);
         memcpy(&bits[1], &mesh->lattice->spacing[axis], sizeof bits[1]);
-        sum = mix_bits(mix_bits(sum, bits[0]), bits[1]);
+        sum = blueprint_mix_hash(blueprint_mix_hash(sum, bits[0]), bits[1]);
         sum = hash_array(sum, &mesh->lattice->axes[axis], mesh->lattice->cells[axis] + 1);
     }
     return sum;
@@ -91,7 +98,7 @@ uint64_t blueprint_hash_coordinates(const insitu_mesh *mesh)
 
 uint64_t blueprint_hash_cells(const insitu_mesh *mesh)
 {
-    uint64_t sum = mix_bits(1, (uint64_t)mesh->cell_type);
+    uint64_t sum = blueprint_mix_hash(1, (uint64_t)mesh->cell_type);
     sum = hash_array(sum, &mesh->cell_types, mesh->cell_count);
     sum = hash_array(sum, &mesh->connectivity, mesh->connectivity_count);
     sum = hash_array(sum, &mesh->offsets, mesh->cell_count);

@@ -31,3 +31,9 @@ int64_t blueprint_element_span(const int64_t counts[3], const int64_t strides[3]
     for (int axis = 0; axis < 3; axis++) reach += (counts[axis] > 0 ? counts[axis] - 1 : 0) * strides[axis];
     return reach + 1;
 }
+
+insitu_status blueprint_set_target(const mesh_target *target, const insitu_mesh *mesh)
+{
+    if (target->number == WHOLE_MESH) return insitu_set_mesh(target->session, target->name, mesh);
+    return insitu_set_block(target->session, target->name, target->number, mesh);
+}

@@ -47,27 +47,39 @@ static void pack_lattice(blueprint_mesh *out)
     out->mesh.cell_count = blueprint_element_span(out->lattice.cells, out->lattice.cell_strides);
 }
 
-/* Reads a uniform coordset. elements/origin is the index of the block's first vertex in the whole lattice; the origin
- * of the whole lattice is computed from it, so that all blocks compute the same coordinates. */
+/* Reads elements/origin, the index of the block's first vertex in the whole lattice. Its entries are called i0, j0 and
+ * k0 in the specification, and i, j and k in older nodes. */
+static bool read_first(const node *topology, int64_t first[3], bool *has_first)
+{
+    static const char *const paths[2][3] = {{"elements/origin/i", "elements/origin/j", "elements/origin/k"},
+                                            {"elements/origin/i0", "elements/origin/j0", "elements/origin/k0"}};
+    for (int form = 0; form < 2; form++)
+        for (int axis = 0; axis < 3; axis++) {
+            if (!node_integer(topology, paths[form][axis], false, &first[axis])) return false;
+            *has_first = *has_first || node_has(topology, paths[form][axis]);
+        }
+    return true;
+}
+
+/* Reads a uniform coordset. The origin of the whole lattice is computed from elements/origin, so that all blocks
+ * compute the same coordinates. */
 static bool read_uniform(const node *coordset, const node *topology, blueprint_mesh *out)
 {
     static const char *const dims[3] = {"dims/i", "dims/j", "dims/k"};
     static const char *const origins[3] = {"origin/x", "origin/y", "origin/z"};
     static const char *const spacings[3] = {"spacing/dx", "spacing/dy", "spacing/dz"};
-    static const char *const firsts[3] = {"elements/origin/i", "elements/origin/j", "elements/origin/k"};
-    int64_t counts[3] = {1, 1, 1};
+    int64_t counts[3] = {1, 1, 1}, first[3] = {0, 0, 0};
+    if (!read_first(topology, first, &out->has_first)) return false;
     for (int axis = 0; axis < 3; axis++) {
         double origin = 0, spacing = 1;
-        int64_t first = 0;
         if (!node_integer(coordset, dims[axis], axis == 0, &counts[axis])) return false;
         if (!node_has(coordset, dims[axis])) continue;
         if (!node_real(coordset, origins[axis], false, &origin)) return false;
         if (!node_real(coordset, spacings[axis], false, &spacing)) return false;
-        if (!node_integer(topology, firsts[axis], false, &first)) return false;
         if (spacing == 0) return node_set_error(coordset, spacings[axis], INSITU_ERROR_MESH, "is 0");
-        out->lattice.origin[axis] = origin - spacing * (double)first;
+        out->lattice.origin[axis] = origin - spacing * (double)first[axis];
         out->lattice.spacing[axis] = spacing;
-        out->lattice.first[axis] = first;
+        out->lattice.first[axis] = first[axis];
     }
     if (!set_vertex_counts(coordset, "dims", counts, out)) return false;
     pack_lattice(out);
@@ -231,6 +243,8 @@ bool blueprint_read_topology(const node *domain, const node *topology, blueprint
     if (!check_coordset_type(topology, type, of_coordset)) return false;
     if (!read_coordset(&coordset, topology, of_coordset, out)) return false;
     if (out->is_left_out) return true;
+    out->has_level =
+        strcmp(type, "uniform") == 0 && (node_has(domain, "state/level") || node_has(domain, "state/level_id"));
     if (strcmp(type, "structured") == 0) return read_structured(topology, out);
     return strcmp(type, "unstructured") != 0 || blueprint_read_unstructured(topology, out);
 }

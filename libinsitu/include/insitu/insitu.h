@@ -175,8 +175,8 @@ typedef struct insitu_lattice {
      * such as 1, 2 or 8. It is at most 2^20, and is not read along an axis without cells. All 0: the mesh has no
      * levels. first is then the index of the block's first cell among all cells that its level may have; its magnitude
      * is at most 2^40. A cell that is covered by the inner cells of a finer block of the mesh, on any rank, is not
-     * drawn. Finer blocks must begin and end at borders of coarser cells. A vertex on a coarser cell's face or edge
-     * gets the value that is interpolated there, even if values are given at vertices. */
+     * drawn. Finer blocks must end at borders of the coarser cells that no other block covers. A vertex on a coarser
+     * face or edge gets the value that is interpolated there, even if values are given at vertices. */
     int64_t refinement[3];
 } insitu_lattice;
 

@@ -16,19 +16,26 @@
  *
  * This library does not link Conduit. It calls the Conduit that the code is linked with, through a table of functions.
  *
- * A topology "T" of a node that is set as "name" becomes the mesh "name/T", or "T" if name is "". If the node has
- * several domains, their topologies become "name/T/0", "name/T/1", ..., numbered by the domain's index on this rank;
- * the session joins them like any other meshes. The adaptor reads uniform, rectilinear, structured and unstructured
- * topologies of two and three dimensions, with the shapes tri, quad, polygonal, tet, hex, wedge, pyramid, polyhedral
- * and mixed. The first three types of topologies become lattices (insitu_lattice). Fields at vertices and elements may
- * have any numeric type, and their components may be in one allocation or several. Ghost flags are the element fields
- * ascent_ghosts and vtkGhostType, and those that state/metadata/vtk_fields declares as "Ghosts". Cells that a nestset's
- * windows assign to a child domain are not drawn, because the child's cells are drawn instead.
+ * A topology "T" of a node that is set as "name" becomes the mesh "name/T", or "T" if name is "". If the node is a list
+ * of domains, their topologies "T" become blocks of this mesh (insitu_set_block), numbered by the domain's index on
+ * this rank, so that there is no seam between domains. A domain that has other fields than those before it on this rank
+ * becomes a mesh "name/T/3" of its own, with the same number. The adaptor reads uniform, rectilinear, structured and
+ * unstructured topologies of two and three dimensions, with the shapes tri, quad, polygonal, tet, hex, wedge, pyramid,
+ * polyhedral and mixed. The first three types of topologies become lattices (insitu_lattice). Fields at vertices and
+ * elements may have any numeric type, and their components may be in one allocation or several. Ghost flags are the
+ * element fields ascent_ghosts and vtkGhostType, and those that state/metadata/vtk_fields declares as "Ghosts".
+ *
+ * Uniform domains of a mesh get a common origin, found by all ranks in the first step, so that common vertices have
+ * equal coordinates even if their stated positions differ by roundings. Uniform domains with state/level (or
+ * state/level_id) are blocks of levels of refinement (insitu_lattice): their ratios follow from the spacings, and cells
+ * that finer domains cover, on any rank, are not drawn. The layers of flagged cells around such a domain lie outside of
+ * the block's interior. Of other domains, cells that a nestset's windows assign to a child domain are not drawn.
  *
  * The following is left out, and named in the report: points and lines, the old stream of element_types, the
  * coordinates r, theta and phi, fields that are given by a basis or have only values per material, ghost flags at
  * vertices, fields of structured topologies whose strides differ from those of the topology or of the other element
- * fields, and windows that are not within their domain.
+ * fields, and windows that are not within their domain. A domain whose spacing or position does not fit the coarsest
+ * level's is drawn, but covers no cells, and is named too.
  *
  * The arrays must stay valid until insitu_blueprint_step() returns; the node may be destroyed earlier. */
 #ifndef INSITU_BLUEPRINT_H
@@ -61,7 +68,7 @@ typedef struct insitu_blueprint insitu_blueprint;
 
 /* The report of the last step on this rank. */
 typedef struct insitu_blueprint_report {
-    int meshes;             /* number of meshes set: one per topology of a domain */
+    int meshes;             /* number of meshes and blocks set: one per topology of a domain */
     int fields;             /* number of fields set, over all meshes */
     int64_t cells;          /* number of cells set, including ghosts */
     int64_t bytes_copied;   /* size of arrays that the adaptor allocated, for the reasons in copied_why */

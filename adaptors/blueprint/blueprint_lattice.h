@@ -1,0 +1,51 @@
+/* The lattice that the uniform blocks of a mesh have in common, on all ranks. Nodes state the position of each block in
+ * floating point. But common vertices of blocks are recognized by equal bits of their coordinates, so that all blocks
+ * must compute these from one origin (insitu_lattice). Also, a level of refinement is stated as a number; the ratios
+ * follow from the spacings of all blocks. */
+#ifndef BLUEPRINT_LATTICE_H
+#define BLUEPRINT_LATTICE_H
+
+#include "blueprint_mesh.h"
+
+/* A uniform block as its node describes it. */
+typedef struct uniform_block {
+    insitu_lattice lattice;
+    bool exists; /* false if the mesh is not uniform */
+    bool has_first, has_level;
+} uniform_block;
+
+typedef struct common_lattice {
+    double origin[3];              /* smallest origin of the blocks with the coarsest spacing, for each axis */
+    double coarsest[3], finest[3]; /* absolute values of the spacing; 0: no block has cells along this axis */
+} common_lattice;
+
+typedef struct named_lattice {
+    uint64_t mesh; /* hash of the mesh's name */
+    common_lattice common;
+} named_lattice;
+
+typedef struct named_lattices {
+    named_lattice *items;
+    int count;
+} named_lattices;
+
+/* Returns the mesh as a uniform block, before it is placed. */
+uniform_block uniform_block_of(const blueprint_mesh *mesh);
+
+/* Extends the mesh's common lattice by a block; adds the mesh if it is not in the list. Returns false if memory runs
+ * out. */
+bool named_lattices_add(named_lattices *list, uint64_t mesh, const uniform_block *block);
+
+const common_lattice *named_lattices_find(const named_lattices *list, uint64_t mesh);
+bool named_lattices_are_same(const named_lattices *a, const named_lattices *b);
+void named_lattices_free(named_lattices *list);
+
+/* Combines the lists of all ranks: *out receives the meshes of the own list, with the blocks of all ranks. Returns
+ * false on all ranks if memory runs out on one, or if MPI returns an error. Collective. */
+bool named_lattices_agree(MPI_Comm comm, const named_lattices *own, named_lattices *out);
+
+/* Returns the block as a part of the common lattice. If the block does not fit it, its description stays. *is_level
+ * receives whether the block could be given its refinement, or needs none. */
+insitu_lattice uniform_block_place(const uniform_block *block, const common_lattice *common, bool *is_level);
+
+#endif
