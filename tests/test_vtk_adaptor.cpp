@@ -785,9 +785,55 @@ void leaves_of_composites_are_meshes_and_go_when_they_are_gone(void **)
     assert_int_equal(f.session.meshes.size(), 2);
     assert_int_equal(f.mesh("m/1").mesh.cell_type, INSITU_HEX);
     assert_ptr_equal(f.mesh("m/1").mesh.coordinates[0].data, b->GetPoints()->GetVoidPointer(0));
-    assert_int_equal(f.mesh("m/2").mesh.vertex_count, 8);
+    assert_int_equal(f.mesh("m/blocks[2]").mesh.vertex_count, 8);
     assert_int_equal(f.set(nullptr), INSITU_OK);
     assert_true(f.session.meshes.empty());
+}
+
+vtkSmartPointer<vtkImageData> image_with(const std::vector<const char *> &fields, int layers = 1)
+{
+    auto image = vtkSmartPointer<vtkImageData>::New();
+    image->SetDimensions(3, 3, layers + 1);
+    for (const char *name : fields) {
+        vtkNew<vtkDoubleArray> values;
+        values->SetName(name);
+        values->SetNumberOfTuples(image->GetNumberOfPoints());
+        values->Fill(0);
+        image->GetPointData()->AddArray(values);
+    }
+    return image;
+}
+
+void structured_leaves_with_the_same_fields_are_blocks_of_one_mesh(void **)
+{
+    std::vector<const char *> many(40, "a field with a long name");
+    std::vector<std::string> names(40);
+    for (size_t i = 0; i < 40; i++) many[i] = (names[i] = "a field with a long name " + std::to_string(i)).c_str();
+    const std::vector<const char *> fewer(many.begin(), many.end() - 1);
+    vtkNew<vtkMultiBlockDataSet> blocks;
+    const std::vector<vtkSmartPointer<vtkImageData>> leaves = {image_with({"b", "a"}), image_with({"a"}),
+                                                               image_with({"a", "b"}), image_with({"a", "b"}, 0),
+                                                               image_with(many),       image_with(fewer)};
+    for (size_t i = 0; i < leaves.size(); i++) blocks->SetBlock(static_cast<unsigned>(i), leaves[i]);
+    fixture f;
+    assert_int_equal(f.set(blocks), INSITU_OK);
+    assert_int_equal(f.report.meshes, 6);
+    assert_int_equal(f.report.fields, 2 + 1 + 2 + 2 + 40 + 39);
+    assert_int_equal(f.session.meshes.size(), 6);
+    for (const char *name :
+         {"m/blocks of a, b[0]", "m/blocks of a[1]", "m/blocks of a, b[2]", "m/flat blocks of a, b[3]"})
+        assert_int_equal(f.session.meshes.count(name), 1);
+    std::set<std::string> others;
+    for (const auto &[name, mesh] : f.session.meshes)
+        if (name.find("long name") != std::string::npos) others.insert(name.substr(0, name.find('[')));
+    assert_int_equal(others.size(), 2);
+    for (const std::string &name : others) assert_true(name.size() <= 255);
+    blocks->SetBlock(2, nullptr);
+    assert_int_equal(f.set(blocks), INSITU_OK);
+    assert_int_equal(f.session.meshes.size(), 5);
+    assert_int_equal(f.set(leaves[0]), INSITU_OK);
+    assert_int_equal(f.session.meshes.size(), 1);
+    assert_int_equal(f.session.meshes.count("m"), 1);
 }
 
 void arrays_outlive_the_data_set(void **)
@@ -914,6 +960,7 @@ int main()
         cmocka_unit_test(structured_grids_are_hexahedra),
         cmocka_unit_test(polygons_are_shells),
         cmocka_unit_test(leaves_of_composites_are_meshes_and_go_when_they_are_gone),
+        cmocka_unit_test(structured_leaves_with_the_same_fields_are_blocks_of_one_mesh),
         cmocka_unit_test(arrays_outlive_the_data_set),
         cmocka_unit_test(one_name_at_points_and_cells_warns),
         cmocka_unit_test(malformed_data_is_refused),

@@ -1,5 +1,5 @@
-/* AMR by the VTK adaptor: each place of the domain is drawn by one cell, the finest there. The oracle looks for a point
- * of each cell in the bounds of the finer grids, and compares the volume of the drawn cells with the domain's. */
+/* AMR by the VTK adaptor: grids become blocks of levels of one mesh, which lie where the boxes say. That the session
+ * then draws each place of the domain by the finest cell there is tested by session_levels and vtk_structured. */
 #include <array>
 #include <cmath>
 #include <string>
@@ -46,8 +46,6 @@ const std::vector<block> blocks = {{0, {0, 0, 0}, {4, 6, 4}, 1},   {0, {4, 0, 0}
                                    {0, {-2, 0, 0}, {2, 6, 4}, 1},  {1, {4, 2, 2}, {6, 4, 4}, 2},
                                    {1, {-4, 4, 0}, {2, 6, 4}, 2},  {1, {-2, 4, 0}, {4, 2, 2}, 2},
                                    {2, {16, 12, 8}, {12, 8, 8}, 8}};
-constexpr double domain = 9 * 6 * 4; // cells of level 0
-
 vtkSmartPointer<vtkUniformGrid> grid_of(const block &b, bool is_flat = false)
 {
     auto grid = vtkSmartPointer<vtkUniformGrid>::New();
@@ -108,45 +106,51 @@ bool is_covered(const block &b, const std::array<int, 3> &cell, bool is_flat)
     return false;
 }
 
-/* Each mesh against its block; returns the volume that is drawn, in cells of level 0. */
-double check(const fixture &f, bool is_flat = false)
+std::string name_of(size_t n)
 {
-    double drawn = 0;
-    for (size_t n = 0; n < blocks.size(); n++) {
-        const block &b = blocks[n];
-        const auto found = f.session.meshes.find("m/" + std::to_string(n));
-        if (found == f.session.meshes.end()) continue;
-        const insitu_mesh &mesh = found->second.mesh;
-        const auto *ghosts = static_cast<const uint8_t *>(mesh.ghosts.data);
-        const int layers = is_flat ? 1 : b.cells[2];
-        assert_int_equal(mesh.cell_count, b.cells[0] * b.cells[1] * layers);
-        int64_t i = 0;
-        for (int z = 0; z < layers; z++)
-            for (int y = 0; y < b.cells[1]; y++)
-                for (int x = 0; x < b.cells[0]; x++, i++) {
-                    const bool is_hidden = ghosts && ghosts[i];
-                    assert_int_equal(is_hidden, is_covered(b, {x, y, z}, is_flat));
-                    drawn += is_hidden ? 0 : std::pow(b.ratio, is_flat ? -2 : -3);
-                }
-    }
-    return drawn;
+    return "m[" + std::to_string(n) + "]";
 }
 
-void refined_cells_are_ghosts_by_spacings_or_ratios(void **)
+/* Compares the lattice of each block with its place in the level. */
+void check(const fixture &f, bool is_flat = false)
+{
+    for (size_t n = 0; n < blocks.size(); n++) {
+        const block &b = blocks[n];
+        const auto found = f.session.meshes.find(name_of(n));
+        if (found == f.session.meshes.end()) continue;
+        const insitu_mesh &mesh = found->second.mesh;
+        const insitu_lattice &l = *mesh.lattice;
+        assert_int_equal(mesh.cell_count, b.cells[0] * b.cells[1] * (is_flat ? 1 : b.cells[2]));
+        for (size_t a = 0; a < 3; a++) {
+            if (is_flat && a == 2) {
+                assert_int_equal(l.cells[a], 0);
+                continue;
+            }
+            assert_int_equal(l.cells[a], b.cells[a]);
+            assert_int_equal(l.first[a], b.low[a]);
+            assert_int_equal(l.refinement[a], b.ratio);
+            assert_true(l.origin[a] == origin[a] && l.spacing[a] == spacing[a] / b.ratio);
+        }
+    }
+}
+
+void grids_are_blocks_of_levels_by_spacings_or_ratios(void **)
 {
     for (const given what : {given::spacings, given::ratios}) {
         const auto amr = make_amr(what);
         fixture f;
         assert_int_equal(f.set(amr), INSITU_OK);
         assert_int_equal(f.report.meshes, blocks.size());
+        assert_int_equal(f.session.meshes.size(), blocks.size());
         assert_string_equal(f.report.warnings, "");
-        assert_true(check(f) == domain); // sums of powers of two
-        assert_non_null(strstr(f.report.copied_why, "refined, flagged"));
+        check(f);
+        for (const auto &[name, mesh] : f.session.meshes) assert_null(mesh.mesh.ghosts.data);
+        assert_int_equal(f.report.bytes_copied, 0);
         for (unsigned i = 0; i < 3; i++) assert_null(amr->GetDataSet(0, i)->GetCellGhostArray()); // left as it is
     }
 }
 
-void refined_cells_are_the_same_where_vtk_has_flagged_them(void **)
+void refined_cells_that_vtk_has_flagged_are_ghosts_too(void **)
 {
     const auto amr = make_amr(given::spacings);
     amr->SetRefinementRatio(0, 2);
@@ -157,18 +161,24 @@ void refined_cells_are_the_same_where_vtk_has_flagged_them(void **)
     assert_non_null(amr->GetDataSet(0, 0)->GetCellGhostArray());
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
-    assert_true(check(f) == domain);
+    check(f);
+    const block &b = blocks[0];
+    const auto *ghosts = static_cast<const uint8_t *>(f.session.meshes.at(name_of(0)).mesh.ghosts.data);
+    for (int i = 0; i < b.cells[0] * b.cells[1] * b.cells[2]; i++) {
+        const int x = i % b.cells[0], y = i / b.cells[0] % b.cells[1], z = i / b.cells[0] / b.cells[1];
+        assert_int_equal(ghosts[i] != 0, is_covered(b, {x, y, z}, false));
+    }
 }
 
-void finer_grids_of_other_ranks_hide_cells_too(void **)
+void grids_keep_their_numbers_on_ranks_without_others(void **)
 {
     const auto amr = make_amr(given::spacings, false, held::some);
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
     assert_int_equal(f.report.meshes, 3);
-    assert_int_equal(f.session.meshes.count("m/1"), 1); // numbers are those of all ranks
-    assert_int_equal(f.session.meshes.count("m/6"), 1);
-    (void)check(f);
+    assert_int_equal(f.session.meshes.count(name_of(1)), 1);
+    assert_int_equal(f.session.meshes.count(name_of(6)), 1);
+    check(f);
 }
 
 void hidden_cells_stay_hidden(void **)
@@ -177,20 +187,15 @@ void hidden_cells_stay_hidden(void **)
     const block &b = blocks[0];
     amr->GetDataSet(0, 0)->BlankCell(0);
     amr->GetDataSet(2, 0)->BlankPoint(0);
-    assert_false(is_covered(b, {0, 0, 0}, false));
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
-    const auto *coarse = static_cast<const uint8_t *>(f.session.meshes.at("m/0").mesh.ghosts.data);
-    const auto *fine = static_cast<const uint8_t *>(f.session.meshes.at("m/6").mesh.ghosts.data);
+    const auto *coarse = static_cast<const uint8_t *>(f.session.meshes.at(name_of(0)).mesh.ghosts.data);
+    const auto *fine = static_cast<const uint8_t *>(f.session.meshes.at(name_of(6)).mesh.ghosts.data);
     assert_true(coarse[0] && !coarse[1]);
     assert_true(fine[0] && !fine[1]);
-    int64_t hidden = 0, expected = 1;
-    for (int i = 0; i < b.cells[0] * b.cells[1] * b.cells[2]; i++) {
-        const int x = i % b.cells[0], y = i / b.cells[0] % b.cells[1], z = i / b.cells[0] / b.cells[1];
-        hidden += coarse[i] != 0;
-        expected += is_covered(b, {x, y, z}, false);
-    }
-    assert_int_equal(hidden, expected);
+    int64_t hidden = 0;
+    for (int i = 0; i < b.cells[0] * b.cells[1] * b.cells[2]; i++) hidden += coarse[i] != 0;
+    assert_int_equal(hidden, 1);
 }
 
 void flat_amr_is_quads(void **)
@@ -198,9 +203,15 @@ void flat_amr_is_quads(void **)
     const auto amr = make_amr(given::spacings, true);
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
-    assert_int_equal(f.session.meshes.at("m/0").mesh.cell_type, INSITU_QUAD);
+    assert_int_equal(f.session.meshes.at(name_of(0)).mesh.cell_type, INSITU_QUAD);
     assert_int_equal(f.report.cells_flat + f.report.cells_not_drawn, 0);
-    assert_true(check(f, true) == 9 * 6);
+    assert_string_equal(f.report.warnings, "");
+    check(f, true);
+}
+
+bool is_on_level(const fixture &f, size_t n)
+{
+    return f.session.meshes.at(name_of(n)).mesh.lattice->refinement[0] != 0;
 }
 
 void boxes_that_do_not_fit_are_reported(void **)
@@ -210,9 +221,27 @@ void boxes_that_do_not_fit_are_reported(void **)
     amr->SetAMRBox(0, 0, vtkAMRBox(low, high));
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
-    assert_non_null(strstr(f.report.warnings, "mesh 'm/0': the AMR's boxes"));
-    assert_null(strstr(f.report.warnings, "mesh 'm/1'"));
-    assert_null(f.session.meshes.at("m/0").mesh.ghosts.data);
+    assert_non_null(strstr(f.report.warnings, "mesh 'm[0]': the AMR's boxes"));
+    assert_null(strstr(f.report.warnings, "mesh 'm[1]'"));
+    assert_true(!is_on_level(f, 0) && is_on_level(f, 1));
+}
+
+/* A box of level 1 that begins within a cell of level 0, and one whose grid is elsewhere. */
+void boxes_within_cells_make_no_levels(void **)
+{
+    auto amr = make_amr(given::spacings);
+    const int low[3] = {5, 2, 2}, high[3] = {10, 5, 5};
+    amr->SetAMRBox(1, 0, vtkAMRBox(low, high));
+    fixture f;
+    assert_int_equal(f.set(amr), INSITU_OK);
+    for (size_t n = 0; n < blocks.size(); n++) {
+        assert_false(is_on_level(f, n));
+        assert_non_null(strstr(f.report.warnings, ("mesh '" + name_of(n) + "': the AMR's boxes").c_str()));
+    }
+    amr = make_amr(given::spacings);
+    amr->GetDataSet(1, 1)->SetOrigin(0, 0, 0);
+    assert_int_equal(f.set(amr), INSITU_OK);
+    for (size_t n = 0; n < blocks.size(); n++) assert_int_equal(is_on_level(f, n), n != 4);
 }
 
 void levels_that_do_not_overlap_are_drawn_whole(void **)
@@ -226,8 +255,9 @@ void levels_that_do_not_overlap_are_drawn_whole(void **)
     fixture f;
     assert_int_equal(f.set(amr), INSITU_OK);
     assert_int_equal(f.report.meshes, 2);
-    assert_null(f.session.meshes.at("m/0").mesh.ghosts.data);
-    assert_true(static_cast<const uint8_t *>(f.session.meshes.at("m/1").mesh.ghosts.data)[5] != 0);
+    assert_null(f.session.meshes.at("m/blocks of f[0]").mesh.ghosts.data);
+    assert_int_equal(f.session.meshes.at("m/blocks of f[1]").mesh.lattice->refinement[0], 0);
+    assert_true(static_cast<const uint8_t *>(f.session.meshes.at("m/blocks of f[1]").mesh.ghosts.data)[5] != 0);
 }
 
 } // namespace
@@ -235,12 +265,13 @@ void levels_that_do_not_overlap_are_drawn_whole(void **)
 int main()
 {
     const CMUnitTest tests[] = {
-        cmocka_unit_test(refined_cells_are_ghosts_by_spacings_or_ratios),
-        cmocka_unit_test(refined_cells_are_the_same_where_vtk_has_flagged_them),
-        cmocka_unit_test(finer_grids_of_other_ranks_hide_cells_too),
+        cmocka_unit_test(grids_are_blocks_of_levels_by_spacings_or_ratios),
+        cmocka_unit_test(refined_cells_that_vtk_has_flagged_are_ghosts_too),
+        cmocka_unit_test(grids_keep_their_numbers_on_ranks_without_others),
         cmocka_unit_test(hidden_cells_stay_hidden),
         cmocka_unit_test(flat_amr_is_quads),
         cmocka_unit_test(boxes_that_do_not_fit_are_reported),
+        cmocka_unit_test(boxes_within_cells_make_no_levels),
         cmocka_unit_test(levels_that_do_not_overlap_are_drawn_whole),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);

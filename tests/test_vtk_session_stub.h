@@ -13,7 +13,7 @@ struct stub_mesh {
 };
 
 struct insitu_session {
-    std::map<std::string, stub_mesh> meshes;
+    std::map<std::string, stub_mesh> meshes;     // block 3 of mesh "m" is "m[3]"
     insitu_status next_mesh_status = INSITU_OK;  // what insitu_set_mesh() returns for a mesh
     insitu_status next_field_status = INSITU_OK; // what insitu_set_field() returns
 };

@@ -5,11 +5,13 @@
 #include "insitu/vtk.h"
 
 #include <exception>
+#include <functional>
 #include <map>
 #include <memory>
 #include <new>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vtkCellArray.h>
@@ -46,6 +48,11 @@ struct mesh_part {
     std::vector<insitu_field> fields;
 };
 
+/* The name of a mesh of the session, and the number of a block or whole_mesh. */
+using part_key = std::pair<std::string, int64_t>;
+using part_map = std::map<part_key, mesh_part>;
+constexpr int64_t whole_mesh = -1;
+
 /* An error as an exception within the adaptor. The C functions convert it to a status and a message. */
 struct failure {
     insitu_status status;
@@ -59,20 +66,21 @@ struct set_result {
     int64_t cells_set = 0;
     int meshes = 0;
     int fields = 0;
-    std::set<std::string> names; // names of the meshes that were set
+    std::set<part_key> keys; // keys of the parts that were set
 };
 
 } // namespace
 
 struct insitu_vtk_adaptor {
     insitu_session *session = nullptr;
-    std::map<std::string, std::map<std::string, mesh_part>>
-        parts; // mesh parts, by the name given to insitu_vtk_set() and the mesh's name
+    std::map<std::string, part_map> parts; // mesh parts, by the name given to insitu_vtk_set()
     std::string error, copied_why, cells_why, warnings;
 };
 
 namespace
 {
+
+constexpr size_t longest_list = 160; // bytes of the fields' names in a mesh's name, which has at most 255
 
 constexpr unsigned char hiding_bits =
     vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
@@ -231,27 +239,38 @@ void check(insitu_vtk_adaptor *adaptor, insitu_status status)
     if (status != INSITU_OK) throw failure{status, insitu_error(adaptor->session)};
 }
 
-void set_part(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
-              mesh_part &&new_part, set_result &out)
+insitu_status set_mesh(insitu_vtk_adaptor *adaptor, const part_key &key, const insitu_mesh *mesh)
+{
+    if (key.second == whole_mesh) return insitu_set_mesh(adaptor->session, key.first.c_str(), mesh);
+    return insitu_set_block(adaptor->session, key.first.c_str(), key.second, mesh);
+}
+
+insitu_status set_field(insitu_vtk_adaptor *adaptor, const part_key &key, const insitu_field *field)
+{
+    if (key.second == whole_mesh) return insitu_set_field(adaptor->session, key.first.c_str(), field);
+    return insitu_set_block_field(adaptor->session, key.first.c_str(), key.second, field);
+}
+
+void set_part(insitu_vtk_adaptor *adaptor, part_map &parts, const part_key &key, mesh_part &&new_part, set_result &out)
 {
     if (new_part.mesh.cell_count == 0) return;
-    out.names.insert(name);
-    mesh_part &kept = parts[name];
-    check(adaptor, insitu_set_mesh(adaptor->session, name.c_str(), &new_part.mesh));
+    out.keys.insert(key);
+    mesh_part &kept = parts[key];
+    check(adaptor, set_mesh(adaptor, key, &new_part.mesh));
     kept = std::move(new_part);
     out.meshes++;
     for (const insitu_field &field : kept.fields) {
-        check(adaptor, insitu_set_field(adaptor->session, name.c_str(), &field));
+        check(adaptor, set_field(adaptor, key, &field));
         out.fields++;
     }
 }
 
-void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
-              vtkUnstructuredGrid *grid, set_result &out)
+void set_leaf(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkUnstructuredGrid *grid,
+              set_result &out)
 {
     mesh_part new_part;
     make_mesh_part(grid, name, out, new_part);
-    set_part(adaptor, parts, name, std::move(new_part), out);
+    set_part(adaptor, parts, {name, whole_mesh}, std::move(new_part), out);
 }
 
 /* Reports the bytes of the lists that insitu_vtk_make_grid() allocated for data. */
@@ -275,65 +294,96 @@ void log_made_lists(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::stri
         log.copied(what + " ghosts", "cells with hidden points, or refined, flagged", grid->GetNumberOfCells());
 }
 
-/* Sets a data set that is not an unstructured grid. flags, unless null, replace its ghost flags. */
-void set_converted(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
-                   vtkDataSet *data, vtkUnsignedCharArray *flags, set_result &out)
+/* Sets a data set that is neither structured nor an unstructured grid. */
+void set_converted(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkDataSet *data,
+                   set_result &out)
 {
-    vtkSmartPointer<vtkDataSet> flagged = data;
-    if (flags) {
-        flagged = vtkSmartPointer<vtkDataSet>::Take(data->NewInstance());
-        flagged->ShallowCopy(data);
-        flagged->GetCellData()->AddArray(flags);
-    }
-    mesh_part new_part;
-    if (make_lattice_part(flagged, name, out, new_part)) {
-        if (flags)
-            out.log.copied("mesh '" + name + "' ghosts", "cells that are hidden or refined, flagged",
-                           new_part.mesh.cell_count);
-        set_part(adaptor, parts, name, std::move(new_part), out);
-        return;
-    }
-    const auto grid = vtkSmartPointer<vtkUnstructuredGrid>::Take(insitu_vtk_make_grid(flagged));
+    const auto grid = vtkSmartPointer<vtkUnstructuredGrid>::Take(insitu_vtk_make_grid(data));
     log_made_lists(grid, data, "mesh '" + name + "'", out.log);
     set_leaf(adaptor, parts, name, grid, out);
 }
 
-/* Sets the leaf of a composite at the iterator, unless it is an unstructured grid. */
-void set_converted_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
-                        vtkCompositeDataSet *composite, vtkCompositeDataIterator *it, set_result &out)
+/* Returns the name of the mesh whose blocks are the structured leaves that have the same fields as this one, and as
+ * many dimensions. Leaves with other fields cannot be blocks of the same mesh. The name must not depend on other
+ * leaves, because these may be on other ranks. */
+std::string name_of_blocks(const std::string &name, const mesh_part &p)
 {
-    auto *data = vtkDataSet::SafeDownCast(it->GetCurrentDataObject());
-    auto *amr = vtkOverlappingAMR::SafeDownCast(composite);
-    auto *at = vtkUniformGridAMRDataIterator::SafeDownCast(it);
-    vtkSmartPointer<vtkUnsignedCharArray> flags;
-    if (amr && at)
-        flags =
-            make_refined_flags(amr, at->GetCurrentLevel(), at->GetCurrentIndex(), data, "mesh '" + name + "'", out.log);
-    set_converted(adaptor, parts, name, data, flags, out);
+    std::set<std::string> fields;
+    for (const insitu_field &field : p.fields) fields.insert(field.name);
+    std::string list;
+    for (const std::string &field : fields) list += (list.empty() ? " of " : ", ") + field;
+    if (list.size() > longest_list)
+        list = list.substr(0, longest_list) + "... " + std::to_string(std::hash<std::string>()(list));
+    return name + (p.mesh.cell_type == INSITU_QUAD ? "/flat blocks" : "/blocks") + list;
+}
+
+/* A composite data set while its leaves are set. */
+struct composite_state {
+    vtkCompositeDataSet *data;
+    vtkCompositeDataIterator *it;
+    amr_refinements refinements; // of the levels of overlapping AMR
+};
+
+/* Describes the position of a grid of overlapping AMR. */
+void place_amr_grid(const composite_state &composite, const std::string &what, conversion_log &log,
+                    insitu_lattice &lattice)
+{
+    auto *amr = vtkOverlappingAMR::SafeDownCast(composite.data);
+    auto *at = vtkUniformGridAMRDataIterator::SafeDownCast(composite.it);
+    if (!amr || !at) return;
+    if (!place_on_level(amr, composite.refinements, at->GetCurrentLevel(), at->GetCurrentIndex(), lattice))
+        log.warn(what + ": the AMR's boxes, spacings or ratios are not set, do not fit each other, or are not those of "
+                        "its grids: only ghost flags tell which of its cells are refined");
+}
+
+/* Sets a structured leaf as a block. Returns false if the leaf is not structured. */
+bool set_block(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, int64_t number,
+               const composite_state &composite, vtkDataSet *leaf, set_result &out)
+{
+    mesh_part new_part;
+    if (!make_lattice_part(leaf, name + "/" + std::to_string(number), out, new_part)) return false;
+    place_amr_grid(composite, "mesh '" + name + "[" + std::to_string(number) + "]'", out.log, *new_part.lattice);
+    const bool is_amr = vtkOverlappingAMR::SafeDownCast(composite.data);
+    const std::string mesh = is_amr ? name : name_of_blocks(name, new_part);
+    set_part(adaptor, parts, {mesh, number}, std::move(new_part), out);
+    return true;
 }
 
 /* Sets every leaf. Empty leaves are counted, so that a leaf has the same number on all ranks. */
-void set_leaves(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
-                vtkCompositeDataSet *composite, set_result &out)
+void set_leaves(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkCompositeDataSet *data,
+                set_result &out)
 {
-    const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(data->NewIterator());
+    auto *amr = vtkOverlappingAMR::SafeDownCast(data);
+    const composite_state composite = {data, it, amr ? find_refinements(amr) : amr_refinements()};
     it->SkipEmptyNodesOff();
     int64_t number = 0;
     for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem(), number++) {
         vtkDataObject *leaf = it->GetCurrentDataObject();
         if (!leaf) continue;
         const std::string leaf_name = name + "/" + std::to_string(number);
+        auto *leaf_data = vtkDataSet::SafeDownCast(leaf);
         if (auto *grid = vtkUnstructuredGrid::SafeDownCast(leaf))
             set_leaf(adaptor, parts, leaf_name, grid, out);
-        else if (vtkDataSet::SafeDownCast(leaf))
-            set_converted_leaf(adaptor, parts, leaf_name, composite, it, out);
-        else
+        else if (!leaf_data)
             out.log.warn("mesh '" + leaf_name + "': a " + leaf->GetClassName() + " is not drawn");
+        else if (!set_block(adaptor, parts, name, number, composite, leaf_data, out))
+            set_converted(adaptor, parts, leaf_name, leaf_data, out);
     }
 }
 
-void set_data(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts, const std::string &name,
-              vtkDataObject *data, set_result &out)
+/* Sets a data set that is not an unstructured grid. */
+void set_other(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkDataSet *data, set_result &out)
+{
+    mesh_part new_part;
+    if (make_lattice_part(data, name, out, new_part))
+        set_part(adaptor, parts, {name, whole_mesh}, std::move(new_part), out);
+    else
+        set_converted(adaptor, parts, name, data, out);
+}
+
+void set_data(insitu_vtk_adaptor *adaptor, part_map &parts, const std::string &name, vtkDataObject *data,
+              set_result &out)
 {
     if (!data) return;
     if (auto *grid = vtkUnstructuredGrid::SafeDownCast(data))
@@ -341,22 +391,25 @@ void set_data(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &par
     else if (auto *composite = vtkCompositeDataSet::SafeDownCast(data))
         set_leaves(adaptor, parts, name, composite, out);
     else if (auto *other = vtkDataSet::SafeDownCast(data))
-        set_converted(adaptor, parts, name, other, nullptr, out);
+        set_other(adaptor, parts, name, other, out);
     else
         throw failure{INSITU_ERROR_ARGUMENT, "mesh '" + name + "': a " + data->GetClassName() +
                                                  " is not taken, expected a vtkDataSet or a composite of them"};
 }
 
-/* Removes the meshes that an earlier call set and this one did not. */
-void remove_meshes_not_set(insitu_vtk_adaptor *adaptor, std::map<std::string, mesh_part> &parts,
-                           const std::set<std::string> &names)
+/* Removes the parts that an earlier call set and this one did not. A whole mesh of which there are blocks now has been
+ * replaced by them, so that nothing must be removed from the session. */
+void remove_parts_not_set(insitu_vtk_adaptor *adaptor, part_map &parts, const std::set<part_key> &keys)
 {
     for (auto it = parts.begin(); it != parts.end();) {
-        if (names.count(it->first) > 0) {
+        const part_key &key = it->first;
+        const auto blocks = keys.upper_bound({key.first, whole_mesh});
+        const bool is_replaced = key.second == whole_mesh && blocks != keys.end() && blocks->first == key.first;
+        if (keys.count(key) > 0) {
             ++it;
             continue;
         }
-        check(adaptor, insitu_set_mesh(adaptor->session, it->first.c_str(), nullptr));
+        if (!is_replaced) check(adaptor, set_mesh(adaptor, key, nullptr));
         it = parts.erase(it);
     }
 }
@@ -364,9 +417,9 @@ void remove_meshes_not_set(insitu_vtk_adaptor *adaptor, std::map<std::string, me
 void set_all(insitu_vtk_adaptor *adaptor, const char *name, vtkDataObject *data, set_result &out)
 {
     if (!name || !name[0]) throw failure{INSITU_ERROR_ARGUMENT, "insitu_vtk_set: a mesh needs a name"};
-    std::map<std::string, mesh_part> &parts = adaptor->parts[name];
+    part_map &parts = adaptor->parts[name];
     set_data(adaptor, parts, name, data, out);
-    remove_meshes_not_set(adaptor, parts, out.names);
+    remove_parts_not_set(adaptor, parts, out.keys);
     if (out.cells_set == 0 && out.cells.not_drawn > 0)
         throw failure{INSITU_ERROR_MESH, "mesh '" + std::string(name) + "': none of its " +
                                              std::to_string(out.cells.not_drawn) +
@@ -450,7 +503,7 @@ void insitu_vtk_destroy(insitu_vtk_adaptor **adaptor)
 {
     if (!adaptor || !*adaptor) return;
     for (const auto &[name, parts] : (*adaptor)->parts)
-        for (const auto &[mesh, held] : parts) (void)insitu_set_mesh((*adaptor)->session, mesh.c_str(), nullptr);
+        for (const auto &[key, held] : parts) (void)set_mesh(*adaptor, key, nullptr);
     delete *adaptor;
     *adaptor = nullptr;
 }

@@ -1,26 +1,31 @@
-/* Finds the cells of overlapping AMR that are covered by finer levels, from the boxes of the levels. */
+/* The levels of overlapping AMR as levels of refinement of one mesh. */
 #ifndef VTK_AMR_H
 #define VTK_AMR_H
 
-#include <string>
+#include <array>
+#include <cstdint>
+#include <vector>
 
-#include <vtkSmartPointer.h>
+#include "insitu/insitu.h"
 
-#include "vtk_arrays.h"
-
-class vtkDataSet;
 class vtkOverlappingAMR;
-class vtkUnsignedCharArray;
 
 namespace insitu_vtk
 {
 
-/* Returns the ghost flags of data, the grid with this number in its level, with REFINEDCELL set in cells that a box of
- * the next level covers, as vtkAMRUtilities::BlankCells() does. Returns null if no box covers any. If the boxes do not
- * match data, adds a warning to log. amr and data do not change. */
-vtkSmartPointer<vtkUnsignedCharArray> make_refined_flags(vtkOverlappingAMR *amr, unsigned level, unsigned number,
-                                                         vtkDataSet *data, const std::string &what,
-                                                         conversion_log &log);
+/* For each level, the number of its cells that make one cell of level 0 along each axis. */
+using amr_refinements = std::vector<std::array<int64_t, 3>>;
+
+/* Finds the refinement of each level. Returns an empty list if boxes, spacings or ratios are not set, or if a box
+ * begins or ends within a cell of the next coarser level. The result is the same on all ranks, because VTK requires
+ * these data on every rank. */
+amr_refinements find_refinements(vtkOverlappingAMR *amr);
+
+/* Describes the lattice of a grid as a part of its level: the origin is that of the AMR, `first` that of the grid's
+ * box, and the refinement is set if there are several levels. Returns false without changes if the box is not that of
+ * the grid. */
+bool place_on_level(vtkOverlappingAMR *amr, const amr_refinements &refinements, unsigned level, unsigned number,
+                    insitu_lattice &lattice);
 
 } // namespace insitu_vtk
 

@@ -11,9 +11,14 @@
  *     insitu_destroy(&session);
  *
  * The adaptor accepts all vtkDataSets (unstructured, curvilinear and rectilinear grids, images, polygonal data) and
- * composite data sets of them (multiblock, partitioned data set collections, AMR). The leaves of a composite become the
- * meshes "name/0", "name/1", ..., numbered in the order of VTK's iterator including empty leaves. All numeric point and
- * cell arrays become fields.
+ * composite data sets of them (multiblock, partitioned data set collections, AMR). All numeric point and cell arrays
+ * become fields.
+ *
+ * The leaves of a composite are numbered in the order of VTK's iterator, including empty leaves. Images, rectilinear
+ * and curvilinear grids become blocks of one mesh (insitu_set_block), so that there is no seam between them. For
+ * overlapping AMR this mesh is called name. For other composites, those with the fields a and b become blocks of
+ * "name/blocks of a, b", or of "name/flat blocks of a, b" if they have two dimensions. All other leaves become the
+ * meshes "name/0", "name/1", ....
  *
  * Points are borrowed if they are float or double, interleaved (AOS) or with separate components (SOA); others are
  * copied to double.
@@ -37,9 +42,11 @@
  * Cells that vtkGhostType flags as duplicate, hidden or refined are not drawn, nor are cells of structured grids with a
  * hidden point, nor cells whose avtGhostZones (VisIt) is not 0. Flags that are bytes are borrowed, others copied.
  *
- * Of overlapping AMR, cells within a box of the next level are not drawn, whether or not vtkAMRUtilities::BlankCells()
- * has flagged them, and whichever rank holds the finer grid. Boxes, and spacings or ratios, must be set for all levels
- * on every rank, as VTK requires; a warning is reported if they do not match the grids.
+ * The levels of overlapping AMR become levels of refinement (insitu_lattice): cells within a box of a finer level are
+ * not drawn, whichever rank holds the finer grid, and values are continuous between levels. Boxes, and spacings or
+ * ratios, must be set for all levels on every rank, as VTK requires, and boxes must end at borders of coarser cells. If
+ * they do not match each other or the grids, a warning is reported, and only ghost flags hide cells, such as those that
+ * vtkAMRUtilities::BlankCells() sets. All grids must have the same fields.
  *
  * No function throws exceptions or changes a data set. */
 #ifndef INSITU_VTK_H
@@ -55,7 +62,7 @@ typedef struct insitu_vtk_adaptor insitu_vtk_adaptor;
 
 /* The report of insitu_vtk_set() on one data set, on this rank. */
 typedef struct insitu_vtk_report {
-    int meshes;              /* number of meshes set: 1, or that of the leaves with cells to draw */
+    int meshes;              /* number of meshes and blocks set: 1, or that of the leaves with cells */
     int fields;              /* number of fields set, over all meshes */
     int64_t cells;           /* number of cells set, including ghosts */
     int64_t cells_split;     /* number of cells split into several; currently always 0 */
