@@ -73,6 +73,12 @@ insitu_add_long_test(vtk_formats_cut_often
 set_tests_properties(vtk_formats vtk_formats_cut_often PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300)
 
+add_executable(test_vtk_structured test_vtk_structured.cpp)
+target_link_libraries(test_vtk_structured PRIVATE test_vtk_run insitu_render_files insitu_quick_flags PkgConfig::CMOCKA VTK::IOXML)
+insitu_add_split_test(vtk_structured $<TARGET_FILE:test_vtk_structured> ${plain}/bin/insitu-render ${MPIEXEC_EXECUTABLE})
+set_tests_properties(vtk_structured vtk_structured_whole PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
+set_tests_properties(vtk_structured PROPERTIES TIMEOUT 300)
+
 add_executable(test_vtk_tool test_vtk_tool.cpp)
 target_link_libraries(test_vtk_tool PRIVATE test_vtk_run insitu_quick_flags PkgConfig::CMOCKA VTK::IOLegacy VTK::IOXML)
 add_test(NAME vtk_tool COMMAND test_vtk_tool $<TARGET_FILE:insitu-render> ${plain}/bin/insitu-render

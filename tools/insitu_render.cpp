@@ -197,15 +197,15 @@ std::string milliseconds(double ms)
     return text;
 }
 
-/* Returns the line that describes the step: cells are summed over ranks, and times are the maximum over ranks.
- * Collective. */
+/* Returns the line that describes the step: cells that are not hidden are summed over ranks, and times are the maximum
+ * over ranks. Collective. */
 std::string step_line(const rank_info &w, const insitu_report &r, const std::string &name, double time, double read_ms)
 {
     const char *const names[] = {"prepare", "build", "refit", "surface", "volume", "composite", "write"};
     double times[9] = {r.prepare_ms,   r.build_ms, r.refit_ms, r.surface_ms, r.volume_ms,
                        r.composite_ms, r.write_ms, r.total_ms, read_ms};
     MPI_Allreduce(MPI_IN_PLACE, times, 9, MPI_DOUBLE, MPI_MAX, w.comm);
-    int64_t cells = r.cells;
+    int64_t cells = r.cells - r.cells_ghost;
     MPI_Allreduce(MPI_IN_PLACE, &cells, 1, MPI_INT64_T, MPI_SUM, w.comm);
     std::ostringstream line;
     line << name << "  cycle " << r.cycle << "  time " << time << "  " << cells << " cells  read "
@@ -269,7 +269,7 @@ data_extent find_extent(const rank_info &w, step_source &source, const std::stri
     data_extent extent;
     run_on_all_ranks(w, [&] {
         for (size_t i = 0; i < source.count(); i++)
-            if (const auto data = source.read(i).data) add_extent(data, field, extent);
+            if (const auto data = source.read(i).data) add_extent(grids_of(data, source.name(i)), field, extent);
     });
     MPI_Allreduce(MPI_IN_PLACE, extent.low, 4, MPI_DOUBLE, MPI_MIN, w.comm);
     MPI_Allreduce(MPI_IN_PLACE, extent.high, 4, MPI_DOUBLE, MPI_MAX, w.comm);

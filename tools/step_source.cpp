@@ -1,5 +1,6 @@
 /* If a step has at least as many parts (the pieces of a .pvtu, the blocks of a .vtm, the files of --pieces) as there
- * are ranks, each rank reads some parts completely. Otherwise, and for any partition other than blocks, every rank
+ * are ranks, each rank reads some parts completely. Of one structured grid, each rank reads a part of the extent.
+ * Otherwise, and for any partition other than blocks, every rank
  * reads everything and keeps its own cells. */
 #include "step_source.h"
 
@@ -86,7 +87,7 @@ vtkSmartPointer<vtkDataObject> step_source::read_pieces(std::string &warnings)
     for (int64_t f = 0; f < files; f++) {
         if (keeps_whole_files() && f * ranks_ / files != rank_) continue;
         const auto file = static_cast<size_t>(f);
-        all->SetBlock(static_cast<unsigned>(f), grids_of(open(file).read(0, 0, 1), options_.files[file]));
+        all->SetBlock(static_cast<unsigned>(f), drawable_data_of(open(file).read(0, 0, 1), options_.files[file]));
         warnings += open(file).take_warnings();
     }
     if (keeps_whole_files()) return all;
@@ -109,8 +110,9 @@ step_source::result step_source::read(size_t index)
     const auto data = is_by_pieces ? file.read(s.inside, rank_, ranks_) : file.read(s.inside, 0, 1);
     r.warnings += file.take_warnings();
     r.time = s.inside < file.times().size() ? file.times()[s.inside] : time_of(data, fallback);
-    const auto grids = grids_of(data, file.step_path(s.inside));
-    r.data = is_by_pieces ? grids : distribute_cells(grids, options_.how, rank_, ranks_);
+    if (!data) return r;
+    const auto drawable = drawable_data_of(data, file.step_path(s.inside));
+    r.data = is_by_pieces ? drawable : distribute_cells(drawable, options_.how, rank_, ranks_);
     return r;
 }
 

@@ -7,13 +7,24 @@
 #include <cstdint>
 #include <vector>
 
+#include <vtkAMRInformation.h>
 #include <vtkBoundingBox.h>
+#include <vtkCellData.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
+#include <vtkDataSetAttributes.h>
+#include <vtkFieldData.h>
+#include <vtkIdList.h>
 #include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkOverlappingAMR.h>
+#include <vtkUniformGrid.h>
+#include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
 #include "cell_extract.h"
+#include "extent_parts.h"
+#include "insitu/vtk_grids.h"
 
 namespace render_tool
 {
@@ -43,7 +54,7 @@ class owner
     {
     }
 
-    int of(vtkUnstructuredGrid *grid, vtkIdType cell, int64_t number) const
+    int of(vtkDataSet *grid, vtkIdType cell, int64_t number) const
     {
         const auto ranks = static_cast<uint64_t>(ranks_);
         switch (how_) {
@@ -54,15 +65,15 @@ class owner
     }
 
   private:
-    uint64_t square(vtkUnstructuredGrid *grid, vtkIdType cell) const
+    uint64_t square(vtkDataSet *grid, vtkIdType cell) const
     {
-        vtkIdType count = 0;
-        const vtkIdType *points = nullptr;
-        grid->GetCellPoints(cell, count, points);
+        vtkNew<vtkIdList> points;
+        grid->GetCellPoints(cell, points);
+        const vtkIdType count = points->GetNumberOfIds();
         uint64_t sum = 0;
         for (int axis = 0; axis < 3; axis++) {
             double centre = 0;
-            for (vtkIdType i = 0; i < count; i++) centre += grid->GetPoint(points[i])[axis];
+            for (vtkIdType i = 0; i < count; i++) centre += grid->GetPoint(points->GetId(i))[axis];
             const double length = bounds_.GetLength(axis);
             if (count == 0 || !(length > 0)) continue;
             const double at = (centre / static_cast<double>(count) - bounds_.GetMinPoint()[axis]) / length * 8;
@@ -94,7 +105,7 @@ int64_t number_cells(std::vector<leaf> &leaves, vtkBoundingBox &bounds)
     int64_t count = 0;
     for (leaf &l : leaves) {
         l.first_cell = count;
-        auto *grid = vtkUnstructuredGrid::SafeDownCast(l.data);
+        auto *grid = vtkDataSet::SafeDownCast(l.data);
         if (!grid || grid->GetNumberOfCells() == 0) continue;
         count += grid->GetNumberOfCells();
         bounds.AddBounds(grid->GetBounds());
@@ -111,6 +122,78 @@ vtkSmartPointer<vtkDataObject> extract_part(vtkUnstructuredGrid *grid, int64_t f
     if (mine.empty()) return nullptr;
     if (static_cast<vtkIdType>(mine.size()) == grid->GetNumberOfCells()) return grid;
     return extract_cells(grid, mine);
+}
+
+/* Returns a copy of a structured grid in which the cells of other ranks are hidden, or null if this rank has none. */
+vtkSmartPointer<vtkDataObject> hide_others(vtkDataSet *grid, int64_t first_cell, const owner &owners, int rank)
+{
+    const vtkIdType count = grid->GetNumberOfCells();
+    const auto given = vtkSmartPointer<vtkUnsignedCharArray>::Take(insitu_vtk_ghost_flags(grid->GetCellData(), count));
+    vtkNew<vtkUnsignedCharArray> flags;
+    flags->SetName(vtkDataSetAttributes::GhostArrayName());
+    flags->SetNumberOfValues(count);
+    vtkIdType mine = 0;
+    for (vtkIdType i = 0; i < count; i++) {
+        const bool is_mine = owners.of(grid, i, first_cell + i) == rank;
+        const unsigned flag = given ? given->GetValue(i) : 0;
+        mine += is_mine;
+        flags->SetValue(i, static_cast<unsigned char>(is_mine ? flag : flag | vtkDataSetAttributes::HIDDENCELL));
+    }
+    if (mine == 0) return nullptr;
+    if (mine == count) return grid;
+    auto copy = vtkSmartPointer<vtkDataSet>::Take(grid->NewInstance());
+    copy->ShallowCopy(grid);
+    copy->GetCellData()->AddArray(flags);
+    return copy;
+}
+
+/* How data is distributed. */
+struct deal {
+    const owner &owners;
+    partition how;
+    int rank, ranks;
+    int64_t cells;
+};
+
+/* Returns this rank's part of a leaf. */
+vtkSmartPointer<vtkDataObject> part_of_leaf(const leaf &l, const deal &d)
+{
+    extent whole, part;
+    if (auto *grid = vtkUnstructuredGrid::SafeDownCast(l.data))
+        return extract_part(grid, l.first_cell, d.owners, d.rank);
+    if (!find_extent(l.data, whole)) return d.rank == 0 ? l.data : nullptr;
+    auto *grid = vtkDataSet::SafeDownCast(l.data);
+    if (d.how != partition::block) return hide_others(grid, l.first_cell, d.owners, d.rank);
+    if (!part_of_extent(whole, {l.first_cell, cells_of_extent(whole), d.cells}, d.rank, d.ranks, part)) return nullptr;
+    if (part == whole) return grid;
+    return crop(grid, part);
+}
+
+/* Distributes the grids of overlapping AMR. The boxes of all levels stay on all ranks. */
+vtkSmartPointer<vtkDataObject> part_of_amr(vtkOverlappingAMR *amr, const std::vector<leaf> &leaves, const deal &d)
+{
+    std::vector<int> counts;
+    for (unsigned level = 0; level < amr->GetNumberOfLevels(); level++)
+        counts.push_back(static_cast<int>(amr->GetNumberOfDataSets(level)));
+    auto part = vtkSmartPointer<vtkOverlappingAMR>::New();
+    part->Initialize(static_cast<int>(counts.size()), counts.data());
+    part->SetAMRInfo(amr->GetAMRInfo());
+    part->SetFieldData(amr->GetFieldData());
+    size_t number = 0;
+    for (unsigned level = 0; level < amr->GetNumberOfLevels(); level++)
+        for (unsigned i = 0; i < amr->GetNumberOfDataSets(level); i++, number++) {
+            const leaf &l = leaves[number];
+            auto *grid = vtkUniformGrid::SafeDownCast(l.data);
+            if (!grid) continue;
+            const int64_t middle = l.first_cell + grid->GetNumberOfCells() / 2;
+            vtkSmartPointer<vtkDataObject> mine;
+            if (d.how != partition::block)
+                mine = hide_others(grid, l.first_cell, d.owners, d.rank);
+            else if (middle * d.ranks / d.cells == d.rank)
+                mine = grid;
+            if (mine) part->SetDataSet(level, i, vtkUniformGrid::SafeDownCast(mine));
+        }
+    return part;
 }
 
 } // namespace
@@ -133,17 +216,14 @@ vtkSmartPointer<vtkDataObject> distribute_cells(vtkDataObject *data, partition h
     if (!data || ranks == 1) return data;
     std::vector<leaf> leaves = list_leaves(data);
     vtkBoundingBox bounds;
-    const int64_t cells = number_cells(leaves, bounds);
-    const owner owners(how, ranks, std::max<int64_t>(cells, 1), bounds);
-    auto part = [&](const leaf &l) -> vtkSmartPointer<vtkDataObject> {
-        if (auto *grid = vtkUnstructuredGrid::SafeDownCast(l.data))
-            return extract_part(grid, l.first_cell, owners, rank);
-        return rank == 0 ? l.data : nullptr;
-    };
-    if (!vtkCompositeDataSet::SafeDownCast(data)) return part(leaves[0]);
+    const int64_t cells = std::max<int64_t>(number_cells(leaves, bounds), 1);
+    const owner owners(how, ranks, cells, bounds);
+    const deal d = {owners, how, rank, ranks, cells};
+    if (auto *amr = vtkOverlappingAMR::SafeDownCast(data)) return part_of_amr(amr, leaves, d);
+    if (!vtkCompositeDataSet::SafeDownCast(data)) return part_of_leaf(leaves[0], d);
     auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
     all->SetNumberOfBlocks(static_cast<unsigned>(leaves.size()));
-    for (size_t i = 0; i < leaves.size(); i++) all->SetBlock(static_cast<unsigned>(i), part(leaves[i]));
+    for (size_t i = 0; i < leaves.size(); i++) all->SetBlock(static_cast<unsigned>(i), part_of_leaf(leaves[i], d));
     return all;
 }
 

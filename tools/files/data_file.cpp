@@ -2,7 +2,9 @@
  * reader returns zeros for data missing at the end of a file, the length of the file is checked first. */
 #include "data_file.h"
 
+#include <algorithm>
 #include <cerrno>
+#include <climits>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -24,6 +26,7 @@
 #ifdef INSITU_VTK_EXODUS
 #include "exodus_reader.h"
 #endif
+#include "extent_parts.h"
 #include "file_kinds.h"
 #include "file_length.h"
 #ifdef INSITU_VTK_HDF
@@ -75,6 +78,11 @@ class vtk_file : public data_file
         if (!times_.empty()) warnings() = exodus_warnings(path, reader_);
 #endif
         if (kind.piece_tag) pieces_ = count_tags(path, kind.piece_tag);
+        if (kind.has_extents && info && info->Has(pipeline::WHOLE_EXTENT())) {
+            info->Get(pipeline::WHOLE_EXTENT(), whole_.data());
+            cells_ = cells_of_extent(whole_);
+            pieces_ = static_cast<int>(std::clamp<int64_t>(cells_, 1, INT_MAX));
+        }
     }
 
     const std::vector<double> &times() const override
@@ -92,7 +100,12 @@ class vtk_file : public data_file
     vtkSmartPointer<vtkDataObject> read(size_t step, int piece, int pieces) override
     {
         const quiet_stderr quiet;
-        if (step < times_.size())
+        extent part;
+        const bool is_extent = cells_ > 0;
+        if (is_extent && !part_of_extent(whole_, {0, cells_, cells_}, piece, pieces, part)) return nullptr;
+        if (is_extent)
+            reader_->UpdateExtent(part.data());
+        else if (step < times_.size())
             reader_->UpdateTimeStep(times_[step], piece, pieces);
         else
             reader_->UpdatePiece(piece, pieces, 0);
@@ -110,6 +123,8 @@ class vtk_file : public data_file
     vtkSmartPointer<vtkAlgorithm> reader_;
     std::vector<double> times_;
     int pieces_ = 1;
+    extent whole_{};    // of a structured grid
+    int64_t cells_ = 0; // number of its cells; 0 for other files
 };
 
 /* A .vtu file without points and cells. VTK's reader reports an error if the lists of points and cells are missing in

@@ -104,40 +104,40 @@ const std::vector<file_kind> &file_kinds()
 {
     constexpr bool no = false, yes = true;
     static const std::vector<file_kind> kinds = {
-        {".vtu", make_plain<vtkXMLUnstructuredGridReader>, no, no, nullptr},
-        {".pvtu", nullptr, no, no, nullptr},
-        {".vti", make_plain<vtkXMLImageDataReader>, no, no, nullptr},
-        {".pvti", make_plain<vtkXMLPImageDataReader>, no, yes, nullptr},
-        {".vtr", make_plain<vtkXMLRectilinearGridReader>, no, no, nullptr},
-        {".pvtr", make_plain<vtkXMLPRectilinearGridReader>, no, yes, nullptr},
-        {".vtp", make_plain<vtkXMLPolyDataReader>, no, no, nullptr},
-        {".vts", make_plain<vtkXMLStructuredGridReader>, no, no, nullptr},
-        {".pvts", make_plain<vtkXMLPStructuredGridReader>, no, yes, nullptr},
-        {".vtm", make_plain<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet"},
-        {".vtmb", make_plain<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet"},
-        {".vtpc", make_plain<vtkXMLPartitionedDataSetCollectionReader>, no, yes, nullptr},
-        {".vthb", make_amr, no, yes, nullptr},
-        {".vtk", make_legacy, no, no, nullptr},
-        {".pvd", nullptr, yes, no, nullptr},
-        {".series", nullptr, yes, no, nullptr},
+        {".vtu", make_plain<vtkXMLUnstructuredGridReader>, no, no, nullptr, no},
+        {".pvtu", nullptr, no, no, nullptr, no},
+        {".vti", make_plain<vtkXMLImageDataReader>, no, no, nullptr, yes},
+        {".pvti", make_plain<vtkXMLPImageDataReader>, no, yes, nullptr, yes},
+        {".vtr", make_plain<vtkXMLRectilinearGridReader>, no, no, nullptr, yes},
+        {".pvtr", make_plain<vtkXMLPRectilinearGridReader>, no, yes, nullptr, yes},
+        {".vtp", make_plain<vtkXMLPolyDataReader>, no, no, nullptr, no},
+        {".vts", make_plain<vtkXMLStructuredGridReader>, no, no, nullptr, yes},
+        {".pvts", make_plain<vtkXMLPStructuredGridReader>, no, yes, nullptr, yes},
+        {".vtm", make_plain<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet", no},
+        {".vtmb", make_plain<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet", no},
+        {".vtpc", make_plain<vtkXMLPartitionedDataSetCollectionReader>, no, yes, nullptr, no},
+        {".vthb", make_amr, no, yes, nullptr, no},
+        {".vtk", make_legacy, no, no, nullptr, no},
+        {".pvd", nullptr, yes, no, nullptr, no},
+        {".series", nullptr, yes, no, nullptr, no},
 #ifdef INSITU_VTK_HDF
-        {".vtkhdf", make_plain<vtkHDFReader>, yes, no, nullptr},
+        {".vtkhdf", make_plain<vtkHDFReader>, yes, no, nullptr, no},
 #endif
 #ifdef INSITU_VTK_EXODUS
-        {".ex2", make_exodus, yes, no, nullptr},
-        {".exo", make_exodus, yes, no, nullptr},
-        {".exii", make_exodus, yes, no, nullptr},
-        {".e", make_exodus, yes, no, nullptr},
-        {".g", make_exodus, yes, no, nullptr},
+        {".ex2", make_exodus, yes, no, nullptr, no},
+        {".exo", make_exodus, yes, no, nullptr, no},
+        {".exii", make_exodus, yes, no, nullptr, no},
+        {".e", make_exodus, yes, no, nullptr, no},
+        {".g", make_exodus, yes, no, nullptr, no},
 #endif
 #ifdef INSITU_VTK_CGNS
-        {".cgns", make_cgns, yes, no, nullptr},
+        {".cgns", make_cgns, yes, no, nullptr, no},
 #endif
 #ifdef INSITU_VTK_ENSIGHT
-        {".case", make_ensight, yes, no, nullptr},
+        {".case", make_ensight, yes, no, nullptr, no},
 #endif
 #ifdef INSITU_VTK_OPENFOAM
-        {".foam", make_openfoam, yes, no, nullptr},
+        {".foam", make_openfoam, yes, no, nullptr, no},
 #endif
     };
     return kinds;

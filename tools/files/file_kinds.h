@@ -18,6 +18,7 @@ struct file_kind {
     bool may_hold_steps;
     bool names_files;      // the file references files in its folder, which the reader opens
     const char *piece_tag; // XML tag that occurs once for each piece that can be read separately
+    bool has_extents;      // the file is one structured grid, of which any part can be read
 };
 
 const std::vector<file_kind> &file_kinds();

@@ -1,5 +1,6 @@
 #include "grids_of.h"
 
+#include "extent_parts.h"
 #include "insitu/vtk_grids.h"
 
 #include <stdexcept>
@@ -35,6 +36,23 @@ vtkSmartPointer<vtkUnstructuredGrid> with_ghost_bytes(vtkUnstructuredGrid *grid)
     copy->GetCellData()->RemoveArray("avtGhostZones");
     copy->GetCellData()->AddArray(flags);
     return copy;
+}
+
+/* Returns the leaves of a composite as a multiblock, each converted by the function. */
+template <typename Convert>
+vtkSmartPointer<vtkDataObject> convert_leaves(vtkCompositeDataSet *composite, Convert convert)
+{
+    std::vector<vtkSmartPointer<vtkDataObject>> leaves;
+    const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    it->SkipEmptyNodesOff();
+    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem()) {
+        vtkDataObject *leaf = it->GetCurrentDataObject();
+        leaves.push_back(leaf ? convert(leaf) : nullptr);
+    }
+    auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
+    all->SetNumberOfBlocks(static_cast<unsigned>(leaves.size()));
+    for (size_t i = 0; i < leaves.size(); i++) all->SetBlock(static_cast<unsigned>(i), leaves[i]);
+    return all;
 }
 
 /* Converts a leaf to an unstructured grid. An object that is not a data set is returned unchanged. */
@@ -87,17 +105,22 @@ vtkSmartPointer<vtkDataObject> grids_of(vtkDataObject *data, const std::string &
     auto *composite = vtkCompositeDataSet::SafeDownCast(data);
     if (!composite) return grid_of(data, path);
     if (auto *amr = vtkOverlappingAMR::SafeDownCast(data)) vtkAMRUtilities::BlankCells(amr);
-    std::vector<vtkSmartPointer<vtkDataObject>> leaves;
-    const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
-    it->SkipEmptyNodesOff();
-    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem()) {
-        vtkDataObject *leaf = it->GetCurrentDataObject();
-        leaves.push_back(leaf ? grid_of(leaf, path) : nullptr);
-    }
-    auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
-    all->SetNumberOfBlocks(static_cast<unsigned>(leaves.size()));
-    for (size_t i = 0; i < leaves.size(); i++) all->SetBlock(static_cast<unsigned>(i), leaves[i]);
-    return all;
+    return convert_leaves(composite, [&](vtkDataObject *leaf) { return grid_of(leaf, path); });
+}
+
+vtkSmartPointer<vtkDataObject> drawable_data_of(vtkDataObject *data, const std::string &path)
+{
+    const auto convert = [&](vtkDataObject *leaf) -> vtkSmartPointer<vtkDataObject> {
+        extent whole;
+        if (find_extent(leaf, whole)) return leaf;
+        return grid_of(leaf, path);
+    };
+    auto *composite = vtkCompositeDataSet::SafeDownCast(data);
+    if (!composite) return convert(data);
+    auto *amr = vtkOverlappingAMR::SafeDownCast(data);
+    if (!amr) return convert_leaves(composite, convert);
+    vtkAMRUtilities::BlankCells(amr);
+    return amr;
 }
 
 } // namespace render_tool

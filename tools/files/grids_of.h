@@ -1,4 +1,4 @@
-/* Converts the contents of any file to unstructured grids, which can be distributed and drawn. */
+/* Converts the contents of any file to data sets that can be distributed and drawn. */
 #ifndef GRIDS_OF_H
 #define GRIDS_OF_H
 
@@ -18,6 +18,10 @@ namespace render_tool
  * flag. Unstructured grids are returned unchanged. Throws std::runtime_error, whose message begins with path, if a cell
  * refers to a point that does not exist. */
 vtkSmartPointer<vtkDataObject> grids_of(vtkDataObject *data, const std::string &path);
+
+/* Same as grids_of(), but images, rectilinear and curvilinear grids with cells of two or three dimensions stay as they
+ * are, and overlapping AMR does. Cells of AMR under a finer level get a ghost flag. */
+vtkSmartPointer<vtkDataObject> drawable_data_of(vtkDataObject *data, const std::string &path);
 
 /* Returns "", or a description of the first cell that lies outside the connectivity or refers to a point that does not
  * exist. */

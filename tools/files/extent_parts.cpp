@@ -1,0 +1,99 @@
+/* An extent is divided in two along its longest axis, and so on, as its ranks are divided in two. In this way the parts
+ * are compact, and parts of a file consist of long runs of its bytes: of axes of equal length, the slowest is cut. */
+#include "extent_parts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <vtkImageData.h>
+#include <vtkRectilinearGrid.h>
+#include <vtkStructuredGrid.h>
+
+namespace render_tool
+{
+
+namespace
+{
+
+int cells_along(const extent &of, size_t axis)
+{
+    return of[2 * axis + 1] - of[2 * axis];
+}
+
+size_t longest_axis(const extent &of)
+{
+    size_t longest = 2;
+    for (const size_t axis : {size_t{1}, size_t{0}})
+        if (cells_along(of, axis) > cells_along(of, longest)) longest = axis;
+    return longest;
+}
+
+/* The number of the first cell, among the total, of which the rank gets an equal share. */
+double first_of_rank(const cell_range &range, int rank, int ranks)
+{
+    return static_cast<double>(range.total) * rank / ranks;
+}
+
+} // namespace
+
+bool find_extent(vtkDataObject *data, extent &out)
+{
+    if (auto *image = vtkImageData::SafeDownCast(data))
+        image->GetExtent(out.data());
+    else if (auto *rectilinear = vtkRectilinearGrid::SafeDownCast(data))
+        rectilinear->GetExtent(out.data());
+    else if (auto *curvilinear = vtkStructuredGrid::SafeDownCast(data))
+        curvilinear->GetExtent(out.data());
+    else
+        return false;
+    return cells_of_extent(out) > 0;
+}
+
+int64_t cells_of_extent(const extent &whole)
+{
+    int64_t cells = 1;
+    int dimensions = 0;
+    for (size_t axis = 0; axis < 3; axis++) {
+        const int along = cells_along(whole, axis);
+        if (along < 0) return 0;
+        if (along == 0) continue;
+        cells *= along;
+        dimensions++;
+    }
+    return dimensions > 1 ? cells : 0;
+}
+
+bool part_of_extent(const extent &whole, const cell_range &range, int rank, int ranks, extent &part)
+{
+    int first = 0, end = ranks; // the ranks that share `part`
+    auto low = static_cast<double>(range.first), high = static_cast<double>(range.first + range.count);
+    part = whole;
+    while (end - first > 1) {
+        const int middle = (first + end) / 2;
+        const double border = std::clamp(first_of_rank(range, middle, ranks), low, high);
+        const size_t axis = longest_axis(part);
+        const double share = high > low ? (border - low) / (high - low) : 0;
+        const int cut = part[2 * axis] + static_cast<int>(std::lround(share * cells_along(part, axis)));
+        if (rank < middle) {
+            part[2 * axis + 1] = cut;
+            high = border;
+            end = middle;
+        } else {
+            part[2 * axis] = cut;
+            low = border;
+            first = middle;
+        }
+        if (cells_along(part, axis) == 0) return false;
+    }
+    return true;
+}
+
+vtkSmartPointer<vtkDataSet> crop(vtkDataSet *data, const extent &part)
+{
+    auto copy = vtkSmartPointer<vtkDataSet>::Take(data->NewInstance());
+    copy->ShallowCopy(data);
+    copy->Crop(part.data());
+    return copy;
+}
+
+} // namespace render_tool

@@ -1,0 +1,40 @@
+/* Divides structured data sets among ranks: by extents, so that no cells need to be listed. */
+#ifndef EXTENT_PARTS_H
+#define EXTENT_PARTS_H
+
+#include <array>
+#include <cstdint>
+
+#include <vtkSmartPointer.h>
+
+class vtkDataObject;
+class vtkDataSet;
+
+namespace render_tool
+{
+
+/* The first and the last point along each axis, as in VTK. */
+using extent = std::array<int, 6>;
+
+/* Returns true, and the extent, if data is an image, a rectilinear or a curvilinear grid with cells of two or three
+ * dimensions. */
+bool find_extent(vtkDataObject *data, extent &out);
+
+/* Returns the number of cells of two or three dimensions in the extent; 0 if it has fewer dimensions. */
+int64_t cells_of_extent(const extent &whole);
+
+/* A range of cells among all that are distributed. */
+struct cell_range {
+    int64_t first, count, total;
+};
+
+/* Finds the rank's part of an extent whose cells are this range. Each rank gets at most one part, in proportion to the
+ * cells of the range that fall to it if each rank gets an equal share of the total. Returns false if it gets none. */
+bool part_of_extent(const extent &whole, const cell_range &range, int rank, int ranks, extent &part);
+
+/* Copies the part of a structured data set. */
+vtkSmartPointer<vtkDataSet> crop(vtkDataSet *data, const extent &part);
+
+} // namespace render_tool
+
+#endif
