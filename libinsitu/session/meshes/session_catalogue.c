@@ -32,7 +32,7 @@ static size_t append_fault(char *text, size_t capacity, size_t at, const base_er
     return fault->status ? append_line(text, capacity, at, 'e', (int)fault->status, 0, fault->message) : at;
 }
 
-/* Properties that this rank's parts of a mesh have in common. */
+/* Properties that this rank's parts of a mesh share; they are written into its table. */
 typedef struct part_summary {
     bool is_given, has_cells, has_ids, is_refined;
     const base_error *problem; /* error of the first part that has one; NULL: no part has an error */
@@ -64,7 +64,7 @@ static const session_field *find_set_field(const session_mesh *part, const char 
     return index < 0 || part->fields[index].is_derived ? NULL : &part->fields[index];
 }
 
-/* Returns whether no earlier part has the field. The field is then listed with this part. */
+/* Returns whether the part is the first one that has the field; the table lists the field with this part. */
 static bool is_first_part_with(const session_parts *parts, int part, const session_field *field)
 {
     for (int i = 0; i < part; i++)
@@ -72,7 +72,7 @@ static bool is_first_part_with(const session_parts *parts, int part, const sessi
     return true;
 }
 
-/* Finds an error of a field on any part: its description is invalid, or it is not the same on all blocks. */
+/* Finds an error of a field on any part: its description is invalid, or differs between blocks. */
 static void find_field_problem(const session_parts *parts, const session_field *first, base_error *problem)
 {
     const insitu_field *as = &first->given;
@@ -163,7 +163,7 @@ static void hash_parts(const session_parts *parts, uint64_t *hash)
     }
 }
 
-/* An error that only some blocks have is part of the hash, because other ranks do not know of it. */
+/* An error that only some blocks have is part of the hash of names, because other ranks must be informed of it. */
 uint64_t session_names_hash(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -341,7 +341,7 @@ static session_catalogue_field *record_field(session_catalogue_mesh *mesh, bool 
     return field;
 }
 
-/* Ends a rank's table of a mesh: records the fields that were missing from it. */
+/* Completes a mesh's entry in a rank's table: records the fields that the rank lacks. */
 static void record_missing_fields(session_catalogue_mesh *mesh, bool has_cells, bool has_ids, int rank)
 {
     if (!mesh || !has_cells) return;
@@ -361,9 +361,9 @@ static bool store_fault(base_error **fault, int rank, insitu_status status, cons
     return *fault != NULL;
 }
 
-/* Records a fault of the rank. field: NULL if the mesh has the fault; mesh: NULL if its owner is unknown. Lack of
- * memory is also recorded for the catalogue, because callers then mostly skip the data that they would have passed
- * next. */
+/* Records an error that a rank's table contains. field: NULL if the error is one of the whole mesh; mesh: NULL if it is
+ * unknown to which mesh the error belongs. Lack of memory is also recorded for the catalogue, because callers usually
+ * skip the data that they would have passed next. */
 static bool record_fault(session_catalogue *catalogue, session_catalogue_mesh *mesh, session_catalogue_field *field,
                          int rank, insitu_status status, const char *message)
 {

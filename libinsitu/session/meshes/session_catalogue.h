@@ -22,34 +22,35 @@ typedef struct session_catalogue_field {
 
 /* A vertex that hangs on a face: its value is the weighted sum of the values at the face's corners. */
 typedef struct session_hanging_vertex {
-    int64_t group;      /* the group of equal vertices to which it belongs (session_hanging.h) */
+    int64_t group;      /* group of equal vertices that contains it (session_hanging.h) */
     int64_t corners[4]; /* indices of groups, or of the values received from other ranks */
     double weights[4];  /* weight of the value at each corner; they sum to 1 */
     bool is_received;   /* set if the corners are values received from other ranks, not groups of this rank */
 } session_hanging_vertex;
 
-/* A vertex that is equal to others up to rounding, and the least position among these vertices. */
+/* A vertex that coincides with others up to rounding, and the lexicographically least position of all of them. */
 typedef struct session_twin {
-    int64_t vertex;     /* number of the vertex among those of the part */
-    double position[3]; /* least position of the vertices that are equal to it */
+    int64_t vertex;     /* index of the vertex in the part */
+    double position[3]; /* lexicographically least position of all vertices that coincide with it */
 } session_twin;
 
 /* The outer faces of one of this rank's parts of a mesh, on which vertices may hang, and the vertices that may hang;
  * kept while vertices move. */
 typedef struct session_border {
-    /* value of session_catalogue_mesh.cells_hash for which the border was computed; 0: not computed yet */
+    /* session_catalogue_mesh.cells_hash at the time when the border was computed; 0: not computed yet */
     uint64_t cells_hash;
     int64_t face_count, vertex_count;
     session_face *faces; /* faces that belong to only one cell, counted over all ranks */
     int64_t *vertices;   /* vertices of the faces that only one cell of this rank has */
-    int64_t twin_count;  /* number of twins, which are updated if vertices move (session_hanging.twins_version) */
+    /* number of twins, which are computed again if vertices move (session_hanging.twins_version) */
+    int64_t twin_count;
     session_twin *twins; /* sorted by vertex */
 } session_border;
 
 /* This rank's hanging vertices in the meshes of a joint, and the values that it sends to other ranks for their hanging
  * vertices. */
 typedef struct session_hanging {
-    /* value of session_joint.positions_hash for which these were computed; 0: not computed yet */
+    /* session_joint.positions_hash at the time when this struct was computed; 0: not computed yet */
     uint64_t positions_hash;
     int border_count;
     session_border *borders; /* one border per part; NULL: not computed yet */
@@ -61,18 +62,19 @@ typedef struct session_hanging {
     int64_t sent_total; /* number of values sent to all ranks together */
 } session_hanging;
 
-/* Groups of equal vertices of a joint's meshes on this rank (plan/session_vertex_groups.h). They are kept while the
- * meshes stay as they are. */
+/* Groups of equal vertices of a joint's meshes on this rank (plan/session_vertex_groups.h). They are reused as long as
+ * the meshes do not change. */
 typedef struct session_vertex_groups {
-    /* value of session_joint.positions_hash for which these were computed; 0: not computed yet */
+    /* session_joint.positions_hash at the time when the groups were computed; 0: not computed yet */
     uint64_t positions_hash;
-    int64_t *first_vertices;  /* number of each part's first vertex, and at the end the total number of vertices */
+    /* index of each part's first vertex in group_of_vertex, and at the end the total number of vertices */
+    int64_t *first_vertices;
     int64_t *group_of_vertex; /* group of each vertex; -1: it belongs to no drawn cell */
     int64_t count;            /* number of groups */
     /* for each group, the number of corners of drawn cells in all groups before it; count + 1 entries */
     int64_t *corner_starts;
     session_key_table keys; /* keys of the groups; empty unless a mesh has patches, whose vertices are found by key */
-    /* Groups that lie in the boxes of other ranks, sorted by their home; there are none if there is only one rank. */
+    /* Groups that lie in other ranks' bounding boxes, sorted by their home rank; none if there is only one rank. */
     int64_t shared_count;     /* number of these groups */
     int64_t *shared_groups;   /* index of each of these groups */
     session_key *shared_keys; /* key by which each of these groups is found on its home rank */
@@ -82,35 +84,35 @@ typedef struct session_vertex_groups {
 typedef struct session_catalogue_mesh {
     char *name;
     int first_rank;  /* lowest rank that has cells of the mesh; -1: there is none */
-    bool has_ids;    /* set if all ranks with cells give vertex ids */
+    bool has_ids;    /* set if all ranks that have cells give global vertex ids */
     bool is_refined; /* set if some block, on any rank, has a level of refinement */
     /* set if all drawn cells, over all ranks, are shells; computed by session_check_vertex_order() */
     bool has_shells_alone;
     /* set if cells, on any rank, are of higher order; computed by session_check_vertex_order() */
     bool has_higher_order;
-    /* error of the mesh; NULL: there is none. The step then ignores the mesh, but its fields' names are kept */
+    /* error of the mesh; NULL: there is none. The step ignores a mesh with an error, but its fields' names are kept */
     base_error *fault;
     int field_count;
     session_catalogue_field *fields;
-    /* name of a joint that contains only this mesh (session_joint.name) if the mesh has vertex ids; otherwise 0 */
+    /* if the mesh has vertex ids: name of the joint that contains only this mesh (session_joint.name); otherwise 0 */
     uint64_t single_joint_name;
     /* hashes, over all ranks, of the stamps of cells and of coordinates; 0: not computed yet */
     uint64_t cells_hash, positions_hash;
-    /* this rank's data about the parts on all ranks; valid if computed for the current positions_hash */
+    /* the home ranks of vertices and faces of this mesh; valid if computed for the current positions_hash */
     session_homes homes;
 } session_catalogue_mesh;
 
-/* A set of meshes over which equal vertices have one mean of cell values: the meshes that have a layer's field, and no
- * vertex ids. A mesh with ids is a joint by itself. */
+/* A set of meshes across which cell values are averaged at equal vertices: the meshes without vertex ids that have a
+ * layer's field. A mesh with ids is a joint by itself. */
 typedef struct session_joint {
     uint64_t name;                   /* value of scene_field.joint_name or session_catalogue_mesh.single_joint_name */
     int count;                       /* number of meshes */
     session_catalogue_mesh **meshes; /* the meshes of the joint, sorted by name; owned by the catalogue */
-    /* set if the joint is a single mesh with global vertex ids: vertices are equal if their ids are */
+    /* set if the joint is a single mesh with global vertex ids; vertices are then equal if their ids are equal */
     bool by_id;
     uint64_t positions_hash;    /* hash of the vertex positions of all its meshes */
     session_homes own_homes;    /* homes of a joint of several meshes; unused if it has one mesh */
-    const session_homes *homes; /* own_homes, or the homes of the single mesh */
+    const session_homes *homes; /* points to own_homes, or to the homes of the single mesh */
     session_vertex_groups groups;
     session_hanging hanging;
 } session_joint;
@@ -121,20 +123,20 @@ typedef struct session_catalogue {
     bool are_derived;      /* set if the catalogue contains the derived fields of the current scene */
     bool are_joined;       /* set if the joints are those of the current scene */
     bool are_hashes_known; /* set if the meshes' hashes of cells and positions are up to date */
-    base_error *fault;     /* error whose mesh is unknown; no image can be drawn */
+    base_error *fault;     /* error that belongs to no known mesh; no image can be drawn */
     int mesh_count, joint_count;
     session_catalogue_mesh *meshes;
     session_joint **joints;
 } session_catalogue;
 
 /* Updates the catalogue. is_shared states that all ranks have equal names (compared by session_names_hash()) and that
- * no mesh or field has an error. Meshes with an error are put aside. Collective. */
+ * no mesh or field has an error. Meshes with an error are excluded from the step. Collective. */
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);
 
-/* Updates the homes of all meshes and joints that are out of date. half_diagonal is that of the scene's bounds.
- * Collective; all ranks return the same status. */
+/* Computes the homes of all meshes and joints again whose cells or positions have changed. half_diagonal is that of the
+ * scene's bounds. Collective; all ranks return the same status. */
 insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
                                    const session_team *team, base_error *error);
 /* Marks the homes as unknown. This must be called on all ranks if cells have changed on any rank;

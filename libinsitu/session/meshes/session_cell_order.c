@@ -1,6 +1,6 @@
-/* All other code reads each cell's vertices contiguously, in VTK's order. Kernels that process eight cells at once rely
- * on it, so for another order connectivity is copied, instead of a case in each of these kernels. Cells that are the
- * same in both orders, such as tets, are not copied. */
+/* All other code reads each cell's vertices contiguously, in VTK's order, and kernels process eight such cells at once.
+ * If the caller has another order, connectivity is copied, so that these kernels need no further case. Cells whose
+ * order is the same in both, such as tets, are not copied. */
 #include "session_cell_order.h"
 
 #include "region.h"
@@ -60,8 +60,8 @@ static cell_rows make_cell_rows(const session_mesh *mesh)
     return rows;
 }
 
-/* Returns whether all entries fit into 4 bytes. If one does not although there are few vertices, it is a bad index;
- * entries are then copied with 8 bytes, so that it is reported with its value. */
+/* Returns whether all entries fit into 4 bytes. An entry that does not, although there are few vertices, is an invalid
+ * index; entries are then copied with 8 bytes, so that the error message shows its value. */
 static bool fit_in_32_bits(const cell_rows *rows, int threads)
 {
     int64_t least = 0, most = 0;

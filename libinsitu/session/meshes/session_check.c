@@ -1,9 +1,9 @@
 /* Validation of a mesh, before any other code reads it: the grid's accessors rely on valid arrays.
  *
- * The cells are checked in one parallel pass, in blocks. Each thread keeps the lowest bad cell that it meets, and the
- * reported cell is the lowest of all, for any number of threads. Its fault is determined once, afterwards. Coordinates
- * are checked if a drawn cell uses them: vertices of no cell, or only of ghosts, may have any coordinates. Indices are
- * checked for ghosts too. */
+ * The cells are checked in one parallel pass, in blocks. Each thread records its lowest invalid cell, and the lowest of
+ * all is reported, so that the result does not depend on the number of threads. What is wrong with this cell is
+ * determined afterwards. Coordinates are checked if a drawn cell uses them: vertices that belong to no cell, or only to
+ * ghosts, may have any coordinates. Indices are checked for ghosts too. */
 #include "session_check.h"
 
 #include <omp.h>
@@ -29,10 +29,10 @@
 
 typedef struct face_edge {
     int64_t low, high,
-        face; /* smaller and larger vertex of the edge, and a face that has it, as stored in the connectivity */
+        face; /* an edge's smaller and larger vertex, and a face that has the edge, as numbered in the connectivity */
 } face_edge;
 
-/* A buffer of one thread that grows as needed. It must be zero initially. */
+/* A buffer of one thread, enlarged when needed. It must be zero-initialized. */
 typedef struct edge_buffer {
     face_edge *edges;
     int64_t capacity;
@@ -260,7 +260,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, edge_buffer
     if (place->type == GRID_POLYGON) return check_polygon(mesh, cell, place);
     const int count = grid_type_vertices(place->type);
     if (count == 0) return BAD_TYPE;
-    /* cells of the padding have no vertices; those of all others are in range */
+    /* the padding contains no vertices, and the vertices of all other cells are in range */
     if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD;
     if (g->offsets.data) {
         place->first = grid_array_index(&g->offsets, cell);
@@ -540,8 +540,8 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
     mesh->given_counts = (session_counts){tally.drawn_count, tally.ghost_count, tally.inverted_count, tally.flat_count,
                                           tally.shell_count};
     if (mesh->topology.is_split) mesh->given_counts = session_count_parents(mesh, tally.inverted_count > 0);
-    if (mesh->cells.lattice)
-        mesh->given_counts.ghost_count -= mesh->cells.cell_count - session_cell_count(mesh); /* without padding */
+    /* cell count without the padding of lattices */
+    if (mesh->cells.lattice) mesh->given_counts.ghost_count -= mesh->cells.cell_count - session_cell_count(mesh);
     mesh->flat_count = tally.flat_count;
     mesh->shell_count = tally.shell_count;
     mesh->size_sum = tally.size_sum;

@@ -10,7 +10,7 @@
 #include "region.h"
 #include "session_agree.h"
 
-/* The meaning of the numbers in an array. */
+/* What the numbers in an array mean. */
 typedef enum conform_role { OF_PLACES, OF_INDICES, OF_TYPES, OF_FLAGS } conform_role;
 
 /* An array of a mesh that may have to be copied. */
@@ -38,14 +38,14 @@ static conform_array find_array(insitu_mesh *m, int number)
     }
 }
 
-/* Returns the type as which indices are read, either in place or from a copy. */
+/* Returns the type in which indices are read, either in place or from a copy. */
 static insitu_type index_type(insitu_type type, int64_t below)
 {
     if (type == INSITU_INT64 || type == INSITU_UINT64) return INSITU_INT64;
     return type == INSITU_UINT32 && below > INT32_MAX ? INSITU_INT64 : INSITU_INT32;
 }
 
-/* Returns the type as which the array is read. *is_copied is set if it must be read from a copy. */
+/* Returns the type in which the array is read. *is_copied is set if it must be read from a copy. */
 static insitu_type read_type(const conform_array *of, bool has_map, bool *is_copied)
 {
     const insitu_type type = of->array->type;
@@ -169,8 +169,8 @@ static bool copy_map(const insitu_mesh *original, session_conformed *out)
     return true;
 }
 
-/* Makes the description refer to the copy of an array, if it needs one. The copy is taken over from the last
- * description if is_kept, and is otherwise allocated. Returns false if memory runs out. */
+/* Makes the description refer to a copy of the array with this number, if its type cannot be read in place. If is_kept,
+ * the previous description's copy is reused; otherwise a new one is allocated. Returns false if memory runs out. */
 static bool refer_to_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given, session_conformed *out)
 {
     const conform_array of = find_array(given, number);
@@ -210,7 +210,7 @@ insitu_status session_conform_mesh(session_mesh *mesh, const insitu_mesh *origin
     session_drop_conformed(&mesh->conformed);
     mesh->conformed = made;
     mesh->original = *original;
-    mesh->original.cell_type_map = NULL; /* the map has been copied above */
+    mesh->original.cell_type_map = NULL; /* copy_map() has copied the map already */
     mesh->given = given;
     mesh->given.cell_type_map = NULL;
     return INSITU_OK;

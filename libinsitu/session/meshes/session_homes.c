@@ -11,7 +11,7 @@
 
 enum { MOST_SAMPLES = 1024 };
 
-/* The data that each rank sends to all others. */
+/* What each rank sends to all others. */
 typedef struct rank_part {
     session_box box;
     int64_t first_id; /* first id of this rank's share of the ids */
@@ -33,8 +33,8 @@ static int compare_ids(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Returns one of this rank's ids, namely the quantile of this rank in a sample of its ids. Any evenly chosen sample
- * suffices, as all ranks receive the result. */
+/* Returns the r-th of P quantiles of this rank's ids, where r is its rank and P the number of ranks. It is estimated
+ * from a sample of the ids; any evenly chosen sample suffices, because all ranks receive the result. */
 static int64_t sample_quantile(const session_mesh *mesh, const session_team *team)
 {
     const grid_array ids = session_grid_array(&mesh->given.vertex_ids);

@@ -1,4 +1,4 @@
-/* Homes of items that several ranks have, which are vertices and faces on the borders between their parts of a mesh.
+/* Homes of items that several ranks share, namely vertices and faces on the borders between the ranks' parts of a mesh.
  * The home of an item is a rank near it, which all ranks that have the item can determine without communication. So
  * neither a rank's messages nor the number of ranks to which it sends grow with the number of ranks.
  *
@@ -23,7 +23,7 @@ typedef struct session_box {
     double lower[3], upper[3];
 } session_box;
 
-/* The data that a rank has about the parts, on all ranks, of one or several meshes. */
+/* What a rank stores about the parts of one or several meshes on all ranks, to find the home of an item. */
 typedef struct session_homes {
     bool is_computed; /* set if the other members are up to date */
     bool by_id;       /* set if homes are found by global vertex ids, and not by positions */
@@ -34,7 +34,8 @@ typedef struct session_homes {
     int near_count;
     int *near_ranks;
     session_box *boxes; /* box of each of these ranks */
-    /* If by_id: the ids are divided into ranges, each with its first id and the rank that is home of its ids. */
+    /* If by_id: the ids are divided into ranges. Each range has its first id and the rank that is the home of its
+     * ids. */
     int share_count;
     int64_t *first_ids;
     int *owners;
@@ -48,7 +49,7 @@ void session_homes_free(session_homes *homes);
 insitu_status session_homes_find(session_homes *homes, const struct session_mesh *const *meshes, int count, bool by_id,
                                  double half_diagonal, const struct session_team *team, base_error *error);
 
-/* Returns whether the point lies in the box, including its border. */
+/* Returns whether the point lies inside the box or on its border. */
 bool session_is_in_box(const session_box *box, const double point[3]);
 
 /* Returns whether the point lies in the box of another rank. */

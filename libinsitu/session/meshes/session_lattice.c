@@ -64,7 +64,7 @@ static insitu_status check_cells(const insitu_lattice *l, base_error *error)
                      (long long)l->cells[0], (long long)l->cells[1], (long long)l->cells[2]);
 }
 
-/* Sorts the axes by stride; an axis with a single index comes first, as its stride is never used. */
+/* Sorts the axes by stride; an axis with a single index comes first, because its stride is never used. */
 static void order_axes(const int64_t strides[3], const int64_t counts[3], int order[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -255,8 +255,9 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
         memcmp(a->interior_end, b->interior_end, sizeof a->interior_end) != 0)
         changes |= INSITU_CHANGED_TOPOLOGY;
     const bool is_moved = memcmp(a->first, b->first, sizeof a->first) != 0;
+    /* finer blocks may now cover other cells of this block, or this block other cells of coarser ones */
     if (memcmp(a->refinement, b->refinement, sizeof a->refinement) != 0 || (is_moved && !are_all_zero(a->refinement)))
-        changes |= INSITU_CHANGED_TOPOLOGY; /* other cells are then covered by finer blocks, or cover coarser ones */
+        changes |= INSITU_CHANGED_TOPOLOGY;
     for (int axis = 0; axis < 3; axis++)
         if (a->origin[axis] != b->origin[axis] || a->spacing[axis] != b->spacing[axis] ||
             a->first[axis] != b->first[axis] || !session_is_same_array(&a->axes[axis], &b->axes[axis]))
@@ -309,7 +310,7 @@ void session_take_lattice(session_mesh *mesh)
     }
     compute_packed_strides(vertices, packed);
     out->vertex_numbering = make_numbering(are_all_zero(l->vertex_strides) ? packed : l->vertex_strides, vertices);
-    /* The axis without cells comes last, so that the first four corners are a quad's. */
+    /* the axis without cells comes last, so that the first four corners of a cell form its quad */
     const int last = l->cells[0] ? l->cells[1] ? 2 : 1 : 0, axes[3] = {last == 0, last == 2 ? 1 : 2, last};
     for (int i = 0; i < 8; i++) {
         out->corner_offsets[i] = 0;

@@ -1,4 +1,4 @@
-/* Structured blocks: checks of the caller's description, and the grid made of it. */
+/* Structured blocks: checks of the caller's description, and the grid built from it. */
 #ifndef SESSION_LATTICE_H
 #define SESSION_LATTICE_H
 
@@ -7,7 +7,7 @@
 /* Checks the description mesh->lattice, which must not be NULL. Local. */
 insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error);
 
-/* Returns whether the cells are quads, because one axis has no cells. */
+/* Returns whether the cells are quads, which is the case if the lattice has no cells along one axis. */
 bool session_is_plane(const insitu_lattice *lattice);
 
 /* Returns whether the coordinates are given along a lattice's axes instead of by vertex. */
@@ -21,8 +21,8 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
  * Local. */
 void session_take_lattice(session_mesh *mesh);
 
-/* Completes the grid of a mesh that has a lattice: the cell type, the indices and, unless they are given by vertex, the
- * coordinates. */
+/* Completes the grid of a mesh with a lattice: sets the cell type and the indices and, unless coordinates are given by
+ * vertex, the coordinates. */
 void session_read_lattice(session_mesh *mesh, grid *g);
 
 /* Computes the cells[axis] + 1 coordinates along an axis of a lattice that is uniform or rectilinear. Local. */

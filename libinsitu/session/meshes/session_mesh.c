@@ -45,7 +45,7 @@ grid_array session_grid_array(const insitu_array *array)
 
 grid_array session_coordinates(const insitu_mesh *mesh, int axis)
 {
-    static const double zero = 0; /* the first half of its bytes is also a zero of type float */
+    static const double zero = 0; /* if it is read as float, the first half of its bytes is a 0 of type float */
     const insitu_array *given = &mesh->coordinates[axis];
     if (given->data) return session_grid_array(given);
     return (grid_array){.data = (const char *)&zero, .is_wide = session_type_size(mesh->coordinates[0].type) == 8};
@@ -415,7 +415,7 @@ static void free_mesh(session_mesh *mesh)
     base_free(mesh);
 }
 
-/* Compares a mesh with a name, a block's number and the axes of a mirror image, in this order. */
+/* Compares a mesh with a sort key: name, then block number, then axes of a mirror image. */
 static int compare_mesh(const session_mesh *mesh, const char *name, int64_t block, int mirror_axes)
 {
     const int order = strcmp(mesh->name, name);
@@ -438,10 +438,10 @@ static int find_mesh_index(const session_meshes *meshes, const char *name, int64
     return low;
 }
 
-/* More than any mirror_axes. */
+/* larger than any value of mirror_axes */
 enum { ALL_AXES = 8 };
 
-/* Returns the number of meshes up to the last part of this name. */
+/* Returns the index after the last part of this name among the sorted meshes. */
 static int find_end_of_name(const session_meshes *meshes, const char *name)
 {
     return find_mesh_index(meshes, name, INT64_MAX, ALL_AXES);

@@ -8,39 +8,42 @@
 #include "mmbvh.h"
 
 typedef struct session_field {
-    insitu_field given; /* the name is a copy that the session owns, the values are the caller's */
+    insitu_field given; /* the name is a copy owned by the session; the values belong to the caller */
     /* array of all components or, if each component has its own array (component_arrays), of the first one */
     grid_array values;
     grid_array *component_arrays; /* array of each component; NULL: all components are in `values` */
     int64_t component_stride;     /* distance in bytes between the components of a tuple in `values` */
     base_error problem;           /* error of the last insitu_set_field(), or an error of the values */
-    bool is_problem_of_contents;  /* set if the error is one of the values, found by the check of this step */
-    bool has_index;        /* set if an index array gives the tuple of each vertex or cell (insitu_field.index) */
-    bool is_copy_stale;    /* the values or the index have changed since the copy was made */
-    bool is_in_statistics; /* set if statistics of this step need the field; fields that images show have scalars */
+    bool is_problem_of_contents;  /* set if the error is an invalid value found by the check of this step */
+    bool has_index;     /* set if an index array gives the tuple of each vertex or cell (insitu_field.index) */
+    bool is_copy_stale; /* set if the values or the index have changed since the copy was made */
+    /* set if statistics of this step need the field; fields shown by images have scalars instead */
+    bool is_in_statistics;
     /* set if given.fill was called in this step; the values are valid unless fill_problem holds an error */
     bool is_filled;
     base_error fill_problem;
     /* set if the session computes the field from other fields, in `copy` (plan/session_derived.h) */
     bool is_derived;
-    bool is_source;           /* set if a derived field that this step needs is computed from it */
-    bool is_displacement;     /* set if the scene warps the mesh by this field */
-    uint64_t inputs_hash;     /* hash of the inputs of a derived field's values; 0: there are no values yet */
-    int64_t version;          /* incremented at each known change of the values */
-    int64_t source_version;   /* on a mirror image: version of the source's field whose values this one has */
-    bool has_borrowed_copy;   /* set if `copy` belongs to the field of a mirror image's source */
+    bool is_source;       /* set if this step computes a derived field from it */
+    bool is_displacement; /* set if the scene displaces the mesh's vertices by this field */
+    /* hash of the inputs from which a derived field was computed; 0: there are no values yet */
+    uint64_t inputs_hash;
+    int64_t version;          /* number of times that the values are known to have changed */
+    int64_t source_version;   /* on a mirror image: `version` of the source's field from which the values were taken */
+    bool has_borrowed_copy;   /* set if `copy` is owned by the field of a mirror image's source */
     insitu_patch *patches;    /* copy of the table given.patches, owned by the session */
     insitu_array *components; /* copy of the table given.components, owned by the session */
-    char *copy;               /* packed tuples with interleaved components; NULL: not copied yet */
+    char *copy;               /* packed tuples with interleaved components; NULL: there is no copy yet */
     int64_t copy_bytes;       /* size of `copy` in bytes */
 } session_field;
 
-/* The sets of cells over which an extent is computed. All of these cells are drawn and have only finite values. */
+/* The sets of cells over which a minimum and maximum are computed. All of these cells are drawn and have only finite
+ * values. */
 typedef enum session_extent_kind {
     SESSION_SEEN, /* all drawn cells that have only finite values */
-    /* like SESSION_SEEN, but the minimum is computed over only those cells all of whose values are positive */
+    /* as SESSION_SEEN, but the minimum is taken only over cells all of whose values are positive */
     SESSION_POSITIVE,
-    SESSION_SOLID, /* like SESSION_SEEN, but without shells */
+    SESSION_SOLID, /* as SESSION_SEEN, but without shells */
     SESSION_EXTENTS
 } session_extent_kind;
 
@@ -54,7 +57,7 @@ typedef struct session_extremes {
 typedef struct session_plane {
     double normal[3]; /* unit normal */
     double point[3];  /* a point on the plane */
-    /* set if the point is at `offset` along the normal from the centre of the data's bounds, and moves with them */
+    /* set if the point is at `offset` along the normal from the centre of the data's bounds, and follows the centre */
     bool is_central;
     double offset; /* distance along the normal from the centre of the data's bounds to the point */
     /* additional shift along the normal, as a fraction (-1 .. 1) of half the data's extent */
@@ -64,16 +67,16 @@ typedef struct session_plane {
 /* A scalar that a layer uses: a component or the magnitude of a field, as given or recentred to vertices; or the
  * vertices' signed distances from a plane. */
 typedef struct session_scalar {
-    int field;               /* index of the field in the mesh; -1: the scalar is the distance from a plane */
+    int field;               /* index of the field in the mesh; -1: the scalar is the signed distance from a plane */
     int component;           /* same as grid_field.component */
     bool is_recentred;       /* set if cell or corner values are averaged to vertices */
     uint64_t joint_name;     /* value of scene_field.joint_name, if the values are recentred */
     int64_t computed_count;  /* number of times that the values have been computed */
-    uint64_t positions_hash; /* value of session_joint.positions_hash for which the values were computed */
+    uint64_t positions_hash; /* session_joint.positions_hash at the time when the values were computed */
     bool is_used;            /* set if an image of this step uses the scalar */
     /* set if an image of this step needs ranges of its values in the tree; scalars that only give colours need none */
     bool needs_ranges;
-    bool needs_all_cells; /* set if an image of this step may need any cell */
+    bool needs_all_cells; /* set if an image of this step may show any cell, whatever its values are */
     /* Intervals of the values that this step's images show, unless needs_all_cells is set. Only cells whose values
      * intersect an interval are needed. */
     int interval_count;
@@ -82,22 +85,22 @@ typedef struct session_scalar {
     float *distances;    /* distance of each vertex, a copy reported to the user; NULL: not computed yet */
     /* cell values recentred to vertices, a copy reported to the user; NULL: not computed yet */
     double *vertex_values;
-    grid_field original_values; /* the original values of the cells, if recentred ones are used */
+    grid_field original_values; /* the caller's values of the cells, if recentred values are used */
     /* index of each vertex in `gradients`, or -1; NULL: not computed yet. A copy reported to the user, for smooth
      * normals of the last step that drew some */
     int32_t *gradient_indices;
     float (*gradients)[3];    /* gradient at each vertex that has an index */
     int64_t gradient_count;   /* number of gradients */
     bool are_values_stale;    /* set if recentred values must be computed again */
-    bool may_have_changed;    /* set if the caller passed the values again, so that they may have changed */
+    bool may_have_changed;    /* set if the caller has set the field again, so that the values may have changed */
     bool has_checksum;        /* set if the checksums below have been computed */
     uint64_t checksum;        /* checksum of all values of the last picture */
     uint64_t sample_checksum; /* checksum of a few of the values */
-    int64_t version;          /* incremented whenever the checksum shows that the values have changed */
+    int64_t version;          /* number of times that a checksum has shown that the values have changed */
     bool has_own_ranges;      /* set if ranges are stored in node_ranges, and not in the tree's nodes */
     float *node_ranges;       /* minimum and maximum of the values in each node of the tree; NULL: not computed yet */
     bool are_ranges_stale;    /* set if the ranges in the tree were computed for other values */
-    /* number of drawn cells with a value that is not finite; cells may be pieces (session_count_unusable()) */
+    /* number of drawn cells with a value that is not finite; a split cell counts once per piece */
     int64_t unusable_count;
     session_extremes extremes[SESSION_EXTENTS];
 } session_scalar;
@@ -123,58 +126,61 @@ typedef struct session_threshold {
  * pyramids that is built on these faces. It is a copy reported to the user (session_outer_mesh.h). */
 typedef struct session_outer {
     session_threshold threshold;
-    int64_t version;      /* version of the values to which the threshold was applied, if there is a threshold */
+    /* session_scalar.version of the values to which the threshold was applied, if there is a threshold */
+    int64_t version;
     bool is_needed;       /* set if an image of this step needs it */
     bool are_faces_known; /* set if `faces` is up to date for the current cells */
     int64_t face_count;
-    session_face *faces;       /* sorted by cell */
-    struct session_mesh *mesh; /* the mesh, which has the name of the whole mesh; NULL: not made yet */
-    double *coordinates;       /* 3 coordinates per vertex of the mesh */
+    session_face *faces; /* sorted by cell */
+    /* the mesh built on the faces, which has the name of the whole mesh; NULL: not built yet */
+    struct session_mesh *mesh;
+    double *coordinates; /* 3 coordinates per vertex of the mesh */
     int64_t *connectivity, *offsets;
     unsigned char *types;
     int64_t *loops; /* same as render_part.loops */
-    /* for each vertex and each cell of the outer mesh: the one of the whole mesh whose values it has */
+    /* for each vertex and each cell of the outer mesh: the vertex and the cell of the whole mesh whose values it
+     * takes */
     int64_t *vertex_origins, *cell_origins;
     int64_t bytes;
 } session_outer;
 
 /* Arrays owned by the session that are read in place of the caller's (session_topology.h). They are computed once per
- * topology, and are copies reported to the user. */
+ * topology, and are reported to the user as copies. */
 typedef struct session_topology {
-    /* set if the arrays are up to date for the current cells, even if nothing had to be computed */
+    /* set if the arrays match the current cells, even if nothing had to be computed */
     bool is_made;
-    bool has_own_order;               /* set if `connectivity` is read, together with the caller's offsets and types */
-    bool has_own_cells;               /* set if the next members are read, and not the caller's cells */
+    bool has_own_order;               /* set if `connectivity` below is read with the caller's offsets and types */
+    bool has_own_cells;               /* set if the cells below are read instead of the caller's cells */
     grid_array offsets, connectivity; /* offsets are NULL if all cells have the type cell_type */
-    unsigned char *cell_types;        /* NULL: all cells have the type cell_type */
+    unsigned char *cell_types;        /* type of each cell; NULL: all cells have the type cell_type */
     int cell_type;
-    bool has_own_faces;                         /* set if the next members are read, and not the caller's faces */
-    grid_array face_offsets, face_connectivity; /* empty if there are no polyhedra */
-    /* lengths of the arrays that are read, either the caller's or these */
+    bool has_own_faces;                         /* set if the faces below are read instead of the caller's faces */
+    grid_array face_offsets, face_connectivity; /* faces of the cells; empty if there are no polyhedra */
+    /* number of entries of the arrays that are read, whether these are the caller's or the session's */
     int64_t connectivity_count, face_connectivity_count;
     int64_t cell_bytes, face_bytes;
     int64_t polyhedron_count; /* number of polyhedra that the caller gave */
     int64_t recognised_count; /* number of these polyhedra that are read as tets, hexes, wedges or pyramids */
     /* Cells of higher order are read as linear pieces (session_split.h); the pieces of a cell are consecutive. */
-    bool is_split;               /* if not set, the next members are empty */
+    bool is_split;               /* set if cells are split; if not set, the members below are empty */
     bool depends_on_coordinates; /* set if the pieces depend on the coordinates */
     int64_t cell_count;          /* number of pieces */
     uint32_t *parents;           /* for each piece, the caller's cell */
     int64_t *first_pieces;       /* for each of the caller's cells its first piece, and at the end cell_count */
-    unsigned char *ghosts;       /* for each piece, whether its cell is a ghost; NULL: no cell is */
+    unsigned char *ghosts;       /* one byte per piece, nonzero if its cell is a ghost; NULL: there are no ghosts */
 } session_topology;
 
 /* Separate vertices for each corner of each cell, which are read in place of the vertices that cells share
  * (session_torn.h). They are a copy reported to the user. Corners are numbered as in the caller's connectivity, without
  * the unused ends of rows. */
 typedef struct session_torn {
-    bool is_torn; /* if not set, all other members are empty */
+    bool is_torn; /* set if vertices are separate; if not set, all other members are empty */
     bool is_made; /* set if the coordinates are up to date */
     /* set if cells are split into pieces: then `shared` is the caller's connectivity, whose entries are the corners */
     bool are_corners_entries;
     int64_t corner_count;
     grid_array shared_connectivity; /* the connectivity whose corners get separate vertices */
-    grid_array corners;             /* the corner of each entry of `shared`; the permutation is its own inverse */
+    grid_array corners;             /* for each entry of `shared`, its corner; the permutation is its own inverse */
     grid_array coordinates[3];
     int64_t bytes;
 } session_torn;
@@ -213,23 +219,22 @@ typedef struct session_warp {
     uint64_t key;                /* hash that identifies the displacements by which they were moved */
     char *places;                /* memory of the moved coordinates (session_places.h) */
     insitu_array coordinates[3]; /* the moved coordinates; no data along an axis if they are the caller's */
-    insitu_array unmoved[3];     /* what session_mesh.given has without the warp */
-    /* the caller's lattice without coordinates along axes, as coordinates are then given by vertex */
+    insitu_array unmoved[3];     /* values of session_mesh.given before the vertices were moved */
+    /* the caller's lattice without its coordinates along the axes, because moved coordinates are given by vertex */
     insitu_lattice lattice;
     int64_t bytes;
-    base_error problem; /* why the vertices could not be moved, which the check of the mesh returns */
+    base_error problem; /* the reason why the vertices could not be moved; the check of the mesh returns it */
 } session_warp;
 
-/* The coordinates of a mirror image (session_mirror.h), of which those that are computed are a copy reported to the
- * user. */
+/* Coordinates of a mirror image (session_mirror.h). Those that are computed are reported to the user as a copy. */
 typedef struct session_mirrored {
     double planes[3];            /* coordinate of the mirror plane of each axis along which the image is mirrored */
     char *places;                /* memory of the mirrored coordinates (session_places.h) */
     insitu_array coordinates[3]; /* the mirrored coordinates; no data along an axis if they are those of the source */
     double *axes[3];             /* coordinates along a lattice's axes, owned; NULL: coordinates are given by vertex */
-    insitu_lattice lattice;      /* lattice of the description */
+    insitu_lattice lattice;      /* lattice in the image's description */
     int64_t bytes;
-    /* values of the source's members of these names for which the image was made */
+    /* the source's members of these names at the time when the image was made */
     int64_t cells_stamp, coordinates_stamp;
 } session_mirrored;
 
@@ -238,13 +243,14 @@ enum { SESSION_CONFORMED = 9 };
 /* Copies of arrays whose type cannot be read in place (session_conform.h). They are reported to the user. */
 typedef struct session_conformed {
     char *copies[SESSION_CONFORMED]; /* NULL: the array is read in place */
-    unsigned char *types;            /* cell types of the caller's own numbers; NULL: the caller has no own numbers */
+    /* cell types converted from the caller's own numbers; NULL: the caller uses the library's numbers */
+    unsigned char *types;
     int type_count;
     int64_t bytes;
 } session_conformed;
 
-/* The box of cells of a block with a level of refinement, without ghost layers, given by indices of its level. It is
- * sent to other ranks as 64-bit words. */
+/* The cells of a refined block without its ghost layers, as a box of indices in the block's level. It is sent to other
+ * ranks as 64-bit words. */
 typedef struct session_level_box {
     uint64_t mesh; /* hash of the mesh's name */
     int64_t block, rank;
@@ -259,19 +265,20 @@ typedef struct session_misfit {
     int rank;                  /* rank that has the finer block */
 } session_misfit;
 
-/* Numbers of the caller's cells by kind. Shells are cells that are drawn and flat. */
+/* Numbers of cells, one for each kind. Shells are cells that are drawn and have no volume. */
 typedef struct session_counts {
     int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
 } session_counts;
 
-/* Block number of a mesh that is not given as blocks; blocks have numbers from 0 on. */
+/* Block number of a mesh that does not consist of blocks; blocks have numbers from 0 on. */
 #define SESSION_WHOLE INT64_MIN
 
 /* One rank's part of a mesh, or one block of it. Blocks of one mesh have the same name. */
 typedef struct session_mesh {
     char *name;
     int64_t block; /* the block's number, or SESSION_WHOLE */
-    /* Images are parts of the mesh beside the caller's own, of which statistics, counts and errors take no notice. */
+    /* Mirror images are further parts of the mesh beside the caller's own. Statistics, counts and errors ignore
+     * them. */
     struct session_mesh *source; /* the caller's part of which this one is a mirror image; NULL: it is the caller's */
     int mirror_axes;             /* bit i is set if the image is mirrored along axis i; 0: it is the caller's part */
     session_mirrored mirrored;
@@ -290,25 +297,27 @@ typedef struct session_mesh {
      * (outer/session_covers.h). A copy reported to the user; NULL: `ghosts` is read */
     unsigned char *covered;
     session_misfit misfit;
-    grid cells;                  /* the cells in the form that the session reads */
+    grid cells;                  /* the cells in the form that all code of the session reads */
     bool is_given;               /* false after an insitu_set_mesh() that failed; `problem` then holds the error */
     base_error problem;          /* error of the last insitu_set_mesh(), or an error of the arrays' contents */
-    bool is_problem_of_contents; /* set if the error is one of the arrays' contents, found by the check of this step */
+    bool is_problem_of_contents; /* set if the error is one of the arrays' contents, found by the check in this step */
     int field_count;
     session_field *fields;
 
-    /* values of session_meshes.stamp when the cells and the coordinates last changed */
+    /* session_meshes.stamp at the last change of the cells, and at that of the coordinates */
     int64_t cells_stamp, coordinates_stamp;
     bool is_check_stale;       /* set if cells or coordinates have not been checked since they changed */
     bool is_topology_stale;    /* set if the tree was built for other cells */
     bool is_geometry_stale;    /* set if the tree was computed for other coordinates */
     double lower[3], upper[3]; /* bounds of the drawn cells; lower > upper: there are none */
-    /* numbers of `cells`, which may be pieces of the caller's cells; shells are cells that are drawn and flat */
+    /* counts of the cells in `cells`, which may be pieces of the caller's cells; shells are cells that are drawn and
+     * flat */
     int64_t drawn_count, flat_count, shell_count;
-    session_counts given_counts; /* numbers of the caller's cells */
-    bool has_shells_alone;       /* same as session_catalogue_mesh.has_shells_alone, that is, over all ranks */
-    double size_sum;             /* sum of the cube roots of the volumes of the drawn cells */
-    uint64_t *flat_cells;        /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
+    session_counts given_counts; /* counts of the caller's cells */
+    /* same as session_catalogue_mesh.has_shells_alone, so true only if it holds over all ranks */
+    bool has_shells_alone;
+    double size_sum;      /* sum of the cube roots of the volumes of the drawn cells */
+    uint64_t *flat_cells; /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
 
     uint64_t single_joint_name; /* same as session_catalogue_mesh.single_joint_name */
     bool is_refined;            /* same as session_catalogue_mesh.is_refined */
@@ -351,12 +360,12 @@ typedef struct session_meshes {
     int64_t level_box_count; /* number of refined blocks near those of this rank, including its own */
     session_level_box *level_boxes;
     int64_t stamp; /* incremented by each change of cells or coordinates */
-    /* set if the scene of the last step that drew warped or mirrored meshes; the same on all ranks */
+    /* set if the last step that drew an image warped or mirrored meshes; the same on all ranks */
     bool are_transformed;
-    /* error of a set call that cannot be stored with a mesh; it is kept for one step */
+    /* error of a set call that belongs to no stored mesh; it is kept for one step */
     base_error pending_error;
     char *pending_mesh, *pending_field; /* mesh and field of this error; NULL: it belongs to no particular one */
-    /* number of meshes that this step ignores; they are stored in items, after the first `count` */
+    /* number of meshes that this step ignores; they are stored in `items` after the first `count` meshes */
     int excluded_count;
     session_filling filling;
 } session_meshes;
@@ -381,18 +390,18 @@ static inline int64_t session_type_size(insitu_type type)
 /* Returns whether the address and the stride of an array are multiples of its element size. */
 bool session_is_aligned(const insitu_array *array);
 
-/* Returns the array in the form that the mesh processing reads. Its indices count from 0. */
+/* Returns the caller's array as the grid_array through which meshes are read. Its indices count from 0. */
 grid_array session_grid_array(const insitu_array *array);
 
-/* Returns the vertices' coordinates along an axis; if z is not given, a single 0 for all vertices. */
+/* Returns the vertices' coordinates along an axis. If z is not given, it is an array whose elements are all the same
+ * 0. */
 grid_array session_coordinates(const insitu_mesh *mesh, int axis);
 
-/* Returns an array of indices in the form that the mesh processing reads. Its indices count from the mesh's
- * index_base. */
+/* Returns an array of indices as a grid_array. Its indices count from the mesh's index_base. */
 grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array);
 
-/* Returns an array of offsets in the form that the mesh processing reads. There are `count` cells or faces with a total
- * of `entries` entries; the last offset may be missing. */
+/* Returns an array of offsets as a grid_array, for `count` cells or faces that have `entries` entries in total. The
+ * caller may omit the last offset. */
 grid_array session_offset_array(const insitu_mesh *mesh, const insitu_array *array, int64_t count, int64_t entries);
 
 /* Returns the cells as the caller's arrays describe them. */
@@ -431,7 +440,7 @@ static inline session_mesh *session_find_mesh(const session_meshes *meshes, cons
 {
     return session_find_block(meshes, name, SESSION_WHOLE);
 }
-/* returns the field's index, or -1 if the mesh does not have it */
+/* Returns the index of the mesh's field with this name, or -1 if there is none. */
 int session_find_field(const session_mesh *mesh, const char *name);
 
 /* Adds a field without values. Its name is copied and must not exist yet. Returns NULL if memory runs out. */
@@ -461,7 +470,7 @@ void session_drop_axes(session_lattice *lattice);
 void session_drop_conformed(session_conformed *conformed);
 void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
-/* Frees the copies of the caller's tables: patches and components. */
+/* Frees the session's copies of the field's tables of patches and components. */
 void session_drop_field_tables(session_field *field);
 /* Frees the data that depends on the cells, after these have changed. Fields are kept. */
 void session_drop_cell_data(session_meshes *meshes, session_mesh *mesh);
@@ -491,7 +500,7 @@ typedef struct session_part_walk {
     session_mesh *part;
     session_mesh *whole;  /* the mesh whose outer faces the part contains; NULL: the part is a mesh of the caller */
     session_outer *outer; /* the outer surface that the part belongs to; NULL: the part is a mesh of the caller */
-    /* state of the iterator: indices of the next mesh, of the mesh whose outer faces are visited, and of the outer
+    /* state of the iterator: indices of the next mesh, of the mesh whose outer faces are visited, and of its next outer
      * surface */
     int mesh_index, whole_index, outer_index;
 } session_part_walk;
@@ -511,21 +520,21 @@ static inline int64_t session_cell_count(const session_mesh *mesh)
     return mesh->cells.lattice ? mesh->lattice.cells.cell_count : mesh->given.cell_count;
 }
 
-/* Returns the caller's cell that contains a cell of `cells`: that cell itself, unless cells are split into pieces. */
+/* Returns the caller's cell to which a cell of `cells` belongs. They are the same cell unless cells are split into
+ * pieces. */
 static inline int64_t session_given_cell(const session_mesh *mesh, int64_t cell)
 {
     return mesh->topology.is_split ? (int64_t)mesh->topology.parents[cell] : cell;
 }
 
-/* Returns the first of the consecutive cells of `cells` that belong to the caller's cell. They end where those of the
- * next one begin. */
+/* Returns the first of the consecutive cells of `cells` that belong to the caller's cell; they end before the first
+ * cell of the caller's next one. */
 static inline int64_t session_first_piece(const session_mesh *mesh, int64_t cell)
 {
     return mesh->topology.is_split ? mesh->topology.first_pieces[cell] : cell;
 }
 
-/* Returns the number of cells of which each has its own pieces: those of the caller if they are split, otherwise those
- * of `cells`. */
+/* Returns the number of the caller's cells if they are split into pieces, and otherwise the number of `cells`. */
 static inline int64_t session_whole_count(const session_mesh *mesh)
 {
     return mesh->topology.is_split ? mesh->given.cell_count : mesh->cells.cell_count;
@@ -545,12 +554,13 @@ const base_error *session_pending_error(const session_meshes *meshes);
 void session_store_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field);
 void session_drop_pending(session_meshes *meshes);
 
-/* Stores an error of a field's values for the rest of the step, and copies it to *first if that holds no error yet. */
+/* Stores an error in a field's values, which lasts for the rest of the step, and copies it to *first unless that
+ * already holds an error. */
 void session_store_problem(session_field *field, const base_error *problem, base_error *first);
 
-/* Removes a mesh from the list for the rest of the step, as if this rank had no part of it. */
+/* Removes a mesh from the list for the rest of the step, so that this rank acts as if it had no part of it. */
 void session_exclude_mesh(session_meshes *meshes, session_mesh *mesh);
-/* Puts the meshes that were put aside back into the list. */
+/* Puts the meshes that the step has excluded back into the list. */
 void session_restore_excluded(session_meshes *meshes);
 
 /* Refuses a public call made inside a fill function, as it would change data that the step reads. Returns whether it

@@ -141,8 +141,8 @@ static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error
     return session_check_pointers(lists, &rule, INSITU_ERROR_MESH, error);
 }
 
-/* Checks a description of faces by owners and neighbours; such a mesh must not describe its cells in another way
- * too. */
+/* Checks that faces are described by owners and neighbours correctly, and that cells are not described in another way
+ * as well. */
 static insitu_status check_face_owners(const insitu_mesh *mesh, base_error *error)
 {
     if (!session_has_owners(mesh)) {
@@ -220,7 +220,7 @@ static insitu_status check_cell_rows(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* order is for cells of one Lagrange type that no other array describes. */
+/* Checks that `order` is only given for a mesh of one Lagrange type, in which no other array gives the order. */
 static insitu_status check_lagrange_order(const insitu_mesh *mesh, base_error *error)
 {
     const int type = (int)mesh->cell_type;
@@ -243,7 +243,8 @@ static insitu_status check_lagrange_order(const insitu_mesh *mesh, base_error *e
                      mesh->order, type);
 }
 
-/* Cells of one type of higher order. With offsets, a step looks at each cell's nodes. */
+/* Checks the description of a mesh of one type of higher order. If offsets are given, each cell's number of nodes is
+ * checked later, in a step. */
 static insitu_status check_higher_order(const insitu_mesh *mesh, base_error *error)
 {
     const long long cells = mesh->cell_count, nodes = session_cell_nodes(mesh), count = mesh->connectivity_count;
@@ -357,7 +358,7 @@ static unsigned find_description_changes(const session_mesh *mesh, const insitu_
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
-/* Reads the finer lattices again in place of the caller's new description, unless they no longer fit it. */
+/* Replaces the caller's new description by the finer lattices again, unless these no longer fit it. */
 static void keep_finer(session_mesh *mesh, unsigned changed)
 {
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) session_drop_finer(&mesh->finer);
@@ -409,7 +410,7 @@ insitu_status session_prefix_error(base_error *error, const char *mesh, const ch
     return base_fail(error, what->status, "mesh \"%s\": %.700s", mesh, what->message);
 }
 
-/* Removes the other kind of mesh with this name: a mesh is either a whole or consists of blocks. */
+/* Removes the mesh of this name if it is of the other kind: a mesh is either given as a whole or as blocks. */
 static void remove_other_kind(session_meshes *meshes, const char *name, int64_t block)
 {
     const session_parts parts = session_find_parts(meshes, name);

@@ -1,5 +1,6 @@
-/* The image is described like a mesh of the caller's, with changes as far as the source has changed. Its arrays are the
- * source's: the caller's, or copies that the source owns. */
+/* A mirror image is described like a mesh that the caller sets again whenever its source mesh has changed. It reads the
+ * source's arrays, which belong to the caller or are copies owned by the source; only mirrored coordinates are its
+ * own. */
 #include "session_mirror.h"
 
 #include <string.h>
@@ -19,8 +20,8 @@ static bool is_mirrored(const session_mesh *image, int axis)
 
 /* ---- coordinates by vertex --------------------------------------------------------------------------------------- */
 
-/* Returns the axes along which the image has coordinates of its own: those along which it is mirrored, or all of the
- * source's if these are not packed in an array for each axis. */
+/* Returns the axes along which the image stores coordinates of its own: the mirrored axes; or all axes of the source,
+ * if the source's coordinates are interleaved or strided. */
 static int find_own_axes(const session_mesh *image)
 {
     enum { IN_PLANE = 3, ALL = 7 };
@@ -34,7 +35,7 @@ static int find_own_axes(const session_mesh *image)
     return are_packed ? image->mirror_axes : image->mirror_axes | (given->coordinates[2].data ? ALL : IN_PLANE);
 }
 
-/* Copies coordinates along an axis, in their own type, or mirrors them. */
+/* Copies coordinates along an axis without changing their type, and mirrors them if the axis is mirrored. */
 static void mirror_numbers(const session_mesh *image, int axis, int threads)
 {
     const grid_array from = session_coordinates(&image->source->given, axis);
@@ -91,7 +92,8 @@ static bool mirror_lattice(session_mesh *image)
 
 /* ---- the image --------------------------------------------------------------------------------------------------- */
 
-/* Describes the lattice without levels of refinement: the flags of covered cells are the source's. */
+/* Describes the lattice without its levels of refinement, because the image shares the source's flags of covered
+ * cells. */
 static void describe_lattice(session_mesh *image, insitu_mesh *out)
 {
     session_mirrored *m = &image->mirrored;
@@ -128,7 +130,8 @@ static unsigned find_changes(const session_mesh *image, const double planes[3])
     return is_moved ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
 }
 
-/* Mirrors the coordinates, in memory that is kept while the cells are the same. Returns false if memory runs out. */
+/* Mirrors the coordinates. Their memory is reused as long as the cells do not change. Returns false if memory runs
+ * out. */
 static bool mirror_coordinates(session_mesh *image, const double planes[3], unsigned changed, int threads)
 {
     const session_mesh *source = image->source;

@@ -104,7 +104,7 @@ const char *session_order_refused(const session_nodes *of, insitu_vertex_order o
 
 /* ---- VTK's order ----------------------------------------------------------------------------------------------- */
 
-/* Returns the number of a quad's corner; i and j are set if it is at the far end of the axis. */
+/* Returns the index of a quad's corner in VTK's order. i and j are nonzero at the far end of their axis. */
 static int number_quad_corner(bool i, bool j)
 {
     return i ? (j ? 2 : 1) : (j ? 3 : 0);
@@ -143,7 +143,8 @@ static int find_least(const int *b, int count)
     return out;
 }
 
-/* b: the barycentric coordinates times the order; the last one belongs to the first corner. */
+/* Returns the index of a tet's node in VTK's order. b: the node's barycentric coordinates times the order; the last one
+ * belongs to the first corner. */
 static int number_triangle_node(int order, const int b[3])
 {
     int at = 0, max = order, min = 0;
@@ -175,7 +176,7 @@ static int number_tet_node(int order, const int b[4])
     return at;
 }
 
-/* Numbers the nodes inside a triangle of order p row by row. */
+/* Returns the index of a node inside a triangle of order p, if these nodes are numbered row by row. */
 static int number_inner_triangle_node(int p, int i, int j)
 {
     return i + p * (j - 1) - j * (j + 1) / 2;
@@ -198,7 +199,7 @@ static int number_wedge_node(int p, int i, int j, int k)
     return inside + number_inner_triangle_node(p, i, j) + triangle * (k - 1);
 }
 
-/* For orders 1 and 2. */
+/* Returns the index of a pyramid's node in VTK's order, for pyramids of order 1 and 2. */
 static int number_pyramid_node(int p, int i, int j, int k)
 {
     if (p == 1) return k ? 4 : number_quad_corner(i, j);

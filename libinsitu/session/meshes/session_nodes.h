@@ -29,14 +29,14 @@ bool session_nodes_of(int type, int64_t count, session_nodes *out);
 /* Returns the type INSITU_LAGRANGE_* with the same corners as the linear type, or GRID_NO_TYPE if there is none. */
 int session_lagrange_type(int corner_type);
 
-/* Describes the cell of a linear type's shape that has all nodes of the lattice of the order. */
+/* Describes the cell with the shape of a linear type that has all nodes of a lattice of this order. */
 session_nodes session_complete_nodes(int corner_type, int order);
 
 /* Returns the number of nodes of a cell of the type and order, or 0 if there is no such cell. Order 0 stands for the
  * order of a type that has only one. */
 int64_t session_node_count(int type, int order);
 
-/* Returns NULL, or the reason why this vertex order is not defined for the cell. */
+/* Returns the reason why the vertex order is not defined for the cell, or NULL if it is defined. */
 const char *session_order_refused(const session_nodes *of, insitu_vertex_order order);
 
 /* Returns the position in the row of the cell's node i, j, k of its lattice, whose axes are the edges at the first
@@ -44,13 +44,13 @@ const char *session_order_refused(const session_nodes *of, insitu_vertex_order o
  * cell lacks, the result is at least session_nodes.count. */
 int session_node_index(const session_nodes *of, insitu_vertex_order order, int i, int j, int k);
 
-/* Returns whether i, j, k, which are from 0 to the order, are a node of the lattice of the cell's order. */
+/* Returns whether the lattice of the cell's order has a node i, j, k; each of them is from 0 to the order. */
 bool session_is_node(const session_nodes *of, int i, int j, int k);
 
-/* Returns the position in the row of the node with number n in VTK's order, for cells of order 2. */
+/* Returns the position in the row of connectivity of the n-th node in VTK's order, for cells of order 2. */
 int session_quadratic_index(const session_nodes *of, insitu_vertex_order order, int n);
 
-/* Returns the number of nodes of each cell of a mesh of one type, or 0 if the mesh does not say. */
+/* Returns the number of nodes of each cell of a mesh of one type, or 0 if the description does not determine it. */
 int64_t session_cell_nodes(const insitu_mesh *mesh);
 
 #endif

@@ -7,7 +7,7 @@ static bool has_axis(int axes, int axis)
     return axes >> axis & 1;
 }
 
-/* Returns whether the coordinates have these axes and types. */
+/* Returns whether there are coordinates along exactly these axes, with these types. */
 static bool are_as_asked(const insitu_array coordinates[3], int axes, const insitu_type types[3])
 {
     bool are_so = true;
@@ -37,7 +37,7 @@ bool session_reserve_places(char **places, insitu_array coordinates[3], int64_t 
     for (int axis = 0; axis < 3; axis++) {
         coordinates[axis] = (insitu_array){0};
         if (!*places || !has_axis(axes, axis)) continue;
-        /* numbers of different sizes stand in an array for each axis */
+        /* coordinates whose types differ in size are not interleaved: each axis has an array of its own */
         coordinates[axis] = (insitu_array){*places + offset, types[axis],
                                            has_one_type ? used * largest : session_type_size(types[axis])};
         offset += has_one_type ? largest : count * largest;

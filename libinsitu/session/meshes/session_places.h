@@ -1,5 +1,5 @@
-/* Coordinates of vertices that the session computes in place of the caller's. Those of a vertex stand side by side:
- * loops that read coordinates are fastest if all three have one stride. */
+/* Memory for vertex coordinates that the session computes and that replace the caller's. The coordinates of a vertex
+ * are interleaved, because loops that read coordinates are fastest if all three have one stride. */
 #ifndef SESSION_PLACES_H
 #define SESSION_PLACES_H
 
@@ -7,14 +7,14 @@
 
 #include "session_mesh.h"
 
-/* Provides memory for the coordinates of `count` vertices along the axes whose bits are set in `axes`, in these types,
- * and describes them in coordinates; the others get no data. The memory, *places, is kept if it is already that of the
- * same axes and types, for which the count must be the same. *is_new is set otherwise. *bytes receives its size.
- * Returns false if memory runs out; then there is none, and no coordinates have data. Local. */
+/* Allocates memory for the coordinates of `count` vertices, in these types, along the axes whose bits are set in
+ * `axes`, and makes `coordinates` refer to it; coordinates along other axes get no data. The memory, *places, is reused
+ * if it already has the same axes and types, and then must also have the same count; otherwise *is_new is set. *bytes
+ * receives its size. Returns false if memory runs out; then *places is NULL and no coordinates have data. Local. */
 bool session_reserve_places(char **places, insitu_array coordinates[3], int64_t count, int axes,
                             const insitu_type types[3], int64_t *bytes, bool *is_new);
 
-/* Stores a number in an array of places. Returns whether it differs from the one that was there. */
+/* Stores a coordinate. Returns whether it differs from the one that was stored before. */
 static inline bool session_store_place(const insitu_array *array, int64_t vertex, double number)
 {
     char *to = (char *)(uintptr_t)array->data + vertex * array->stride_bytes;

@@ -9,8 +9,8 @@
 #include "vector3.h"
 
 typedef struct cell_frame {
-    double mean[3];         /* mean of the vertices, each weighted by the number of its faces */
-    double least_vertex[3]; /* position of the first vertex in the order of coordinates */
+    double mean[3];         /* mean of the vertices, in which each vertex is weighted by the number of its faces */
+    double least_vertex[3]; /* position of the cell's lexicographically first vertex */
     double box_volume;      /* volume of the bounding box */
 } cell_frame;
 
@@ -19,7 +19,7 @@ typedef struct frame_sums {
     double count;
 } frame_sums;
 
-/* Adds a face's vertices. Repeated consecutive vertices count once. */
+/* Adds a face's vertices to the mean. A vertex that is repeated consecutively counts once. */
 static void add_face(const grid *g, int64_t face, frame_sums *sums, double least[3])
 {
     int64_t from, to;
@@ -69,7 +69,8 @@ static void read_relative_corner(const grid *g, int64_t entry, const double mean
     for (int axis = 0; axis < 3; axis++) out[axis] -= mean[axis];
 }
 
-/* Returns the volume of the tet between a triangle and a corner of the cell, all relative to the mean. */
+/* Returns the volume of the tet that a triangle forms with a corner of the cell's box; all positions are relative to
+ * the mean of the vertices. */
 static double tet_volume_from_origin(const double origin[3], double corners[3][3])
 {
     double d[3][3];

@@ -31,7 +31,7 @@ void session_list_kinds(session_rows *rows)
         if ((type == last_type && size == last_size) || session_find_kind(rows, type, size) >= 0) continue;
         session_row_kind *kind = &rows->kinds[rows->kind_count++];
         *kind = (session_row_kind){type, {type, 1, (int)size, true, false}};
-        session_nodes_of(type, size, &kind->nodes); /* changes nothing if the type is linear */
+        session_nodes_of(type, size, &kind->nodes); /* leaves the nodes unchanged if the type is linear */
         last_type = type;
         last_size = size;
     }

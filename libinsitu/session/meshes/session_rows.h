@@ -7,24 +7,25 @@
 
 enum { ROWS_MOST_KINDS = 64 };
 
-/* A type of cell with a number of nodes. */
+/* A type of cell together with a number of nodes per cell. */
 typedef struct session_row_kind {
     int type; /* type of the cells as the caller gives it */
     session_nodes nodes;
 } session_row_kind;
 
 typedef struct session_rows {
-    grid cells;                         /* the caller's cells; without connectivity, entry i is vertex i */
-    int64_t nodes_per_cell, row_stride; /* without offsets: nodes per cell, and distance in entries from cell to cell */
+    grid cells; /* the caller's cells; if they have no connectivity, entry i is vertex i */
+    /* if cells have no offsets: number of nodes of each cell, and number of entries from one cell to the next */
+    int64_t nodes_per_cell, row_stride;
     /* set if the mesh is torn (session_torn), so that each node has a vertex of its own */
     bool is_torn;
     int kind_count;
     session_row_kind kinds[ROWS_MOST_KINDS];
 } session_rows;
 
-/* Describes the rows of a mesh whose description is valid. There are no kinds yet. */
+/* Describes the rows of a mesh, whose description must be valid. The list of kinds is empty. */
 session_rows session_rows_of(const session_mesh *mesh);
-/* Describes the rows of a description that is valid, without regard to torn meshes. There are no kinds yet. */
+/* Describes the rows of a valid description, as if the mesh were not torn. The list of kinds is empty. */
 session_rows session_given_rows(const insitu_mesh *given);
 
 static inline int64_t session_row_first(const session_rows *rows, int64_t cell)
@@ -39,7 +40,7 @@ static inline int64_t session_row_size(const session_rows *rows, int64_t cell)
                      (uint64_t)grid_array_index(&rows->cells.offsets, cell));
 }
 
-/* Returns the caller's vertex that an entry of connectivity names. */
+/* Returns the caller's vertex to which an entry of the connectivity refers. */
 static inline int64_t session_row_vertex(const session_rows *rows, int64_t entry)
 {
     return rows->cells.connectivity.data ? grid_array_index(&rows->cells.connectivity, entry) : entry;

@@ -1,6 +1,6 @@
 /* All numbers here are results of reductions, so that they are the same on every rank and for every partition. A new
- * space requires new trees. So the old one is kept while the cells stay approximately in place, even if the mesh moves
- * slightly in every step. */
+ * origin or scale requires new trees. So the old ones are kept while the cells stay approximately in place, even if the
+ * mesh moves slightly in every step. */
 #include "session_space.h"
 
 #include "session_agree.h"
@@ -72,8 +72,8 @@ int session_flat_axis(const session_extent *extent)
     return flat;
 }
 
-/* Returns whether the space can be kept: the bounds' centre is inside the old bounds, and the size is at most 4 times
- * and at least 1/8 of the old one. */
+/* Returns whether the origin and the scale can be kept: the bounds' centre is inside the old bounds, and the size is at
+ * most 4 times and at least 1/8 of the old one. */
 static bool is_space_valid(const session_space *space)
 {
     if (!space->has_origin) return false;

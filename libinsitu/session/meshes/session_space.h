@@ -6,7 +6,7 @@
 
 #include "session_mesh.h"
 
-/* Global bounds of the drawn cells, and quantities derived from them. */
+/* The bounds of the drawn cells of all ranks, and quantities derived from them. */
 typedef struct session_extent {
     double lower[3], upper[3]; /* bounds of the drawn cells; both 0 if there are no cells */
     double half_diagonal;      /* half the diagonal of the bounds */

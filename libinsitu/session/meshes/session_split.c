@@ -17,17 +17,17 @@
 
 enum { LINEAR_TYPES = GRID_POLYHEDRON + 1 };
 
-/* The caller's cells while they are split. */
+/* Working data of splitting the caller's cells. */
 typedef struct split_work {
     const session_mesh *mesh;
     session_rows rows;
-    session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of each kind of row */
-    bool is_of_type[LINEAR_TYPES];             /* set for the types that pieces have */
+    session_pattern patterns[ROWS_MOST_KINDS]; /* pattern of pieces for each kind of row */
+    bool is_of_type[LINEAR_TYPES];             /* for each type, set if some piece has it */
     int only_type;                             /* the type of all pieces; 0 if they differ */
     /* index of the first piece and of its first entry, for each cell, and the totals; first_entries is NULL if pieces
      * have one type */
     int64_t *first_pieces, *first_entries;
-    bool gives_entries;       /* set if entries of the caller's connectivity are stored instead of vertices */
+    bool gives_entries;       /* set if pieces store entries of the caller's connectivity instead of vertices */
     grid_array piece_entries; /* connectivity of the pieces */
 } split_work;
 
@@ -247,7 +247,8 @@ static int64_t entry_count(const split_work *w)
     return w->first_entries ? w->first_entries[cells] : w->first_pieces[cells] * grid_type_vertices(w->only_type);
 }
 
-/* Stores the corner at the given position of the cell's row, as its entry or as its vertex. */
+/* Stores a corner of a piece, which is given by its position in the cell's row: as a vertex, or as an entry of the
+ * caller's connectivity. */
 static void store_corner(const split_work *w, int64_t cell, int64_t at, int place)
 {
     const int64_t first = session_row_first(&w->rows, cell);

@@ -1,10 +1,10 @@
-/* The linear pieces that are read in place of cells of higher order. */
+/* Splits cells of higher order into linear pieces, which are read in their place. */
 #ifndef SESSION_SPLIT_H
 #define SESSION_SPLIT_H
 
 #include "session_mesh.h"
 
-/* Returns whether some cells are of higher order. Reads the types of mixed cells. */
+/* Returns whether some cells are of higher order. If types are mixed, it reads the types of all cells. */
 bool session_has_higher_order(const insitu_mesh *given);
 
 /* Creates the mesh's topology of pieces. Returns an error, and creates nothing, if types, counts, offsets or indices of
@@ -22,8 +22,8 @@ int64_t session_entry_place(const insitu_mesh *given, int64_t entry);
  * tested only if any_inverted is set, and flat if all its pieces are. Local. */
 session_counts session_count_parents(const session_mesh *mesh, bool any_inverted);
 
-/* Returns of how many of the caller's cells the list has a piece. If memory runs out, returns the number of all that
- * are drawn. Local. */
+/* Returns how many of the caller's cells have a piece in the list. If memory runs out, returns the number of all drawn
+ * cells. Local. */
 int64_t session_count_parents_of(const session_mesh *mesh, const uint32_t *pieces, int64_t count);
 
 #endif

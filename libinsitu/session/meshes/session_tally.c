@@ -91,8 +91,8 @@ static bool is_flat_everywhere(int type, double points[][3])
     return is_flat_volume(sum / of.volume_factor, box_volume(points, grid_type_vertices(type)));
 }
 
-/* Computes the cube root of the volume in the same way as the vectorized code (session_lane_loops.c). The math
- * library's function would take longer than the volume. */
+/* Computes the cube root of the volume by the same formula as the vectorized code (session_lane_loops.c), which takes
+ * less time than the math library's function. */
 MMBVH_INLINE double cell_size(double volume)
 {
     if (!(volume > 1e-280 && volume < 1e280)) return cbrt(volume);
@@ -108,8 +108,8 @@ MMBVH_INLINE double cell_size(double volume)
     return y;
 }
 
-/* Adds a cell's volume to the sums. The volume of a flat cell must be added as 0, whatever sign and size rounding gives
- * it. */
+/* Adds a cell's volume to the sums. For a flat cell, whose computed volume is only a rounding error, 0 must be
+ * passed. */
 MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
 {
     tally->drawn_count++;
@@ -275,7 +275,7 @@ MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell,
     int64_t next = cell;
     while (next < end && grid_cell_type(g, next) == type && offsets_are_good(mesh, next, count)) next++;
     if (next > cell) alike.first_entry = fetch_first(g, cell, count, shape);
-    alike.count = next > cell ? next - cell : 1; /* a cell with wrong offsets is a run of length 1 */
+    alike.count = next > cell ? next - cell : 1; /* a cell with wrong offsets is processed alone */
     return alike;
 }
 
@@ -318,7 +318,8 @@ static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t e
 static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;
-    if (alike->count < LANES || alike->g->lattice) return 0; /* there is only one cell in the run */
+    /* cells of a lattice are consecutive only within a row, so that this run has a single cell */
+    if (alike->count < LANES || alike->g->lattice) return 0;
     lane_run *const run = session_lanes_of(cpu_best_isa(), alike->g, alike->type);
     if (!run) return 0;
     lane_sums sums;
@@ -331,9 +332,9 @@ static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least
     return taken;
 }
 
-/* Adds the cells of a run a second time, each with its own bounding box. This is needed only if the least volume may be
- * flat compared to the box of all of them. Computing all boxes would take a thirtieth of the time for a mesh of
- * tets. */
+/* Adds the cells of a run a second time, each with its own bounding box. This is needed only if the smallest volume is
+ * so small, compared to the bounding box of the whole run, that the cell may be flat. Computing all boxes would take a
+ * thirtieth of the time for a mesh of tets. */
 static mesh_tally tally_run_again(const grid *g, int64_t begin, int64_t end)
 {
     mesh_tally again = tally_empty();
@@ -376,7 +377,7 @@ bool tally_axes(const session_mesh *mesh, mesh_tally *tally)
     const grid *g = &mesh->cells;
     if (!g->coordinates[0].axis || g->ghosts) return false;
     mesh_tally t = tally_empty();
-    /* products over the axes of (positive + negative) and of (positive - negative) */
+    /* products over the axes of (positive_count + negative_count), and of (positive_count - negative_count) */
     int64_t sized = 1, difference = 1;
     t.drawn_count = 1;
     t.size_sum = 1;

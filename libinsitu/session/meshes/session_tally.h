@@ -1,4 +1,4 @@
-/* Sums over a mesh's cells that are computed when the mesh is checked: bounds, counts and sizes. */
+/* Sums over a mesh's cells that are computed while the mesh is checked: bounds, counts and sizes. */
 #ifndef SESSION_TALLY_H
 #define SESSION_TALLY_H
 
@@ -8,7 +8,7 @@ typedef struct mesh_tally {
     double lower[3], upper[3];
     int64_t drawn_count, ghost_count, inverted_count, flat_count,
         shell_count; /* shells are cells that are drawn and flat */
-    /* sum of the cube roots of the volumes; added block by block, so that it rounds like a sum of few terms */
+    /* sum of the cube roots of the volumes; added block by block, which keeps the rounding error small */
     double size_sum;
 } mesh_tally;
 

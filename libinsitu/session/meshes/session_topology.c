@@ -165,7 +165,8 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
 
 /* ---- cells' faces from owner and neighbour -------------------------------------------------------------------- */
 
-static const int64_t outside = INT64_MIN; /* marks a halo cell, or the missing cell of a face in a separate list */
+/* number that marks a cell of another rank, or the missing cell of a face in a separate list */
+static const int64_t outside = INT64_MIN;
 
 session_face_sides session_sides(const insitu_mesh *given)
 {
@@ -186,7 +187,7 @@ void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_
     if (apart >= 0 && (cells[0] == -1 || cells[0] == -1 - base)) cells[0] = outside;
     for (int i = 0; i < 2; i++)
         if (cells[i] >= given->cell_count && cells[i] - given->cell_count < given->halo_cell_count) cells[i] = outside;
-    /* CGNS uses 0 for a missing cell, on either side of the face. */
+    /* CGNS gives a missing cell the number 0, on either side of the face. */
     if (cells[1] >= 0 && (cells[0] == outside || (base == 1 && cells[0] == -1))) {
         cells[0] = cells[1];
         cells[1] = -1;
@@ -411,10 +412,10 @@ enum { TYPES = GRID_POLYHEDRON + 1 };
 
 typedef struct recognition {
     bool is_faulty; /* set if some cell is invalid */
-    int64_t polyhedron_count,
-        recognised_count;       /* numbers of original polyhedra, and of those that are read as another type */
-    int64_t type_counts[TYPES]; /* number of cells by their new type */
-    int64_t entry_count;        /* number of entries of all cells, with their new types */
+    /* number of polyhedra that the caller gave, and number of those that are read as another type */
+    int64_t polyhedron_count, recognised_count;
+    int64_t type_counts[TYPES]; /* for each type, number of cells that are read as this type */
+    int64_t entry_count;        /* number of connectivity entries of all cells after the change of types */
     unsigned char *types;
 } recognition;
 
@@ -576,7 +577,7 @@ static bool may_have_polyhedra(const grid *g)
     return g->cell_count && g->offsets.data && grid_has_faces(g) && (g->cell_types || g->cell_type == GRID_POLYHEDRON);
 }
 
-/* Copies of cells' values have one for each piece. */
+/* Marks the session's copies of cell values as stale, because they contain one value for each piece of a cell. */
 static void mark_value_copies_stale(session_mesh *mesh)
 {
     for (int i = 0; i < mesh->field_count; i++)

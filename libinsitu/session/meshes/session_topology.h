@@ -1,18 +1,18 @@
-/* Provides the cells in the form that all other code reads: the caller's arrays, or arrays owned by the session if
- * cells are described by their faces. */
+/* Provides the cells in the form that all other code reads: in the caller's arrays or, if cells are described by their
+ * faces, in arrays owned by the session. */
 #ifndef SESSION_TOPOLOGY_H
 #define SESSION_TOPOLOGY_H
 
 #include "session_mesh.h"
 
-/* Returns the list of the vertices of a face, if each face has its own list. */
+/* Returns the array with the vertices of the face, for meshes in which each face has its own array. */
 static inline const void *session_face_list(const insitu_mesh *mesh, int64_t face)
 {
     const int64_t stride = mesh->face_lists.stride_bytes ? mesh->face_lists.stride_bytes : (int64_t)sizeof(void *);
     return *(const void *const *)(const void *)((const char *)mesh->face_lists.data + face * stride);
 }
 
-/* The location of a given face's vertices. */
+/* Where the vertices of one of the caller's faces are stored. */
 typedef struct session_face_row {
     grid_array list;
     int64_t first, size; /* index of the row's first entry in the list, and number of the face's vertices */
@@ -21,7 +21,7 @@ typedef struct session_face_row {
 
 session_face_row session_given_face(const insitu_mesh *mesh, int64_t face);
 
-/* Owners and neighbours of faces. */
+/* For each face, the cell that owns it and the neighbouring cell. */
 typedef struct session_face_sides {
     const insitu_mesh *given;
     grid_array owner, neighbour, boundary_owner;
@@ -31,7 +31,7 @@ session_face_sides session_sides(const insitu_mesh *given);
 /* Stores the two cells of a face. A missing cell is negative; it is cells[1], unless both are missing. */
 void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2]);
 
-/* Makes the grid read the current arrays: the session's own if they exist, else the caller's. Local. */
+/* Sets the arrays that the grid reads: the session's own arrays if there are any, otherwise the caller's. Local. */
 void session_read_topology(session_mesh *mesh);
 
 /* Returns the type that the caller gave the cell, regardless of the type as which it is read. */
@@ -39,8 +39,9 @@ int session_given_type(const session_mesh *mesh, int64_t cell);
 
 /* Computes the data that the description leaves to the library, once per topology: the cells' faces from owner and
  * neighbour, one array of the faces' vertices from several, the cells' vertices in VTK's order, and tets, hexes, wedges
- * and pyramids from polyhedra with such faces. Then it makes the grid read this data. Errors in owner, neighbour and
- * lists are reported; session_check.c finds all others. After an error nothing is stored. Local. */
+ * and pyramids from polyhedra with such faces. Then it sets the arrays that the grid reads to this data. Errors in
+ * owner, neighbour and lists are reported; session_check.c finds all others. After an error nothing is stored.
+ * Local. */
 insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error);
 
 #endif

@@ -1,7 +1,7 @@
-/* A moved coordinate has the type of the caller's, and is double on a lattice with coordinates along axes, which
- * becomes one with coordinates by vertex. It is computed as x + scale * u in double and rounded once, so that equal
- * vertices of blocks and ranks that have equal displacements stay equal. Coordinates are compared while they are
- * written: a field that was set again with the same values moves nothing. */
+/* Moved coordinates have the type of the caller's. A lattice with coordinates along its axes is read with coordinates
+ * by vertex instead, in double. A coordinate is computed as x + scale * u in double and rounded once, so that equal
+ * vertices of blocks and ranks with equal displacements stay equal. New coordinates are compared with the old ones, so
+ * that the mesh does not count as moved if the field was set again with the same values. */
 #include "session_warp.h"
 
 #include <string.h>
@@ -48,7 +48,8 @@ static void mark_moved(session_meshes *meshes, session_mesh *mesh)
 void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
 {
     const bool was_on = mesh->warp.is_on;
-    if (mesh->warp.problem.status) { /* the check of the mesh must find that it is gone */
+    /* the mesh is checked again, because the check has stored this problem as the mesh's error */
+    if (mesh->warp.problem.status) {
         mesh->is_check_stale = true;
         meshes->are_cells_changed = true;
     }
@@ -70,7 +71,7 @@ static insitu_type moved_type(const insitu_mesh *given, int axis)
 }
 
 /* Ensures that there is memory for the moved coordinates. *is_new is set if it is new. Returns false if memory runs
- * out. If z is not given and does not move, it stays as it is. */
+ * out. Coordinates along z get no memory if they are not given and do not move. */
 static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *is_new)
 {
     enum { IN_PLANE = 3, ALL = 7 };
@@ -86,10 +87,10 @@ static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *i
 typedef struct moved_axis {
     grid_array from;
     grid_array by;          /* displacements, in the order of the tuples; without data, nothing moves along the axis */
-    const insitu_array *to; /* NULL: the coordinates are not copied */
+    const insitu_array *to; /* receives the moved coordinates; NULL: those along this axis are not stored */
 } moved_axis;
 
-/* Stores a vertex's moved coordinate. Returns whether it differs from the one that was there. */
+/* Stores a vertex's moved coordinate. Returns whether it differs from the one stored before. */
 static bool move_coordinate(const moved_axis *axis, double scale, int64_t vertex, int64_t tuple)
 {
     double place = grid_array_number(&axis->from, vertex);
@@ -97,8 +98,8 @@ static bool move_coordinate(const moved_axis *axis, double scale, int64_t vertex
     return session_store_place(axis->to, vertex, place);
 }
 
-/* Moves all vertices. *bad becomes the first vertex whose index is that of no tuple, or else the number of vertices.
- * Returns whether a coordinate has changed. */
+/* Moves all vertices. *bad becomes the first vertex whose index is out of range, or the number of vertices if there is
+ * none. Returns whether a coordinate has changed. */
 static bool move_vertices(const session_mesh *mesh, const session_displacement *by, const moved_axis axes[3],
                           int threads, int64_t *bad)
 {
@@ -136,7 +137,7 @@ static insitu_status describe_index(const session_mesh *mesh, const session_disp
                      base);
 }
 
-/* Computes the moved coordinates from the description without the warp. */
+/* Computes the moved coordinates from the coordinates that the caller described. */
 static insitu_status compute_coordinates(session_mesh *mesh, const session_displacement *by, int threads, bool *differ,
                                          base_error *error)
 {

@@ -1,6 +1,5 @@
-/* Meshes that are drawn with their vertices at x + scale * u, u being a field of the caller's. The moved coordinates
- * are read in place of the caller's, so that everything that reads the mesh meets the mesh that the caller would have
- * given with these coordinates. */
+/* Draws meshes with their vertices at x + scale * u, where u is a field of the caller. The moved coordinates replace
+ * the caller's, so that all other code reads the mesh as if the caller had given these coordinates. */
 #ifndef SESSION_WARP_H
 #define SESSION_WARP_H
 
@@ -10,24 +9,24 @@
 typedef struct session_displacement {
     int field;                /* index of the field in the mesh */
     uint64_t key;             /* hash that differs if the displacements may differ */
-    int component_count;      /* 2 or 3 */
-    grid_array components[3]; /* displacement along each axis, in the order of the caller's tuples */
-    grid_array index;         /* tuple of each vertex; without data, vertex i has tuple i */
+    int component_count;      /* number of components: 2 or 3 */
+    grid_array components[3]; /* array of the displacements along each axis, one per tuple */
+    grid_array index;         /* index of each vertex's tuple; if it has no data, vertex i has tuple i */
     int64_t count;            /* number of tuples */
     double scale;             /* factor of the displacements */
 } session_displacement;
 
 /* Moves the vertices, unless they were moved by the same displacements before, and marks the mesh as moved if a
- * coordinate has changed. An error is one of the index, or lack of memory; it leaves the mesh unusable until it is
- * moved again. Uses all threads. Local. */
+ * coordinate has changed. It fails if an index is out of range or if memory runs out; the mesh is then unusable until
+ * its vertices are moved again. Uses all threads. Local. */
 insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, const session_displacement *by, int threads,
                                 base_error *error);
 
-/* Reads the caller's own coordinates again, if the mesh is warped. Local. */
+/* Restores the caller's own coordinates if the mesh is warped. Local. */
 void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh);
 
-/* Makes the description mesh->given refer to the moved coordinates, after the caller has set the mesh again. The grid
- * must be read afterwards. */
+/* Makes the description mesh->given refer to the moved coordinates again after the caller has set the mesh. The caller
+ * of this function must then call session_read_topology(). */
 void session_read_warp(session_mesh *mesh);
 
 #endif
