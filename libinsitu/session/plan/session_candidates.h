@@ -12,8 +12,9 @@
 bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count,
                         const session_extent *extent);
 
-/* Returns false if values alone do not determine which cells may be visible, so that any may be. Otherwise *key is a
- * hash of everything except the values themselves that determines the candidates: the scalars and their intervals. */
+/* Returns whether values alone determine which cells may be visible. If so, *key becomes a hash of all that selects the
+ * candidates apart from the values themselves, namely the scalars and their intervals. If not, any cell may be
+ * visible. */
 bool session_find_candidates(const session_mesh *mesh, uint64_t *key);
 /* Selects the candidates and counts, per scalar, the cells whose values are not finite. Parallel. Local. */
 insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_selection *out, base_error *error);

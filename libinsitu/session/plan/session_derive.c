@@ -1,4 +1,5 @@
-/* Derived fields are computed in their order, each after the fields on which it depends:
+/* Derived fields are computed one after the other, each after the fields on which it depends. These are the steps for
+ * one:
  *     cells' values that are needed at vertices  ->  session_recentre()
  *     an expression:  blocks of vertices or cells, each instruction for a whole block
  *     a gradient, or a quantity computed from one:  sums over the cells around each vertex and over all ranks
@@ -33,12 +34,13 @@ typedef struct derive_work {
     int derived_index;
     int recentring_count;
     session_recentring *recentrings;
-    int *stale; /* per recentring or mesh: nonzero if its values are out of date */
+    int *stale; /* for each recentring or mesh, nonzero if its values are out of date */
 } derive_work;
 
 /* ---- meshes and inputs of a derived field ---------------------------------------------------------------------- */
 
-/* Returns the derived field on the mesh, as all ranks know it; NULL if the mesh does not have it, or it has a fault. */
+/* Returns the catalogue's entry for the derived field on the mesh; NULL if the mesh does not have the field, or has a
+ * fault in it. */
 static const session_catalogue_field *find_field(const derive_work *w, const session_catalogue_mesh *mesh)
 {
     for (int f = 0; f < mesh->field_count; f++)
@@ -74,13 +76,13 @@ static bool next_visited_part(const derive_work *w, part_visit *v)
     return false;
 }
 
-/* Returns the number of the input's component, in the format of grid_field.component. */
+/* Returns the component that the input of a derived field uses, in the format of grid_field.component. */
 static int input_component(const scene_field *input, int component_count)
 {
     return input->component == SCENE_COMPONENT_ONLY ? 0 : session_resolve_component(input, component_count);
 }
 
-/* Returns whether the values of this input on the mesh must first be recentred to vertices. */
+/* Returns whether the input's values on the mesh must first be recentred to vertices. */
 static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mesh, const scene_field *input)
 {
     const session_catalogue_field *field = find_field(w, mesh), *from = session_catalogue_find(mesh, input->name);
@@ -156,7 +158,7 @@ static session_scalar *find_recentred(const derive_work *w, const session_catalo
                                      : NULL;
 }
 
-/* Returns a hash of all data from which the values on this rank's part are computed. */
+/* Returns a hash of everything that determines the derived values on one of this rank's parts. */
 static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -197,7 +199,7 @@ static insitu_status find_stale(derive_work *w, base_error *error)
 
 /* ---- values of one mesh ------------------------------------------------------------------------------------------ */
 
-/* Returns the values of an input, or of one of its components, at vertices or cells, as the derived field is. */
+/* Returns the values of an input or of one of its components, with the centring of the derived field. */
 static grid_field input_values(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                                int input, int component)
 {
@@ -246,7 +248,7 @@ static void store_values(const session_field *field, int64_t place, const double
             ((float *)(void *)field->copy)[place * count + c] = (float)values[c];
 }
 
-/* Records that the values are new, for the scalars and fields that depend on them. */
+/* Records that the derived values have changed, so that scalars and fields that depend on them are computed again. */
 static void mark_values_new(const derive_work *w, const session_catalogue_mesh *mesh, session_mesh *part, int index)
 {
     session_mark_scalars_stale(part, index);
@@ -274,7 +276,7 @@ static void load_block(const grid_field *field, int64_t first, int count, double
         for (int i = 0; i < count; i++) out[i] = (double)*(const float *)(const void *)(data + i * stride);
 }
 
-/* The buffers of a thread for one block of points. */
+/* A thread's buffers for evaluating an expression on one block of points. */
 typedef struct block_buffer {
     const double **inputs;
     double *values; /* values of the inputs, followed by the program's stack */
@@ -406,8 +408,8 @@ static void store_gradients(const derive_work *w, const session_vertex_sums *sum
     }
 }
 
-/* Lists the scalars whose gradients are computed: a vector's components, of which a vector with two has none along
- * z. */
+/* Lists the scalars whose gradients are computed: the components of a vector. A vector with two components has no third
+ * scalar. */
 static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh, const session_mesh *part,
                         grid_field out[SESSION_GRADIENTS])
 {

@@ -6,7 +6,7 @@
 #include "session_catalogue.h"
 #include "session_space.h"
 
-/* The input of the computation; it is the same on every rank except for the rank's own meshes. */
+/* Input for computing derived fields; it is the same on every rank except for the rank's own meshes. */
 typedef struct session_derive_basis {
     const scene *scene;
     session_catalogue *catalogue;

@@ -19,7 +19,8 @@ static uint64_t derived_field_bit(const scene *scene, const scene_field *field)
     return derived < 0 ? 0 : (uint64_t)1 << derived;
 }
 
-/* Adds to the set of needed fields those on which they depend, which come before them in the list. */
+/* Adds, to the set of needed fields, those on which they depend. A field depends only on fields before it in the
+ * list. */
 static uint64_t add_source_bits(const scene *scene, uint64_t needed)
 {
     for (int i = scene->derived_count - 1; i >= 0; i--)
@@ -75,10 +76,11 @@ void session_mark_sources(const scene *scene, uint64_t needed, const session_mes
 typedef struct derived_place {
     const char *scene_path;
     const scene_derived *derived;
-    const session_catalogue_mesh *mesh, *first_mesh; /* first_mesh: first mesh of the catalogue */
+    /* first_mesh: the first mesh of the catalogue on which the field exists */
+    const session_catalogue_mesh *mesh, *first_mesh;
 } derived_place;
 
-/* Begins a message with the place of the derived field, such as "scene.yaml:3: fields.q.vorticity". */
+/* Begins a message with the derived field's position in the scene, such as "scene.yaml:3: fields.q.vorticity". */
 #define AT "%s:%d: fields.%.200s%s%s: "
 #define OF(place)                                                                                                      \
     (place)->scene_path, (place)->derived->line, (place)->derived->name, *(place)->derived->key ? "." : "",            \
@@ -98,7 +100,7 @@ static insitu_status refuse_components(const derived_place *at, const scene_fiel
                      OF(at), name, found->component_count, at->mesh->name, name, name);
 }
 
-/* Checks that a vector has the same number of components on all meshes that are joined. */
+/* Checks that a vector has the same number of components on all meshes of a joint. */
 static insitu_status check_other_meshes(const derived_place *at, const scene_field *input,
                                         const session_catalogue_field *found, base_error *error)
 {

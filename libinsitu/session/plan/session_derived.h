@@ -7,9 +7,9 @@
 #include "session_catalogue.h"
 #include "session_plan.h"
 
-/* Adds the scene's derived fields to the catalogue, on the meshes that have all fields on which they depend, and to
- * this rank's meshes, unless they have been added. A derived field's error is stored as its fault in the catalogue.
- * Must be called whenever the catalogue or the scene may be new. Collective, agreed. */
+/* Adds the scene's derived fields to the catalogue, for the meshes that have all fields on which they depend, and to
+ * this rank's meshes, unless they have been added before. A derived field's error is stored as its fault in the
+ * catalogue. Must be called whenever the catalogue or the scene may be new. Collective, agreed. */
 insitu_status session_name_derived(const scene *scene, const char *scene_path, session_catalogue *catalogue,
                                    session_meshes *meshes, const session_team *team, base_error *error);
 

@@ -14,7 +14,7 @@
 #include "session_transfer.h"
 #include "session_unusable.h"
 
-/* The minimum and the negated maximum of a range, so that one reduction by minimum computes both. */
+/* The minimum and the negated maximum of a range, so that a single reduction by minimum yields both. */
 typedef struct field_range {
     double low, negated_high;
 } field_range;
@@ -26,11 +26,11 @@ typedef struct planned_layer {
     const scene_image *image;
     const scene_isosurface *isosurface;
     const scene_volume *volume;
-    const scene_surface *surface; /* a surface with a threshold */
+    const scene_surface *surface; /* an outer surface with a threshold */
     int number;                   /* number of the layer's first warning */
     /* range of the layer's values; for a surface, low is 0 if some cell is within the threshold */
     field_range range;
-    bool is_empty; /* set if the surface is empty */
+    bool is_empty; /* set if no cell is within the surface's threshold */
     /* set if the layer shows nothing according to the trees, and no warning has been reported yet */
     bool is_unreported;
 } planned_layer;
@@ -114,7 +114,7 @@ static void add_root_range(const session_mesh *mesh, const session_scalar *scala
     widen_range((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
 }
 
-/* Widens the range by the values of cells of this kind, which are computed if necessary. */
+/* Widens the range by the values of this set of cells, which are computed if necessary. */
 static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                              field_range *range)
 {
@@ -141,7 +141,7 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
         if (layer->surface && !of_all_cells)
             add_face_range(mesh, layer->surface, &range);
         else if (scalar && layer->isosurface && mesh->has_shells_alone)
-            /* shells are in no tree, so their values are read */
+            /* shells are not in trees, so that their values are read */
             add_extent_range(mesh, scalar, threads, SESSION_SEEN, &range);
         else if (scalar && of_all_cells)
             add_extent_range(mesh, scalar, threads, SESSION_SOLID, &range);
@@ -151,14 +151,14 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
     return range;
 }
 
-/* Further data that is part of the reduction. */
+/* Data beyond the layers' ranges that the same reduction combines. */
 typedef struct layer_news {
     bool has_other_cells; /* set if some rank has cells that are not shown (session_unusable.h) */
     int reporting_word;   /* maximum of all ranks' session_reporting_word() */
 } layer_news;
 
-/* Reduces the layers' ranges over all ranks, together with earlier errors and the news; after an error the rest is
- * undefined. Collective. */
+/* Combines the layers' ranges, earlier errors and the further data over all ranks in one reduction. The ranges are
+ * undefined after an error. Collective. */
 static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, layer_batch *batch,
                                    bool of_all_cells, layer_news *news, base_error *error)
 {
@@ -187,8 +187,8 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
 
 /* ---- empty layers ---------------------------------------------------------------------------------------------- */
 
-/* Returns the identity of the layer's warning. In a sweep over isovalues each picture has one isovalue, whose number is
- * that in the file. */
+/* Returns the identity of the layer's warning. In a sweep over isovalues each picture has one isovalue; its number is
+ * the one in the file's list. */
 static session_warning make_warning(const planned_layer *layer, int value)
 {
     const session_warning_kind kind = layer->isosurface ? WARNING_ISOVALUE
@@ -197,8 +197,8 @@ static session_warning make_warning(const planned_layer *layer, int value)
     return (session_warning){kind, layer->image->name, NULL, layer->number + value};
 }
 
-/* Returns whether an isovalue has no crossing. A crossing belongs to the cell that reaches the value from below, so
- * that the minimum of all values has none. */
+/* Returns whether no cell crosses an isovalue. A crossing belongs to the cell whose values reach the isovalue from
+ * below, so that the minimum of all values has none. */
 static bool is_outside(double value, const field_range *range)
 {
     return value <= range->low || value > -range->negated_high;
@@ -213,8 +213,8 @@ static bool is_transparent(const scene_volume *volume, const field_range *range)
     return true;
 }
 
-/* Returns the trees' range with its minimum raised by the rounding to float32, because the true minimum may be that
- * much larger. */
+/* Returns the range from the trees with its minimum raised by the rounding to float32, because the true minimum may be
+ * larger by that. */
 static field_range least_of_trees(const field_range *range)
 {
     const double low = range->low < INFINITY ? (double)nextafterf((float)range->low, INFINITY) : INFINITY;
@@ -226,7 +226,8 @@ static int count_values(const planned_layer *layer)
     return layer->isosurface ? layer->isosurface->value_count : 1;
 }
 
-/* Returns whether the layer, or its isovalue number `value`, shows no value of the range. */
+/* Returns whether the layer shows no value of the range. For an isosurface only its isovalue number `value` is
+ * tested. */
 static bool is_layer_empty(const planned_layer *layer, int value, const field_range *range)
 {
     if (layer->isosurface) return is_outside(layer->isosurface->values[value], range);
@@ -282,7 +283,8 @@ static void warn_of_threshold(session_report *report, const planned_layer *layer
                  -layer->range.negated_high);
 }
 
-/* Warns of an empty layer. If the field has no value at all, other warnings give the reason. */
+/* Warns of an empty layer. If the field has no value at all, nothing is said here, because another warning explains
+ * it. */
 static void warn_of_layer(session_report *report, const planned_layer *layer)
 {
     const bool has_values = layer->range.low <= -layer->range.negated_high || !layer->is_unreported;

@@ -24,7 +24,7 @@ static bool is_joint_member(const session_catalogue_mesh *mesh, const join_wish 
     return found && session_is_recentred(field, found->centring, mesh->is_refined);
 }
 
-/* Adds an empty joint for up to count meshes. Returns NULL if memory runs out. */
+/* Adds a joint without meshes, with space for `count` of them. Returns NULL if memory runs out. */
 static session_joint *add_joint(session_catalogue *catalogue, uint64_t name, int count)
 {
     session_joint **joints = base_realloc(catalogue->joints, (size_t)(catalogue->joint_count + 1) * sizeof *joints);
@@ -50,7 +50,8 @@ static bool add_joint_of_one(session_catalogue *catalogue, session_catalogue_mes
     return true;
 }
 
-/* Computes the name of the joint of all meshes of the wish that have no global ids, and adds the joint if it is new. */
+/* Computes the name of the joint that consists of all requested meshes without global ids, and adds the joint if it is
+ * new. */
 static bool join_meshes(session_catalogue *catalogue, const join_wish *wish, uint64_t *joined)
 {
     uint64_t hash = SESSION_HASH_BEGIN;

@@ -1,8 +1,8 @@
-/* Creates joints: sets of meshes over which equal vertices have one mean of cell values.
+/* Creates joints, which are sets of meshes across which cell values are averaged at equal vertices.
  *
  * Codes that describe each level of refinement, or each block, as a separate mesh need isosurfaces without a seam
- * between these. Meshes are joined if a layer shows the same field on them. So with separate layers, one for each
- * material, the field is not averaged across the border between materials. */
+ * between these. Meshes are joined if one layer shows the same field on them. If each material has a layer of its own,
+ * meshes are not joined, and the field is not averaged across the border between materials. */
 #ifndef SESSION_JOINTS_H
 #define SESSION_JOINTS_H
 

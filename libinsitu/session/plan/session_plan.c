@@ -23,7 +23,7 @@
 
 enum { NAMES_SIZE = 700 };
 
-/* Lists the existing fields' names for a message. */
+/* Lists the names of the fields that exist, for a message. */
 static void list_fields(const session_catalogue *catalogue, char names[NAMES_SIZE])
 {
     size_t size = 0;
@@ -45,7 +45,7 @@ static void list_meshes(const session_catalogue *catalogue, char names[NAMES_SIZ
     if (size == 0) snprintf(names, NAMES_SIZE, "none");
 }
 
-/* Returns the fault's status and stores the fault in *error; returns INSITU_OK if it is NULL. */
+/* Copies the fault to *error and returns its status. If the fault is NULL, returns INSITU_OK. */
 static insitu_status refuse_fault(const base_error *fault, base_error *error)
 {
     if (!fault) return INSITU_OK;
@@ -53,8 +53,8 @@ static insitu_status refuse_fault(const base_error *fault, base_error *error)
     return error->status;
 }
 
-/* Returns the fault of a mesh on which the layer is drawn, because a field that seems to be on no mesh may be on the
- * faulty one. NULL if there is none. */
+/* Returns the fault of a mesh on which the layer is drawn; NULL if there is none. A faulty mesh is reported before a
+ * missing field, because the mesh may be the one that has the field. */
 static const base_error *find_hidden_fault(const session_plan_basis *basis, const scene_field *field)
 {
     for (int m = 0; m < basis->catalogue->mesh_count; m++) {
@@ -119,7 +119,7 @@ static insitu_status refuse_missing_field(const session_plan_basis *basis, const
                      basis->scene_path, field->line, field->name, meant, names);
 }
 
-/* Checks that a mesh that the layer names exists, and that it has the field unless it has no cells on any rank. */
+/* Checks that a mesh that the layer names exists. If any rank has cells of it, the mesh must also have the field. */
 static insitu_status check_named_mesh(const session_plan_basis *basis, const scene_field *field, const char *name,
                                       base_error *error)
 {
@@ -200,7 +200,7 @@ static const char *colour_without(const scene_colour_map *map)
     return map->has_nan ? "of the colour nan" : "grey";
 }
 
-/* Warns of meshes that have the surface but not the field that colours it. */
+/* Warns of meshes that have the surface but lack the field that colours it. */
 static void warn_of_grey(const session_catalogue *catalogue, const scene_image *image, const scene_isosurface *layer,
                          session_report *report)
 {
@@ -216,7 +216,7 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
     }
 }
 
-/* Checks the field of a layer's contour lines. on: the field that names the meshes of the layer. */
+/* Checks the field of a layer's contour lines. on: a field whose list of meshes is that of the layer. */
 static insitu_status check_lines(const session_plan_basis *basis, const scene_lines *lines, const scene_field *on,
                                  base_error *error)
 {
@@ -275,7 +275,8 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 {
     bool is_planned = true;
     for (int i = 0; i < plan->image_count; i++) {
-        if (plan->images[i]->variant.view > 0) continue; /* the layers of other views are those of view 0 */
+        /* views of an orbit share the layers of their first view, which is checked alone */
+        if (plan->images[i]->variant.view > 0) continue;
         scene_field_walk walk = {.image = plan->images[i]};
         for (const scene_field *field; is_planned && (field = scene_next_field(&walk)) != NULL;)
             is_planned = walk.role == SCENE_THRESHOLD || add_recentrings(catalogue, plan, field);
@@ -302,8 +303,8 @@ static bool is_due(const scene_image *image, const session_moment *m)
     return image->cycle_interval <= 1 || m->cycle % image->cycle_interval == 0;
 }
 
-/* Returns whether any rank has cells, or any mesh has a fault. If not, fields are not required, and the picture is its
- * background. */
+/* Returns whether any rank has cells, or any mesh has a fault. If neither is the case, a picture shows only its
+ * background, so that missing fields are no error. */
 static bool has_cells_or_faults(const session_plan_basis *basis)
 {
     return basis->extent->cell_count > 0 || basis->catalogue->has_faults;
@@ -352,8 +353,8 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
     }
 }
 
-/* Warns of meshes that have the layer but not the field of its contour lines. on: the layer's meshes and, unless it is
- * an outer surface, its field. */
+/* Warns of meshes that have the layer but lack the field of its contour lines. on: a field whose list of meshes is that
+ * of the layer; only meshes that have this field are considered, unless the layer is an outer surface. */
 static void warn_of_no_lines(const session_catalogue *catalogue, const scene_image *image, const scene_field *on,
                              const scene_lines *lines, session_report *report)
 {
@@ -388,7 +389,7 @@ static void warn_of_shells(const session_catalogue *catalogue, const scene_image
 }
 
 /* Warns of a mesh with global vertex ids if a layer shows it, by means at vertices, together with other meshes: its
- * vertices do not count as equal to theirs. */
+ * vertices are not matched with those of the others. */
 static void warn_of_apart(const session_catalogue *catalogue, const scene_image *image, const char *layer,
                           const scene_field *field, session_report *report)
 {
@@ -451,7 +452,7 @@ void session_plan_free(session_plan *plan)
     *plan = (session_plan){0};
 }
 
-/* Returns whether an image has no outputs and its pictures are not kept in memory; warns if that is so. */
+/* Returns whether an image has no outputs although pictures are not kept in memory; warns if so. */
 static bool is_for_nobody(const session_plan_basis *basis, const scene_image *image, session_report *report)
 {
     const bool is_for_none = image->output_count == 0 && !basis->keeps_pictures;
@@ -463,8 +464,8 @@ static bool is_for_nobody(const session_plan_basis *basis, const scene_image *im
     return is_for_none;
 }
 
-/* Selects the images that are due and can be drawn. Views of an orbit share their layers, and so the warnings about
- * these. */
+/* Selects the images that are due and can be drawn. Views of an orbit share their layers, and therefore the layers'
+ * warnings. */
 static void select_images(const session_plan_basis *basis, session_report *report, session_plan *plan)
 {
     bool is_well = false;
@@ -501,7 +502,7 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     if (is_whole) session_mark_sources(basis->scene, session_derived_of_plan(basis->scene, &plan), meshes);
     if (!is_whole) session_fail_for_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
     insitu_status status =
-        /* agrees only if necessary, because fill functions may be collective */
+        /* fill functions may be collective, so that all ranks must agree on the status before they are called */
         basis->is_filled ? session_agree(team->comm, error) : INSITU_OK;
     if (!status) {
         if (is_whole) session_fill_fields(meshes, basis->catalogue, true, error);

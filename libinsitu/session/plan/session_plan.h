@@ -8,7 +8,7 @@
 #include "session_report.h"
 #include "session_space.h"
 
-/* A request for cell values at vertices. There is one for each set of meshes, field and component. */
+/* A request to average cell values at vertices. There is one for each combination of meshes, field and component. */
 typedef struct session_recentring {
     session_joint *joint;
     const char *field;
@@ -19,12 +19,12 @@ typedef struct session_recentring {
 typedef struct session_plan {
     int image_count; /* number of images that can be drawn */
     const scene_image **images;
-    /* Numbers of layers over all images, in which an orbit's views count once. Surfaces are outer surfaces and, if
-     * there are meshes of shells alone, isosurfaces. */
+    /* Number of layers of each kind in all images; views of an orbit count once. `surfaces` counts outer surfaces and,
+     * if there are meshes of shells alone, isosurfaces. */
     int slice_count, surface_count;
     int recentring_count;
     session_recentring *recentrings;
-    int *stale;         /* one number per recentring: work space of session_recentre() */
+    int *stale;         /* one number per recentring: working memory of session_recentre() */
     int64_t cell_count; /* number of drawn cells over all ranks */
     base_error refusal; /* error of the first due image that cannot be drawn */
 } session_plan;
@@ -36,12 +36,13 @@ typedef struct session_moment {
     bool is_first; /* set if there is no previous step */
 } session_moment;
 
-/* The input of a plan; the same on every rank. */
+/* Input for making a plan; the same on every rank. */
 typedef struct session_plan_basis {
     const scene *scene;
     const char *scene_path; /* path of the scene file, for messages */
     const session_moment *moment;
-    uint64_t allowed_images; /* one bit per image of the file, set unless the image's condition does not hold */
+    /* one bit per image of the file, not set if the image's condition does not hold in this step */
+    uint64_t allowed_images;
     const session_catalogue *catalogue;
     const session_extent *extent;
     bool is_filled;      /* set if some rank has a field with a fill function */

@@ -1,4 +1,4 @@
-/* Computes the ranges of values of colour maps that the scene does not fix. */
+/* Computes the ranges of colour maps for which the scene gives no fixed range. */
 #ifndef SESSION_RANGES_H
 #define SESSION_RANGES_H
 
@@ -7,8 +7,8 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* The scalar whose extremes are computed: a field, or, if a plane is given, the distances from the plane on the meshes
- * that have the field. */
+/* The scalar whose minimum and maximum are computed: a field or, if a plane is given, the distances from the plane on
+ * the meshes that have the field. */
 typedef struct session_range_subject {
     const scene_field *field;
     const scene_plane *plane; /* the plane; NULL: the field's own values are used */
@@ -19,9 +19,9 @@ typedef struct session_range_subject {
 insitu_status session_find_extremes(const session_meshes *meshes, const session_team *team,
                                     const session_range_subject *of, double *low, double *high, base_error *error);
 
-/* Computes the range of a layer's field over all ranks' drawn cells, by the colour map's rule; for SCENE_RANGE_RUN only
- * the range of this step. low > high: there are no values. The result has the same bits on any partition.
- * Collective. */
+/* Computes the range of a layer's field over all ranks' drawn cells, as the colour map requires (extremes, percentiles
+ * or symmetric). SCENE_RANGE_RUN yields the range of this step alone. low > high: there are no values. The result has
+ * the same bits on any partition. Collective. */
 insitu_status session_find_range(const session_meshes *meshes, const session_team *team, const scene_field *field,
                                  const scene_colour_map *map, double *low, double *high, base_error *error);
 

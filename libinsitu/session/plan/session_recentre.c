@@ -37,7 +37,8 @@ typedef struct value_groups {
     int64_t *ends;         /* end of each group's values; count entries */
     double *values;
     double *means; /* mean of each group; count entries */
-    /* per group: whether its values are those of boundary faces, else those of cells or corners; count entries */
+    /* for each group, nonzero if its values are those of boundary faces, and 0 if those of cells or corners; count
+     * entries */
     unsigned char *has_face_values;
 } value_groups;
 
@@ -60,7 +61,7 @@ typedef struct recentring {
 
 /* ---- values by group ----------------------------------------------------------------------------------------- */
 
-/* Makes groups without values. The array `starts` remains owned by the caller. */
+/* Initializes groups that have no values yet. The caller keeps ownership of the array `starts`. */
 static bool groups_create(value_groups *groups, int64_t count, const int64_t *starts)
 {
     *groups = (value_groups){.count = count, .starts = starts};
@@ -130,7 +131,7 @@ static void groups_average(value_groups *groups, int threads)
 
 /* ---- this rank's values ---------------------------------------------------------------------------------------- */
 
-/* The groups of a cell's vertices, or the vertices, each listed once. */
+/* The groups of a cell's vertices without duplicates. For vertex values of split cells, the vertices themselves. */
 typedef struct cell_groups {
     int64_t count, capacity;
     int64_t *groups;
@@ -171,7 +172,8 @@ static void drop_duplicates(cell_groups *list)
     list->count = count;
 }
 
-/* Adds a value to a group, unless the group has values of faces. is_shared: several threads may do so at once. */
+/* Adds a value to a group, unless the group has values of boundary faces. is_shared: other threads may add to the group
+ * at the same time. */
 static inline void add_value(value_groups *values, int64_t group, double value, bool is_shared)
 {
     int64_t at;
@@ -184,8 +186,8 @@ static inline void add_value(value_groups *values, int64_t group, double value, 
     values->values[at] = value;
 }
 
-/* Adds the cell's value to the group of each of its vertices, once per group; or, for values at corners, adds each
- * finite one to the group of its corner. */
+/* Adds a cell's values to the groups of its vertices. A cell value is added once per group. Of values at corners, each
+ * finite one is added to its corner's group. */
 static void add_cell_values(recentring *r, int part, int64_t cell, cell_groups *list, bool is_shared)
 {
     const grid_field *field = &r->parts[part].field;
@@ -206,7 +208,7 @@ static void add_cell_values(recentring *r, int part, int64_t cell, cell_groups *
     for (int64_t i = 0; i < list->count; i++) add_value(&r->values, list->groups[i], value, is_shared);
 }
 
-/* As above, for a caller's cell that is split into pieces. Pieces share vertices. */
+/* Adds the values of one of the caller's cells that is split into pieces. Vertices that pieces share are added once. */
 static void add_split_cell_values(recentring *r, int part, int64_t cell, cell_groups *list, bool is_shared)
 {
     const session_mesh *mesh = r->list.items[part];
@@ -229,7 +231,7 @@ static void add_split_cell_values(recentring *r, int part, int64_t cell, cell_gr
     }
 }
 
-/* Adds the finite values at the vertices of drawn cells to their groups, each vertex once. */
+/* Adds the finite values at vertices of drawn cells to the vertices' groups. Each vertex is added once. */
 static void add_vertex_values(recentring *r, int part)
 {
     const grid_field *field = &r->parts[part].field;
@@ -361,7 +363,7 @@ static void average_own_values(recentring *r, const session_team *team, base_err
 
 /* ---- groups that several ranks have ---------------------------------------------------------------------------- */
 
-/* Number of words before the values: the key, and the count, in which the bit FACE_VALUES marks values of faces. */
+/* number of words of a record before its values: the key, and the count, whose bit FACE_VALUES marks values of faces */
 enum { RECORD_HEAD = 4 };
 #define FACE_VALUES (UINT64_C(1) << 63)
 
@@ -408,7 +410,7 @@ static const uint64_t *next_record(const uint64_t *record)
     return record + RECORD_HEAD + record_count(record);
 }
 
-/* Returns whether the record has values that its group uses. If any rank has values of faces, those of cells are
+/* Returns whether the group uses the record's values. If any rank has values of boundary faces, values of cells are
  * ignored. */
 static bool has_values(const uint64_t *record, const value_groups *values, int64_t group)
 {
@@ -428,7 +430,7 @@ static bool number_records(const session_mail *in, int64_t *groups, session_key_
     return true;
 }
 
-/* Collects the records' values by group. starts: one entry more than there are groups, all 0. */
+/* Collects the records' values by group. starts: zero-initialized, one entry more than there are groups. */
 static bool gather_records(const session_mail *in, const int64_t *groups, int64_t count, int64_t *starts,
                            value_groups *values)
 {
@@ -449,7 +451,7 @@ static bool gather_records(const session_mail *in, const int64_t *groups, int64_
     return true;
 }
 
-/* Stores the mean for each record's key in reply->words and reply->counts. */
+/* Stores, in the reply, the mean for the key of each record. */
 static bool merge_records(const session_mail *in, int ranks, int threads, session_mail *reply)
 {
     session_key_table keys = {0};
@@ -477,7 +479,7 @@ static bool merge_records(const session_mail *in, int ranks, int threads, sessio
     return is_done;
 }
 
-/* Replaces the means of groups that other ranks have, too, by those over all ranks. */
+/* Replaces the means of groups that other ranks share by the means over all ranks. */
 static insitu_status merge_shared(const session_team *team, recentring *r, base_error *error)
 {
     const session_vertex_groups *groups = &r->joint->groups;
@@ -500,8 +502,8 @@ static insitu_status merge_shared(const session_team *team, recentring *r, base_
 
 /* ---- one recentring -------------------------------------------------------------------------------------------- */
 
-/* Copies the means to the vertices. A corner whose own value is not finite keeps it, so that its cell is not drawn, as
- * without means. For cell values this is checked elsewhere (grid_field.own). */
+/* Copies the means to the vertices. A corner whose own value is not finite keeps that value, so that its cell is not
+ * drawn, as without means. For values of cells, grid_field.own serves this purpose instead. */
 static void copy_means_to_vertices(const recentring *r, int part, int threads)
 {
     const int64_t *of_vertex = r->joint->groups.group_of_vertex + r->joint->groups.first_vertices[part];
@@ -520,8 +522,9 @@ static void copy_means_to_vertices(const recentring *r, int part, int threads)
     }
 }
 
-/* Returns whether some of the meshes have values of cells, or values of vertices some of which may be hanging. Values
- * at corners are not constrained, because codes that have them do so themselves. */
+/* Returns whether values at hanging vertices must be constrained: some mesh has values of cells, or values of vertices
+ * of which some may be hanging. Values at corners are not constrained, because codes that have them do so
+ * themselves. */
 static bool is_constrained(const session_recentring *item)
 {
     for (int i = 0; i < item->joint->count; i++)

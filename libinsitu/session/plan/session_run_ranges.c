@@ -50,7 +50,7 @@ static int count_layers(const scene_image *image)
 
 /* ---- the file -------------------------------------------------------------------------------------------------- */
 
-/* Stores an error about the file. what: "read" or "written". */
+/* Stores an error that the file could not be `what` ("read" or "written"), and returns its status. */
 static insitu_status fail_at_file(const session_image_ranges *ranges, const char *what, const file_failure *failure,
                                   base_error *error)
 {
@@ -100,7 +100,7 @@ static insitu_status read_lines(session_image_ranges *ranges, const file_content
     char *line = content->text, *const end = content->text + content->size;
     for (int number = 1; line < end; number++) {
         char *stop = memchr(line, '\n', (size_t)(end - line));
-        if (!stop) stop = end; /* ends the line at a NUL byte */
+        if (!stop) stop = end; /* the last line ends at the text's terminating NUL */
         *stop = '\0';
         if (line + strlen(line) != stop || !read_line(ranges, line))
             return base_fail(error, INSITU_ERROR_SCENE,
@@ -177,7 +177,7 @@ static session_image_ranges *find_ranges(const session_run_ranges *all, const sc
     return NULL;
 }
 
-/* Prepares an entry at the end of the list; the caller counts it when it is complete. */
+/* Initializes an entry after the end of the list. The caller increments the count when the entry is complete. */
 static bool prepare_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
 {
     const int count = count_layers(image);

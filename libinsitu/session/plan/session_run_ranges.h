@@ -1,4 +1,5 @@
-/* Keeps ranges that widen over a run (range: run): the widest range with which each layer of an image has been drawn.
+/* Keeps colour ranges that widen over a run (range: run): for each layer of an image, the widest range with which it
+ * has been drawn.
  *
  * They are stored in a file NAME.ranges, where NAME is the image's name, in the folder of the image's first output: the
  * part of its path before the last slash that comes before any placeholder. Further pictures of a sweep use
@@ -13,7 +14,7 @@
 #include "scene.h"
 #include "session_team.h"
 
-/* The range of a layer over the run; it points into the scene. */
+/* The widest range of a layer over the run; its pointers refer to the scene. */
 typedef struct session_run_range {
     const char *kind; /* kind of the layer, as written in the file of ranges */
     int number;       /* number of the layer among those of its kind */
@@ -24,7 +25,7 @@ typedef struct session_run_range {
 
 typedef struct session_image_ranges {
     char *image, *path; /* name of the image, and path of the file that keeps its ranges */
-    /* index of the combination of the image's sweep to which the ranges belong (scene_variant.layers); 0 without a
+    /* the combination of the image's sweep to which the ranges belong, by number (scene_variant.layers); 0 without a
      * sweep */
     int layers;
     int count;

@@ -15,8 +15,9 @@
 typedef struct smooth_item {
     const session_catalogue_mesh *mesh;
     const session_catalogue_field *field;
-    const scene_field *scene_field; /* the field in the first layer that shows it */
-    uint64_t joint_name;            /* name of the joint (session_joint_name()) if values are recentred */
+    const scene_field *scene_field; /* the field as described in the first layer that shows it */
+    /* name of the joint over which values are recentred (session_joint_name()); unused if values are not recentred */
+    uint64_t joint_name;
     int component;
     int value_count;
     mmbvh_interval *values; /* isovalues of all layers that show the field */
@@ -27,10 +28,10 @@ typedef struct smooth_items {
     smooth_item *items;
 } smooth_items;
 
-/* The data of this rank for one item. */
+/* This rank's data for one field that needs gradients. */
 typedef struct smooth_work {
-    session_scalar **scalars; /* the scalar of each part */
-    mmbvh_selection *crossed; /* per part, the cells that the isosurface crosses */
+    session_scalar **scalars; /* scalar of each part */
+    mmbvh_selection *crossed; /* for each part, the cells that the isosurface crosses */
     session_vertex_sums sums;
 } smooth_work;
 
@@ -63,7 +64,7 @@ bool session_has_smooth_normals(const scene_isosurface *layer, const session_cat
     return layer->normals == SCENE_VERTEX || (layer->normals == SCENE_GRADIENT && has_polynomials);
 }
 
-/* Adds a mesh of a layer with smooth normals. */
+/* Adds a mesh on which a layer with smooth normals is drawn. */
 static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, const scene_isosurface *layer)
 {
     const session_catalogue_field *field = session_catalogue_find(mesh, layer->field.name);
@@ -82,14 +83,15 @@ static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, c
     return true;
 }
 
-/* Lists the items, in the same order on all ranks. */
+/* Lists the fields that need gradients, in the same order on all ranks. */
 static bool list_items(const session_plan *plan, const session_catalogue *catalogue, smooth_items *out)
 {
     bool is_listed = true;
     for (int m = 0; m < catalogue->mesh_count; m++)
         for (int i = 0; i < plan->image_count; i++) {
             const scene_image *image = plan->images[i];
-            if (image->variant.view > 0) continue; /* the layers of other views are those of view 0 */
+            /* views of an orbit share the layers of their first view, so that only that one is listed */
+            if (image->variant.view > 0) continue;
             for (int n = 0; n < image->isosurface_count && is_listed; n++)
                 is_listed = !session_has_smooth_normals(&image->isosurfaces[n], catalogue) ||
                             add_layer(out, &catalogue->meshes[m], &image->isosurfaces[n]);
@@ -113,8 +115,7 @@ bool session_is_smooth(const session_plan *plan, const session_catalogue *catalo
 
 /* ---- vertices of crossed cells ------------------------------------------------------------------------------- */
 
-/* Sets the entries of the vertices of a part's crossed cells to 0, and the others to -1. Returns the number of vertices
- * set to 0. */
+/* Marks the vertices of a part's crossed cells by 0, and all others by -1. Returns the number of marked vertices. */
 static int64_t mark_crossed_vertices(const mmbvh_selection *crossed, session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
@@ -166,7 +167,7 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_
     return error->status;
 }
 
-/* Prepares this rank's data for the item. */
+/* Allocates and fills this rank's data for a field that needs gradients. */
 static insitu_status create_work(const smooth_item *item, const session_meshes *meshes, int threads, smooth_work *work,
                                  base_error *error)
 {
@@ -200,8 +201,8 @@ static void free_work(smooth_work *work)
 
 /* ---- one item ------------------------------------------------------------------------------------------------ */
 
-/* Numbers the part's vertices for which this rank needs sums; the others have sums only for other ranks, or none.
- * sum_of[n] becomes the index of the sum of number n. */
+/* Numbers the part's vertices whose gradients this rank needs. All other vertices have sums for other ranks only, or no
+ * sums. sum_of[n] becomes the index of the sum of vertex number n. */
 static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32_t *sum_of)
 {
     int64_t count = 0;
@@ -215,8 +216,8 @@ static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32
     return count;
 }
 
-/* Stores the gradients of a part's vertices. They are scaled to the size of the scene, because their length does not
- * matter, so that no unit of the values makes them too small for a float. */
+/* Stores the gradients of a part's vertices. They are scaled to the size of the scene, so that they fit into a float
+ * whatever the unit of the values is; their length does not matter. */
 static bool store_gradients(const session_vertex_sums *sums, session_sum_part *part, session_scalar *scalar)
 {
     const int64_t vertices = part->mesh->cells.vertex_count, words = session_sum_words(1);

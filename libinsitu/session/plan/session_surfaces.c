@@ -9,19 +9,19 @@
 #include "session_outer_mesh.h"
 #include "session_thresholds.h"
 
-/* The faces that a layer needs of one mesh; this rank may have no part of it. */
+/* A mesh whose outer faces a layer shows, and the layer's threshold. This rank may have no part of the mesh. */
 typedef struct surface_wish {
     const session_catalogue_mesh *mesh;
     const scene_threshold *threshold;
 } surface_wish;
 
-/* Returns the part's outer faces for the wish; NULL if it has none. */
+/* Returns the part's outer faces for the requested surface; NULL if it has none. */
 static session_outer *find_own_outer(const session_mesh *part, const surface_wish *wish)
 {
     return part->is_given ? session_find_outer(part, wish->threshold) : NULL;
 }
 
-/* Returns whether faces are out of date on some of this rank's parts. */
+/* Returns whether the outer faces of any of this rank's parts are out of date. */
 static bool are_faces_stale(const session_meshes *meshes, const surface_wish *wish)
 {
     const session_parts parts = session_find_parts(meshes, wish->mesh->name);
@@ -47,8 +47,7 @@ static int add_wish(surface_wish *wishes, int count, const surface_wish *wish)
     return count + 1;
 }
 
-/* Lists the outer surfaces of an image's layers with the meshes on which they are drawn. Returns the new length of the
- * list. */
+/* Lists the outer surfaces that an image's layers show, with their meshes. Returns the new length of the list. */
 static int list_image_wishes(const scene_image *image, const session_catalogue *catalogue, surface_wish *wishes,
                              int count)
 {
@@ -77,12 +76,13 @@ static int list_wishes(const session_plan *plan, const session_catalogue *catalo
     return count;
 }
 
-/* Determines which of the faces are out of date on some rank. If a rank has failed before, all return its error.
+/* Determines which outer faces are out of date on some rank. If a rank has failed before, all return its error.
  * Collective. */
 static insitu_status find_stale_wishes(const session_meshes *meshes, const surface_wish *wishes, int count,
                                        const session_team *team, int *stale, bool *is_any, base_error *error)
 {
-    /* entries: whether this rank has failed; whether it has faces that are out of date */
+    /* first entry: nonzero if this rank has failed; the others: nonzero if its outer faces of a surface are out of
+     * date */
     int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0};
     for (int i = 0; i < count; i++) {
         stale[i] = are_faces_stale(meshes, &wishes[i]);
@@ -116,7 +116,7 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_wish
     return status ? status : session_agree(team->comm, error);
 }
 
-/* Prepares a mesh of outer faces for drawing. Each of its cells has one drawn face. */
+/* Prepares a mesh of outer faces for drawing, so that each of its cells shows one face. */
 static insitu_status prepare_outer_mesh(const session_mesh *mesh, session_outer *outer, base_error *error)
 {
     const insitu_status status = session_make_outer_mesh(mesh, outer, error);

@@ -12,9 +12,9 @@
 
 enum { band_entries = 16 };
 
-/* Values are stored relative to the low end in double, so a range may be as narrow as their digits allow. A range from
- * the data counts as a single value if it is not wider than these shares of its larger end, because means over cells
- * and ranks have rounding errors of a few times 2^-53. */
+/* Limits, as shares of the larger end, below which a range from the data counts as a single value, because means over
+ * cells and ranks have rounding errors of a few times 2^-53. A range that the scene gives may be as narrow as its
+ * digits allow, because values are stored relative to its low end in double. */
 static const double least_of_data = 64 * DBL_EPSILON, widest_log = 1e30;
 
 /* Width of the range that a constant field gets, as a share of its value. */
@@ -46,8 +46,8 @@ bool session_is_too_narrow(double low, double high)
     return low < high && high - low < fmax(least_of_data * larger_magnitude(low, high), FLT_MIN);
 }
 
-/* Extends a range so that it is not empty, and positive for a logarithmic scale; a constant field gets its value in the
- * middle. Returns whether there is a single value, and stores it in *constant. */
+/* Widens a range so that it is not empty and, for a logarithmic scale, positive. The range of a constant field gets the
+ * field's value in its middle. Returns whether there is a single value, and stores it in *constant. */
 static bool make_range_usable(const scene_colour_map *map, double *low, double *high, double *constant)
 {
     const bool is_log = map->scale == SCENE_LOG;
@@ -90,7 +90,7 @@ bool session_takes_memory(const scene_colour_map *map, const scene_volume *volum
     return volume && (map->is_banded || map->has_below || map->has_above);
 }
 
-/* Fills a table for bands, and for the colours outside the range. */
+/* Fills a table with the colours of the bands and those outside the range. */
 static bool expand_table(const scene_colour_map *map, session_transfer *out)
 {
     render_transfer *t = &out->transfer;
@@ -157,7 +157,8 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
 int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS])
 {
     const scene_range *range = &volume->colour_map.range;
-    scene_colour_map map = volume->colour_map; /* a map with a single colour does not allocate memory */
+    /* the bands and outside colours are removed below, because a map with a single colour allocates no memory */
+    scene_colour_map map = volume->colour_map;
     map.is_banded = map.has_below = map.has_above = false;
     session_transfer t;
     session_make_transfer(1, &map, range->is_fixed ? range->low : 0, range->is_fixed ? range->high : 1, volume, &t);

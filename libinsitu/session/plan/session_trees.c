@@ -43,7 +43,7 @@ static void update_rate(double *rate, double seconds, int64_t cells)
     *rate = *rate > 0 ? 0.5 * (*rate + now) : now;
 }
 
-/* The data of an update, besides the meshes. */
+/* What all updates of trees in a step share, apart from the meshes. */
 typedef struct tree_update {
     session_trees *trees;
     const session_space *space;
@@ -64,7 +64,7 @@ static session_scalar *find_own_scalar(const session_mesh *mesh)
     return NULL;
 }
 
-/* Returns the scalar whose ranges are in the nodes; if there is none, the first scalar that is drawn. */
+/* Returns the scalar whose ranges are stored in the nodes; if there is none, the first scalar that is drawn. */
 static session_scalar *choose_own_scalar(session_mesh *mesh)
 {
     session_scalar *own = find_own_scalar(mesh);
@@ -87,14 +87,13 @@ static double half_box_area(const session_mesh *mesh)
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* Chooses the tree builder. A tree over a selection is mostly used in one step, too, but has few cells, so its builder
- * hardly matters. */
+/* Chooses the tree builder. Trees over a selection of cells are small, so that the choice hardly matters for them. */
 static mmbvh_builder choose_builder(const session_mesh *mesh, const mmbvh_selection *selection)
 {
     return !selection && mesh->full_tree_steps == 1 ? MMBVH_MORTON : MMBVH_SAH;
 }
 
-/* Builds a tree over the selection, or over all cells if selection is NULL. */
+/* Builds a tree over the selected cells, or over all cells if `selection` is NULL. */
 static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const mmbvh_selection *selection,
                                 base_error *error)
 {
@@ -170,7 +169,7 @@ static insitu_status build_and_refit(const tree_update *u, session_mesh *mesh, b
     return status ? status : refit_ranges(u, mesh, error);
 }
 
-/* Returns whether the tree has become so much more expensive, relative to its mesh, that it should be rebuilt. Boxes
+/* Returns whether the tree's cost, relative to that of its mesh, has grown so much that it should be rebuilt. Boxes
  * that were not refitted count as unchanged. */
 static bool is_decayed(const session_mesh *mesh)
 {
@@ -178,8 +177,8 @@ static bool is_decayed(const session_mesh *mesh)
     return tree > worst_cost * built;
 }
 
-/* Lists which nodes of the tree the scalars show, as intervals of values per scalar. The ranges must be up to date
- * there. */
+/* Lists the intervals of values that are shown, for each scalar; nodes of the tree outside of them are invisible. The
+ * tree's ranges must be up to date. */
 static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
 {
     int count = 0;
@@ -212,8 +211,8 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     return is_decayed(mesh) ? build_and_refit(u, mesh, error) : INSITU_OK;
 }
 
-/* Updates the bounds. Bounds that are valid only for visible nodes suffice as long as nothing else can be visible. If
- * something else can, and the vertices no longer move, all bounds are refitted, once. */
+/* Updates the bounds. Bounds that are valid only for visible nodes suffice as long as the candidates are the same. If
+ * the candidates have changed, and the vertices no longer move, all bounds are refitted, once. */
 static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, bool are_values_new, base_error *error)
 {
     uint64_t key;
@@ -221,7 +220,7 @@ static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, boo
     const bool is_other = !is_told || are_values_new || key != mesh->candidates_key;
     if (!mesh->is_geometry_stale && !(mesh->are_bounds_partial && is_other)) return INSITU_OK;
     const insitu_status status = refit_bounds(u, mesh, !is_told || !mesh->is_geometry_stale, error);
-    mesh->candidates_key = status ? ~key : key; /* after a failure the bounds belong to no set of candidates */
+    mesh->candidates_key = status ? ~key : key; /* if refitting fails, the bounds are valid for no set of candidates */
     return status;
 }
 
@@ -240,8 +239,8 @@ static uint64_t hash_parts(const session_meshes *meshes, int *count)
     return key;
 }
 
-/* Fills in the bounding boxes of the parts. Their ranges are unbounded: several fields share the tree, and nodes are
- * tested by range from the parts' roots on. */
+/* Stores the bounding boxes of the parts for the tree over them. The ranges there are unbounded, because several fields
+ * share the tree; ranges are tested from the root of each part's own tree on. */
 static void fill_boxes(const session_meshes *meshes, float *boxes, int count)
 {
     int part = 0;
@@ -290,7 +289,7 @@ static double full_tree_cost(const tree_update *u, const session_mesh *mesh)
     return estimate_rate(u->trees->rates.build, first_rates.build, u->threads) * (double)mesh->drawn_count;
 }
 
-/* Returns whether there is a full tree over the current cells. */
+/* Returns whether there is a full tree built over the current cells. */
 static bool has_full_tree(const session_mesh *mesh)
 {
     return mesh->has_tree && !mesh->is_partial && !mesh->is_topology_stale;
@@ -317,7 +316,7 @@ static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
     return !has_new_values(mesh) && mesh->candidates_key == key;
 }
 
-/* Updates a partial tree. key: the hash of the candidates. */
+/* Updates a partial tree. key: the hash that identifies the candidates. */
 static insitu_status update_partial(const tree_update *u, session_mesh *mesh, uint64_t key, base_error *error)
 {
     if (is_partial_fresh(mesh, key)) return INSITU_OK;
@@ -328,7 +327,7 @@ static insitu_status update_partial(const tree_update *u, session_mesh *mesh, ui
     const double seconds = omp_get_wtime() - start;
     update_rate(&u->trees->rates.select, seconds, mesh->given.cell_count);
     u->report->build_ms += 1e3 * seconds;
-    /* The full tree is built if the partial one would cost at least half of its price. */
+    /* a partial tree that costs at least half as much as the full tree is not worth building */
     const bool is_forced = u->choice == SCENE_TREE_PARTIAL;
     const bool is_partial = is_forced || 2 * selection.count <= mesh->drawn_count;
     status = build_tree(u, mesh, is_partial ? &selection : NULL, error);
@@ -362,9 +361,9 @@ static insitu_status update_tree(const tree_update *u, session_mesh *mesh, base_
     return status;
 }
 
-/* One thread's update of some of the parts. Blocks are many and small: a parallel region for each would cost more than
- * it saves. So if there are several parts per thread, each part is updated by one thread. Rates are not measured
- * then. */
+/* Updates some of the parts on one thread. If a mesh has many small blocks, a parallel region for each would cost more
+ * than it saves; so if there are several parts per thread, each part is updated by one thread. Seconds per cell are
+ * then not measured. */
 typedef struct thread_update {
     tree_update update;
     session_trees trees;

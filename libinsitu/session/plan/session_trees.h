@@ -20,8 +20,8 @@ typedef struct session_trees {
     bool is_parent_stale;
 } session_trees;
 
-/* Builds or refits those of the marked meshes' trees that are out of date. choice: the scene's kind of tree. Adds to
- * the report's times. Local: errors are passed on by the next reduction. */
+/* Builds or refits the trees of the marked meshes that are out of date. choice: which kind of tree the scene requests.
+ * Adds the times to the report. Local; errors are shared by the next reduction. */
 insitu_status session_update_trees(session_trees *trees, const session_meshes *meshes, const session_space *space,
                                    scene_tree choice, const session_team *team, insitu_report *report,
                                    base_error *error);

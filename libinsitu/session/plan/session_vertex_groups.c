@@ -93,8 +93,8 @@ static void find_group_position(const groups_basis *basis, const session_vertex_
         memcpy(place, groups->keys.keys[group].words, 3 * sizeof *place);
 }
 
-/* Finds the home rank of each group that lies in another rank's box, and counts the groups per home; -1: only this rank
- * has the group. */
+/* Finds the home rank of each group that lies in another rank's box, and counts the groups per home. The home is -1 if
+ * only this rank can have the group. */
 static void find_homes(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out, int *home)
 {
     for (int64_t group = 0; group < out->count; group++) {

@@ -9,12 +9,13 @@
 
 #include "session_catalogue.h"
 
-/* The data from which groups are made. */
+/* Input for grouping the vertices of a joint's meshes. */
 typedef struct session_vertex_groups_basis {
     uint64_t positions_hash;
     int part_count;
     const session_mesh *const *parts; /* this rank's parts of all meshes of the joint */
-    const session_border *borders;    /* borders with twins of vertices, one per part; NULL: vertices have no twins */
+    /* borders of the parts, which contain the twins of vertices; NULL: vertices have no twins */
+    const session_border *borders;
     const session_homes *homes;
     bool by_id; /* set if the joint is a single mesh whose vertices are equal if their global ids are */
     int ranks;

@@ -21,7 +21,7 @@ enum { KEY_WORDS = 3 };
 
 /* ---- keys of all vertices ------------------------------------------------------------------------------------- */
 
-/* Sets the entries of vertices of cells that are not ghosts to 0, and the others to -1. */
+/* Marks the vertices of cells that are not ghosts by 0, and all others by -1. */
 static void mark_vertices(session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
@@ -92,7 +92,7 @@ static void mail_free(sums_messages *mail)
     base_free(mail->asked_numbers);
 }
 
-/* Finds the position of one vertex for each of this rank's keys. */
+/* For each of this rank's keys, finds the position of a vertex that has it. */
 static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3])
 {
     *out = base_alloc((size_t)(sums->own_count ? sums->own_count : 1) * sizeof **out);
@@ -140,7 +140,7 @@ static bool write_requests(const session_vertex_sums *sums, const session_team *
     return true;
 }
 
-/* Ensures space for the requested keys after this rank's own. */
+/* Ensures space for the keys that other ranks request, which are stored after this rank's own. */
 static bool extend_keys(session_vertex_sums *sums, int64_t more)
 {
     session_key_table all;
@@ -151,8 +151,9 @@ static bool extend_keys(session_vertex_sums *sums, int64_t more)
     return true;
 }
 
-/* Adds the keys that other ranks have requested or, if all vertices already have keys, looks them up. *numbers: the
- * index of each, in the order of the messages; -1: this rank has no such vertex. */
+/* Finds the number of each key that other ranks have requested, and adds the key if it is new. If every vertex already
+ * has a key, none are added. *numbers: these numbers, in the order of the messages; -1: this rank has no such
+ * vertex. */
 static bool read_requests(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
 {
     const int64_t count = in->total / KEY_WORDS;

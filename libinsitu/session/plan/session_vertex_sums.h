@@ -18,13 +18,14 @@ typedef struct session_sum_part {
     session_polynomials *polynomials;
 } session_sum_part;
 
-/* The data of this rank for the sums of the same scalars on one or several meshes. part_count is 0 if this rank has
- * none of the meshes. */
+/* This rank's data for sums of the same scalars on one or several meshes. part_count is 0 if this rank has no part of
+ * the meshes. */
 typedef struct session_vertex_sums {
     int part_count;
     session_sum_part *parts;
     int field_count;
-    bool by_id;            /* set if vertices are equal by global ids; otherwise they are equal by coordinates */
+    /* set if vertices are equal if their global ids are; otherwise vertices with equal coordinates are equal */
+    bool by_id;
     bool has_all_vertices; /* set if every vertex of each part has a key, so that all ranks get the sums of all their
                               cells */
     session_key_table keys;

@@ -17,7 +17,7 @@
 /* Largest fraction of the half frame that the data fills. */
 static const double filled = 0.95;
 
-/* Returns `up`, or a coordinate axis if `up` is parallel to the direction of view. */
+/* Returns `up` or, if that is parallel to the direction of view, a coordinate axis that is not. */
 static void choose_up(const double direction[3], const double up[3], double out[3])
 {
     double cross[3];
@@ -43,13 +43,14 @@ static camera_tangents find_tangents(const scene_image *image)
     return (camera_tangents){up * image->width / image->height, up};
 }
 
-/* Maxima over the corners: the numbers a and b that are derived at the top of this file. */
+/* The maxima a and b over the corners, as derived at the top of this file, towards each side of the picture, and the
+ * largest distance behind the centre. */
 typedef struct corner_reach {
     double right, left, up, down, back;
 } corner_reach;
 
-/* Distances from the centre of the frame to the limit of the data on each side, either as fractions of half the frame
- * or as tangents. */
+/* Distances from the centre of the frame to the limits within which the data must lie: as fractions of half the frame,
+ * or as tangents of angles. */
 typedef struct camera_frame {
     double right, left, up, down;
 } camera_frame;
@@ -59,11 +60,12 @@ typedef struct camera_frame {
 typedef struct camera_fit {
     corner_reach perspective_reach, orthographic_reach;
     camera_frame tangents, frame_fractions;
-    bool is_centred; /* set if the data is centred in the free part of the frame */
+    bool is_centred; /* set if the data is centred in the part of the frame that decorations leave free */
 } camera_fit;
 
-/* Space that a column of colour bars, a title, a line of text, and the numbers of rulers take from the picture, as
- * multiples of the height of text; and the shape of a colour bar, approximately as in adaptors/image/layout.cpp. */
+/* Space that decorations take from the picture, as multiples of the height of text: a column of colour bars, a title, a
+ * line of text, and the numbers of rulers. Below: the shape of a colour bar, approximately as in
+ * adaptors/image/layout.cpp. */
 static const double bar_room = 6.5, title_room = 2.4, line_room = 1.5, ruler_room = 3;
 static const double letter_width = 0.6, label_width = 7, bar_borders = 1.2, bar_height = 5.3, line_height = 1.2;
 
@@ -105,8 +107,9 @@ static double find_bar_width(const scene_image *image)
     return has_bars_inside(image) ? width * fmax(1, ceil(count / rows)) : 0;
 }
 
-/* Returns the height of the lines at the middle of the top or bottom, or of those at its corners, whichever is larger,
- * as a multiple of the height of text. Lines at corners count only if they extend far into the picture. */
+/* Returns the height of the lines of text at the top or bottom of the picture, as a multiple of the height of text:
+ * those in the middle or those at the corners, whichever is larger. Lines at corners count only if they extend far into
+ * the picture. */
 static double find_lines_height(const scene_image *image, scene_anchor middle, scene_anchor left, scene_anchor right)
 {
     const scene_decorations *d = &image->decorations;
@@ -203,8 +206,8 @@ static double fitting_height(const camera_fit *fit, double aspect)
                 across);
 }
 
-/* Returns a position of the eye between low and high. It is in the middle if is_centred, and otherwise as near to 0 as
- * allowed. */
+/* Returns a position of the eye between low and high: the middle if is_centred, and otherwise the position nearest to
+ * 0. */
 static double choose_eye_position(double low, double high, bool is_centred)
 {
     if (is_centred || low > high) return 0.5 * (low + high);

@@ -80,7 +80,7 @@ static void intersect_plane(clip_box *box, const render_clip *clip)
     }
 }
 
-/* Computes the distances from the centre of a sphere to the nearest and the farthest point of the box. */
+/* Computes the distances from a sphere's centre to the nearest and the farthest point of the box. */
 static void find_distances(const clip_box *box, const double centre[3], double *nearest, double *farthest)
 {
     double near[3], far[3];
@@ -146,7 +146,7 @@ typedef struct clip_basis {
     const scene_image *image;
     const render_clip *clips;
     session_report *report;
-    bool is_empty; /* set if nothing remains of all layers together */
+    bool is_empty; /* set if all layers' clips together leave nothing */
 } clip_basis;
 
 static void warn_of_layer(const clip_basis *b, const char *layer, const char *field, int number, uint32_t set)

@@ -1,4 +1,4 @@
-/* The clips of an image's layers, which remove a part of them. */
+/* Converts the clips of an image, which cut away a part of its layers. */
 #ifndef SESSION_CLIPS_H
 #define SESSION_CLIPS_H
 

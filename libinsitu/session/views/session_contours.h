@@ -9,7 +9,7 @@
 #include "session_team.h"
 
 typedef struct session_contours {
-    render_lines lines;                  /* count is 0 if there are no lines, because the field has no range */
+    render_lines lines;                  /* number of lines; 0 if the field has no range */
     double values[RENDER_MAX_LINES];     /* value of each line */
     float colours[3 * RENDER_MAX_LINES]; /* colour of each line, linear RGB */
 } session_contours;

@@ -83,14 +83,14 @@ static void fill_parts(const session_meshes *meshes, session_layers *layers)
 
 static const double no_number = NAN;
 
-/* Returns a field that is NaN at all vertices. */
+/* Returns a field with the value NaN at all vertices. */
 static grid_field make_absent_field(void)
 {
     return (grid_field){.values = {.data = (const char *)&no_number, .stride = 0, .is_wide = true},
                         .component_count = 1};
 }
 
-/* Sets the field and the ranges of a part. scalar is NULL if the part does not have the field. */
+/* Stores a part's field and ranges for a layer. scalar is NULL if the part lacks the field. */
 static void set_scalar_field(session_layers *layers, ptrdiff_t at, const session_mesh *mesh,
                              const session_scalar *scalar, bool wants_ranges)
 {
@@ -98,7 +98,7 @@ static void set_scalar_field(session_layers *layers, ptrdiff_t at, const session
     if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
 }
 
-/* Sets a layer's field, which consists of the fields of all parts and is stored as the slot-th section of part_count
+/* Stores the fields of all parts for a layer, in section number `slot` of the array of fields; a section has part_count
  * fields. If plane is not NULL, the values are the distances from it instead of the field's values. */
 static render_field set_layer_field(const session_meshes *meshes, session_layers *layers, int slot,
                                     const scene_field *field, const scene_plane *plane, bool wants_ranges)
@@ -166,10 +166,10 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
     warn_of_width(basis, field, low, high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
         session_fail_for_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
-    return INSITU_OK; /* a lack of memory is stored in *error and shared in the next phase */
+    return INSITU_OK; /* if memory runs out here, the next phase shares *error */
 }
 
-/* Returns the slot of the field of a surface's contour lines. */
+/* Returns the section in the array of fields for the contour lines of a surface. */
 static int find_lines_slot(const session_layers *layers, const scene_image *image, int surface)
 {
     return 2 * layers->surface_count + image->volume_count + surface;
@@ -274,8 +274,8 @@ static bool gather_values(const session_mesh *whole, const session_outer *outer,
     return *values != NULL;
 }
 
-/* Sets a layer's field to the values at the outer faces, which are gathered from those of the cells. Returns false if
- * memory runs out. */
+/* Stores, as the layer's field, the values at the outer faces, which are gathered from the values of the cells. Returns
+ * false if memory runs out. */
 static bool set_gathered_field(const session_meshes *meshes, session_layers *layers, int slot,
                                const scene_surface *layer, const scene_field *field, render_field *out)
 {
@@ -410,7 +410,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     session_layers layers = {0};
     if (!error->status && !allocate_layers(basis, image, &layers))
         session_fail_for_memory(error, 1 << 10, "an image's layers");
-    /* If the scene exceeds a limit, the error is the same on all ranks and does not belong to one of them. */
+    /* Errors about a limit of the scene are the same on all ranks, so that the message names no rank. */
     insitu_status status = error->status == INSITU_ERROR_SCENE ? session_agree_without_rank(basis->team->comm, error)
                                                                : session_agree(basis->team->comm, error);
     warn_of_samples(basis, image);
@@ -421,7 +421,8 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
         const scene_isosurface *isosurface = &image->isosurfaces[i - image->isosurface_count];
         const scene_surface shells = session_shells_of(isosurface, image->height);
         status = fill_outer(basis, &shells, i, &layers, error);
-        layers.surfaces[i].colours = isosurface->colours; /* `shells` is gone when the layer is drawn */
+        /* `shells` is a local variable, which no longer exists when the layer is drawn */
+        layers.surfaces[i].colours = isosurface->colours;
     }
     for (int i = 0; i < image->surface_count && !status; i++)
         status = fill_outer(basis, &image->surfaces[i], layers.first_outer + i, &layers, error);

@@ -21,7 +21,7 @@ typedef struct session_layers {
     render_surface_layer *surfaces;
     render_volume_layer *volumes;
     session_transfer *transfers; /* transfer functions of the surfaces, followed by those of the volumes */
-    double *distances;           /* isovalue of each surface that is a plane; 0 for the others */
+    double *distances;           /* isovalue of each surface that is drawn as a slice's plane; 0 for the others */
     session_contours *contours;  /* contour lines of each surface */
     /* sections of part_count fields: for each surface its field and its colour field, then one for each volume, then
      * one for the lines of each surface */

@@ -74,7 +74,7 @@ static void fill_view(const session_space *space, const scene_image *image, sess
  * for many and few rays. */
 static const double sample_seconds = 1e-7;
 
-/* Returns the length of the intersection of the pixel's ray with the bounds. */
+/* Returns the length of the part of a pixel's ray that lies within the bounds. */
 static double chord_of_bounds(const session_extent *e, const render_camera *camera, int x, int y)
 {
     double base[3], direction[3], begin = 0, end = INFINITY;
@@ -90,8 +90,7 @@ static double chord_of_bounds(const session_extent *e, const render_camera *came
     return end > begin ? (end - begin) * vector3_length(direction) : 0;
 }
 
-/* Returns the number of samples that all ranks would compute if the bounds were filled with cells and no sample was
- * hidden. */
+/* Estimates the number of samples that all ranks compute, as if cells filled the bounds and no sample were hidden. */
 static double estimate_samples(const session_extent *e, const scene_image *image, const session_view *view)
 {
     enum { PROBES = 16 };
@@ -123,13 +122,13 @@ static insitu_status check_sampling_time(const session_extent *e, const char *sc
 
 /* ---- views without data -------------------------------------------------------------------------------------- */
 
-/* Positions in the picture of the corners of the bounds. */
+/* The bounds' corners as projected into the picture. */
 typedef struct corner_bounds {
     /* bounds of those corners that are in front of the eye, in coordinates in which the borders of the picture are at
      * -1 and 1 */
     double low[2], high[2];
     int behind_count; /* number of corners behind the eye */
-    bool is_beside;   /* set if all corners are beyond one border */
+    bool is_beside;   /* set if all corners lie beyond the same border of the picture */
 } corner_bounds;
 
 static corner_bounds project_bounds(const session_extent *e, const render_camera *c)
@@ -155,7 +154,7 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
     return b;
 }
 
-/* Returns the reason why no data is in view; NULL if some data may be. */
+/* Returns the reason why no data can be in view; NULL if some data may be. */
 static const char *find_unseen_reason(const session_extent *e, const render_camera *c)
 {
     const corner_bounds b = project_bounds(e, c);
