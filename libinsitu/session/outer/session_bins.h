@@ -24,7 +24,8 @@ typedef struct session_bin_walk {
     const session_bins *bins;
     int64_t first_bin[3], last_bin[3]; /* range of bins that the box touches, along each axis */
     int64_t bin[3];                    /* first bin of the current row */
-    int64_t next, end;                 /* range in `items` of the points of the row that are not visited yet */
+    /* range, in session_bins.items, of the points of the current row that have not been visited */
+    int64_t next, end;
 } session_bin_walk;
 
 session_bin_walk session_walk_bins(const session_bins *bins, const double lower[3], const double upper[3],

@@ -38,7 +38,7 @@ typedef struct session_cell_faces {
     int64_t count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     int64_t first; /* index of the cell's first entry in the connectivity */
-    int64_t size;  /* number of a shell's vertices; 0: the cell is not a shell */
+    int64_t size;  /* number of the shell's vertices, if the cell is a shell; otherwise 0 */
 } session_cell_faces;
 
 static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t cell)
@@ -71,7 +71,7 @@ static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t ce
     return out;
 }
 
-/* The vertices around a face. session_face_vertex() returns the vertex with a number of 0 .. size - 1. */
+/* The vertices of a face in loop order. session_face_vertex() returns the vertex with a number from 0 to size - 1. */
 typedef struct session_face_loop {
     const session_cell_faces *faces;
     /* corner numbers within the cell; NULL: the vertices are the entries of the list from `first` on */

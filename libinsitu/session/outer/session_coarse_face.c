@@ -43,8 +43,8 @@ static session_box find_bounding_box(const double places[][3], int count)
     return box;
 }
 
-/* Computes the face's normal, box, area and width. side is 1 if the cell is behind the face, according to the
- * orientation of its vertices, and -1 if it is in front. */
+/* Computes the face's normal, box, area and width. side: 1 if the cell is behind the face as seen along the normal of
+ * its loop of vertices, and -1 if it is in front. */
 static void measure_face(session_coarse_face *f, double side)
 {
     double a[3], b[3];

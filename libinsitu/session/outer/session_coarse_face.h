@@ -7,21 +7,21 @@
 
 typedef struct session_coarse_face {
     int count; /* number of corners: 3 or 4 */
-    /* corners in loop order, beginning with the least one and continuing to the lesser of its neighbours; a triangle's
-     * fourth corner equals its third */
+    /* corners in loop order, beginning with the lexicographically least one and continuing to the lesser of its
+     * neighbours; a triangle's fourth corner equals its third */
     double corner_positions[4][3];
     double normal[3]; /* unit vector that points away from the cell */
     session_box box;
     double area,
-        width; /* area of the face, and length of its longest diagonal; of a triangle, the longer of two edges */
+        width; /* area of the face, and length of its longest diagonal or, for a triangle, of the longer of two edges */
 } session_coarse_face;
 
 enum { SESSION_FACE_WORDS = 13 };
 
-/* The part of a triangle or quad that suffices to exclude most positions from it. */
+/* An outline of a triangle or quad that contains all data needed to exclude most positions from it. */
 typedef struct session_face_outline {
     int count;
-    int64_t vertices[4]; /* vertices in the order in which the cell has them */
+    int64_t vertices[4]; /* vertices in the cell's own order */
     double corner_positions[4][3];
     session_box box;
     double diameter; /* upper bound of the distance between any two corners */

@@ -18,7 +18,8 @@
 static const double place_slack = 1e-5;
 
 /* A vertex hangs on a face only if the face's area is larger by this factor than those of the faces that have the
- * vertex as a corner. A face that is divided once, along one side, has twice the area of its parts. */
+ * vertex as a corner. A face that is divided into two parts has twice the area of each part, the smallest ratio that
+ * occurs. */
 static const double least_ratio = 1.25;
 
 /* Two faces have opposite orientation if the dot product of their normals is below this. Exactly opposite faces have
@@ -29,7 +30,7 @@ enum { MOST_ROUNDS = 64 };
 
 typedef struct searched_face {
     session_coarse_face face;
-    int64_t groups[4];     /* the groups of the corners if the face is this rank's own; all -1 if it was received */
+    int64_t groups[4];     /* groups of the corners if the face belongs to this rank; all -1 if it was received */
     int source_rank;       /* the rank that sent the face */
     int64_t message_index; /* index of the face in that rank's message */
 } searched_face;
@@ -45,7 +46,7 @@ typedef struct candidate {
     double weights[4];
 } candidate;
 
-/* A face at a candidate's position. It is an element of one of the candidate's linked lists. */
+/* A candidate together with a face at its position. It is an element of one of the candidate's linked lists. */
 typedef struct contact {
     int64_t face;         /* index of the face in hanging_search.faces */
     int64_t next_contact; /* index of the next element of the list; -1: this is the last one */
@@ -55,15 +56,16 @@ typedef struct contact {
 typedef struct hanging_search {
     const session_hanging_basis *basis;
     const session_team *team;
-    unsigned char *face_states; /* one face_state for each face of the borders */
+    unsigned char *face_states; /* for each face of the borders, its face_state */
     int64_t face_count, own_count, candidate_count, face_capacity;
-    /* this rank's faces that were read first, then the received faces, then further ones of this rank */
+    /* faces of this rank that may touch candidates, then the received faces, then this rank's faces that were read
+     * later */
     searched_face *faces;
     candidate *candidates;
     double rounding; /* upper bound of the rounding errors of coordinates */
     int64_t contact_count, contact_capacity;
     contact *contacts;
-    session_bins bins; /* bins of the candidates */
+    session_bins bins; /* the candidates, sorted into bins */
 } hanging_search;
 
 static void search_free(hanging_search *s)
@@ -216,7 +218,8 @@ static bool bin_candidates(hanging_search *s)
 
 typedef enum face_state {
     FACE_UNREAD,
-    /* a candidate that is not one of its corners is near the face, or the face intersects another rank's box */
+    /* the face must be read: a candidate that is not one of its corners is near it, or it intersects another rank's
+     * box */
     FACE_WANTED,
     FACE_READ
 } face_state;
@@ -269,12 +272,12 @@ static bool is_face_needed(const hanging_search *s, int m, const session_face *f
 {
     session_face_outline f;
     if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
-    const double slack =
-        place_slack * f.diameter + s->rounding; /* at least as large as the result of find_face_slack() */
+    /* a bound that is at least as large as the result of find_face_slack() */
+    const double slack = place_slack * f.diameter + s->rounding;
     return has_candidate(s, m, &f, slack, is_hit) || (!is_hit && intersects_rank_box(s, &f.box, slack));
 }
 
-/* Appends a face to those that were read, if it is a triangle or quad. Returns false if memory runs out. */
+/* Appends a face to the list of faces if it is a triangle or quad. Returns false if memory runs out. */
 static bool read_face(hanging_search *s, int m, const session_face *face)
 {
     int64_t vertices[4];
@@ -422,8 +425,8 @@ static bool test_face_hit(hanging_search *s, int64_t number, candidate *c)
     return add_contact(s, number, weights, &c->hit_list);
 }
 
-/* Adds the face to the list of faces that have the candidate as a corner, if it has, and if the candidate lies on some
- * face. Returns false if memory runs out. */
+/* Adds the face to the list of faces that have the candidate as a corner, if this is the case and the candidate lies on
+ * some face. Returns false if memory runs out. */
 static bool test_face_corner(hanging_search *s, int64_t number, candidate *c)
 {
     const session_coarse_face *f = &s->faces[number].face;
@@ -445,7 +448,7 @@ static bool test_faces(hanging_search *s, try_function *try_one)
     return is_done;
 }
 
-/* Returns the largest area of those faces that have the candidate as a corner and whose normal is opposite to that of
+/* Returns the largest area among the faces that have the candidate as a corner and whose normal is opposite to that of
  * f; 0 if there are none. */
 static double largest_opposite_area(const hanging_search *s, const candidate *c, const session_coarse_face *f)
 {

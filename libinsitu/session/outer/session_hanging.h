@@ -29,8 +29,8 @@ typedef struct session_hanging_basis {
     int64_t group_count;
 } session_hanging_basis;
 
-/* Returns whether vertices of the joint that differ only by rounding are treated as equal. This is the case for the
- * vertices of several meshes, and of several levels of refinement. */
+/* Returns whether vertices of the joint that differ only by rounding count as equal. They do in joints of several
+ * meshes, and in meshes with levels of refinement. */
 bool session_has_twins(const session_joint *joint);
 
 /* Computes the joint's borders, and the twins of its vertices, unless they are up to date. `parts` are this rank's.

@@ -34,14 +34,14 @@ typedef struct part_cells {
     int64_t first_cell;   /* number of the part's first cell among those of all parts */
     int64_t first_vertex; /* number of the part's first vertex among those of all parts */
     uint64_t *hashes;     /* hash of each vertex's position or global id */
-    /* one byte per vertex, nonzero if its sum of hashes is not 0, so that it may be a corner of an outer face */
+    /* one byte per vertex, nonzero if its sum of hashes is not 0, so that an outer face may contain it */
     unsigned char *may_be_outer;
 } part_cells;
 
 /* A face that may be an outer face. */
 typedef struct found_face {
     session_face face;
-    int part; /* -1: the face has turned out not to be an outer face */
+    int part; /* -1: the face has turned out to be no outer face */
 } found_face;
 
 typedef struct face_search {
@@ -51,14 +51,14 @@ typedef struct face_search {
     part_cells *cells;                /* the cells of each part, with the search's data about them */
     int64_t cell_count, vertex_count; /* total numbers over all parts */
     uint64_t *hashes;                 /* hash of each vertex's position or global id, part by part */
-    /* number of tables in vertex_sums; if there are more threads, they share tables */
+    /* number of tables in vertex_sums; threads share tables if there are more threads than tables */
     int table_count;
     uint64_t *vertex_sums; /* exclusive or of the hashes of each vertex's faces, in table_count tables */
-    /* exclusive or of the sums of all vertices with the same hash (& mask): vertices at the same position count as
-     * one */
+    /* exclusive or of the sums of all vertices whose hashes have the same lowest bits, so that vertices at one position
+     * count as one vertex */
     uint64_t *hash_sums;
     uint64_t mask;
-    unsigned char *may_be_outer; /* one byte per vertex of all parts, nonzero if it may be a corner of an outer face */
+    unsigned char *may_be_outer; /* one byte per vertex of all parts, nonzero if an outer face may contain the vertex */
     int64_t count;
     found_face *faces; /* sorted by part and cell */
     session_key *keys;
@@ -89,8 +89,8 @@ static int64_t count_part_vertices(const part_cells *p)
 
 /* ---- keys ---------------------------------------------------------------------------------------------------- */
 
-/* Returns whether the face's i-th vertex is not among the vertices before it. A vertex that the face contains twice
- * counts once: a quad with two corners at the same position is a triangle. */
+/* Returns whether the face's i-th vertex is new, that is, different from all vertices before it. A vertex that the face
+ * contains twice counts once: a quad with two corners at the same position is a triangle. */
 static inline bool is_first_occurrence(const part_cells *p, const session_face_loop *loop, int64_t i)
 {
     const uint64_t hash = p->hashes[session_face_vertex(loop, i)];
@@ -208,7 +208,7 @@ static void add_faces(const xor_table *x, int64_t cell)
     if (table->count) {
         int64_t vertices[GRID_MAX_CELL_VERTICES];
         const int count = grid_cell_vertices(g, cell, vertices);
-        /* with constant arguments the compiler unrolls all loops of the function */
+        /* the arguments for tets are constants, so that the compiler unrolls all loops of the function */
         const bool is_tet = type == GRID_TET;
         if (is_tet ? add_cell(x, session_faces_of_type(GRID_TET), vertices, 4) : add_cell(x, table, vertices, count))
             return;

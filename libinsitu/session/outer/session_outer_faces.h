@@ -7,11 +7,12 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* One of this rank's parts of a mesh. */
+/* One of this rank's parts of a mesh in a search for outer faces. */
 typedef struct session_face_part {
     const session_mesh *mesh;
     session_outer *outer; /* receives the faces; its threshold selects the cells */
-    /* one byte per vertex, which is set to 1 for the vertices of faces that only one cell of this rank has; or NULL */
+    /* one byte per vertex, which the search sets to 1 if the vertex is on a face that only one cell of this rank has;
+     * or NULL */
     unsigned char *is_border;
 } session_face_part;
 

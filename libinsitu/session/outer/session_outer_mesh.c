@@ -72,9 +72,9 @@ static double measure_perimeter(const corner_loop *loop)
     return sum;
 }
 
-/* Distance from the face's plane, as a fraction of the face's width, above which a point counts as lying on one side.
- * The centre of a shell lies in its plane, and rounding must not determine its side, since it depends on where the list
- * of vertices begins. */
+/* Fraction of a face's width. A point that is farther than this from the face's plane lies on one side of it. The
+ * centre of a shell lies in its plane up to rounding, which must not determine its side, because it depends on the
+ * vertex at which the shell's list of vertices begins. */
 static const double side_slack = 1e-9;
 
 /* Computes the apex of the cell made on a face. It lies above the centre of the corners, at half of the mean side
@@ -110,8 +110,8 @@ static void find_inside(const grid *g, int64_t cell, double out[3])
 
 /* ---- the mesh ------------------------------------------------------------------------------------------------ */
 
-/* A face with more than four corners, or a concave quad, which is drawn as triangles (polygon.h). Repeated consecutive
- * corners are dropped. */
+/* A face with more than four corners, or a concave quad. It is drawn as triangles (polygon.h). Corners that are
+ * repeated consecutively are dropped. */
 typedef struct face_polygon {
     int count;
     int64_t *vertices;
@@ -125,13 +125,14 @@ typedef struct face_polygon {
 typedef struct outer_work {
     const grid *cells;
     session_outer *out;
-    int64_t *vertex_map; /* for each vertex of the whole mesh, its index among the new vertices; -1: it has none yet */
-    float *heights;      /* for each new vertex, -1 if it is an apex, 0 if it lies on a face */
+    /* for each vertex of the whole mesh, its index in the outer mesh; -1: the outer mesh does not contain it yet */
+    int64_t *vertex_map;
+    float *heights; /* for each vertex of the outer mesh, 0 if it lies on a face, -1 if it is an apex */
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
     face_polygon polygon; /* buffer with space for the largest polygon */
-    int64_t loop_end;     /* number of entries stored in the loops */
-    /* If cells are split into pieces, the loop of a face is the rim of the caller's face of which it is a part;
-     * `rim_loops` has the loop of each face of the current cell, or 0 if it is not stored yet. */
+    int64_t loop_end;     /* number of entries of the stored loops */
+    /* If cells are split into pieces, the loop of a piece's face is the rim of the caller's face that contains it;
+     * `rim_loops` has the index of the loop of each face of the current cell; 0: the loop is not stored yet. */
     bool has_rims;
     session_rims rims;
     const uint32_t *parents; /* same as session_topology.parents */
@@ -242,7 +243,7 @@ static void find_polygon_normal(face_polygon *p, const double inside[3])
     for (int axis = 0; axis < 3; axis++) p->normal[axis] = length > 0 ? sign * sum[axis] / width : 0;
 }
 
-/* Appends the loop of the polygon, to which the cells from number `first` on belong. */
+/* Appends the loop around the polygon as that of the cells from number `first` on. */
 static void add_loop(outer_work *w, const face_polygon *p, int64_t first)
 {
     int64_t *loops = w->out->loops;
@@ -267,7 +268,8 @@ static int64_t add_rim(outer_work *w, int64_t cell, int face)
     return loop;
 }
 
-/* Sets the rim of the caller's face as the loop of the cells from number `first` on, which stand on a piece's face. */
+/* Sets the loop of the cells from number `first` on, which are built on a piece's face, to the rim of the caller's
+ * face. */
 static void set_rim(outer_work *w, int64_t piece, const face_polygon *p, int64_t first)
 {
     const int64_t cell = w->parents[piece];
@@ -359,7 +361,8 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer)
     return most;
 }
 
-/* Adds what the rims of the caller's cells require that have outer faces. A node of a rim may be on no outer face. */
+/* Adds the entries that are needed for the rims of those of the caller's cells that have outer faces. Some nodes of a
+ * rim may lie on no outer face. */
 static void add_rim_bounds(const outer_work *w, const session_outer *outer, outer_counts *most)
 {
     int64_t last = -1;

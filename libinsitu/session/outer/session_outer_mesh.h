@@ -1,4 +1,5 @@
-/* Builds a mesh on the outer faces of another mesh. An isosurface of the new mesh is the outer surface of the other.
+/* Builds a mesh on the outer faces of another mesh, such that an isosurface of the new mesh is the other one's outer
+ * surface.
  *
  * On each face there is a pyramid, or on a triangle a tet, that extends into the cell. Polygons with more corners are
  * divided into fans of triangles that begin at their least vertex, as in polyhedra. The scalar of the mesh is 0 at the
@@ -11,11 +12,11 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Computes outer->mesh and its scalar from the faces, unless they exist. They can then be drawn. Local. */
+/* Builds outer->mesh and its scalar from the faces, unless they exist. They can then be drawn. Local. */
 insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *outer, base_error *error);
 
-/* Returns the values of a field of the whole mesh on the mesh of its outer faces. They are allocated by base_alloc();
- * NULL if memory runs out. */
+/* Returns a field's values on the mesh of outer faces, gathered from its values on the whole mesh. They are allocated
+ * by base_alloc(); NULL if memory runs out. */
 double *session_gather_outer_values(const session_outer *outer, const grid_field *field);
 
 #endif

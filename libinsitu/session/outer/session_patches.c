@@ -184,11 +184,12 @@ static insitu_status check_owners(patch_faces *p, base_error *error)
 /* ---- the cells behind them, by a search of all cells ------------------------------------------------------------- */
 
 typedef struct cell_search {
-    session_key_table keys;              /* keys of those faces all of whose vertices have groups */
-    int64_t *key_of_face;                /* for each face, the index of its key; -1: it has none */
-    int64_t *given_counts, *cell_counts; /* for each key, how often it is given, and how many cells have the face */
-    unsigned char *is_drawn;             /* for each key, set if one of these cells is drawn */
-    unsigned char *has_face;             /* for each group, set if a face with a key contains it */
+    session_key_table keys; /* keys of those faces all of whose vertices have groups */
+    int64_t *key_of_face;   /* for each face, the index of its key; -1: it has none */
+    /* for each key, number of given faces with this key, and number of cells that have such a face */
+    int64_t *given_counts, *cell_counts;
+    unsigned char *is_drawn; /* for each key, set if one of its cells is drawn */
+    unsigned char *has_face; /* for each group of vertices, set if a face with a key contains it */
 } cell_search;
 
 static void search_free(cell_search *s)
@@ -272,7 +273,7 @@ static insitu_status check_cell_counts(const cell_search *s, patch_faces *p, bas
     for (int patch = 0; patch < field->patch_count; patch++)
         for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
             const int64_t key = s->key_of_face[f];
-            if (key < 0) continue; /* the face belongs to a ghost cell */
+            if (key < 0) continue; /* no drawn cell has the face, only a ghost cell */
             if (s->cell_counts[key] > s->given_counts[key])
                 return fail_at_face(p, patch, i, "is between two cells, not on the boundary", error);
             if (s->cell_counts[key] == 0) return fail_at_face(p, patch, i, "is no face of a cell", error);

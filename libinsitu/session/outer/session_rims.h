@@ -1,5 +1,5 @@
-/* The faces of the caller's cells of higher order, and their rims, the nodes along their edges. Pieces of a cell have
- * faces that are parts of these. */
+/* The faces of the caller's cells of higher order, and their rims, that is, the nodes along a face's edges. A cell is
+ * split into pieces, whose faces are parts of these faces. */
 #ifndef SESSION_RIMS_H
 #define SESSION_RIMS_H
 
@@ -9,16 +9,17 @@ enum { RIMS_MOST_FACES = 6, RIMS_MOST_NODES = 4 * NODES_MOST_ORDER };
 
 /* The faces of a kind of cell. Nodes are given by their positions in the cell's row. */
 typedef struct session_rim_kind {
-    int counts[RIMS_MOST_FACES]; /* number of nodes of each rim; 0: the cell has fewer faces */
+    int counts[RIMS_MOST_FACES]; /* number of nodes of each face's rim; 0: the cell does not have this face */
     int nodes[RIMS_MOST_FACES][RIMS_MOST_NODES];
-    unsigned char *faces_of_node; /* for each node, one bit per face on which it lies */
+    unsigned char *faces_of_node; /* for each node, the faces on which it lies, one bit per face */
 } session_rim_kind;
 
 typedef struct session_rims {
     session_rows rows;
     session_rim_kind *kinds;
-    int64_t cell;                   /* the caller's cell whose faces are set in faces_of_vertex; -1: there is none */
-    unsigned char *faces_of_vertex; /* for each vertex of session_mesh.cells, one bit per face of the cell */
+    int64_t cell; /* the caller's cell to which faces_of_vertex refers; -1: none */
+    /* for each vertex of session_mesh.cells, the faces of the cell on which it lies, one bit per face */
+    unsigned char *faces_of_vertex;
 } session_rims;
 
 /* Finds the rims of all kinds of cells of a mesh whose cells are split. Returns false if memory runs out; the caller

@@ -23,7 +23,8 @@ static void copy_isovalues(const scene_isosurface *layer, scene_lines *out)
     }
 }
 
-/* The largest float below 1. With an opacity below 1, pixels that a line covers only in part show what is behind. */
+/* The largest float below 1. With an opacity below 1, a pixel that a line covers only in part also shows the
+ * background. */
 static const float nearly_opaque = 0.99999994F;
 
 scene_surface session_shells_of(const scene_isosurface *layer, int height)

@@ -91,8 +91,8 @@ void session_set_outer_fresh(const session_mesh *mesh, session_outer *outer)
     outer->version = scalar ? scalar->version : 0;
 }
 
-/* Hides all pieces of each cell of which a piece is hidden, because one of the cell's values is outside the threshold.
- */
+/* Hides all pieces of a cell if one of them is hidden, so that a cell of which one value is outside the threshold is
+ * hidden completely. */
 static void hide_whole_cells(const session_mesh *mesh, unsigned char *is_hidden)
 {
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) {

@@ -13,13 +13,14 @@ session_outer *session_find_outer(const session_mesh *mesh, const scene_threshol
 /* Marks the outer faces as shown by an image of this step. Returns false if memory runs out. Local. */
 bool session_mark_outer(session_mesh *mesh, const scene_threshold *threshold);
 
-/* Frees the faces of thresholds that no image of this step shows, because the values on which they depend will probably
- * have changed before the next use. */
+/* Frees the outer faces of thresholds that no image of this step shows. The values on which they depend will probably
+ * have changed before they are used again. */
 void session_drop_thresholds(session_mesh *mesh);
 
-/* Returns whether the faces have not been computed, or were computed for other values. */
+/* Returns whether the outer faces have not been computed, or were computed for other values of the threshold's
+ * field. */
 bool session_is_outer_stale(const session_mesh *mesh, const session_outer *outer);
-/* Records that the faces were computed for the current values. */
+/* Records that the outer faces were computed for the current values of the threshold's field. */
 void session_set_outer_fresh(const session_mesh *mesh, session_outer *outer);
 
 /* Returns one byte per cell, which is nonzero if the cell is beyond the threshold; NaN counts as beyond. The array is

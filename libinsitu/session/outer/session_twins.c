@@ -16,10 +16,11 @@ enum { CORNER_WORDS = 4 };
 /* A vertex of an outer face. */
 typedef struct face_corner {
     double position[3];
-    double slack; /* vertices that are nearer to it than this are treated as equal */
+    double slack; /* vertices that are nearer than this to it are treated as equal to it */
 } face_corner;
 
-/* A vertex of a face that only one cell of this rank has, and the least position of all vertices equal to it. */
+/* A vertex of a face that only one cell of this rank has, and the lexicographically least position of all vertices
+ * equal to it. */
 typedef struct border_vertex {
     double position[3], least_position[3];
 } border_vertex;

@@ -1,4 +1,5 @@
-/* Data that depends on a scalar's values must be computed again only if the values have changed. */
+/* Data that depends on a scalar's values is expensive to compute. So it is computed again only if a checksum of the
+ * values has changed. */
 #include "session_checksums.h"
 
 #include <string.h>
@@ -14,8 +15,8 @@ static uint64_t mix_bits(uint64_t sum, uint64_t bits)
     return product ^ product >> 29;
 }
 
-/* Computes the checksum in several independent lanes, since each multiplication depends on the previous one in its
- * lane. */
+/* Computes the checksum in several independent sums, because within one sum each multiplication must wait for the
+ * previous one. */
 static uint64_t sum_words(const char *data, int64_t bytes)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];

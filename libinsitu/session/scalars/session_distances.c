@@ -66,7 +66,7 @@ static session_scalar *add_distance(session_mesh *mesh, const scene_plane *plane
     return scalar;
 }
 
-/* Moves a plane that passes through the centre of the data, if the bounds have changed. */
+/* Moves the point of a plane that passes through the centre of the data, if the data's bounds have changed. */
 static void recentre_plane(session_scalar *scalar, const scene_plane *plane, const session_extent *extent)
 {
     double point[3];
@@ -134,8 +134,8 @@ void session_update_distances(const session_meshes *meshes, const session_team *
 }
 
 /* Returns the isovalue of a slice. A crossing belongs to the cell that reaches the isovalue from below, so that the
- * minimum of all distances has no crossing. So a value of a tenth of the tolerance above the minimum is used: it
- * differs from it in float32, but the difference is invisible. */
+ * minimum of all distances has no crossing. So if the minimum is 0 up to the tolerance, the isovalue is a tenth of the
+ * tolerance above the minimum: it differs from it in float32, but not visibly. */
 double session_slice_distance(double low, double high, double half_diagonal)
 {
     const double tolerance = SESSION_BORDER_SHARE * half_diagonal;

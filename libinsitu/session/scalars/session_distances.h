@@ -24,8 +24,8 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
 /* Returns the distances from the plane; NULL if the mesh has none. */
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane);
 
-/* Computes those distances that are used and stale. Each is computed from the vertex's own coordinates alone, so that
- * all ranks obtain the same. Local. */
+/* Computes the distances that this step uses and that are out of date. Each is computed from the vertex's own
+ * coordinates alone, so that all ranks obtain the same. Local. */
 void session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error);
 
 /* Returns the distance at which the plane is drawn. low and high are the minimum and maximum of the data's distances

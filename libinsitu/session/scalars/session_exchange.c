@@ -90,7 +90,7 @@ static void receive_message(delivery *d, const MPI_Status *found, base_error *er
 static insitu_status receive_all(delivery *d, int *failed, base_error *error)
 {
     int own = error->status ? d->rank : d->ranks, has_joined = 0, is_over = 0;
-    base_error lost = {0}; /* first error of this rank in receiving messages */
+    base_error lost = {0}; /* first error of this rank while it received messages */
     MPI_Request all = MPI_REQUEST_NULL;
     insitu_status status = INSITU_OK;
     while (!status && !is_over) {

@@ -17,7 +17,7 @@ static session_field *add_field(session_mesh *mesh, const char *name, base_error
     return field;
 }
 
-/* Returns the number of those entries of the connectivity that are vertices of cells. */
+/* Returns the number of entries of the connectivity that are vertices of cells, without the unused ends of rows. */
 int64_t session_corner_count(const insitu_mesh *mesh)
 {
     if (mesh->cell_count == 0) return 0;
@@ -25,8 +25,8 @@ int64_t session_corner_count(const insitu_mesh *mesh)
     return mesh->cell_count * session_cell_nodes(mesh);
 }
 
-/* Returns the number of the mesh's vertices, cells or corners, depending on the field's centring. For corners in rows,
- * it is the number of all entries from the first to the last corner. */
+/* Returns the number of values that a field needs: the mesh's number of vertices, cells or corners, depending on the
+ * field's centring. For corners in rows, it is the number of all entries from the first to the last corner. */
 int64_t session_count_field_positions(const insitu_mesh *mesh, const insitu_field *field)
 {
     if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
@@ -40,8 +40,7 @@ static const char *describe_centring(insitu_centring centring)
     return centring == INSITU_VERTEX ? "vertices" : centring == INSITU_CELL ? "cells" : "corners of cells";
 }
 
-/* Returns whether the field has an index. An array without elements may have the address NULL; then its type determines
- * whether it is given. */
+/* Returns whether the field has an index. The address of an empty array may be NULL, so that its type decides. */
 static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 {
     return field->index.data || (field->index.type && session_count_field_positions(&mesh->original, field) == 0);
@@ -133,7 +132,7 @@ static insitu_status check_patch_arrays(const insitu_patch *patch, int component
                                     "components of values", error);
 }
 
-/* Checks how the patch identifies its faces, and checks its values. */
+/* Checks the values of a patch, and the way in which it identifies its faces. */
 static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *patch, int components, base_error *error)
 {
     const bool has_vertices = patch->connectivity.data != NULL;
@@ -181,7 +180,7 @@ static insitu_status check_patches(const session_mesh *mesh, const insitu_field 
     return INSITU_OK;
 }
 
-/* Checks the description of a field that has a fill function, before the function is called. */
+/* Checks, before the fill function is called, the description of a field that has one. */
 static insitu_status check_fill(const insitu_field *field, base_error *error)
 {
     if (field->patch_count)
@@ -240,7 +239,7 @@ static bool are_same_components(const insitu_field *a, const insitu_field *b)
     return is_same;
 }
 
-/* Returns whether the values have the same addresses and layout as before. */
+/* Returns whether the new description has the same addresses and layout of values as the stored one. */
 static bool is_same_place(const insitu_field *a, const insitu_field *b)
 {
     return session_is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes &&
@@ -248,8 +247,8 @@ static bool is_same_place(const insitu_field *a, const insitu_field *b)
            a->component_count == b->component_count && are_same_components(a, b) && are_same_patches(a, b);
 }
 
-/* Replaces the field's tables of patches and components by copies of the given ones, which may be the field's own.
- * Returns false if memory runs out. */
+/* Replaces the field's tables of patches and components by copies of the given tables, which may be those that the
+ * field already owns. Returns false if memory runs out. */
 static bool copy_tables(session_field *field, const insitu_field *given, base_error *error)
 {
     const size_t components = given->components ? (size_t)given->component_count : 0;
@@ -285,15 +284,15 @@ static void set_value_array(session_field *field, const insitu_field *given)
     if (!values.stride_bytes) values.stride_bytes = size * given->component_count;
     field->values = field->component_arrays ? field->component_arrays[0] : session_grid_array(&values);
     if (!values.data || field->component_arrays || field->component_stride % size == 0) return;
-    /* the other components are not aligned, so that the values must be read as unaligned ones */
+    /* only the first component is aligned, so that all must be read as unaligned values */
     values.stride_bytes = field->component_stride;
     const grid_array other = session_grid_array(&values);
     field->values.unusual_type = other.unusual_type;
     field->values.is_integer = other.is_integer;
 }
 
-/* Sets the arrays of values, and stores whether their copy must be computed again. The tables must have been copied
- * before. */
+/* Sets the arrays of values, and records whether the field's copy must be computed again. The tables of patches and
+ * components must have been copied before. */
 static void set_value_arrays(const session_mesh *mesh, session_field *field, const insitu_field *given, bool is_other,
                              bool is_stale)
 {
@@ -312,8 +311,8 @@ static void set_value_arrays(const session_mesh *mesh, session_field *field, con
     set_value_array(field, given);
 }
 
-/* Stores a field's description. The tables must have been copied before, unless all values are read from the same
- * addresses as before (is_same). */
+/* Stores a field's description. The tables of patches and components must have been copied before, unless is_same is
+ * set: then all values are read from the same addresses as before. */
 static void store_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given, bool is_same)
 {
     session_field *field = &mesh->fields[index];
@@ -321,7 +320,7 @@ static void store_field(session_meshes *meshes, session_mesh *mesh, int index, c
                           field->given.component_count != given->component_count || field->problem.status;
     const bool is_stale = is_other || given->changed & INSITU_CHANGED_VALUES || !is_same;
     if (is_other) {
-        /* The components of the scalars may no longer have the same meaning. */
+        /* scalars are dropped, because a component's number may now mean something else */
         session_drop_scalars(mesh);
         field->version++;
         meshes->are_names_changed = true;
@@ -344,7 +343,7 @@ insitu_status session_set_part_field(session_meshes *meshes, session_mesh *mesh,
     base_error what = {0};
     session_field *field = &mesh->fields[index];
     if (field->is_derived) {
-        /* The caller uses the name of a derived field; session_name_derived() reports this error. */
+        /* the caller uses the name of a derived field, an error that session_name_derived() reports later */
         session_drop_copy(field);
         *field = (session_field){.given = {.name = field->given.name}};
     }
@@ -434,7 +433,7 @@ insitu_status session_store_filled(session_mesh *mesh, int index, const insitu_f
     set_value_arrays(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
     field->given.fill = promised.fill;
     field->given.fill_data = promised.fill_data;
-    /* Scalars may refer to the previous table of components. */
+    /* new components also make scalars stale, because scalars may refer to the previous table */
     if (filled->changed & INSITU_CHANGED_VALUES || filled->components) session_mark_scalars_stale(mesh, index);
     return INSITU_OK;
 }

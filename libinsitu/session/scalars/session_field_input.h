@@ -21,8 +21,8 @@ insitu_status session_store_filled(session_mesh *mesh, int index, const insitu_f
 /* Marks the field's scalars as stale, because its values have changed. */
 void session_mark_scalars_stale(session_mesh *mesh, int field);
 
-/* Returns the number of those entries of the connectivity that are vertices of cells. The mesh must not have
- * polyhedra. */
+/* Returns the number of entries of the connectivity that are vertices of cells, without the unused ends of rows. The
+ * mesh must not have polyhedra. */
 int64_t session_corner_count(const insitu_mesh *mesh);
 /* Returns the number of the field's values or, if it has an index, of the index's entries. For corners in rows it is
  * the smallest allowed number. */

@@ -28,7 +28,7 @@ static insitu_status call_fill(session_meshes *meshes, const session_mesh *mesh,
                      given->name, (int)status, insitu_status_name(status));
 }
 
-/* If the call has failed, its error is returned every time the field is needed. */
+/* A call that has failed is not repeated in this step; its error is returned again. */
 insitu_status session_fill_field(session_meshes *meshes, session_mesh *mesh, int index, base_error *error)
 {
     session_field *field = &mesh->fields[index];
@@ -81,7 +81,7 @@ void session_forget_filled(const session_meshes *meshes)
             field->given.values.data = field->given.index.data = NULL;
             field->values.data = NULL;
             field->given.patch_count = 0;
-            /* the tables of the last step are owned by the field, and must not be passed as the caller's */
+            /* the field owns the tables of the last step, which must not be passed to the function as the caller's */
             field->given.patches = NULL;
             field->given.components = NULL;
         }

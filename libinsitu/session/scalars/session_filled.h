@@ -5,9 +5,9 @@
 #include "session_catalogue.h"
 #include "session_mesh.h"
 
-/* Calls the fill functions of the fields that statistics need or, if of_images, of those whose scalars are used, unless
- * they were called in this step. All are called, even if some fail, in the same order on all ranks. The first error is
- * returned. Local, but fill functions may communicate. */
+/* Calls the fill functions of the fields that statistics need or, if of_images is set, of the fields whose scalars
+ * images use. Functions that have been called in this step are not called again. All are called, even if some fail, in
+ * the same order on all ranks. The first error is returned. Local, but fill functions may communicate. */
 insitu_status session_fill_fields(session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
                                   base_error *error);
 

@@ -47,7 +47,8 @@ typedef struct node {
 typedef double number_pair __attribute__((vector_size(16)));
 typedef int64_t word_pair __attribute__((vector_size(16)));
 
-/* Where the contributions of corners are added: to sums or, if sums is NULL, to their bounds. */
+/* Where the contributions of corners are added: to the sums or, if `sums` is NULL, to the bounds from which the unit of
+ * the sums is derived. */
 typedef struct target {
     const session_gradient_basis *basis;
     int64_t *sums;
@@ -60,8 +61,8 @@ typedef struct target {
 
 /* ---- integers ------------------------------------------------------------------------------------------------ */
 
-/* Returns the power of two with which numbers up to `largest` are scaled to HIGH_BITS bits. If there is none it returns
- * 0, so that all scaled numbers are 0. */
+/* Returns the power of two by which numbers up to `largest` are multiplied so that they fit into HIGH_BITS bits.
+ * Returns 0 if there is no such power, so that all scaled numbers are 0. */
 static double find_power_of_two(double largest)
 {
     int exponent = 0;
@@ -198,7 +199,8 @@ static inline __attribute__((always_inline)) void add_corner(target *to, const n
                       field_count);
 }
 
-/* Sets the third edge at a corner of a shell: the normal, with the length of the other edges and with either sign. */
+/* Sets the third edge at a corner of a shell to the shell's normal, with the length of the other edges. Its sign does
+ * not matter. */
 static void set_normal_edge(double edge[3][3])
 {
     vector3_cross(edge[0], edge[1], edge[2]);
@@ -232,8 +234,8 @@ static inline __attribute__((always_inline)) bool read_node(const session_gradie
     return isfinite(sum);
 }
 
-/* Corners of cells with a fixed number of vertices: the vertex of the corner, followed by the other ends of its three
- * edges. */
+/* The corners of each type of cell with a fixed number of vertices. Each row is a corner, followed by the other ends of
+ * its three edges. */
 static const signed char tet_corners[][4] = {{0, 1, 2, 3}, {1, 0, 2, 3}, {2, 0, 1, 3}, {3, 0, 1, 2}};
 static const signed char hex_corners[][4] = {{0, 1, 3, 4}, {1, 0, 2, 5}, {2, 1, 3, 6}, {3, 0, 2, 7},
                                              {4, 5, 7, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 4, 6, 3}};
@@ -313,8 +315,7 @@ static bool add_node(node_list *list, target *to, int64_t vertex)
     return read_node(to->basis, vertex, to->scale, to->basis->field_count, &list->nodes[list->count++]);
 }
 
-/* Lists the vertices of the cell in the order in which the cell has them. Returns false if a value is not finite, or if
- * memory runs out. */
+/* Lists the cell's vertices in the cell's own order. Returns false if a value is not finite, or if memory runs out. */
 static bool list_nodes(node_list *list, target *to, int64_t cell)
 {
     grid_walk walk = grid_walk_cell(to->basis->cells, cell);
@@ -353,7 +354,7 @@ static void add_polyhedron(target *to, int64_t cell, node_list *list)
         grid_face_vertices(g, grid_array_index(&g->connectivity, i), &from, &until);
         const int64_t count = until - from;
         for (int64_t n = 0; n < count; n++) {
-            node nodes[3]; /* the vertex before the corner, the corner itself, and the vertex after it */
+            node nodes[3]; /* vertices of the face before the corner, at the corner, and after it */
             for (int k = 0; k < 3; k++)
                 read_node(basis, grid_array_index(&g->face_connectivity, from + (n + count + k - 1) % count), to->scale,
                           basis->field_count, &nodes[k]);
@@ -379,14 +380,14 @@ static bool has_own_values(const session_gradient_basis *basis, int64_t cell)
     return true;
 }
 
-/* Returns whether the cell is one of those over which sums are computed. */
+/* Returns whether sums are computed over the cell: drawn cells with a volume or, if of_shells is set, shells. */
 static bool is_summed(const session_gradient_basis *basis, int64_t cell)
 {
     return basis->of_shells ? !grid_is_ghost(basis->cells, cell) && grid_is_shell(basis->cells, cell)
                             : grid_is_drawn(basis->cells, cell);
 }
 
-/* As has_entry(), for one of the caller's cells with a polynomial. */
+/* Returns whether one of the caller's cells, which has a polynomial, is drawn and has a node with a sum. */
 static bool has_row_entry(const session_gradient_basis *basis, int64_t cell)
 {
     const session_polynomials *p = basis->polynomials;
@@ -468,7 +469,7 @@ static void add_linear_cell(target *to, int64_t cell, node_list *room)
         add_solid_cell(to, cell, type);
 }
 
-/* Adds the contribution of the polynomial at a node of the row. */
+/* Adds the gradient of a cell's polynomial at its n-th node to that node's sum. */
 static void add_row_node(target *to, const session_derivatives *d, const node_list *row, int n)
 {
     const int field_count = to->basis->field_count;

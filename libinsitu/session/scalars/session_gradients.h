@@ -11,15 +11,16 @@ enum { SESSION_GRADIENTS = 3 /* maximum number of scalars whose gradients one pa
 /* Input for computing sums. The fields have their values at vertices. */
 typedef struct session_gradient_basis {
     const grid *cells;
-    const grid_field *fields; /* array of field_count scalars */
+    const grid_field *fields; /* array of field_count scalars, with values at vertices */
     int field_count;          /* number of scalars: 1 .. SESSION_GRADIENTS */
-    /* set if sums are computed over shells, in whose planes their gradients lie; otherwise over cells with a volume */
+    /* set if sums are computed over shells, so that gradients lie in their planes; otherwise over cells with a
+     * volume */
     bool of_shells;
     const int32_t *sum_indices; /* for each vertex, the index of its sum; -1: it has none */
     double length;              /* a power of two near the size of the scene, the same on all ranks */
     int threads;
-    /* polynomials of the caller's cells, which contribute instead of their pieces; NULL: the cells contribute as linear
-     * ones */
+    /* polynomials of the caller's cells, whose gradients are added instead of those of the linear pieces; NULL: all
+     * cells are linear */
     const session_polynomials *polynomials;
 } session_gradient_basis;
 
@@ -44,7 +45,8 @@ typedef struct session_gradient_bounds {
     double largest_inverse_square;
 } session_gradient_bounds;
 
-/* List, in any order, of the cells that have a vertex with a sum; with polynomials, of the caller's cells. */
+/* The cells that have a vertex with a sum, in any order. If there are polynomials, these are the caller's cells;
+ * otherwise they are cells of the grid. */
 typedef struct session_cell_list {
     int64_t count;
     int64_t *cells;
@@ -68,7 +70,7 @@ bool session_add_gradients(const session_gradient_basis *basis, const session_ce
                            const session_gradient_bounds *bounds, unsigned char *owners, int64_t *sums);
 
 /* Computes the mean gradients from a sum, in units of values divided by coordinates. They are NaN if no cell
- * contributed. length is that of the basis. */
+ * contributed. length: session_gradient_basis.length of the sums. */
 void session_mean_gradients(const int64_t *sum, int field_count, const session_gradient_bounds *bounds, double length,
                             double out[][3]);
 

@@ -1,6 +1,6 @@
-/* Values that have an index are copied once into the order of the vertices, cells or corners, and values at the
- * vertices of a torn mesh into the order of its corners. Otherwise every tree and layer would have to read the index at
- * each vertex of a cell, and vectorized code could not be used. */
+/* Values that have an index are copied once, in the order of the vertices, cells or corners; values at the vertices of
+ * a torn mesh are copied in the order of its corners. Without the copy, each tree and layer would read the index at
+ * each vertex of each cell, and vectorized code could not be used. */
 #include "session_indexed.h"
 
 #include <string.h>
@@ -24,9 +24,10 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
 }
 
 typedef struct indexed_values {
-    const session_mesh *mesh;        /* a torn mesh if values at vertices are read for each corner; else NULL */
-    const uint32_t *parents;         /* for each position that is a piece of a split cell, the cell; else NULL */
-    grid_array index;                /* tuple of each position; without data, position i has tuple i */
+    /* the mesh, if it is torn and values at vertices are read once per corner; else NULL */
+    const session_mesh *mesh;
+    const uint32_t *parents;         /* if positions are pieces of split cells, the cell of each; else NULL */
+    grid_array index;                /* tuple of each position; if it has no data, position i has tuple i */
     grid_field values;               /* the caller's tuples */
     int64_t row_length, used_length; /* number of positions in a row, and how many of them are read */
     int64_t count, position_count;   /* number of tuples, and number of positions that have a tuple */
@@ -57,7 +58,7 @@ static indexed_values make_indexed_values(const session_mesh *mesh, const sessio
     return out;
 }
 
-/* Returns the index in the caller's arrays of the value at a position: the number of the vertex, the cell, or the
+/* Returns the index, in the caller's arrays, of the value at a position of the copy: the number of a vertex, cell or
  * corner. */
 static int64_t find_value_entry(const indexed_values *v, int64_t place)
 {
@@ -123,7 +124,7 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
     return INSITU_OK;
 }
 
-/* Reads the tuple at a vertex or a corner of the caller's cells. */
+/* Copies the tuple at a vertex or a corner of the caller's cells. */
 static void read_node(const void *of, int64_t position, double *tuple)
 {
     const indexed_values *v = of;

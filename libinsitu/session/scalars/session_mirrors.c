@@ -1,6 +1,7 @@
-/* An image has the fields of its source, with the same arrays: the picture of the image has the colours of the picture
- * of the source, as in a mirror, also those of components of vectors. Fields with a fill function take the values that
- * the source's function has made, which precedes the image among the parts. Derived fields are those of the source. */
+/* A mirror image has the fields of its source mesh, with the same arrays. So the picture of the image has the same
+ * colours as that of the source, as in a mirror, even where components of vectors are shown. For a field with a fill
+ * function, the image takes the values that the function has already computed for the source. Derived fields are those
+ * of the source. */
 #include "session_mirrors.h"
 
 #include <math.h>
@@ -16,7 +17,8 @@ enum { ALL_AXES = 7 };
 
 /* ---- fields ------------------------------------------------------------------------------------------------------ */
 
-/* The fill function of an image's field: gives the values of the source's field, which is filled already. */
+/* The fill function of a mirror image's field, which returns the values of the source's field. That field is filled
+ * first. */
 static insitu_status take_filled(void *of_image, insitu_field *field)
 {
     session_mesh *image = of_image;
@@ -38,7 +40,7 @@ static insitu_status take_filled(void *of_image, insitu_field *field)
     return INSITU_OK;
 }
 
-/* Returns the description of the source's field for the image. */
+/* Returns a description of the source's field with which it is set on the image. */
 static insitu_field describe_field(session_mesh *image, const session_field *from)
 {
     insitu_field out = from->given;
@@ -123,7 +125,7 @@ static void update_image(const scene_mirror *mirror, session_meshes *meshes, ses
     if (image) share_fields(meshes, image, error);
 }
 
-/* Names of meshes and fields are the same with images and without, so that the catalogue stays as it is. */
+/* Mirror images have the names of their meshes and fields, so that the catalogue does not change. */
 void session_update_mirrors(const scene *scene, session_meshes *meshes, int threads, base_error *error)
 {
     const bool are_names_changed = meshes->are_names_changed;
@@ -138,7 +140,7 @@ void session_update_mirrors(const scene *scene, session_meshes *meshes, int thre
 
 /* ---- warnings ---------------------------------------------------------------------------------------------------- */
 
-/* The bounds of the caller's parts for which a mirror stands, over all ranks: minima and negated maxima. */
+/* Bounds, over all ranks, of the meshes that the mirror draws: three minima, then three negated maxima. */
 enum { ENDS = 6 };
 
 static void find_ends(const scene_mirror *mirror, const scene *scene, const session_meshes *meshes, double ends[ENDS])
@@ -161,7 +163,7 @@ static void warn_of_mirror(const scene_mirror *mirror, const double ends[ENDS], 
     session_warn_of_absent_mesh(mirror->mesh, mirror->line, SESSION_MIRROR, catalogue, report);
     for (int axis = 0; axis < 3; axis++) {
         const double plane = mirror->planes[axis], below = plane - ends[axis], above = -ends[3 + axis] - plane;
-        /* vertices near the plane may be on its other side by rounding */
+        /* rounding may put vertices near the plane on its other side, which is not reported */
         const bool is_cut = mirror->axes >> axis & 1 && fmin(below, above) > 1e-6 * fmax(below, above);
         session_warn(
             report, &(session_warning){WARNING_MIRROR, NULL, mirror->mesh, axis}, is_cut,

@@ -11,8 +11,8 @@ static double given_coordinate(const session_mesh *mesh, int axis, int64_t verte
     return grid_array_number(&places, vertex);
 }
 
-/* Returns the axes along which a vertex of a mirror image lies elsewhere than the vertex of its source, one bit each.
- * Vertices in the mirror planes are those of the source. */
+/* Returns the axes along which a vertex of a mirror image differs in position from its source's vertex, one bit each. A
+ * vertex in a mirror plane has the same position in both. */
 static uint64_t find_mirrored_axes(const session_mesh *mesh, int64_t vertex)
 {
     uint64_t axes = 0;

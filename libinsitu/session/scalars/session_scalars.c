@@ -28,8 +28,8 @@ static uint64_t find_joint_name(const session_mesh *mesh, const scene_field *fie
     return mesh->single_joint_name ? mesh->single_joint_name : field->joint_name;
 }
 
-/* Returns the scalar of the mesh with these properties; NULL if there is none. joined is the hash of the meshes over
- * which a recentred scalar is computed. */
+/* Returns the scalar of the mesh with these properties; NULL if there is none. joined: for a recentred scalar, the hash
+ * of the meshes over which it is averaged. */
 static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred,
                                    uint64_t joined)
 {
@@ -101,7 +101,7 @@ grid_field session_given_field(const session_mesh *mesh, int index, int componen
                       .is_cell_centred = field->given.centring == INSITU_CELL};
     if (!session_is_copied(mesh, field)) {
         if (!field->component_arrays) return out;
-        out.component_stride = 0; /* the array contains only the chosen component */
+        out.component_stride = 0; /* the component's own array is read, as component 0 of it */
         if (component >= 0)
             out.values = field->component_arrays[component];
         else

@@ -21,7 +21,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
 /* Returns the scalar of a layer's field on this rank's mesh; NULL if the mesh does not have the field. */
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
 
-/* Returns the scalar that consists of means at vertices over the meshes with the hash `joined`
+/* Returns the scalar whose values are means at vertices over the meshes with the hash `joined`
  * (scene_field.joint_name); NULL if there is none. */
 session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component, uint64_t joined);
 
@@ -29,11 +29,11 @@ session_scalar *session_find_recentred(const session_mesh *mesh, const char *fie
  * cells. */
 grid_field session_given_field(const session_mesh *mesh, int field, int component);
 
-/* Returns whether the values are read from the session's copy, which is in the order of the vertices, cells or
- * corners. */
+/* Returns whether the field's values are read from the session's copy, in the order of the vertices, cells or corners,
+ * and not from the caller's arrays. */
 bool session_is_copied(const session_mesh *mesh, const session_field *field);
 
-/* Returns whether the copy has the values of the cells' polynomials at the nodes of finer lattices. */
+/* Returns whether the field's copy contains the cells' polynomials evaluated at the nodes of finer lattices. */
 bool session_is_interpolated(const session_mesh *mesh, const session_field *field);
 
 /* Returns whether a copy contains the values in their own type. Otherwise it contains doubles: components in separate
@@ -45,7 +45,7 @@ bool session_is_plain_copy(const session_mesh *mesh, const session_field *field)
  * the field. */
 bool session_find_values(const session_mesh *mesh, const scene_field *field, grid_field *out);
 
-/* Adds a scalar of field 0, all of whose data is marked as stale. Returns NULL if memory runs out. */
+/* Adds a scalar of the field with index 0, and marks all of its data as stale. Returns NULL if memory runs out. */
 session_scalar *session_add_scalar(session_mesh *mesh);
 
 /* Returns whether the scalar is the vertices' distance from a plane. */

@@ -14,8 +14,8 @@ void session_curl(const double g[3][3], double out[3])
     out[2] = g[1][0] - g[0][1];
 }
 
-/* The difference between the squares of the rotation rate and the strain rate equals minus the trace of the square of
- * the gradient, so that only its products of entries are summed. */
+/* Returns the Q criterion. The difference between the squares of the rotation rate and the strain rate equals minus the
+ * trace of the gradient's square, so that only products of its entries are summed. */
 double session_q_criterion(const double g[3][3])
 {
     const double squares = (g[0][0] * g[0][0] + g[1][1] * g[1][1]) + g[2][2] * g[2][2];
@@ -40,7 +40,7 @@ static double middle_eigenvalue(const double m[6])
     const double a = x / size, b = y / size, c = z / size, d = m[3] / size, e = m[4] / size, f = m[5] / size;
     const double half = 0.5 * ((a * (b * c - f * f) - d * (d * c - f * e)) + e * (d * f - b * e));
     const double third = 2 * acos(-1.0) / 3;
-    /* the angle that belongs to the largest eigenvalue, between 0 and 60 degrees */
+    /* the angle for the largest eigenvalue, between 0 and 60 degrees */
     const double angle = acos(fmin(fmax(half, -1), 1)) / 3;
     return mean + 2 * size * cos(angle - third);
 }

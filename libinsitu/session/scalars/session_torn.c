@@ -65,8 +65,8 @@ static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *erro
     return INSITU_OK;
 }
 
-/* Copies coordinates, packed, in their own type. Entries of connectivity that no cell uses may not be vertices; they
- * get the first one's position. */
+/* Copies the vertex positions to all corners, packed and in their own type. Entries of the connectivity that belong to
+ * no cell may be invalid indices; they get the first vertex's position. */
 static bool copy_coordinates(const session_mesh *mesh, int threads, session_torn *torn)
 {
     const grid *shared = &mesh->cells;
@@ -92,7 +92,7 @@ static bool copy_coordinates(const session_mesh *mesh, int threads, session_torn
     return true;
 }
 
-/* Makes the connectivity that has corners for vertices. */
+/* Creates the connectivity of the torn mesh, in which each corner of a cell is a vertex. */
 static insitu_status number_corners(const session_mesh *mesh, int threads, session_torn *torn, base_error *error)
 {
     torn->are_corners_entries = mesh->topology.is_split;
@@ -128,7 +128,7 @@ static insitu_status tear_mesh(session_mesh *mesh, int threads, base_error *erro
     return INSITU_OK;
 }
 
-/* Frees arrays that were computed for other vertices. */
+/* Drops all data that was computed for the previous vertices: outer faces, scalars, the tree and copies of values. */
 static void drop_vertex_data(session_meshes *meshes, session_mesh *mesh)
 {
     mesh->cells_stamp = mesh->coordinates_stamp = ++meshes->stamp;
@@ -165,7 +165,7 @@ insitu_status session_tear_meshes(session_meshes *meshes, const session_catalogu
 {
     for (int m = 0; m < meshes->count && !error->status; m++) {
         session_mesh *mesh = meshes->items[m];
-        /* the nodes of finer lattices are each cell's own anyway */
+        /* a mesh with finer lattices needs no tearing, because each cell has its own nodes */
         const bool is_torn = !mesh->finer.parts && is_named_in_scene(mesh, scene);
         if (mesh->is_given) update_torn_mesh(meshes, mesh, is_torn, team->threads, error);
     }

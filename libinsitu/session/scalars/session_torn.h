@@ -14,7 +14,7 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Tears the meshes that have a corner field used by the scene, unless they are already torn with the current
+/* Tears the meshes that have a field at corners which the scene uses, unless they are already torn with the current
  * coordinates, and restores the others. Cells must have been checked. Collective. */
 insitu_status session_tear_meshes(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                   const session_team *team, base_error *error);

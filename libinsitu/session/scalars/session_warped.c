@@ -7,7 +7,7 @@
 #include "session_mesh_input.h"
 #include "session_warp.h"
 
-/* What a warp needs to know of the step. */
+/* The data of a step that warping its meshes requires. */
 typedef struct warp_step {
     const scene *scene;
     const char *scene_path;
@@ -17,12 +17,12 @@ typedef struct warp_step {
 
 /* ---- the field of displacements ---------------------------------------------------------------------------------- */
 
-/* Records what is wrong with the field, beginning with the place in the scene. */
+/* Stores an error of the field of displacements. The message begins with the field's position in the scene. */
 #define REFUSE(step, warp, error, format, ...)                                                                         \
     base_fail((error), INSITU_ERROR_FIELD, "%s:%d: meshes.%.200s.warp.field: " format, (step)->scene_path,             \
               (warp)->field_line, (warp)->mesh, __VA_ARGS__)
 
-/* Returns whether two components suffice: they are those along x and y. */
+/* Returns whether displacements along x and y suffice, because the mesh lies in a plane z = 0. */
 static bool is_of_shells(const insitu_mesh *mesh)
 {
     return session_may_be_plane(mesh) && (!mesh->coordinates[2].data || !mesh->cell_types.data);
@@ -84,8 +84,8 @@ static session_displacement read_displacement(const scene_warp *warp, const sess
 
 /* ---- meshes ------------------------------------------------------------------------------------------------------ */
 
-/* Moves the vertices by the field. A part without cells need not have it, but its fill function may be collective, and
- * is called as on other ranks. */
+/* Moves the vertices by the field. A part without cells may lack the field. If the field has a fill function, it is
+ * called on such a part too, because it may be collective. */
 static insitu_status warp_by_field(const warp_step *step, const scene_warp *warp, session_mesh *mesh, base_error *error)
 {
     const int index = session_find_field(mesh, warp->field);
@@ -99,7 +99,7 @@ static insitu_status warp_by_field(const warp_step *step, const scene_warp *warp
     return session_warp_mesh(step->meshes, mesh, &by, step->threads, error);
 }
 
-/* Warps the mesh as the scene says. An error is stored for the check of the mesh. */
+/* Warps the mesh if the scene does so. An error is stored; the check of the mesh returns it. */
 static void update_mesh(const warp_step *step, session_mesh *mesh)
 {
     const scene_warp *warp = scene_find_warp(step->scene, mesh->name);

@@ -1,4 +1,4 @@
-/* Finds the fields by which the scene warps meshes, and has the vertices moved (meshes/session_warp.h). */
+/* Finds the fields by which the scene displaces the vertices of meshes, and applies them (meshes/session_warp.h). */
 #ifndef SESSION_WARPED_H
 #define SESSION_WARPED_H
 
@@ -6,18 +6,18 @@
 #include "session_catalogue.h"
 #include "session_report.h"
 
-/* Moves the vertices of this rank's meshes as the scene says, as far as the mesh, the field or the scene has changed.
- * It precedes the check of the meshes, which returns errors of the field. scene_path is for messages. Local, but fill
- * functions may communicate. */
+/* Moves the vertices of the meshes that the scene warps, if the mesh, the field or the scene has changed. It must be
+ * called before the check of the meshes, which returns errors in these fields. scene_path is used in messages. Local,
+ * but fill functions may communicate. */
 void session_update_warps(const scene *scene, const char *scene_path, session_meshes *meshes, int threads);
 
-/* Warns of entries of the scene that stand for no mesh, and of gradients on warped meshes. Local. */
+/* Warns of warps in the scene that name no mesh, and of gradients computed on warped meshes. Local. */
 void session_check_warps(const scene *scene, const session_catalogue *catalogue, session_report *report);
 
-/* What the scene does to a mesh. */
+/* How the scene changes a mesh. */
 typedef enum session_transform { SESSION_WARP = 0, SESSION_MIRROR } session_transform;
 
-/* Warns if no rank has a mesh for which this name of the scene stands. Local. */
+/* Warns if the scene names a mesh that exists on no rank. Local. */
 void session_warn_of_absent_mesh(const char *name, int line, session_transform transform,
                                  const session_catalogue *catalogue, session_report *report);
 
