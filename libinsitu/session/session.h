@@ -1,5 +1,6 @@
-/* The parts of a session. Each part only uses those whose headers it includes, and a function's parameters are the
- * parts that it may access; only the public calls, the step and its first reduction access the whole session. */
+/* The parts of a session. The code of each part only uses those parts whose headers it includes, and a function's
+ * parameters are the parts that it may access; only the public calls, the step and its first reduction access the whole
+ * session. */
 #ifndef SESSION_SESSION_H
 #define SESSION_SESSION_H
 

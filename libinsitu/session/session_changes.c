@@ -1,9 +1,9 @@
-/* The reduction is a maximum over a few integers. It tells every rank whether all are at the same cycle (maximum and
- * minimum), the lowest rank with an error, whether cells, coordinates, levels of refinement or names changed anywhere,
- * whether all tables of names are equal, whether any rank lacks threads, the lowest of the instruction sets, whether
- * any field has a fill function, and the lowest rank that has a warning for all. From rank 0 it has the time, whether
- * the scene file was edited, whether pictures could not be written, and whether they are written in the step. After it,
- * all ranks decide alike without further messages. */
+/* The reduction is a maximum over a few integers. From it every rank determines whether all are at the same cycle
+ * (maximum and minimum), the lowest rank with an error, whether cells, coordinates, levels of refinement or names
+ * changed anywhere, whether all tables of names are equal, whether any rank lacks threads, the lowest of the
+ * instruction sets, whether any field has a fill function, and the lowest rank that has a warning for all. From rank 0
+ * it has the time, whether the scene file was edited, whether pictures could not be written, and whether they are
+ * written in the step. After it, all ranks make the same decisions without further messages. */
 #include "session_changes.h"
 
 #include <string.h>
@@ -14,8 +14,8 @@
 
 enum change_word {
     CYCLE_HIGH,
-    CYCLE_LOW, /* negated, because the reduction is a maximum; so are all entries called low */
-    FAILED,    /* number of ranks minus the lowest failing rank; 0: none */
+    CYCLE_LOW, /* lowest cycle, negated, because the reduction is a maximum; all entries called low are negated */
+    FAILED,    /* number of ranks minus the lowest failing rank; 0: no rank has failed */
     CELLS_CHANGED,
     LEVELS_CHANGED,
     NAMES_CHANGED,
@@ -29,7 +29,7 @@ enum change_word {
     ISA_LOW, /* lowest instruction set, and the lowest rank that has it, in one word */
     ISA_HIGH,
     TELLING,   /* lowest rank with warnings for all ranks (session_reporting_word()) */
-    ROOT_TIME, /* the bits of rank 0's time */
+    ROOT_TIME, /* the bits of the time on rank 0 */
     CHANGE_WORDS
 };
 
@@ -65,7 +65,8 @@ static void pack_changes(const insitu_session *session, int64_t cycle, double ti
     const session_scene_file *file = &session->scene_file;
     const int64_t names = (int64_t)(session_names_hash(meshes) >> 1);
     words[CYCLE_HIGH] = cycle;
-    words[CYCLE_LOW] = ~cycle; /* ~ negates without overflow */
+    /* the complement decreases as the cycle increases, like a negative number, but cannot overflow */
+    words[CYCLE_LOW] = ~cycle;
     words[FAILED] = session_pending_error(meshes) ? team->ranks - team->rank : 0;
     words[CELLS_CHANGED] = meshes->are_cells_changed || !session->space.has_extent;
     words[LEVELS_CHANGED] = meshes->are_levels_changed;

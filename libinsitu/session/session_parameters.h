@@ -9,8 +9,8 @@ enum { SESSION_MOST_ASKED = 256 };
 
 /* The names of parameters that the simulation has requested on this rank. */
 typedef struct session_asked {
-    /* number of recorded names; names beyond SESSION_MOST_ASKED are not recorded, and no parameter is then reported as
-     * unused */
+    /* number of names that were requested; names after the first SESSION_MOST_ASKED are not recorded, and then no
+     * parameter is reported as unused */
     int count;
     uint64_t names[SESSION_MOST_ASKED]; /* hashes of the recorded names */
 } session_asked;

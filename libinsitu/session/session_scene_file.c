@@ -1,5 +1,5 @@
 /* The scene: rank 0 reads its file, or is given its text, and all ranks parse the same text, so that all have the same
- * scene without exchanging its structure. A file that is edited while the simulation runs is read again at the next
+ * scene without exchanging its structure. A file that is edited while the simulation runs is read again by the next
  * step; an edit that does not parse leaves the old scene in place, with a warning in the reports until it is
  * corrected. */
 #include "session_scene_file.h"
@@ -110,8 +110,8 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
            a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
 }
 
-/* Copies the caller's text as if it had been read from a file. A text that is cut here is longer than a scene may be,
- * and is therefore refused. */
+/* Copies the caller's text as if it had been read from a file. A text longer than a scene may be is cut here, and is
+ * then refused when it is parsed. */
 static insitu_status copy_text(const char *given, scene_file_text *text, base_error *error)
 {
     text->size = (int64_t)strnlen(given, MAX_SCENE_BYTES);
@@ -172,7 +172,7 @@ insitu_status session_load_scene(session_scene_file *file, const session_team *t
 bool session_is_scene_edited(const session_scene_file *file, int rank)
 {
     struct stat now;
-    /* An editor may have removed the file for a moment; it is then read at a later step. */
+    /* an editor may have removed the file for a moment; a later step then reads it */
     if (rank != 0 || file->is_text || stat(file->path, &now) != 0) return false;
     return !file->has_stamp || !is_same_file(&now, &file->stamp);
 }

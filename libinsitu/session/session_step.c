@@ -1,4 +1,4 @@
-/* The step: its phases in order, each in its own file.
+/* Performs a step by calling its phases in order; each phase has its own file.
  *
  * A phase gets the parts of the session that it may access. It is collective, and returns one status on all ranks
  * (session_agree.h), so that all of them leave the step after the same phase. The first phase is one small reduction;
@@ -40,13 +40,13 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Reads the edited scene, and drops everything that was created for images of the old one. Cells count as changed if
- * they are split otherwise. */
+/* Reads the edited scene, and drops everything that was created for images of the old one. If the new scene splits
+ * cells of higher order differently, cells count as changed. */
 static void reload_scene(insitu_session *s, session_changes *changes)
 {
     const int pieces = s->scene_file.scene.finer_pieces;
     session_writer_drain(&s->writer);
-    /* waits for pictures that are being written, so that the old scene is no longer used */
+    /* waits until all queued pictures are written, because the writer uses the old scene */
     session_writer_collect(&s->writer, &s->report);
     if (!session_reload_scene(&s->scene_file, &s->team)) return;
     session_writer_drop_memory(&s->writer);
@@ -69,8 +69,8 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     changes->are_cells_changed = changes->are_names_changed = true;
 }
 
-/* Selects kernels that every rank has. Two instruction sets differ in roundings, so that volumes would overlap at a
- * face between cells of two ranks. */
+/* Selects the lowest of the ranks' instruction sets for all ranks. Instruction sets round differently, so that volumes
+ * of ranks with different ones would overlap or leave gaps at a face between cells of two ranks. */
 static void use_common_kernels(const session_changes *changes, session_report *report)
 {
     render_isa_limit(changes->isa_level);
@@ -100,7 +100,7 @@ static insitu_status derive_for_events(insitu_session *s, const session_moment *
     const session_derive_basis basis = derive_basis(s);
     if (!needed) return INSITU_OK;
     session_mark_sources(scene, needed, &s->meshes);
-    /* agrees on the status, because fill functions may be collective */
+    /* all ranks agree on the status here, because fill functions may be collective */
     insitu_status status = session_agree(s->team.comm, error);
     if (!status) session_fill_fields(&s->meshes, &s->catalogue, false, error);
     if (!error->status) session_copy_wanted(&s->meshes, s->team.threads, error);
@@ -131,8 +131,8 @@ static insitu_status name_derived(insitu_session *s, base_error *error)
     return session_name_derived(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team, error);
 }
 
-/* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and finds
- * which meshes the scene joins. An error of the latter is stored in *error. Collective. */
+/* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and finds the
+ * joints of meshes. An error in finding joints is stored only in *error. Collective. */
 static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_shared, base_error *error)
 {
     insitu_status status = INSITU_OK;
@@ -161,7 +161,7 @@ static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed
     return status;
 }
 
-/* Reads cells of higher order as finer ones, if the scene says so. Collective. */
+/* Replaces cells of higher order by finer ones if the scene requests it. Collective. */
 static insitu_status refine_cells(insitu_session *s, base_error *error)
 {
     const int pieces = s->scene_file.scene.finer_pieces;
@@ -172,8 +172,8 @@ static insitu_status refine_cells(insitu_session *s, base_error *error)
     return status || !is_any ? status : session_check_meshes(&s->meshes, &s->team, error);
 }
 
-/* Checks the changed contents of meshes, and updates the catalogue. Meshes and fields with faults are put aside:
- * *refused is the first fault. Collective. */
+/* Checks the changed contents of meshes, and updates the catalogue. Meshes and fields with faults are excluded from the
+ * step; *refused is the first fault. Collective. */
 static insitu_status update_meshes(insitu_session *s, const session_changes *changes, base_error *refused,
                                    base_error *error)
 {
@@ -197,8 +197,8 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     return status ? status : session_check_mirrors(scene, &s->meshes, &s->catalogue, team, &s->report, error);
 }
 
-/* Makes the plan. If fields turn out to be invalid when their values are read, makes another one without their images.
- * Collective. */
+/* Makes the plan. If fields turn out to be invalid when their values are read, makes another plan without the images
+ * that use them. Collective. */
 static insitu_status make_plan(insitu_session *s, const session_plan_basis *basis, base_error *refused,
                                session_plan *plan, base_error *error)
 {
@@ -214,8 +214,8 @@ static insitu_status make_plan(insitu_session *s, const session_plan_basis *basi
     return status;
 }
 
-/* Performs the phases of a step in which something is due. Only data that the plan uses is computed. refused: the error
- * of set calls. Images that do not use a faulty mesh or field are drawn, and the error is returned afterwards. */
+/* Performs the phases of a step in which something is due. Only data that the plan uses is computed. refused: an error
+ * of a set call. Images that do not use a faulty mesh or field are drawn, and the error is returned afterwards. */
 static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, const session_moment *moment,
                                      base_error *refused, base_error *error)
 {

@@ -49,7 +49,7 @@ static int64_t patch_bytes(const insitu_field *field)
     return bytes;
 }
 
-/* The bytes that were copied of a mesh, by the reason why: the bytes of its blocks are added up. */
+/* Bytes that were copied of a mesh, by the reason for the copy. The bytes of its blocks are added up. */
 enum { MOST_REASONS = 24, REASON_SIZE = 512 };
 
 typedef struct copied_reasons {
@@ -69,7 +69,7 @@ __attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *rea
     vsnprintf(words, sizeof words, format, arguments);
     va_end(arguments);
     while (at < reasons->count && strcmp(reasons->texts[at], words) != 0) at++;
-    if (at == MOST_REASONS) at--; /* further reasons are added to the last one */
+    if (at == MOST_REASONS) at--; /* bytes copied for further reasons are added to the last reason */
     if (at == reasons->count) {
         memcpy(reasons->texts[at], words, sizeof words);
         reasons->bytes[at] = 0;
@@ -211,14 +211,14 @@ static bool is_shown(const session_mesh *mesh)
     return is_any;
 }
 
-/* Returns the number of the caller's cells in the mesh's tree. */
+/* Returns how many of the caller's cells the mesh's tree contains. */
 static int64_t count_tree_cells(const session_mesh *mesh)
 {
     return mesh->topology.is_split ? session_count_parents_of(mesh, mesh->tree.cells, mesh->tree.cell_count)
                                    : mesh->tree.cell_count;
 }
 
-/* Reports fields that are left out. Blocks of a mesh have the same fields, so each is reported once. */
+/* Reports the fields that no image uses. Blocks of a mesh have the same fields, so that each field is reported once. */
 static void report_left_out(session_report *out, const session_parts *parts)
 {
     const session_mesh *first = parts->items[0];

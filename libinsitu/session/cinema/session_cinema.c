@@ -43,7 +43,7 @@ static bool reserve_text(session_table *t, size_t more)
     return true;
 }
 
-/* A line that is being written. is_complete is set as long as memory has sufficed for all of it. */
+/* A line of the table while it is written. is_complete: memory has sufficed for all of the line so far. */
 typedef struct table_line {
     session_table *table;
     bool is_complete;
@@ -66,7 +66,7 @@ static void add_number(table_line *line, double number)
 }
 
 /* Adds a text to the line. It is quoted if it contains a character that separates fields (RFC 4180), and preceded by
- * `shield` if a spreadsheet would interpret it as a formula. */
+ * `shield`, a character that prevents a spreadsheet from interpreting it as a formula, if it looks like one. */
 static void add_text(table_line *line, const char *shield, const char *text, char end)
 {
     const bool is_quoted = strpbrk(text, ",\"") != NULL, is_formula = *text && strchr("=+-@", *text);
@@ -77,7 +77,7 @@ static void add_text(table_line *line, const char *shield, const char *text, cha
     add_bytes(line, &end, 1);
 }
 
-/* Adds an empty field, which in Spec D means that there is no value. */
+/* Adds an empty field. In Spec D of Cinema databases it means that there is no value. */
 static void add_empty_field(table_line *line)
 {
     add_bytes(line, ",", 1);

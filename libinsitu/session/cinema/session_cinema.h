@@ -21,19 +21,19 @@ typedef struct session_table {
     const scene_database *database; /* the database, owned by the scene */
     char *text;                     /* the lines of data.csv that are complete */
     size_t size, capacity;
-    bool has_earlier_lines; /* set if `text` contains the earlier lines of the folder's file */
+    bool has_earlier_lines; /* set if `text` includes the lines of the folder's file from before the session */
     bool has_step_lines;    /* set if `text` contains a line of this step */
     bool is_changed;        /* set if the table has changed since the files were written */
     bool has_page;          /* set if this session has written index.html */
     int64_t last_cycle;     /* cycle of the table's last line */
 } session_table;
 
-/* The databases' tables, on rank 0. */
+/* The tables of all databases, on rank 0. */
 typedef struct session_cinema {
     bool has_begun;
     int64_t first_cycle; /* first cycle of the session, or first cycle since the scene was edited */
     int count;
-    session_table *tables; /* one per database of the scene; NULL before the first picture */
+    session_table *tables; /* one table per database of the scene; NULL before the first picture */
 } session_cinema;
 
 /* Stores the cycle of the first step of the session, or of the first step since the scene was edited. Local. */

@@ -28,7 +28,7 @@ typedef struct session_news {
     base_error error; /* error of the last step that failed or has drawn pictures; empty if it has drawn them */
 } session_news;
 
-/* The scene file, as shown in report.json. */
+/* What report.json says about the scene file. */
 typedef struct session_news_scene {
     const scene *scene;
     const char *path; /* path of the file as given by the caller */

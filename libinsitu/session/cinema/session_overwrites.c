@@ -47,7 +47,7 @@ static int find_last_writer(const session_overwrites *all, uint64_t file, int ou
     return -1;
 }
 
-/* Returns the advice that is the last part of the warning. */
+/* Returns the last part of the warning, which advises how to avoid the overwriting. */
 static const char *overwrite_advice(const scene_image *image, const scene_image *before, bool is_same_output)
 {
     if (is_same_output) return "put {cycle} into its path to keep a picture of each step";
@@ -85,7 +85,7 @@ void session_record_written(session_overwrites *all, const scene *scene, int ima
     for (int i = 0; i < drawn->output_count; i++) {
         const scene_output *output = &drawn->outputs[i];
         if (output->montage >= 0 && output->first_panel + drawn->variant.view > 0)
-            continue; /* only the first cell of a montage counts, because all its cells are in the same file */
+            continue; /* the panels of a montage are in one file, so that only the first one is recorded */
         char *path = scene_expand(drawn->outputs[i].path, &moment);
         if (!path) continue;
         const uint64_t file = hash_path(path);

@@ -1,7 +1,7 @@
-/* Makes all ranks agree on an error.
+/* Functions by which all ranks agree on an error.
  *
- * Every phase of a step is collective and ends with these functions. They return the same status on all ranks; if it is
- * an error, *error is also the same on all of them. */
+ * Every phase of a step is collective and ends with one of these functions. They return the same status on all ranks;
+ * if it is an error, *error is also the same on all of them. */
 #ifndef SESSION_AGREE_H
 #define SESSION_AGREE_H
 

@@ -1,6 +1,6 @@
 /* Ranks that are not bound to cores share all cores of the node. Ranks that are bound to a socket or a container share
  * its cores, and a rank that is bound to cores of its own does not share them. These cases are distinguished by the
- * sets of cores on which the ranks may run; it does not matter who has bound the ranks. */
+ * sets of cores on which the ranks may run, whatever program has bound them. */
 #define _GNU_SOURCE 1
 #include "session_cores.h"
 
@@ -17,7 +17,7 @@ int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, i
     double share = 0;
     for (int k = 0; k < cores; k++)
         if (may_run[k]) share += 1 / (double)rank_counts[k];
-    share += 1e-6; /* because of rounding, the sum of eight eighths may be slightly less than one */
+    share += 1e-6; /* rounding may make the sum of eight eighths slightly less than one */
     return share > 1 ? (int)share : 1;
 }
 
@@ -58,7 +58,7 @@ int session_cores_of_rank(MPI_Comm node)
     const bool is_known = find_allowed_cores(own);
     if (MPI_Allreduce(own, all, MOST_CORES, MPI_INT32_T, MPI_SUM, node) == MPI_SUCCESS && is_known)
         return session_share_of_cores(own, all, MOST_CORES);
-    /* If a rank may not run on all cores, it has been bound to its own ones. */
+    /* If a rank may not run on all cores of the node, it has been bound to cores of its own, and those are returned. */
     const int cores = omp_get_num_procs(), share = cores / ranks;
     if (cores < sysconf(_SC_NPROCESSORS_ONLN)) return cores;
     return share > 1 ? share : 1;

@@ -26,7 +26,7 @@ uint64_t session_key_hash(const session_key *key);
 typedef struct session_key_table {
     session_key *keys; /* array of `count` keys */
     int64_t count;
-    int64_t *slots; /* mask + 1 slots with the number of a key; -1: the slot is free */
+    int64_t *slots; /* mask + 1 slots, each with the number of a key; -1: the slot is empty */
     uint64_t mask;
 } session_key_table;
 

@@ -1,4 +1,5 @@
-/* The report of a step while it is written. It contains numbers, lists of texts, and the warnings already reported.
+/* The report of a step while it is written. It contains the numbers and texts of insitu_report, and a list of the
+ * warnings already reported.
  *
  * A warning informs the user that something is drawn as requested but probably not as intended. All warnings are the
  * same on every rank: most are derived from data that all ranks share, the others are sent to all ranks
@@ -20,13 +21,14 @@ typedef struct session_text {
 } session_text;
 
 typedef struct session_report {
-    insitu_report public_report;                 /* its texts are set only at the end of a step */
-    session_text copied_why, left_out, warnings; /* texts of the members of insitu_report with these names */
+    /* the report for the caller; its texts are set only at the end of a step */
+    insitu_report public_report;
+    session_text copied_why, left_out, warnings; /* lines of the members of insitu_report with these names */
     /* warnings of this rank alone, until session_share_lines() sends those of one rank to all ranks */
     session_text own_warnings;
-    int reported_count; /* number of warnings in `reported` */
+    int reported_count; /* number of entries of `reported` */
     uint64_t *reported; /* hashes of warnings that have been reported and whose condition still holds */
-    /* result of session_unusable_key() when its warnings were last reported; 0: there were none */
+    /* result of session_unusable_key() when warnings of unusable cells were last reported; 0: there were none */
     uint64_t unusable_key;
 } session_report;
 
@@ -39,7 +41,7 @@ void session_report_create(session_report *report);
 /* Clears the numbers and the lists for a new step. Local. */
 void session_report_begin(session_report *report, int64_t cycle, double time);
 
-/* Makes the lists of texts available to the caller. Local. */
+/* Copies the lists of texts into the report that the caller reads. Local. */
 void session_report_end(session_report *report);
 
 void session_report_free(session_report *report);

@@ -22,8 +22,8 @@ typedef struct session_team {
     int threads;         /* number of this rank's threads in this step; 0 before the first step */
 } session_team;
 
-/* Creates two duplicates of the caller's communicator. After an error, *out contains those that were created, and they
- * must be freed. Collective. */
+/* Creates two duplicates of the caller's communicator. Even after an error, the caller must free *out, which then
+ * contains the communicators that were created. Collective. */
 insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *error);
 
 /* Determines the number of ranks on this rank's node, its share of the cores, and how ranks are placed on nodes.

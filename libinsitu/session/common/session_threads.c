@@ -89,10 +89,11 @@ bool session_lacks_threads(const session_threads *threads, int asked, int cores)
 /* ---- trial --------------------------------------------------------------------------------------------------- */
 
 typedef struct trial {
-    pthread_mutex_t gate; /* locked until the threads may end */
+    pthread_mutex_t gate; /* locked while threads must not end */
     pthread_t *threads;
     int count;
-    void *spare_memory; /* SPARE_BYTES that are allocated during the trial, so that they are free after it */
+    /* memory of SPARE_BYTES that is allocated during the trial, and freed after it for other needs */
+    void *spare_memory;
 } trial;
 
 static void *wait_at_gate(void *gate)
@@ -143,7 +144,7 @@ static void start_trial_threads(trial *t, int wanted)
     pthread_mutex_lock(&t->gate);
     if (!t->threads || !t->spare_memory || pthread_attr_init(&attributes) != 0) return;
     const size_t stack = stack_of_environment();
-    /* a size that is refused here is not used by OpenMP either */
+    /* OpenMP ignores a stack size that is refused here, too */
     if (stack) pthread_attr_setstacksize(&attributes, stack);
     sigfillset(&all);
     /* signals are blocked while threads are started, so that these never receive the caller's signals */
@@ -263,7 +264,7 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
                   needed_stack_kilobytes(&least, SESSION_WORKER_STACK),
                   needed_stack_kilobytes(&least, SESSION_WORKER_STACK));
     const insitu_status status = session_agree(team->comm, error);
-    if (status) threads->count = 0; /* threads are tried again in the next step */
+    if (status) threads->count = 0; /* counts as not tried, so that the next step tries to start threads again */
     return status;
 }
 

@@ -17,7 +17,7 @@
  * quarter larger. */
 enum { SESSION_WORKER_STACK = 256 << 10, SESSION_CALLER_STACK = 320 << 10 };
 
-/* The number of threads that exist or are known to be startable, for the thread that made the last call. */
+/* The number of threads that exist or have been found to be startable, for the thread that made the last call. */
 typedef struct session_threads {
     int count; /* number of threads; 0: not tried yet */
     pthread_t caller;

@@ -36,7 +36,7 @@ static void project_to_pixel(const render_camera *c, const seen_point *p, double
     pixel[1] = 0.5 * c->height - p->position[1] * scale;
 }
 
-/* Clips the edge at the plane with depth `near`. Returns false if all of the edge is nearer. */
+/* Clips the edge at the plane with depth `near`. Returns false if the whole edge is nearer than that. */
 static bool clip_at_near_plane(seen_point *a, seen_point *b, double near)
 {
     if (a->position[2] < near && b->position[2] < near) return false;
@@ -88,8 +88,8 @@ typedef struct ruled_edge {
     double from[3], to[3]; /* the ends in scene coordinates */
     double pixels[2][2];   /* the ends in pixels */
     double outward[2];     /* unit vector in the picture, perpendicular to the edge and pointing out of the box */
-    /* is_in_front: the edge is in front of the eye; is_outer: it lies between a face that is seen from outside and one
-     * that is not */
+    /* is_in_front: the edge lies in front of the eye; is_outer: it is on the box's outline, between a face that is seen
+     * from outside and one that is not */
     bool is_in_front, is_outer;
 } ruled_edge;
 
@@ -295,7 +295,7 @@ static bool is_repeated_bar(const session_decorations *d, int bar)
     return is_found;
 }
 
-/* Input for colour bars, in addition to the layers. */
+/* Input for colour bars. */
 typedef struct bar_basis {
     const scene_decorations *scene;
     const session_catalogue *catalogue;
@@ -352,7 +352,7 @@ static void hash_colours(uint64_t *hash, const float *colours, int count)
     if (colours) session_hash_bytes(hash, colours, 3 * (size_t)count * sizeof *colours);
 }
 
-/* Returns a hash of what the bars show. */
+/* Returns a hash of all that the bars show: words, colours and numbers. */
 static uint64_t hash_bars(const insitu_decorations *d)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -383,7 +383,7 @@ static void fill_axes(session_decorations *d, const render_camera *c)
     }
 }
 
-/* Computes the decorations that show lengths. */
+/* Computes the decorations that show lengths: the scale bar and the rulers. */
 static void fill_length_decorations(session_decorations *d, const scene_decorations *scene,
                                     const session_extent *extent, const render_camera *camera)
 {
@@ -432,7 +432,7 @@ session_decorations *session_make_decorations(const scene_image *image, const se
     return NULL;
 }
 
-/* Makes the pointers of a copy refer to the copy itself. */
+/* Makes the pointers of a copied struct refer to the copy's own members. */
 static void refer_to_itself(session_decorations *copy)
 {
     insitu_decorations *const both[2] = {&copy->decorations, &copy->background};

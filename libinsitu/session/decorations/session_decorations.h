@@ -16,15 +16,17 @@ enum { SESSION_MAX_BARS = 20, SESSION_MAX_WORDS = 17, SESSION_BOX_EDGES = 12 };
 enum { SESSION_RULER_STROKES = 3 * SESSION_MAX_TICKS, SESSION_RULER_LABELS = 3 * SESSION_MAX_TICKS + 3 };
 
 typedef struct session_decorations {
-    insitu_decorations decorations; /* all decorations; its pointers refer to this struct and to the layers */
-    insitu_decorations background;  /* decorations that contain only the background, for files without decorations */
+    /* all decorations; its pointers refer to members of this struct and to the layers */
+    insitu_decorations decorations;
+    insitu_decorations background; /* decorations that contain only the background, for files without decorations */
     insitu_words words[SESSION_MAX_WORDS];    /* the texts */
     insitu_colour_bar bars[SESSION_MAX_BARS]; /* the colour bars */
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
-    char labels[SESSION_MAX_BARS][300];              /* label of each colour bar */
-    const scene_field *fields[SESSION_MAX_BARS];     /* the fields that the colour bars show */
-    insitu_stroke *strokes;                          /* buffer for the boxes of the outline and for the rulers */
-    insitu_label ruler_labels[SESSION_RULER_LABELS]; /* numbers and names along the rulers */
+    char labels[SESSION_MAX_BARS][300];          /* label of each colour bar */
+    const scene_field *fields[SESSION_MAX_BARS]; /* the fields that the colour bars show */
+    /* buffers for the boxes of the outline and for the lines of the rulers */
+    insitu_stroke *strokes;
+    insitu_label ruler_labels[SESSION_RULER_LABELS]; /* numbers and axis names along the rulers */
     uint64_t bars_hash; /* hash of the words, colours and numbers of the bars; equal bars have equal hashes */
 } session_decorations;
 

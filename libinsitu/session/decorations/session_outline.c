@@ -12,8 +12,8 @@ void session_free_outline(session_outline *outline)
     *outline = (session_outline){0};
 }
 
-/* The ends of a box: x, y, z of the lower corner and the negated x, y, z of the upper corner, so that a reduction by
- * minimum computes the union of boxes. */
+/* The bounds of a box in a form in which a reduction by minimum computes the union of boxes: x, y, z of the lower
+ * corner, then the negated x, y, z of the upper one. */
 
 enum { ENDS = 6 };
 

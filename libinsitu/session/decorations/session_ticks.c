@@ -42,15 +42,15 @@ static round_step choose_round_step(double low, double high, int most)
     return step;
 }
 
-/* Removes leading zeros of the exponent: "1.20e+05" becomes "1.20e5". The mantissa is kept, since "1.2e5" would lack a
- * digit that the neighbouring ticks have. */
+/* Removes leading zeros of the exponent: "1.20e+05" becomes "1.20e5". Zeros of the mantissa are kept, since "1.2e5"
+ * would have fewer digits than the neighbouring ticks. */
 static void shorten_exponent(char *text)
 {
     char *e = strchr(text, 'e');
     if (!e) return;
     const bool is_negative = e[1] == '-';
     const size_t zeros = strspn(e + 2, "0");
-    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* one zero of e+00 is kept */
+    const char *digits = e + 2 + (e[2 + zeros] ? zeros : zeros - 1); /* of an exponent e+00 one zero is kept */
     memmove(e + 1 + is_negative, digits, strlen(digits) + 1);
 }
 

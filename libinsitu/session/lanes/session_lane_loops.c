@@ -18,7 +18,7 @@ enum {
     AHEAD = 512 /* prefetch distance in entries of the connectivity; the hardware's own prefetches come too late */
 };
 
-/* Addresses and strides of the mesh's arrays, which are constant during a run. */
+/* Addresses and strides of the mesh's arrays. They are constant during a run of cells. */
 typedef struct lane_source {
     const char *connectivity, *ghosts;
     /* for each axis, the address of the coordinate with index 0; if indices begin with 1, it is outside of the array */
@@ -37,7 +37,7 @@ typedef struct lane_points {
     doubles wide[GRID_MAX_CELL_VERTICES][3];
 } lane_points;
 
-/* Bounds of positions. Either the float members or the double members are used. */
+/* Bounds of vertex positions. Either the float members or the double members are used. */
 typedef struct lane_bounds {
     floats narrow_lower[3], narrow_upper[3];
     doubles lower[3], upper[3];
@@ -115,7 +115,7 @@ LANE_INLINE int64_t read_index(const lane_source *s, const char *indices, int i)
     return s->wide_index ? ((const int64_t *)(const void *)indices)[i] : ((const int32_t *)(const void *)indices)[i];
 }
 
-/* Returns whether all indices are valid. An index is if both index and (last - index) have a positive sign. */
+/* Returns whether all indices are valid. An index is valid if neither the index nor (last - index) is negative. */
 LANE_INLINE bool are_valid_wide_indices(const int64_t *indices, int count, int64_t base, int64_t last)
 {
     int64_t signs = last;

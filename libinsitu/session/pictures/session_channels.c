@@ -67,7 +67,7 @@ static render_job make_opaque_job(const render_job *job, render_surface_layer *s
 
 /* ---- numbers ------------------------------------------------------------------------------------------------- */
 
-/* The numbers of the layer and of the surface within it, for each isovalue of the job. */
+/* For each isovalue of the job, the numbers by which the user identifies its layer and its surface within the layer. */
 typedef struct surface_numbers {
     int count;
     float layer[RENDER_MAX_ISOVALUES], surface[RENDER_MAX_ISOVALUES];
@@ -96,7 +96,8 @@ static surface_numbers number_surfaces(const scene_image *image, bool has_shells
     return out;
 }
 
-/* Converts the numbers of each pixel from (value, number of the isovalue, 0, opacity) to value, layer and surface. */
+/* Replaces the numbers of each pixel, which are (value, number of the isovalue, 0, opacity), by value, layer and
+ * surface. */
 static void convert_surface_numbers(const scene_image *image, bool has_shells, float *values, int threads)
 {
     const surface_numbers numbers = number_surfaces(image, has_shells);

@@ -1,5 +1,5 @@
-/* Deep pictures, which store several samples per pixel. Determines whether an image needs one, and manages its memory
- * on rank 0. */
+/* Determines whether an image needs a deep picture, which stores several samples per pixel, and manages its memory on
+ * rank 0. */
 #ifndef SESSION_DEEP_H
 #define SESSION_DEEP_H
 

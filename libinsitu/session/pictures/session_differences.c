@@ -36,7 +36,7 @@ typedef struct differing {
     /* The hits of the current round and their samples. */
     int64_t first, count;
     render_difference_samples *samples;
-    int64_t *requested_hits; /* hits for which samples are requested, in the order of the message */
+    int64_t *requested_hits; /* hits for which other ranks' samples are requested, in the order of the message */
 } differing;
 
 /* ---- data shared by all ranks -------------------------------------------------------------------------------- */
@@ -69,8 +69,8 @@ static insitu_status share_ranges(differing *d, base_error *error)
     return INSITU_OK;
 }
 
-/* Keeps only the ranks that are near enough to this rank's hits. Hits lie in this rank's box, so that the distance of
- * their samples from it is at most the largest sampling radius. */
+/* Removes the ranks that are too far from this rank's hits to have samples for them. Hits lie in this rank's box, so
+ * that the distance of their samples from it is at most the largest sampling radius. */
 static void keep_near_ranks(differing *d)
 {
     const render_box *own = &d->boxes[d->rank];
@@ -127,7 +127,7 @@ static bool write_requests(differing *d, session_mail *out)
     return true;
 }
 
-/* Computes the answers to received requests. Their words are suitably aligned. Returns false if memory runs out. */
+/* Computes the answers to received requests. The words of a message are aligned for a request's type. */
 static bool write_answers(const differing *d, const session_mail *in, session_mail *out, base_error *error)
 {
     const int64_t count = in->total / REQUEST_WORDS;

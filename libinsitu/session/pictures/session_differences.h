@@ -9,9 +9,9 @@
 #include "render.h"
 
 /* Computes the lighting of the hits in job->waiting from the samples of all ranks, adds them to the fragments, and
- * frees the list. The time taken is added to *ms. *error may hold an error of tracing on some ranks. Collective; all
- * ranks return the same status. An error that occurs on this rank at the very end is only stored in *error, and is
- * shared in the next phase. */
+ * frees the list. The time taken is added to *ms. If tracing has failed on this rank, *error contains the error.
+ * Collective; all ranks return the same status. An error that occurs on this rank at the very end is only stored in
+ * *error, and is shared in the next phase. */
 insitu_status session_differ_fragments(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
                                        base_error *error);
 

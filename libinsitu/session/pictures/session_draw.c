@@ -24,14 +24,16 @@
 /* Maximum number of fragments that a rank computes at once for pixels in which cells overlap. They need 64 MiB. */
 enum { overlap_fragments = 1 << 21 };
 
-/* The pictures on rank 0: the current frame, and the sum of frames if there are several. Other ranks only know the
+/* The pictures on rank 0: the current frame, and the sum of frames if there are several. Other ranks only store the
  * size. */
 typedef struct canvas {
     image frame;
     /* block that holds the pixels of `frame`; the writer becomes its owner when the picture is passed to it */
     session_picture memory;
-    float *depth;  /* depth of the frame, saved here while further frames are drawn without depth */
-    image samples; /* frames and their sums for the pixels at edges, if only these take more than one frame */
+    float *depth; /* depth of the frame, saved here while further frames are drawn without depth */
+    /* frames that contain only the pixels at edges, and the sums of these pixels, if only edges are drawn more than
+     * once */
+    image samples;
     int64_t edge_count, *edges;
     double *edge_sums;
     double *frame_sum; /* sum of the frames; NULL: there is only one frame */
@@ -252,7 +254,7 @@ typedef struct frames_basis {
     session_frame_target target;
     canvas *canvas;
     int64_t overlap_count; /* number of pixels in which cells overlap, the maximum over the frames */
-    deep_image *deep;      /* the next frame fills it; NULL: there is no deep picture, or it has been drawn */
+    deep_image *deep;      /* deep picture that the next frame fills; NULL: there is none, or it has been drawn */
 } frames_basis;
 
 static insitu_status draw_frame(frames_basis *b, const render_job *job, image *out, base_error *error)
@@ -266,7 +268,7 @@ static insitu_status draw_frame(frames_basis *b, const render_job *job, image *o
     return status;
 }
 
-/* Finds the pixels at edges in rank 0's picture and sends them to all ranks. The caller frees *pixels. */
+/* Finds the pixels at edges in rank 0's picture, and sends them to all ranks. The caller must free *pixels. */
 static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_error *error)
 {
     canvas *c = b->canvas;
@@ -353,7 +355,7 @@ static scene_moment make_moment(const session_drawing *d, const scene_image *ima
     return scene_moment_of(image, d->cycle, d->report->public_report.time);
 }
 
-/* Compares the picture's colour bars with those of the step's earlier pictures with which it shares them. */
+/* Compares the picture's colour bars with those of this step's earlier pictures in the same montage. */
 static void compare_bars(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
 {
     for (int i = 0; i < image->output_count && decorations && d->shared_bars; i++) {
@@ -423,8 +425,8 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-/* Warns on rank 0 of texts that cannot be drawn as written. The texts are laid out here, and again later by the writing
- * thread, so that the warnings belong to the step that draws them. */
+/* Warns on rank 0 of texts that cannot be drawn as written. The writing thread lays the texts out again later; they are
+ * also laid out here, so that the warnings belong to the step that draws them. */
 static void warn_of_words(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
 {
     insitu_word_faults faults;
@@ -527,7 +529,7 @@ insitu_status session_draw_images(const session_drawing *drawing, const session_
     session_drawing own = *drawing;
     const session_drawing *d = &own;
     const bool are_bars_shared = has_shared_bars(d->scene);
-    /* without memory, only the warning is lost */
+    /* if memory runs out here, only the warning is lost */
     own.shared_bars = are_bars_shared && d->team->rank == 0
                           ? base_calloc((size_t)d->scene->montage_count, sizeof *own.shared_bars)
                           : NULL;
@@ -536,7 +538,7 @@ insitu_status session_draw_images(const session_drawing *drawing, const session_
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
         has_lines = has_lines || scene_has_words(plan->images[i]);
-        /* a copy of the image with the camera's current position; all lists still belong to the scene */
+        /* a copy of the image with the camera's position in this step; its lists still belong to the scene */
         scene_image placed = *plan->images[i];
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->public_report.time);
         if (draw_image(d, &placed, &reason) == INSITU_OK) {

@@ -15,14 +15,15 @@
 #include "session_team.h"
 #include "session_writer.h"
 
-/* The colour bars of the pictures of a montage that are to share them, as far as they are drawn in a step. */
+/* Whether the pictures of a montage that are to share their colour bars have the same bars, as far as they have been
+ * drawn in this step. */
 typedef struct session_shared_bars {
     const char *path; /* path of the output, with placeholders; NULL: no picture has been drawn yet */
     uint64_t hash;    /* session_decorations.bars_hash of the first picture */
     bool differ;      /* set if another picture has other bars */
 } session_shared_bars;
 
-/* Input data for drawing images. */
+/* Input for drawing images. */
 typedef struct session_drawing {
     const session_team *team;
     const char *scene_path; /* path of the scene file, for messages */

@@ -20,8 +20,8 @@ typedef struct session_files {
     const scene *scene;         /* the scene of the image; it must exist until the files are written */
     session_cinema *cinema;
     session_montages *montages;
-    /* If not set and `news` is not NULL, only report.json is written. If both are not set, the tables of databases and
-     * the montages are written, which follow the pictures of a step. */
+    /* If not set, there is no picture: report.json is written if `news` is not NULL, and otherwise the tables of
+     * databases and the montages, which are written after all pictures of a step. */
     bool has_picture;
     char *news;        /* text of report.json, owned by this struct (session_news.h); NULL: it is not written */
     scene_image image; /* a copy whose camera is that of the step, and whose lists belong to the scene */

@@ -61,7 +61,8 @@ static insitu_status trace_fragments(const session_frame_target *t, const render
     return session_differ_fragments(t->comm, &traced, fragments, &rendered->surface_ms, error);
 }
 
-/* Computes the lighting of the fragments. All turns of a frame use the same occluders, as only their pixels differ. */
+/* Computes the lighting of the fragments. All turns of a frame use the same occluders, because they differ only in
+ * their pixels. */
 static insitu_status light_fragments(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                                      session_frame *frame, render_statistics *rendered, base_error *error)
 {
@@ -93,7 +94,7 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
                                            &composited, error)
                  : comp_composite(&t->compositing, &fragments, t->background, job->threads, out, &composited, error);
     if (status && !composited.has_failed) *error = (base_error){0};
-    /* compositing returns the same status on all ranks, but not the same message */
+    /* compositing returns the same status on all ranks, but messages may differ, so that ranks agree on one */
     if (status) status = session_agree(t->comm, error);
     base_free(fragments.items);
     add_to_frame(frame, &rendered, composited.sent_fragments, 1e3 * (MPI_Wtime() - start));
@@ -207,10 +208,10 @@ static void remove_samples(const unsigned char *pixels, const image *out)
         if (pixel_set_has(pixels, p)) out->deep->counts[p] = 0;
 }
 
-/* A second picture on rank 0, for the pixels of a turn. */
+/* A second picture on rank 0, into which the pixels of a turn are drawn. */
 typedef struct second_picture {
     image picture;
-    unsigned char *turn_pixels; /* the set of pixels of the turn, on every rank */
+    unsigned char *turn_pixels; /* on every rank: the set of pixels that the turn draws */
 } second_picture;
 
 static insitu_status second_picture_create(const session_frame_target *t, const comp_overlaps *overlaps,

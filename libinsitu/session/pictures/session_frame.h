@@ -14,11 +14,12 @@ typedef struct session_frame {
     int64_t sent_bytes;
     /* the schedule that was used; COMP_AUTOMATIC: nothing was sent to other ranks */
     comp_schedule schedule;
-    /* created by the first turn that needs them; NULL again after the frame is drawn */
+    /* occluders of shadow and occlusion rays; created by the first turn that needs them, and NULL after the frame is
+     * drawn */
     struct render_occluders *occluders;
 } session_frame;
 
-/* Parameters of drawing a frame. */
+/* Where and with which limits a frame is drawn. */
 typedef struct session_frame_target {
     MPI_Comm comm;
     comp_group compositing;

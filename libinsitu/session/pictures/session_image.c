@@ -41,7 +41,7 @@ static void *open_library(const char *path, char *why, size_t size)
     if (handle) return handle;
     const char *reason = dlerror();
     const bool is_absent =
-        /* otherwise the file exists, but a library on which it depends does not */
+        /* the loader names the file if it is missing; otherwise a library on which the file depends is missing */
         strncmp(reason, path, strlen(path)) == 0;
     if (!*why || !is_absent) snprintf(why, size, "%s", reason);
     return NULL;
@@ -54,7 +54,7 @@ static bool find_own_folder(char folder[PATH_MAX])
     struct link_map *map = NULL;
     if (!dladdr1((const void *)library, &object, (void **)&map, RTLD_DL_LINKMAP) || !map) return false;
     if (*map->l_name) return dlinfo(map, RTLD_DI_ORIGIN, folder) == 0;
-    /* the object is the main program, which has an empty name in the link map */
+    /* an empty name in the link map means that the object is the main program */
     const ssize_t length = readlink("/proc/self/exe", folder, PATH_MAX - 1);
     if (length <= 0) return false;
     folder[length] = '\0';

@@ -1,4 +1,4 @@
-/* Writes pictures without linking an image library. */
+/* Writes pictures by an image library that is loaded at run time, so that the session is not linked to it. */
 #ifndef SESSION_IMAGE_H
 #define SESSION_IMAGE_H
 

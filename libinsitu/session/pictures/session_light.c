@@ -18,10 +18,10 @@
 
 enum { ROUND_HITS = 1 << 16 };
 
-/* Sizes in words of a request, which is a hit and the set of its rays to trace, and of its answer. */
+/* Sizes in words of a request, which consists of a hit and the set of its rays to trace, and of its answer. */
 enum { ASKED_WORDS = sizeof(render_hit) / 8 + sizeof(render_hit_rays) / 8, ANSWER_WORDS = sizeof(render_hit_rays) / 8 };
 
-/* One round: a part of this rank's hits, and their rays that are not blocked yet. */
+/* The state of one round: some of this rank's hits, and their rays that are not blocked yet. */
 typedef struct lighting {
     MPI_Comm comm;
     const render_job *job;
@@ -35,8 +35,7 @@ typedef struct lighting {
     render_hit_rays *rays;
 } lighting;
 
-/* Requests in the order in which they are found, with the rank to which each is sent, and their order sorted by
- * rank. */
+/* Requests in the order in which hits need them, the rank to which each is sent, and their order sorted by rank. */
 typedef struct request_list {
     int64_t count, capacity;
     int *ranks;
@@ -45,7 +44,7 @@ typedef struct request_list {
     int64_t current_hit; /* index of the hit to which added requests belong */
     const lighting *lighting_state;
     int64_t *first_requests; /* ranks + 1 entries: the first request to each rank */
-    int64_t *message_order;  /* request at each position in the message */
+    int64_t *message_order;  /* for each position in the message, the index of the request */
     bool has_no_memory;
 } request_list;
 
@@ -161,7 +160,7 @@ static bool read_requests(const session_mail *in, render_hit **hits, render_hit_
     return true;
 }
 
-/* Replaces the requests in *in by the answers to them. */
+/* Computes the answers to the requests in *in, and stores them in place of the requests. */
 static insitu_status answer_requests(const lighting *l, session_mail *in, base_error *error)
 {
     render_hit *hits = NULL;

@@ -22,11 +22,11 @@ float *session_reserve_picture(session_picture *picture, size_t bytes);
 
 void session_drop_picture(session_picture *picture);
 
-/* Copies, on rank 0, of the last step's pictures for the caller. */
+/* Copies of the last step's pictures, on rank 0, which the caller can read. */
 typedef struct session_kept_pictures {
     bool is_on; /* set if pictures are kept; the same on every rank, because all images then need depth */
     int count;
-    /* names belong to the scene; pixels and depth of each picture are one block of memory */
+    /* pictures; their names belong to the scene, and pixels and depth of each are one block of memory */
     insitu_picture items[SCENE_MAX_PICTURES];
 } session_kept_pictures;
 

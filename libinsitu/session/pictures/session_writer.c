@@ -26,7 +26,7 @@ static const int64_t most_waiting_bytes = (int64_t)128 << 20, most_free_bytes = 
 
 static pthread_mutex_t all_mutex = PTHREAD_MUTEX_INITIALIZER;
 static session_writer *all_writers;
-static pid_t process; /* id of the process that has the threads; a forked process has none */
+static pid_t process; /* id of the process that started the thread; a forked process does not have the thread */
 
 static void wait_for_thread(session_writer *w)
 {

@@ -21,21 +21,22 @@
 
 enum { SESSION_FREE_PICTURES = 4 };
 
-/* State of the writer. The thread accesses it only with the mutex held, except for the files that it is writing. */
+/* The writer's state. The thread accesses it only while it holds the mutex, except for the files that it is writing. */
 typedef struct session_writer {
     pthread_mutex_t mutex;
-    pthread_cond_t has_changed; /* signals a change of the queue or of is_ending */
+    pthread_cond_t has_changed; /* condition that signals a change of the queue or of is_ending */
     pthread_t thread;
-    bool is_running, is_refused;        /* set if a thread was started, or if a thread could not be started */
-    bool is_ending, is_loaded;          /* set if the thread must end, or if loading the image library was tried */
-    struct session_files *first, *last; /* the queue; the thread is writing its first element */
+    bool is_running, is_refused; /* set if the thread was started, and if starting it has failed */
+    /* set if the thread must end, and if the image library was loaded or loading it has failed */
+    bool is_ending, is_loaded;
+    struct session_files *first, *last;                 /* the queue; the thread is writing its first element */
     struct session_files *finished, *last_finished;     /* list of written files, which the caller's thread collects */
     int64_t written_count;                              /* number of pictures written; used by the thread only */
     int queued_count;                                   /* number of pictures in the queue */
     int64_t queued_bytes;                               /* size of all data in the queue */
     session_picture free_memory[SESSION_FREE_PICTURES]; /* unused blocks that are kept for future pictures */
     base_error failure;          /* first error that no step has returned yet; used by the caller's thread only */
-    int failure_count;           /* number of errors */
+    int failure_count;           /* number of errors since then, including the first */
     double loading_ms;           /* time in milliseconds that loading took in insitu_create(), for the next report */
     struct session_writer *next; /* next writer of this process */
 } session_writer;
