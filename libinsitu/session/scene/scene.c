@@ -1,5 +1,5 @@
-/* Reading of a scene. The document is checked against the schema and read into the structs of the scene file, and these
- * are converted into a struct scene, in which every default is filled in and every colour is linear.
+/* Reads a scene. The document is checked against the schema and read into the structs of the scene file; these are
+ * converted into a struct scene, in which every default is filled in and every colour is linear.
  *
  * strtod() reads numbers according to the locale. A simulation may run in a locale with a decimal comma, so that the
  * thread is switched to the C locale while a scene is read, and switched back afterwards. */
@@ -121,7 +121,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     return status;
 }
 
-/* Converts those variants of an image that differ in their layers, each at its first view. */
+/* Converts the variants of an image that differ in their layers, each by its first view. */
 static insitu_status convert_layers_in_turn(const scene_document *d, const scene_file *in, int source, scene *out)
 {
     char path[32];
@@ -138,8 +138,8 @@ static insitu_status convert_layers_in_turn(const scene_document *d, const scene
     return status;
 }
 
-/* Inserts the views of orbits after the first views. The loop begins with the last image, because only behind it there
- * is free space. */
+/* Inserts the views of orbits after the first views. The loop begins with the last image, because there is free space
+ * only behind it. */
 static void add_views(scene *s, int picture_count)
 {
     int end = picture_count;
@@ -202,7 +202,7 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
     return field->mesh_count == 0;
 }
 
-/* Returns whether the name stands for the mesh, and is longer than the one that was found before, if any. */
+/* Returns whether an entry's name selects the mesh, and is longer than the name of the entry found before, if any. */
 static bool is_nearer(const char *name, const char *found, const char *mesh)
 {
     return scene_name_stands_for(name, mesh) && (!found || strlen(name) > strlen(found));
@@ -277,7 +277,7 @@ static void free_colour_map(scene_colour_map *map)
 
 static void free_image(scene_image *image)
 {
-    if (image->variant.view > 0) return; /* only the variant of view 0 owns these arrays */
+    if (image->variant.view > 0) return; /* only the variant with view 0 owns these arrays */
     for (int i = 0; i < image->isosurface_count; i++) {
         scene_isosurface *surface = &image->isosurfaces[i];
         scene_free_field(&surface->field);

@@ -35,9 +35,9 @@ typedef struct scene_field {
     uint64_t joint_name;
 } scene_field;
 
-/* Returns whether the layer is drawn on a mesh of this name, if the mesh has the field. */
+/* Returns whether the layer's list of meshes allows a mesh of this name. The mesh may still lack the field. */
 bool scene_field_is_on(const scene_field *field, const char *mesh);
-/* Returns whether the name in a scene stands for the mesh: it is the mesh's name or a part of it up to a slash. */
+/* Returns whether a name in a scene selects the mesh: it is the mesh's name, or a part of it up to a slash. */
 bool scene_name_stands_for(const char *name, const char *mesh);
 
 /* The kind of a derived field. All kinds after the expression are computed from gradients at vertices. */
@@ -62,17 +62,17 @@ typedef struct scene_derived {
     const char *key;
     /* component of a gradient or vorticity; SCENE_COMPONENT_DEFAULT: all three components */
     int component;
-    scene_expression expression; /* an expression's program, whose inputs are `inputs` below */
+    scene_expression expression; /* program of an expression; its inputs are `inputs` below */
     int input_count;
-    /* an expression's inputs; for other kinds a vector field, or its two or three components; for a gradient a
-     * scalar */
+    /* fields from which the field is computed: the inputs of an expression; for a gradient a scalar; for other kinds a
+     * vector field, or its two or three components */
     scene_field *inputs;
-    int *made_by; /* per input, the index of the derived field from which it comes, or -1 */
+    int *made_by; /* for each input, the index of the derived field that it is, or -1 */
     /* hash of the set of meshes over which gradients are averaged; set by the session (session_joints.h) */
     uint64_t joint_name;
 } scene_derived;
 
-/* The source of a range that is not fixed. Each source uses the values on all ranks at each drawn step. */
+/* How a range that is not fixed is computed. Each way uses the values on all ranks at each step that draws. */
 typedef enum scene_range_source {
     SCENE_RANGE_DATA, /* the minimum and the maximum of the values */
     /* the minimum and the maximum over all steps drawn so far, which are kept in a file across restarts
@@ -85,7 +85,7 @@ typedef enum scene_range_source {
 typedef struct scene_range {
     bool is_fixed; /* whether low and high are values of the field given by the scene */
     double low, high;
-    scene_range_source source; /* how the range is found; used unless is_fixed */
+    scene_range_source source; /* how the range is computed; used unless is_fixed is set */
 } scene_range;
 
 /* The scale by which values are spaced along a colour map: linear; logarithmic; or, for values of both signs, linear up
@@ -146,15 +146,15 @@ enum { SCENE_MAX_LINES = 64 };
 typedef struct scene_lines {
     bool is_given; /* set if the layer has contour lines */
     scene_field field;
-    bool is_of_colours; /* set if the lines are contours of the field that colours the layer */
+    /* set if the lines are contours of the field that colours the layer, and not of a field of their own */
+    bool is_of_colours;
     /* set if the scene gives the values of lines; otherwise lines divide a range into parts of equal width */
     bool has_values;
     int count;                          /* number of lines, 1 .. SCENE_MAX_LINES */
     double values[SCENE_MAX_LINES];     /* value of each line, in increasing order */
     float width;                        /* width of the lines in pixels */
     float colours[3 * SCENE_MAX_LINES]; /* colour of each line, linear RGB */
-    /* Set if only the lines of the surface are drawn. If a field colours the surface, its colours are the lines'
-     * colours. */
+    /* Set if only the lines of the surface are drawn. If a field colours the surface, the lines get its colours. */
     bool is_alone;
 } scene_lines;
 
@@ -200,8 +200,9 @@ typedef struct scene_threshold {
 } scene_threshold;
 
 typedef struct scene_surface {
-    scene_field meshes_field; /* meshes whose outer surface is drawn; it has no field, so its name is NULL */
-    /* set for layers on meshes of shells alone, which the session adds; the scene file cannot set it */
+    /* names of the meshes whose outer surface is drawn; the struct contains no field, so that its name is NULL */
+    scene_field meshes_field;
+    /* set for a layer that the session adds for meshes of shells alone; a scene file cannot set it */
     bool is_of_shells;
     float colour[3];  /* colour of the edges, linear RGB */
     float edge_width; /* width of the edges in pixels; 0: no edges are drawn */
@@ -268,8 +269,8 @@ typedef struct scene_light {
     float colour[3]; /* linear RGB, multiplied by the light's intensity */
 } scene_light;
 
-/* Camera positions on circles around the data, numbered circle by circle: view / view_count is the index of the
- * circle. */
+/* Camera positions on circles around the data. Views are numbered circle by circle: view / view_count is the index of
+ * the view's circle. */
 enum { SCENE_MAX_ELEVATIONS = 32 };
 
 /* Default distance between the samples of volumes, in cell sizes (scene_image.step_cells). */
@@ -292,8 +293,8 @@ typedef struct scene_camera_point {
 typedef struct scene_camera {
     /* set if eye and focal point are computed from the global bounds; the camera then looks along -direction */
     bool is_automatic;
-    /* Set for keys that the scene gives. If the data is flat, the others are chosen from the data
-     * (session_camera.h). */
+    /* set for each key that the scene gives; if the data is flat, the other keys are chosen from the data
+     * (session_camera.h) */
     bool has_direction, has_up, has_fit, has_projection;
     bool has_bounds; /* automatic camera: set if the bounds below replace those of the data */
     double lower[3], upper[3];
@@ -337,11 +338,11 @@ typedef struct scene_words {
 } scene_words;
 
 /* Titles, colour bars and lines that are drawn in addition to the data. */
-/* What is outlined by boxes: all data, each mesh, or the data of each rank. */
+/* What boxes are drawn around: all data, each mesh, or the data of each rank. */
 typedef enum scene_boxes { SCENE_NO_BOX, SCENE_BOX_OF_DATA, SCENE_BOXES_OF_MESHES, SCENE_BOXES_OF_RANKS } scene_boxes;
 
-/* The format of numbers at colour bars: the shortest that distinguishes neighbours, or all like 0.25, or all like
- * 2.5e-1. */
+/* The format of numbers at colour bars: the shortest that distinguishes neighbours, or fixed-point (0.25), or with an
+ * exponent (2.5e-1). */
 typedef enum scene_notation { SCENE_SHORTEST, SCENE_FIXED, SCENE_SCIENTIFIC } scene_notation;
 
 typedef struct scene_number_form {
@@ -379,14 +380,14 @@ typedef struct scene_decorations {
 typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
 
 typedef struct scene_output {
-    /* path of the file with placeholders (scene_expand()), relative to rank 0's working directory */
+    /* path of the file, with placeholders (scene_expand()), relative to rank 0's working directory */
     char *path;
     /* format by the file name's ending; `bits: 16` selects SCENE_PNG16. EXR files contain float colours and depth. */
     scene_format format;
     bool has_decorations; /* set if the image's decorations, if it has any, are drawn into this file */
     bool has_data;        /* set if an EXR file also contains the nearest surface's normal, value and numbers */
     bool is_deep;         /* set for an EXR file with all samples of each pixel, in order of depth */
-    int database;         /* index of the database of the scene in which the picture is a row; -1: none */
+    int database;         /* index of the scene's database whose table lists the picture; -1: none */
     /* number of bytes of `path` that are the database's folder and its slash; 0 without a database */
     int folder_bytes;
     /* numbers of pictures side by side in one file; 0: the picture is an inset or has a file of its own */
@@ -405,7 +406,7 @@ typedef struct scene_montage {
     int width, height; /* size of each picture in pixels */
     scene_format format;
     int panel_count;    /* number of pictures in a step, at most columns × rows */
-    bool shares_bars;   /* set if colour bars that all pictures have in common are drawn beside them */
+    bool shares_bars;   /* set if colour bars that all pictures share are drawn once, beside them */
     int bar_width;      /* width in pixels of the strip for these bars; 0 without shares_bars */
     bool are_bars_left; /* set if the strip is left of the pictures, otherwise it is right of them */
     int frame_width;    /* width in pixels of the frames of insets */
@@ -434,7 +435,7 @@ typedef struct scene_condition {
 typedef struct scene_statistics {
     scene_field field;
     char *path;         /* path of the file, relative to rank 0's working directory */
-    int cycle_interval; /* cycles that are multiples of this are written */
+    int cycle_interval; /* the statistics are written at cycles that are multiples of this */
     int bin_count;      /* number of the histogram's bins; 0: there is no histogram */
     double low, high; /* range of values that the bins divide; if low > high, the range of the step's values is used */
 } scene_statistics;
@@ -474,17 +475,18 @@ typedef struct scene_image {
     int clip_count; /* number of clips of all layers together, 0 .. SCENE_MAX_CLIPS, without duplicates */
     scene_clip *clips;
     uint32_t clips_of_all; /* set of the clips that cut all layers: one bit per clip */
-    bool has_lights;       /* whether the scene gives lights */
+    bool has_lights;       /* set if the scene gives lights */
     /* number of lights, 1 .. 8; if the scene gives none, there are a default key light and fill light */
     int light_count;
     scene_light *lights;
-    uint32_t shadows; /* lights that cast shadows: one bit per light; 0 by default */
+    uint32_t shadows; /* the lights that cast shadows, one bit per light; 0 by default */
     /* number of rays for ambient occlusion per hit, 1 .. 64; 0 (default): no ambient occlusion */
     int occlusion_samples;
     double occlusion_radius; /* length of these rays in scene units; 0: chosen by the data's bounds */
     /* method of volumes; by default one volume is integrated by segments, several are sampled */
     scene_sampling_method method;
-    /* Error bound of segments in a linear colour channel. 0: the step decides. The default for one volume is 0.01. */
+    /* Error bound of segments, in a linear colour channel. 0: no bound; the step determines the error. The default for
+     * one volume is 0.01. */
     double max_error;
     bool has_default_samples; /* set if several volumes are sampled because the scene does not specify the method */
     double step;              /* distance between samples in scene units; 0: step_cells decides */
@@ -505,7 +507,7 @@ typedef struct scene_image {
     bool is_drawn_once;        /* whether the image is drawn only in the first step in which it is due */
 } scene_image;
 
-/* Iterates over the fields that an image's layers use: for each kind of layer, first the fields that are shown, then
+/* Iterator over the fields that an image's layers use: for each kind of layer, first the fields that are shown, then
  * those that colour the layers. */
 typedef enum scene_layer_kind { SCENE_ISOSURFACE, SCENE_VOLUME, SCENE_SLICE, SCENE_SURFACE } scene_layer_kind;
 
@@ -528,7 +530,7 @@ scene_field *scene_next_field(scene_field_walk *walk);
 /* Returns the name of a kind of layer for messages. */
 const char *scene_layer_word(scene_layer_kind kind);
 
-/* Returns whether the image is the first of its variants, which stores results that all of them share. */
+/* Returns whether the image is the first of its variants; results that all variants share are stored with it. */
 static inline bool scene_is_first_variant(const scene_image *image)
 {
     return image->variant.layers == 0 && image->variant.view == 0;
@@ -545,7 +547,7 @@ static inline bool scene_has_words(const scene_image *image)
            (d->title || d->words_count || d->has_bars || d->has_rulers || d->has_axes || d->has_scale_bar);
 }
 
-/* The cells over which trees are built: all cells, the cells that images can show, or whichever costs less. */
+/* Which cells trees are built over: all cells, those that images can show, or whichever costs less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
 /* The order in which ranks exchange fragments for blending; the constants are those of comp_schedule. */
@@ -572,15 +574,18 @@ typedef struct scene_parameter {
 
 /* A mesh whose vertices are drawn at x + scale * u, where u is the value of a field at the vertex. */
 typedef struct scene_warp {
-    char *mesh;   /* name of the mesh, or beginning of the names of several, as at a layer (scene_name_stands_for()) */
-    char *field;  /* name of the field of displacements */
-    double scale; /* factor of the displacements */
+    /* name of a mesh, or the common beginning of several meshes' names, as in a layer's list of meshes
+     * (scene_name_stands_for()) */
+    char *mesh;
+    char *field;          /* name of the field of displacements */
+    double scale;         /* factor of the displacements */
     int line, field_line; /* lines of the mesh's name and of the field in the scene file */
 } scene_warp;
 
 /* A mesh that is drawn together with its mirror images. */
 typedef struct scene_mirror {
-    char *mesh;       /* name of the mesh, or beginning of the names of several, as at a layer */
+    /* name of a mesh, or the common beginning of several meshes' names, as in a layer's list of meshes */
+    char *mesh;
     int axes;         /* bit i is set if the mesh is mirrored along axis i; at least one is */
     double planes[3]; /* coordinate of the mirror plane of each of these axes */
     int line;         /* line of the mesh's name in the scene file */
@@ -600,7 +605,7 @@ typedef struct scene {
     scene_database *databases;
     int montage_count;
     scene_montage *montages;
-    int statistics_count; /* number of statistics, 0 .. 64 */
+    int statistics_count; /* number of statistics that are written to files, 0 .. 64 */
     scene_statistics *statistics;
     int parameter_count; /* number of parameters, 0 .. 64; their names differ */
     scene_parameter *parameters;
@@ -627,10 +632,11 @@ void scene_list_parameters(const scene *s, const char *name, char *words, size_t
 /* Returns the index of a field among the scene's derived fields; -1 if it is not one of them. */
 int scene_find_derived(const scene *s, const char *name);
 
-/* Returns the warp of the mesh of this name, or NULL if the mesh is drawn as it is. If several entries stand for the
- * mesh, this is the one with the longest name. */
+/* Returns the warp of the mesh of this name, or NULL if the mesh is drawn without one. If several entries select the
+ * mesh, the one with the longest name is returned. */
 const scene_warp *scene_find_warp(const scene *s, const char *mesh);
-/* Returns the mirror of the mesh of this name, by the same rule. */
+/* Returns the mirror of the mesh of this name, or NULL if there is none. If several entries select the mesh, the one
+ * with the longest name is returned. */
 const scene_mirror *scene_find_mirror(const scene *s, const char *mesh);
 
 /* The values by which placeholders are replaced. */

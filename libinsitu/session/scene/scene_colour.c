@@ -1,6 +1,6 @@
 /* Reads the keys that describe how values become colours; all layers use the same description. A map is stored as a
- * table, which is already reversed and cut into bands if the scene requests that, so that no other code depends on the
- * source of the map. */
+ * table, which is already reversed and cut into bands if the scene requests that, so that no other code distinguishes
+ * built-in maps, files and lists. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -104,7 +104,7 @@ static insitu_status use_list(const scene_document *d, const char *path, scene_c
 
 /* ---- files ----------------------------------------------------------------------------------------------------- */
 
-/* Returns the path for opening a file: a path in the scene is relative to the scene's folder. */
+/* Returns the path under which a file is opened: paths in a scene are relative to the scene's folder. */
 static char *path_from_scene(const char *scene_path, const char *name)
 {
     const char *slash = strrchr(scene_path, '/');

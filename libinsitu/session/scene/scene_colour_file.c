@@ -13,7 +13,7 @@
 enum { max_points = 4096 };
 
 typedef struct colour_file {
-    const char *name; /* file name for messages */
+    const char *name; /* name of the file, for messages */
     yaml_document_t yaml;
     base_error *error;
 } colour_file;
@@ -109,7 +109,7 @@ static insitu_status read_space(const colour_file *f, const yaml_node_t *node, c
     return fail_at_node(f, node, "ColorSpace: expected one of RGB, HSV, Lab, CIELAB, Diverging and Step");
 }
 
-/* Reads the colours of bands: red, green and blue of each in turn. */
+/* Reads the colours of bands: the red, green and blue numbers of one band after the other. */
 static insitu_status read_bands(const colour_file *f, const yaml_node_t *list, scene_colour_points *out)
 {
     const int numbers = list->type == YAML_SEQUENCE_NODE ? count_items(list) : 0;

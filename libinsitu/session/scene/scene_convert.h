@@ -21,7 +21,7 @@ bool scene_normalize(double v[3]);
 /* Returns whether two unit vectors are parallel within a millionth of a radian. */
 bool scene_is_parallel(const double a[3], const double b[3]);
 
-/* The factors of the number of pictures that an image makes in a step. */
+/* The numbers whose product is the number of pictures that an image makes in a step. */
 typedef struct scene_series {
     int fields, isovalues, planes, views; /* number of fields, isovalues, planes and views; each is at least 1 */
 } scene_series;
@@ -29,14 +29,14 @@ typedef struct scene_series {
 /* Checks the image's sweep and counts its pictures by factor. path: the path of the image in the file. */
 insitu_status scene_find_series(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_series *out);
-/* Counts the pictures of all images together; too many are an error. */
+/* Counts the pictures of all images together; more than SCENE_MAX_PICTURES are an error. */
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
-/* Reduces the image's layers, which are all those of the file, to what its variant shows. */
+/* Removes, from the image's layers as given in the file, all that its variant does not show. */
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_image *out);
 
-/* Converts the parts of a camera that make several views: its orbit or its moving path. path: the path of the camera in
- * the file. */
+/* Converts those parts of a camera that make several views: its orbit, or its path. path: the path of the camera in the
+ * file. */
 insitu_status scene_convert_orbit(const scene_document *d, const char *path, const scene_file_camera *in,
                                   scene_camera *out);
 insitu_status scene_convert_path(const scene_document *d, const char *path, const scene_file_camera *in,
@@ -83,11 +83,11 @@ insitu_status scene_convert_colour_map(const scene_document *d, const char *path
 insitu_status scene_read_colour_file(const scene_attachment *file, const char *file_name, const char *name,
                                      scene_colour_points *out, base_error *error);
 
-/* Copies the texts of a list into a new array of the same length, which the caller frees, after an error too. A NULL
- * path gives an empty array. */
+/* Copies the texts of a list into a new array of the same length, which the caller frees, after an error too. If path
+ * is NULL, the array is empty. */
 insitu_status scene_copy_texts(const scene_document *d, const char *path, char ***out, int *out_count);
 
-/* Converts the names of meshes of a layer; layer is the path of the layer. */
+/* Converts the list of mesh names of a layer; layer is the layer's path in the file. */
 insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out);
 
 /* Converts the word for a component: magnitude, x, y, z or a number; NULL means SCENE_COMPONENT_DEFAULT. path is the
@@ -115,7 +115,7 @@ scene_material scene_convert_material(const scene_file_material *in);
  * there are none. */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
-/* Makes the set of a layer: the clips of all layers, and the layer's own clips. */
+/* Makes the set of clips that cut a layer: those of all layers, and the layer's own. */
 insitu_status scene_convert_layer_clip(const scene_document *d, const char *layer, const scene_file_clip *in,
                                        scene_image *image, uint32_t *set);
 /* Converts the plane with this index in the list `planes` of the mapping at path. */

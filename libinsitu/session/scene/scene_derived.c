@@ -67,7 +67,7 @@ static insitu_status add_reference(const scene_document *d, const char *path, co
     return status;
 }
 
-/* Reads the fields at the path: one field, or the components of a vector, each of which is a scalar. */
+/* Reads the field or fields at the path: a single field, or the components of a vector, each of which is a scalar. */
 static insitu_status read_references(const scene_document *d, const char *path, scene_derived *out)
 {
     const char *texts[SPACE];
@@ -178,11 +178,12 @@ int scene_find_derived(const scene *s, const char *name)
     return -1;
 }
 
-/* A depth-first search from a field to the fields that it is derived from. */
+/* A depth-first search, from a field to the fields on which it depends. */
 typedef struct search {
     const scene_document *d;
     scene *s;
-    int path[SCENE_MAX_DERIVED], length; /* path of the search, beginning with the field that is being sorted */
+    /* fields on the path of the search, beginning with the field that is being sorted */
+    int path[SCENE_MAX_DERIVED], length;
     int order[SCENE_MAX_DERIVED], count; /* indices of the sorted fields, and their number */
     bool is_done[SCENE_MAX_DERIVED];
 } search;

@@ -41,7 +41,7 @@ static size_t count_lines_before(const char *text, size_t size, size_t offset)
 static insitu_status fail_for_syntax(const scene_document *d, const yaml_parser_t *parser, const char *text,
                                      size_t size)
 {
-    /* libyaml does not report every failed allocation as such. */
+    /* libyaml reports some failed allocations as other errors, so that memory is tested here */
     if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR) {
         return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", d->file_name);
     }
@@ -343,8 +343,8 @@ static int list_choices(const cyaml_schema_value_t *value, const scene_key *key,
     return count;
 }
 
-/* Converts the numbers in a text such as "640x480" or "0 0 5" into the text of the list that the value should be, or ""
- * if the text is not a list of numbers. */
+/* Converts a text of numbers such as "640x480" or "0 0 5" into the text of the list that was probably meant, or "" if
+ * the text does not consist of numbers. */
 static void list_of_numbers(const char *text, const cyaml_schema_value_t *value, char list[list_size])
 {
     static const char between[] = " ,;x*()";
@@ -371,8 +371,8 @@ static bool read_number(const char *text, double *number)
     return end != text && !*end && isfinite(*number);
 }
 
-/* Writes a question about an empty value: an unquoted #ff0000 is read as a comment, and keys may lack their
- * indentation. */
+/* Writes a question that suggests why a value is empty: an unquoted #ff0000 is read as a comment, and keys below it may
+ * lack their indentation. */
 static void ask_of_nothing(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                            char question[question_size])
 {
@@ -449,7 +449,7 @@ static bool is_in_range(double number, const scene_key *key)
     return key->is_high_excluded ? number < key->high : number <= key->high;
 }
 
-/* Returns the choice of the schema with this text, or NULL if there is none. */
+/* Returns the schema's choice whose word is this text, or NULL if there is none. */
 static const cyaml_strval_t *find_choice(const char *text, const cyaml_schema_value_t *value)
 {
     for (uint32_t i = 0; i < value->enumeration.count; i++) {
@@ -475,8 +475,8 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
     }
 }
 
-/* Allocates memory for `count` values at *to, or, if the schema has a pointer there, at its target. If *to is NULL, the
- * value is not stored, but read from the document later. */
+/* Allocates memory for `count` values at *to or, if the schema has a pointer there, at the memory that it points to. If
+ * *to is NULL, the value is not stored, but read from the document later. */
 static bool allocate_values(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
 {
     if (!*to || !(value->flags & CYAML_FLAG_POINTER)) return true;
@@ -510,7 +510,7 @@ static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, co
 static insitu_status check_value(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key, void *to);
 
-/* Writes the path of a list's entry, which uses the entry's name if it has one. */
+/* Writes the path of an entry of a list, by the entry's name if it has one. */
 static void write_item_path(const scene_document *d, const char *path, const yaml_node_t *list, const scene_key *key,
                             int index, char out[path_size])
 {
@@ -579,7 +579,7 @@ static bool accepts_node(const cyaml_schema_value_t *value, const yaml_node_t *n
     }
 }
 
-/* Checks the node against the first form whose type matches. */
+/* Checks the node against the first of the allowed forms whose type matches. */
 static insitu_status check_forms(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
@@ -592,7 +592,7 @@ static insitu_status check_forms(scene_document *d, const char *path, const yaml
     return fail_for_value(d, path, node, value, key);
 }
 
-/* Returns whether a name that the scene chooses is allowed; such names appear in paths of messages and in calls by
+/* Returns whether a name chosen by the scene is allowed; such names appear in paths of messages and in calls by
  * simulations. */
 static bool is_own_name(const yaml_node_t *name)
 {
@@ -633,8 +633,8 @@ static insitu_status check_named(scene_document *d, const char *path, const yaml
     return status;
 }
 
-/* Writes a question whether an unknown key was meant to be at the top of the file, or in the one mapping below this one
- * that has such a key. */
+/* Writes the question whether an unknown key belongs elsewhere: at the top of the file, or in the only mapping below
+ * this one that has such a key. */
 static void ask_for_place(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
 {
     const char *text = name->type == YAML_SCALAR_NODE ? node_text(name) : "", *holder = NULL;

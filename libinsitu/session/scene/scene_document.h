@@ -50,8 +50,8 @@ int scene_document_texts(const scene_document *d, const char *path, const char *
  * scene_document_texts(). */
 int scene_document_names(const scene_document *d, const char *path, const char **names, int most);
 
-/* The kind of the node at a path, and its value if it is a number. A node that has passed the checks has the type of
- * its key. */
+/* The kind of the node at a path, and its value if it is a number. After the checks, the node has the type that the
+ * schema requires for its key. */
 typedef enum scene_node { SCENE_NOTHING, SCENE_SCALAR, SCENE_LIST, SCENE_MAPPING } scene_node;
 scene_node scene_document_kind(const scene_document *d, const char *path);
 /* Returns the length of the list at a path; 0 if there is no list. */

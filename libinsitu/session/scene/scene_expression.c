@@ -137,7 +137,7 @@ static bool add_binary(parser *p, scene_operation operation)
     return add_instruction(p, operation, 0, 0);
 }
 
-/* Emits a power. An exponent that is a small whole number gets an instruction that needs no logarithm. */
+/* Emits the instruction for a power. A small whole exponent gets an instruction that needs no logarithm. */
 static bool add_power(parser *p)
 {
     const scene_instruction *last = &p->expression->instructions[p->expression->count - 1];
@@ -422,7 +422,7 @@ static bool is_operator(scene_operation operation)
 
 void scene_evaluate(const scene_expression *expression, const double *const *inputs, int count, double *stack)
 {
-    double *top = stack - SCENE_BLOCK; /* top entry of the stack */
+    double *top = stack - SCENE_BLOCK; /* entry at the top of the stack */
     for (int k = 0; k < expression->count; k++) {
         const scene_instruction *at = &expression->instructions[k];
         if (at->operation == SCENE_OP_PUSH_NUMBER) {

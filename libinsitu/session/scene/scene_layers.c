@@ -35,8 +35,8 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
     return INSITU_OK;
 }
 
-/* Converts the colours of an isosurface. first: number of isovalues of earlier layers, so that two layers do not begin
- * with the same default colour. */
+/* Converts the colours of an isosurface. first: number of isovalues of earlier layers, from which the default colours
+ * continue, so that layers differ. */
 static insitu_status convert_colours(const scene_document *d, const char *path, const scene_file_isosurface *in,
                                      int first, scene_isosurface *out)
 {

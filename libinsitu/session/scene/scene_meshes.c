@@ -1,4 +1,4 @@
-/* Reads how meshes are drawn: warped, mirrored, or both. */
+/* Reads the key `meshes`, which describes how meshes are drawn: warped, mirrored, or both. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 
 static const char *const axis_names[3] = {"x", "y", "z"};
 
-/* Writes the path of the entry, by its name if that is plain. */
+/* Writes the path of an entry of the mapping, which contains the entry's name if that is plain. */
 static void write_path(const char *name, int index, char path[SCENE_PATH_SIZE])
 {
     if (scene_is_plain_name(name))
@@ -29,7 +29,7 @@ static insitu_status convert_warp(const scene_document *d, const char *path, con
     return warp->mesh && warp->field ? INSITU_OK : scene_fail_for_memory(d);
 }
 
-/* Reads axes whose planes are at 0. */
+/* Reads the axes along which a mesh is mirrored, if the mirror planes are at 0. */
 static insitu_status read_axes(const scene_document *d, const char *path, scene_mirror *out)
 {
     const char *texts[3];
@@ -86,10 +86,10 @@ insitu_status scene_convert_meshes_drawn(const scene_document *d, const scene_fi
 {
     insitu_status status = INSITU_OK;
     if (in->meshes_count == 0) return INSITU_OK;
-    /* Displacements and mirrored coordinates are those of nodes, not of the finer lattices between them. */
+    /* displacements and mirrored coordinates exist at nodes, but not at the nodes of the finer lattices between them */
     if (in->finer_pieces && *in->finer_pieces > 1)
-        return scene_fail_at_key(d, "finer_pieces", "", "is %d and meshes are warped or mirrored, expected 1 with these",
-                                 *in->finer_pieces);
+        return scene_fail_at_key(d, "finer_pieces", "",
+                                 "is %d and meshes are warped or mirrored, expected 1 with these", *in->finer_pieces);
     out->warps = base_calloc((size_t)in->meshes_count, sizeof *out->warps);
     out->mirrors = base_calloc((size_t)in->meshes_count, sizeof *out->mirrors);
     if (!out->warps || !out->mirrors) return scene_fail_for_memory(d);

@@ -58,7 +58,8 @@ static placeholder parse_placeholder(const char *text)
         const char *word;
         placeholder_kind kind;
         int digits;
-        char conversion; /* format of the value: 0 for a whole number, 't' for a text, else as above */
+        /* format of the value: 0 for a whole number, 't' for a text, 'f', 'e' or 'g' for other numbers */
+        char conversion;
     } known[] = {{"{cycle", PLACEHOLDER_CYCLE, 1, 0},          {"{view", PLACEHOLDER_VIEW, 1, 0},
                  {"{plane", PLACEHOLDER_PLANE, 1, 0},          {"{time", PLACEHOLDER_TIME, -1, 'g'},
                  {"{isovalue", PLACEHOLDER_ISOVALUE, -1, 'g'}, {"{name", PLACEHOLDER_NAME, 0, 't'},
@@ -74,7 +75,7 @@ static placeholder parse_placeholder(const char *text)
     return no_placeholder;
 }
 
-/* Writes a number and returns its length. fewest: number of digits if the placeholder gives no format. */
+/* Writes a number and returns its length. fewest: minimum number of digits if the placeholder gives no format. */
 static int write_number(const placeholder *p, double value, int fewest, char *out, size_t size)
 {
     if (p->conversion == 'f') return snprintf(out, size, "%.*f", p->digits, value);
@@ -128,8 +129,8 @@ char *scene_expand(const char *pattern, const scene_moment *moment)
     return text;
 }
 
-/* Returns the key without which the placeholder has no value, if the image lacks this key; else NULL. image: the path
- * of the image in the file. */
+/* Returns the key that gives the placeholder its value, if the image lacks this key; otherwise NULL. image: the path of
+ * the image in the file. */
 static const char *find_missing_key(const scene_document *d, const char *image, placeholder_kind kind)
 {
     static const struct {
@@ -271,7 +272,7 @@ scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double tim
     return (scene_moment){image->name, (long long)cycle, time, v->view, v->plane, image->isovalue, image->swept_field};
 }
 
-/* The path of an output's file, with the output's index among all outputs. */
+/* The path of an output's file, and the output's index among all outputs of the scene. */
 typedef struct written_file {
     char *path;
     int image, output, output_index;
@@ -284,7 +285,7 @@ static int compare_files(const void *a, const void *b)
     return order ? order : first->output_index - second->output_index;
 }
 
-/* Returns a placeholder that would give two pictures of one image different names. */
+/* Returns a placeholder whose use would give two pictures of one image different names. */
 static const char *missing_placeholder(const scene_variant *a, const scene_variant *b)
 {
     if (a->view != b->view) return "view";
@@ -312,8 +313,8 @@ static const scene_output *find_output(const scene *s, const written_file *file)
     return &s->images[file->image].outputs[file->output];
 }
 
-/* Finds the first output with the same file as an earlier one, which is an error unless both are cells of one picture.
- * files: sorted by path. */
+/* Finds the first output that has the same file as an earlier one. This is an error unless both are panels of one
+ * montage. files: sorted by path. */
 static insitu_status check_files(const scene_document *d, const scene *s, const written_file *files, int count)
 {
     int found = -1;

@@ -50,12 +50,12 @@ typedef struct scene_file_light {
     double *direction; /* towards the light, x y z */
     double *colour;    /* red, green and blue, sRGB, 0 .. 1 */
     double *intensity; /* factor of the colour */
-    scene_frame *in;   /* axes of the direction: those of the camera or of the scene */
+    scene_frame *in;   /* axes in which the direction is given: those of the camera or of the scene */
     bool *shadows;     /* whether the light casts shadows */
 } scene_file_light;
 
 typedef struct scene_file_occlusion {
-    int *samples;   /* number of rays per hit */
+    int *samples;   /* number of occlusion rays per hit */
     double *radius; /* length of the rays in scene units */
 } scene_file_occlusion;
 
@@ -104,7 +104,7 @@ typedef struct scene_file_lines {
     double *values; /* value of each line */
     int values_count;
     int *count;             /* number of lines, if the scene gives no values */
-    double *width, *colour; /* width in pixels; red, green and blue */
+    double *width, *colour; /* width of the lines in pixels, and their colour: red, green and blue */
 } scene_file_lines;
 
 typedef struct scene_file_isosurface {
@@ -134,7 +134,7 @@ typedef struct scene_file_volume {
 } scene_file_volume;
 
 typedef struct scene_file_edges {
-    double *width, *colour; /* width in pixels; red, green and blue */
+    double *width, *colour; /* width of the edges in pixels, and their colour: red, green and blue */
 } scene_file_edges;
 
 typedef struct scene_file_threshold {
@@ -143,7 +143,7 @@ typedef struct scene_file_threshold {
 } scene_file_threshold;
 
 typedef struct scene_file_surface {
-    double *colour; /* red, green and blue */
+    double *colour; /* colour of the surface: red, green and blue */
     scene_file_colour_by *colour_by;
     scene_file_edges *edges;
     scene_file_threshold *threshold;
@@ -237,7 +237,7 @@ typedef struct scene_file_histogram {
 
 typedef struct scene_file_statistics {
     char *field, *component, *path;
-    int *every; /* cycles that are multiples of this are written */
+    int *every; /* the statistics are written at cycles that are multiples of this */
     scene_file_histogram *histogram;
 } scene_file_statistics;
 
@@ -256,7 +256,7 @@ typedef struct scene_file_image {
     int *antialias; /* number of positions in a pixel that frames use in turn */
     scene_file_camera *camera;
     scene_file_sweep *sweep;
-    double *background; /* red, green, blue and, if background_count is 4, opacity */
+    double *background; /* background colour: red, green, blue and, if background_count is 4, opacity */
     int background_count;
     scene_file_light *lights;
     int lights_count;
@@ -285,8 +285,8 @@ typedef struct scene_file {
     int *threads;      /* number of threads per rank */
     int *tree;         /* whether trees are built over all cells or over candidates alone (scene_tree) */
     int *schedule;     /* schedule of compositing (scene_schedule) */
-    int *writing;      /* when pictures are written: during the step or behind it (scene_writing) */
-    int *finer_pieces; /* pieces between two nodes of a cell of higher order */
+    int *writing;      /* when pictures are written: during the step, or after it by a thread (scene_writing) */
+    int *finer_pieces; /* number of pieces between two nodes of a cell of higher order */
     scene_file_image *images;
     int images_count;
     scene_file_statistics *statistics;
@@ -299,7 +299,7 @@ typedef struct scene_file {
 
 struct scene_mapping;
 
-/* Describes the meaning and the range of one field of a cyaml schema. */
+/* Describes the meaning and the range of a key, in addition to its field in libcyaml's schema. */
 typedef struct scene_key {
     const char *help;
     const char *default_text; /* default value as the reference shows it; NULL: the key is required */

@@ -43,7 +43,7 @@ static const scene_form path_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER,
 static const scene_form name_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char *, 1, 255)}, {0}}};
 typedef struct no_members {
     char unused;
-} no_members; /* a struct without members, for mappings that are one of several forms and are read from the document */
+} no_members; /* an empty struct for mappings that are one of several forms, because those are read from the document */
 
 #define MAP_KEYS(X)                                                                                                    \
     X(CYAML_FIELD_IGNORE("colours", OPTIONAL),                                                                         \
@@ -172,7 +172,7 @@ DEFINE_MAPPING(sphere, "sphere", SPHERE_KEYS);
       .default_text = "`inside`")
 EXPORT_MAPPING(clip, "clip", CLIP_KEYS);
 
-/* The clip key of a layer of this type. */
+/* Declares the key `clip` of a layer of this type. */
 #define CLIP_KEY(X, type, more)                                                                                        \
     X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, type, clip, scene_clip_fields),                                        \
       .help = "Cuts away parts of this layer, in addition to what the image's `clip` cuts from all layers." more,      \
@@ -227,7 +227,7 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .default_text = "`[0.1, 0.1, 0.1]`", .low = 0, .high = 1)
 DEFINE_MAPPING(lines, "lines", LINES_KEYS);
 
-/* The key of a layer of the type. */
+/* Declares the key that lists the layers of this type. */
 #define LINES_KEY(X, type)                                                                                             \
     X(CYAML_FIELD_MAPPING_PTR("lines", OPTIONAL, type, lines, lines_fields),                                           \
       .help = "Contour lines, at places of the surface where a field has given values.", .default_text = "none",       \

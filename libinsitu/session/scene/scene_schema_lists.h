@@ -23,17 +23,17 @@
     static const scene_key name##_keys[] = {LIST(AS_KEY)};                                                             \
     const scene_mapping scene_##name##_mapping = {the_title, scene_##name##_fields, name##_keys}
 
-/* A required or optional text of at most `longest` bytes. */
+/* Declares a required or optional text of at most `longest` bytes. */
 #define TEXT(key, flags, type, member, longest) CYAML_FIELD_STRING_PTR(key, flags, type, member, 1, longest)
-/* An optional list of exactly `count` numbers. */
+/* Declares an optional list of exactly `count` numbers. */
 #define NUMBERS(key, type, member, count) CYAML_FIELD_SEQUENCE_FIXED(key, POINTER, type, member, &number, count)
-/* An optional name or list of names. */
+/* Declares an optional name or list of names. */
 #define NAMES(key) CYAML_FIELD_IGNORE(key, OPTIONAL)
 #define CHOICE(key, type, member, words)                                                                               \
     CYAML_FIELD_ENUM_PTR(key, CHOICE_FLAGS, type, member, words, CYAML_ARRAY_LEN(words))
 #define CHOICE_FLAGS (POINTER | CYAML_FLAG_STRICT)
 
-/* Each file that includes this header uses only some of these values. */
+/* Values that several of the schema's files use. Each file uses only some of them. */
 #define SHARED static const __attribute__((unused)) cyaml_schema_value_t
 SHARED number = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
 SHARED whole_number = {CYAML_VALUE_INT(CYAML_FLAG_DEFAULT, int)};
@@ -44,10 +44,10 @@ SHARED colour = {CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number,
     "The scalar of the field that is used: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
 #define COMPONENT_DEFAULT "`0` for a field with one component, otherwise `magnitude`"
 
-/* Defined in scene_schema_layers.c. */
+/* the lists of keys that scene_schema_layers.c defines */
 extern const cyaml_schema_field_t scene_layer_fields[], scene_clip_fields[];
 extern const scene_mapping scene_layer_mapping, scene_clip_mapping;
-/* Defined in series/scene_schema_series.c. */
+/* the lists of keys that series/scene_schema_series.c defines */
 extern const cyaml_schema_field_t scene_camera_fields[], scene_sweep_fields[];
 extern const scene_mapping scene_camera_mapping, scene_sweep_mapping;
 

@@ -13,7 +13,7 @@
 /* A document while its short forms are expanded. */
 typedef struct rewrite {
     yaml_document_t *document;
-    yaml_mark_t mark; /* position in the file of the value that is replaced */
+    yaml_mark_t mark; /* position in the file of the value that is being rewritten */
     bool has_memory;
 } rewrite;
 
@@ -297,13 +297,14 @@ const char *scene_shorthand_words(const char *key, size_t length)
     return NULL;
 }
 
-/* Replaces the first word `from` in a text, whose words are joined by _, by the word `to`, which is at least as
- * long. */
+/* Replaces the first word `from` in a text by the word `to`, which is at least as long. Words of the text are separated
+ * by _. */
 static void replace_word(char *text, size_t size, const char *from, const char *to)
 {
     char *at = strstr(text, from);
     if (!at || strlen(text) + strlen(to) >= size) return;
-    const char *behind = at + strlen(from) + (at[strlen(from)] == 's'); /* a plural such as colors is replaced, too */
+    /* a plural such as colors is replaced as well */
+    const char *behind = at + strlen(from) + (at[strlen(from)] == 's');
     if ((at > text && at[-1] != '_') || (*behind && *behind != '_')) return;
     memmove(at + strlen(to), at + strlen(from), strlen(at + strlen(from)) + 1);
     /* copies without the NUL, because the text behind it is already terminated */
@@ -362,7 +363,7 @@ bool scene_expand_shorthand(yaml_document_t *document)
 {
     rewrite r = {.document = document, .has_memory = true};
     const int count = (int)(document->nodes.top - document->nodes.start);
-    /* In these mappings keys are names that the scene chooses, which have no short forms. */
+    /* the keys of these mappings are names chosen by the scene, which have no short forms */
     const int parameters = find_named_mapping(&r, "parameters"), fields = find_named_mapping(&r, "fields");
     const int meshes = find_named_mapping(&r, "meshes");
     for (int number = 1; number <= count && r.has_memory; number++)

@@ -59,7 +59,7 @@ static insitu_status check_positions(const scene_document *d, const char *path, 
     return INSITU_OK;
 }
 
-/* Adds the planes of an entry of the list, which may describe several planes. */
+/* Adds the planes of one entry of the list of planes; an entry may describe several. */
 static insitu_status add_planes(const scene_document *d, const char *path, int index, const scene_file_plane *in,
                                 scene_slice *out)
 {

@@ -26,7 +26,7 @@ typedef struct fault {
     const char *text;
     size_t size;
     size_t first_line, last_line; /* range of the lines to examine, from 0 */
-    bool is_flow;                 /* set if the position is within { } or [ ] */
+    bool is_flow;                 /* set if the position of the error is within { } or [ ] */
     size_t *line;
     char *words;
 } fault;
@@ -168,7 +168,8 @@ static bool is_bare_placeholder(const fault *f, text_line l)
         if (!begins && !is_placeholder) continue;
         const size_t length = word_length(p, end);
         if (!memchr(p, '{', length)) continue;
-        if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue; /* it may be a mapping */
+        /* a text {name} could also be a mapping */
+        if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue;
         return set_fault(f, l.number, "a text with { } needs quotes, expected \"%.*s\"",
                          (int)(f->is_flow ? length : text_length(p, length, end)), p);
     }
@@ -190,10 +191,10 @@ static bool is_unended_quote(const fault *f, text_line l)
                      l.start + column, column < l.length ? l.start[column] : '"');
 }
 
-/* Finds a " in an earlier line that only the " of this line closes. */
+/* Finds a quotation mark in an earlier line that only the quotation mark in this line closes. */
 static bool is_unended_before(const fault *f, text_line l)
 {
-    const char *quote = NULL; /* the quote that is open */
+    const char *quote = NULL; /* the quotation mark that is open */
     text_line opened = l;
     for (text_line other = find_line(f->text, f->size, 0); other.number < l.number;
          other = find_next_line(other, f->text + f->size))
@@ -252,8 +253,8 @@ static bool is_list_item(text_line l)
     return l.indent + 1 < l.length && l.start[l.indent] == '-' && l.start[l.indent + 1] == ' ';
 }
 
-/* Returns the earlier line whose item or key is indented most similarly to this line; items of a list may be indented
- * by 2 more. *expected: the indentation that the line should have. */
+/* Returns the earlier line whose item or key has the indentation nearest to this line's; items of a list may be
+ * indented by 2 more. *expected: the indentation that this line should have. */
 static text_line nearest_indent(const fault *f, text_line l, size_t *expected)
 {
     text_line nearest = l;

@@ -29,8 +29,8 @@ static insitu_status check_views(const scene_document *d, const char *path, cons
                              output->path);
 }
 
-/* The width of the strip for shared colour bars, as a multiple of the height of words: a bar with the widest label that
- * is not wrapped, and its borders (adaptors/image/layout.cpp). */
+/* The width of the strip for shared colour bars, as a multiple of the height of text: a bar whose label is as wide as
+ * possible without being wrapped, and its borders (adaptors/image/layout.cpp). */
 static const double bar_strip = 9;
 
 /* Width of the frames of insets, and their distance from the edges of the file, as shares of its height. */

@@ -1,4 +1,4 @@
-/* Interpolates a moving camera by cubic curves through its points, one curve per coordinate.
+/* Interpolates the position of a moving camera by cubic curves through its points, one curve per coordinate.
  *
  * The slope at a point is the weighted harmonic mean of the slopes to its neighbours (Fritsch and Butland's method),
  * and 0 at the ends and at extrema of the coordinate. The curve therefore has a continuous slope, and stays between the
@@ -13,7 +13,7 @@
 
 /* ---- interpolation ----------------------------------------------------------------------------------------------- */
 
-/* Number of values that are interpolated; a point's values are stored in one list. */
+/* Number of interpolated values; the values of a point are stored in one list. */
 enum { NUMBERS_OF_POINT = 10 };
 
 static void list_numbers(const scene_camera_point *p, double out[NUMBERS_OF_POINT])

@@ -123,7 +123,7 @@ static bool replace_colours(scene_field *field, scene_lines *lines, const char *
     return replace_field(field, name, line) && (!lines->is_of_colours || replace_field(&lines->field, name, line));
 }
 
-/* Replaces the field in all layers that a field colours; *count: the number of these layers. */
+/* Replaces the field in all layers that are coloured by a field; *count is the number of these layers. */
 static bool replace_fields(scene_image *image, const char *name, int line, int *count)
 {
     bool is_done = true;
