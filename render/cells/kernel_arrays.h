@@ -31,7 +31,7 @@ SIMD_INLINE bool kernel_numbers_are_narrow(const kernel_numbers *c)
 
 typedef struct kernel_arrays {
     bool has_lanes;            /* set if indices fit in 32 bits, so that cells can be processed in lanes */
-    bool is_narrow;            /* set if all numbers are float32 and can be gathered */
+    bool is_narrow;            /* set if the coordinates and the field are all float32 and can be gathered */
     bool has_narrow_positions; /* set if the coordinates are float32 and can be gathered */
     const grid *cells;         /* the mesh */
     int type;                  /* type of all cells, or GRID_NO_TYPE if the mesh has several types */
@@ -95,8 +95,8 @@ SIMD_INLINE int kernel_arrays_type(const kernel_arrays *p, uint32_t cell)
     return p->type != GRID_NO_TYPE ? p->type : grid_cell_type(p->cells, cell);
 }
 
-/* Returns the index of the cell's first entry in the connectivity; for a lattice, the cell's first vertex. vertices:
- * number of vertices of each cell, used if the mesh has no offsets. */
+/* Returns the index of the first connectivity entry of the cell; for a lattice, the index of the cell's first vertex.
+ * vertices: number of vertices of each cell, used if the mesh has no offsets. */
 SIMD_INLINE int64_t kernel_arrays_first(const grid *g, uint32_t cell, int vertices)
 {
     if (__builtin_expect(g->lattice != NULL, 0)) return grid_lattice_first(g->lattice, cell);
@@ -220,7 +220,8 @@ static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers
     memcpy(out, v, sizeof v);
 }
 
-/* Numbers as they were read: in `narrow` if the array is float32, which saves operations, else in `wide`. */
+/* Numbers in the precision in which they were read: in `narrow` if the array is float32, which saves operations, else
+ * in `wide`. */
 typedef struct kernel_raw_numbers {
     vf narrow;
     kernel_wide_doubles wide;

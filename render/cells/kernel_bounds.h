@@ -35,8 +35,8 @@ typedef struct kernel_contractions {
 
 /* Bounds for one cell and isovalue per lane. */
 typedef struct kernel_bounds {
-    /* Upper bound of the difference between a face's value and the field on the ray next to it. It is negative if the
-     * field is not known to be monotone along the rays. */
+    /* Upper bound of the difference between the value at a face and the field on the ray next to it. It is negative if
+     * the field has not been proved to be monotone along the rays. */
     float jump[SIMD_WIDTH];
     /* The linear function L that approximates the field: its value at vertex 0, its gradient in tile space, and the
      * bound of |E| = |field - L| including rounding. The bound is infinite if nothing is proved about the cell. */
@@ -83,7 +83,7 @@ static const kernel_slope_table kernel_slope_tables[3] = {
      {{0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}}},
 };
 
-/* Derivatives at corners, indexed by the number of the derivative in kernel_slope_table. */
+/* The derivatives that differ from corner to corner, indexed by their number in kernel_slope_table. */
 typedef struct kernel_lanes_slopes {
     kernel_f64 bend[3][3][4], df[3][4], de[3][4];
 } kernel_lanes_slopes;
@@ -332,9 +332,10 @@ SIMD_INLINE void kernel_f64_terms(int type, const kernel_f64 nonlinear_part[4], 
 
 /* Results of kernel_f64_bounds() that kernel_f64_rate() and the contraction need. */
 typedef struct kernel_f64_rates {
-    /* rounding error of positions across the rays; gradient of the linear function L; coefficients of E = F - L */
+    /* rounding error of positions across the rays; gradient of the linear function L; coefficients of the difference E
+     * between field and L */
     kernel_f64 across, gradient[3], e[8];
-    /* bounds that kernel_f64_bounds() explains; w is the maximum of |J0^-1 d| over the rays' directions d */
+    /* bounds that are explained at kernel_f64_bounds(); w is the maximum of |J0^-1 d| over the rays' directions d */
     kernel_f64 gap, slope, theta, slant, rise, w;
     kernel_f64_mask is_regular;
 } kernel_f64_rates;
@@ -516,14 +517,15 @@ static __attribute__((noinline)) void kernel_bounds_of(int type, const float at[
     for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_f64_bounds, at, half, beam, out);
 }
 
-/* Hexes, wedges or pyramids of one type, one per lane, in the form in which the search for roots reads them. */
+/* Hexes, wedges or pyramids of one type, one per lane, as the search for roots reads them. */
 typedef struct kernel_curved {
     int type;
     int lane; /* lane of the cell that contains all rays of a packet */
     /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex and lane */
     const float (*at)[8][SIMD_WIDTH];
     const float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
-    const kernel_bounds *bounds;        /* NULL if the bounds of a single cell have not been computed yet */
+    /* bounds of the cells; NULL if those of a single cell have not been computed yet */
+    const kernel_bounds *bounds;
     struct kernel_curved_storage *room; /* memory for the data and bounds of a single cell */
 } kernel_curved;
 

@@ -152,10 +152,10 @@ typedef struct kernel_cell {
         /* least sum of weights that is accurate enough: for a tet, of each face; for other cells least[0] bounds that
          * of all triangles */
         least[4];
-    float normal[3]; /* for a tet: gradient from kernel_tet_normal(); valid if has_normal */
+    float normal[3]; /* for a tet: gradient from kernel_tet_normal(); valid if has_normal is set */
 } kernel_cell;
 
-/* The points where rays cross a face: v is the value of f, r the reference coordinates. */
+/* Points at which rays cross a face: depth t, value v of the field, and reference coordinates r. */
 typedef struct kernel_crossing {
     vm mask;
     vf t, v;
@@ -199,8 +199,8 @@ static inline double kernel_size_of(const double (*world)[3], int count)
     return volume > 0 ? cbrt(volume) : longest;
 }
 
-/* Returns a face's vertices as a mask of their indices in the list `vertices`, to which new vertices are added. Returns
- * 0 if the list would exceed four vertices. */
+/* Adds a face's vertices to the list `vertices`, and returns them as a mask of their indices in this list. Returns 0 if
+ * the list would exceed four vertices. */
 static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4], int *count)
 {
     int64_t first, end;
@@ -307,7 +307,7 @@ SIMD_INLINE void kernel_rank_positions(double (*const world)[3], const int count
         }
 }
 
-/* Permutes everything stored by vertex (except colours, which are read later): vertex from[i] moves to position i. */
+/* Permutes everything stored by vertex except colours, which are read later: vertex from[i] moves to position i. */
 SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int count)
 {
     double world[GRID_MAX_CELL_VERTICES][3], values[GRID_MAX_CELL_VERTICES];

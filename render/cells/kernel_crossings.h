@@ -175,8 +175,8 @@ SIMD_INLINE void kernel_cell_transform(kernel_cell *c, const kernel_packet *p, c
     if (p->is_pencil) kernel_cell_lines(c, p->frame, p->tile);
 }
 
-/* The edge functions of a crossed triangle i, j, k in the order of coordinates, which are its weights, and 1 / their
- * sum. Tets use the same weights, so a face's depth and value have the same bits in both its cells. */
+/* The weights of a crossed triangle i, j, k in the order of coordinates, which are its edge functions, and 1 divided by
+ * their sum. Tets use the same weights, so that a face's depth and value have the same bits in both of its cells. */
 typedef struct kernel_weights {
     int i, j, k;
     vf ij, jk, ik, inverse;
@@ -318,7 +318,7 @@ static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kern
 }
 
 /* Computes the crossings of rays with a quad, and returns how many entries of out are set (0 to 2). A ray that meets
- * the patch twice is in both entries. */
+ * the patch twice has a crossing in both entries. */
 SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int corner[4], kernel_crossing *out)
 {
     const kernel_cell *c = s->cell;
@@ -346,8 +346,8 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int cor
     return n;
 }
 
-/* Computes all crossings of rays with a cell that has quadrilateral faces. Returns how many entries of out are set;
- * each has the rays that it belongs to. */
+/* Computes all crossings of rays with a cell that has quadrilateral faces. Returns the number of entries of `out` that
+ * are set; each entry contains the mask of rays to which it applies. */
 SIMD_INLINE int kernel_curved_crossings(const kernel_packet *p, const kernel_cell *c, vm rays,
                                         kernel_crossing out[KERNEL_MAX_CROSSINGS])
 {
@@ -397,7 +397,8 @@ SIMD_INLINE bool kernel_take_nearest(kernel_crossing *list, int count, kernel_cr
     return vm_any(out->mask);
 }
 
-/* Pairs the crossings up; returns how many intervals the rays have at most. */
+/* Sorts each ray's crossings and combines them in pairs to intervals. Returns the largest number of intervals of any
+ * ray. */
 static __attribute__((noinline, unused)) int kernel_curved_intervals(const kernel_packet *p, const kernel_cell *c,
                                                                      vm rays,
                                                                      kernel_interval out[KERNEL_MAX_CELL_INTERVALS])

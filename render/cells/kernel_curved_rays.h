@@ -16,7 +16,7 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Depth t, value v and reference coordinates r at entry and exit, for a list of rays. */
+/* Depths t, values v and reference coordinates r at which the rays of a list enter and leave their cells. */
 typedef struct kernel_curved_ends {
     float t[2][KERNEL_LIST_ROOM], v[2][KERNEL_LIST_ROOM], r[2][3][KERNEL_LIST_ROOM];
 } kernel_curved_ends;
@@ -40,7 +40,8 @@ SIMD_INLINE void kernel_curved_project(const float (*at)[8][SIMD_WIDTH], const k
     }
 }
 
-/* Returns the bits of an edge function, whose sign is exact, and lowers *least to its absolute value. */
+/* Returns the bits of an edge function, whose sign is exact. *least becomes the function's absolute value if that is
+ * smaller. */
 SIMD_INLINE vi kernel_curved_side(const kernel_projected *s, int a, int b, vf *least)
 {
     const vf e = vf_diff_of_products(s->x[a], s->y[b], s->x[b], s->y[a]);
@@ -48,7 +49,7 @@ SIMD_INLINE vi kernel_curved_side(const kernel_projected *s, int a, int b, vf *l
     return vi_from_bits(e);
 }
 
-/* Computes the sides of the shape's edges, and of each quad's diagonal from its loop's vertex 0. */
+/* Computes the edge functions of the shape's edges, and of each quad's diagonal from vertex 0 of the quad's loop. */
 SIMD_INLINE void kernel_curved_sides_of(const kernel_projected *s, int type, kernel_curved_sides *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -62,7 +63,7 @@ SIMD_INLINE void kernel_curved_sides_of(const kernel_projected *s, int type, ker
     }
 }
 
-/* Returns per ray a mask of the faces whose edge functions all have the same sign: those that the ray crosses. */
+/* Returns, per ray, a mask of the faces that the ray crosses: those whose edge functions all have the same sign. */
 SIMD_INLINE vi kernel_curved_around(const kernel_curved_sides *sides, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
@@ -76,7 +77,8 @@ SIMD_INLINE vi kernel_curved_around(const kernel_curved_sides *sides, int type)
 }
 
 /* Returns the rays that cross just one half of a quad, even if it does not look convex; the result does not depend on
- * which diagonal halves it. Adds the rays that may cross its patch twice to *alone. */
+ * which diagonal halves it. Rays that may cross the quad's patch twice are added to *alone, the rays to be traced cell
+ * by cell. */
 SIMD_INLINE vm kernel_curved_cross_one_triangle(const kernel_projected *s, const kernel_curved_sides *sides,
                                                 const kernel_shape *shape, int face, vm rays, vm *alone)
 {
@@ -86,9 +88,9 @@ SIMD_INLINE vm kernel_curved_cross_one_triangle(const kernel_projected *s, const
     return kernel_cross_one_triangle(side, vm_sign(sides->side[shape->edge_count + face]));
 }
 
-/* Finds the two faces that each ray crosses once. Any other ray is marked to be traced in its cell alone (out->alone).
- * at: the cells' vertices, per lane. dents: per ray, bits of the quads that may not look convex; NULL: there are none.
- */
+/* Finds the two faces that each ray crosses once. Rays for which there are not exactly two such faces are added to
+ * out->alone, to be traced cell by cell. at: the cells' vertices, per lane. nonconvex: per ray, one bit for each quad
+ * that may not look convex; NULL: there are no such quads. */
 SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, const vi *nonconvex,
                                     vm rays, kernel_curved_crossed *out, int type)
 {
@@ -116,7 +118,7 @@ SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const k
 
 /* ---- where ---- */
 
-/* The corners of a quad, another one for each ray: vertex numbers in the cell, and field values. */
+/* Corners of a quad that differs from ray to ray: their vertex numbers in the cell, and the field values there. */
 typedef struct kernel_curved_quad {
     vi corner[4];
     vf f[4];
@@ -164,7 +166,8 @@ typedef struct kernel_curved_triangle {
     vf e[3];
 } kernel_curved_triangle;
 
-/* Returns the rays on which the triangle's weights are not good enough. number: the triangle's, per ray. */
+/* Returns the rays on which the sum of the triangle's weights is too small to be accurate. number: number of each ray's
+ * triangle. */
 SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
                                                  const kernel_curved_triangle *own)
 {
@@ -172,7 +175,7 @@ SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved
     return vm_and(rays, vf_lt(vf_abs(weight), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
 }
 
-/* Computes edge functions in doubt, and those of weak weights, again from projected vertices. */
+/* Computes edge functions of uncertain sign, and those of inaccurate weights, again from projected vertices. */
 static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(const kernel_transformed_curved *h,
                                                                              const kernel_lane_rays *p, vm rays,
                                                                              vi number, const vm doubt[3],

@@ -30,7 +30,7 @@
 /* A ray meets a face's plane outside the face by at most 1e-7 / KERNEL_DOUBLE_EDGE of the face's extent. */
 #define KERNEL_DOUBLE_EDGE 1e-3
 
-/* What float32 loses of an interval: its exact length in t, and the rounding errors of its two values. */
+/* The exact length in t of an interval whose ends are float32, and the rounding errors of the values at its ends. */
 typedef struct kernel_precise_interval {
     vf length, rest_in, rest_out;
 } kernel_precise_interval;

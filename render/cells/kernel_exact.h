@@ -61,7 +61,8 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
 
 /* ---- rays in a tet ---- */
 
-/* Points at which rays meet a face's plane. is_sound: the face is not seen edge on. */
+/* Points at which rays meet the plane of a face. is_sound: rays for which the face is not seen edge on, so that the
+ * point is valid. */
 typedef struct kernel_double_end {
     kernel_f64 t, v;
     kernel_f64_mask is_sound;
@@ -87,7 +88,7 @@ SIMD_INLINE void kernel_double_select(kernel_f64_mask m, const kernel_double_end
     to->is_sound = (from->is_sound & m) | (to->is_sound & ~m);
 }
 
-/* Results of kernel_exact.h for a packet of rays, stored in two halves of the lanes because they are in double. */
+/* Exact intervals of a packet's rays in a tet, stored in two halves of the lanes because they are in double. */
 typedef struct kernel_double_lanes {
     float is_sound[SIMD_WIDTH], length[SIMD_WIDTH], v_in[SIMD_WIDTH], rest_in[SIMD_WIDTH], v_out[SIMD_WIDTH],
         rest_out[SIMD_WIDTH];
@@ -202,8 +203,8 @@ static inline void kernel_exact_gradient(const double c[8], const double r[3], d
     out[2] = c[3] + (r[0] * c[5] + r[1] * c[6]) + m * c[7] + slopes[2] * of_m;
 }
 
-/* Inverts the map by Newton's method in double, until a step is below 1e-8: the error after it is below rounding.
- * Returns false if that does not converge. */
+/* Inverts the map by Newton's method in double, until a step is below 1e-8, after which the error is below rounding.
+ * Returns false if the method does not converge. */
 static bool kernel_exact_newton(const kernel_exact_map *map, const double target[3], double r[3])
 {
     for (int n = 0; n < KERNEL_EXACT_STEPS; n++) {

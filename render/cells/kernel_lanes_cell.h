@@ -41,7 +41,7 @@ SIMD_INLINE void kernel_lanes_relative(const kernel_wide_doubles *values, int co
             v[i] = values[i].half[half] - isovalue;
             largest = kernel_f64_max(kernel_f64_abs(v[i]), largest);
         }
-        /* The exponent of the largest value, limited so that its negation gives a normal number. */
+        /* exponent of the largest value, limited so that its negation is the exponent of a normal number */
         kernel_f64_mask exponent = (kernel_f64_mask)largest >> 52;
         const kernel_f64_mask low = exponent < 23;
         const kernel_f64_mask high = exponent > 2023;

@@ -135,7 +135,7 @@ SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], kernel_nonli
         const vf along[2][3] = {{r[2], zero, r[0]}, {zero, r[2], r[1]}};
         memcpy(b->along, along, sizeof along);
     } else if (kernel_has_apex(type)) {
-        /* In the cell |α / k| and |β / k| are at most 1/2; the clamp limits steps beyond the apex. */
+        /* inside the cell |α / k| and |β / k| are at most 1/2; the clamp limits steps beyond the apex */
         const vf half = vf_set(0.75f), inverse = 1.0f / vf_max(r[2], vf_set(1e-6f));
         const vf a = vf_clamp(r[0] * inverse, -half, half), c = vf_clamp(r[1] * inverse, -half, half);
         b->term[0] = a * r[1];
@@ -191,7 +191,7 @@ SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertic
 
 SIMD_INLINE void kernel_hex_sort_vertices(vf (*at)[8], int lists)
 {
-    /* vertex number for the bits of its reference coordinates x, y, z */
+    /* vertex number of a hex for the bits of its reference coordinates x, y, z */
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     vm is_least[8];
     kernel_local_least(at, vertex, 8, is_least);
@@ -286,7 +286,7 @@ SIMD_INLINE vf kernel_local_bent(int type, const vf nonlinear_part[KERNEL_NONLIN
                                             {-1.0f / 3, 2.0f / 3, 0.5f}}};
     const vf *b0 = nonlinear_part[0];
     vf most = vf_set(0);
-    /* The derivatives of αβ / k along k, α and β are at most 1/4, 1/2 and 1/2. */
+    /* the derivatives of αβ / k along k, α and β are at most 1/4, 1/2 and 1/2 */
     if (kernel_has_apex(type)) return 0.5625f * ((b0[0] * b0[0] + b0[1] * b0[1]) + b0[2] * b0[2]);
     for (int n = 0; n < (kernel_is_box(type) ? 8 : kernel_is_prism(type) ? 6 : 0); n++) {
         const float *corner = corners[kernel_is_box(type) ? 0 : 1][n];

@@ -39,7 +39,7 @@ enum { KERNEL_MAP_STEPS = 10 };
         (c)[7] = ((v)[6] - (v)[5] - (v)[7] + (v)[4]) - (c)[4];                                                         \
     } while (0)
 
-/* Compute the nonzero coefficients of a wedge and of a pyramid from the numbers v at their vertices. */
+/* Compute the nonzero polynomial coefficients of a wedge and of a pyramid from the numbers v at their vertices. */
 #define KERNEL_WEDGE_FIT(c, v)                                                                                         \
     do {                                                                                                               \
         (c)[0] = (v)[0];                                                                                               \
@@ -131,8 +131,8 @@ SIMD_INLINE vf kernel_dot(const vf a[3], const vf b[3])
     return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
 }
 
-/* The cross products of the rows of the Jacobian, which are the gradients of the three positions. Divided by det, they
- * are the columns of its inverse. */
+/* The cross products of the rows of the Jacobian, whose rows are the gradients of the three positions. Divided by det,
+ * the cross products are the columns of the inverse Jacobian. */
 typedef struct kernel_jacobian {
     vf cross[3][3]; /* cross[i] = row i+1 × row i+2, with indices modulo 3 */
     vf det;
@@ -153,7 +153,7 @@ SIMD_INLINE void kernel_jacobian_of(const vf position[3][8], bool is_pyramid, co
  * the cell's size. */
 typedef struct kernel_map {
     bool is_pyramid;
-    float tolerance; /* a Newton step smaller than it is the last */
+    float tolerance; /* size of a step of Newton's method below which that step is the last */
     vf origin[3];    /* vertex 0 in tile space */
     vf position[3][8], field[8];
     kernel_f64 exact[2][4][8]; /* the coefficients of positions and field in double, by halves of the lanes */
@@ -216,8 +216,8 @@ SIMD_INLINE void kernel_maps_polynomial(const float (*values)[SIMD_WIDTH], vi la
     }
 }
 
-/* Returns a field at the reference coordinates r in each ray's own cell, computed from its values at the cells'
- * vertices. */
+/* Returns the value of a field at the reference coordinates r in each ray's own cell, computed from the field's values
+ * at the cells' vertices. */
 SIMD_INLINE vf kernel_maps_value(const float (*values)[SIMD_WIDTH], vi lane, const vf r[3], int type)
 {
     const kernel_product m = kernel_product_at(kernel_has_apex(type), r);
@@ -299,8 +299,8 @@ SIMD_INLINE void kernel_lanes_normal(const kernel_map *map, const vf r[3], vf ou
     vf g[3];
     kernel_jacobian_of(map->position, map->is_pyramid, &m, r, &j);
     kernel_gradient_of(map->field, map->is_pyramid, &m, r, g);
-    /* grad = J^-T g, where the columns of J^-1 are cross / det. The sign of det is ignored, because callers orient the
-     * normal themselves. */
+    /* the gradient is J^-T g, where the columns of J^-1 are cross / det; the sign of det is ignored, because callers
+     * orient the normal themselves */
     for (int a = 0; a < 3; a++) out[a] = kernel_dot(j.cross[a], g);
 }
 
@@ -320,8 +320,8 @@ SIMD_INLINE vf kernel_interval_fraction(const kernel_interval *i, vf t)
     return vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
 }
 
-/* Return, for depth t, the value by linear interpolation between the faces, and in the same way a guess of the
- * reference coordinates. */
+/* Return, for depth t, the value and a guess of the reference coordinates, both interpolated linearly between the
+ * faces. */
 SIMD_INLINE vf kernel_line_value(const kernel_interval *i, vf t)
 {
     return i->v_in + kernel_interval_fraction(i, t) * (i->v_out - i->v_in);

@@ -24,7 +24,7 @@ SIMD_INLINE float kernel_largest(const float *v, int count)
     return largest;
 }
 
-/* Makes the cell's vertices its outline. */
+/* Sets the outline to the cell's vertices. */
 SIMD_INLINE void kernel_vertex_outline(const kernel_cell *c, kernel_outline *o)
 {
     const float *places[3] = {c->x, c->y, c->z};
@@ -48,8 +48,9 @@ SIMD_INLINE void kernel_vertex_outline(const kernel_cell *c, kernel_outline *o)
  * corners, and so everywhere, because J is linear in each coordinate). Then no two reference points have the same
  * position, and points between a ray's crossings of the faces are in the cell. */
 
-/* The Jacobian of a cell type. At the middle its columns are weighted sums of the vertices' positions (`middle`). At
- * the corners each column is vertex 1 - vertex 0, plus vertex 3 - vertex 2 if these two differ. */
+/* How the Jacobian of a type of cell is computed from the vertices. At the cell's middle its columns are weighted sums
+ * of the vertices' positions (`middle`). At the corners each column is vertex 1 - vertex 0, plus vertex 3 - vertex 2 if
+ * these two differ. */
 typedef struct kernel_differential {
     float middle[3][GRID_MAX_CELL_VERTICES];
     int column_count, corner_count;
@@ -85,7 +86,7 @@ static const kernel_differential kernel_differentials[3] = {
      6,
      {{0, {0, 1}}, {0, {3, 4}}, {1, {0, 2}}, {1, {3, 5}}, {2, {0, 3}}, {2, {1, 4}}, {2, {2, 5}}},
      {{0, 2, 4}, {0, 2, 5}, {0, 2, 6}, {1, 3, 4}, {1, 3, 5}, {1, 3, 6}}},
-    /* For the pyramid, in the coordinates a, b, k of kernel_map.h, where k is 0 at the apex. */
+    /* The pyramid, in the coordinates a, b, k of kernel_map.h, where k is 0 at the apex. */
     {{{-0.5f, 0.5f, 0.5f, -0.5f}, {-0.5f, -0.5f, 0.5f, 0.5f}, {0.75f, 0.25f, -0.25f, 0.25f, -1}},
      6,
      4,

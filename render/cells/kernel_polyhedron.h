@@ -66,7 +66,7 @@ typedef struct kernel_poly_crossings {
     vf *edge;        /* edge functions of the edges, then of the lines from each vertex to the centre */
     kernel_triangle_crossings
         *facets; /* crossings of surface triangles by number; only those listed in `met` are set */
-    vm *left;    /* by surface triangle, the rays whose crossing has not been assigned to an interval yet */
+    vm *left;    /* for each surface triangle, the rays whose crossing has not been assigned to an interval yet */
     /* rays that cross both triangles of a quad but not its bilinear patch, or the patch twice but no triangle */
     vm uneven;
     int *met;
@@ -185,8 +185,9 @@ SIMD_INLINE void kernel_poly_recompute(const kernel_poly_crossings *r, vm hit, k
                              kernel_polyhedron_position(c, w->j), kernel_polyhedron_position(c, w->k), w);
 }
 
-/* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the unmended weights, which
- * serve as a guess for the quad's patch and are the same as in a hex that shares the face. */
+/* Computes the crossings of a surface triangle and returns the rays that have one. *w gets the weights before
+ * inaccurate ones are computed again. They serve as a guess for the quad's patch, and are the same as in a hex that
+ * shares the face. */
 static vm kernel_poly_facet(const kernel_poly_crossings *r, const polyhedron_facet *t, kernel_weights *w,
                             kernel_triangle_crossings *out)
 {
@@ -227,8 +228,9 @@ SIMD_INLINE void kernel_quad_of_facets(const kernel_poly_crossings *r, const pol
     out->e32 = kernel_facet_side(t[1], r, corner[3], corner[2]);
 }
 
-/* Stores a point of the quad's patch as the face's point of a surface triangle's crossing, for the rays in `mine`. Rays
- * that do not cross the triangle itself use the patch's point for both. */
+/* Stores a point of the quad's patch as the face's point of a surface triangle's crossing, for the rays in `mine`,
+ * whose crossing belongs to this triangle. Rays that do not cross the triangle itself use the patch's point for
+ * both. */
 SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_point *at, vm mine,
                                    bool has_colour, kernel_triangle_crossings *m)
 {
@@ -271,7 +273,8 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
     kernel_quad quad;
     kernel_quad_point places[2];
     int corner[4];
-    for (int i = 0; i < 4; i++) ranks.rank[i] = around[i]; /* vertex numbers are ranks, because vertices are sorted */
+    /* vertices are sorted, so that their numbers are ranks in the order of coordinates */
+    for (int i = 0; i < 4; i++) ranks.rank[i] = around[i];
     kernel_quad_corners(&ranks, loop, corner);
     for (int i = 0; i < 4; i++) corner[i] = around[corner[i]];
     const bool has_corner = kernel_facet_has(&c->facets[first], corner[1]);
@@ -409,8 +412,8 @@ static void kernel_poly_segments(kernel_poly_crossings *r)
         for (int k = 0; k < 3; k++)
             if (vm_any(r->sheets[t->edge[k]].mask))
                 kernel_segment_add(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
-        /* A ray in the tet crosses at least one of its sheets, and crosses its surface triangle if it is inside all
-         * three edges. */
+        /* a ray in the tet crosses at least one of its sheets; it crosses the tet's surface triangle if it is inside
+         * all three edges */
         const vm hit = kernel_inside(r->rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
         if (vm_any(hit)) kernel_segment_add(s, &r->facets[i], hit);
         if (!vm_any(s->mask)) continue;

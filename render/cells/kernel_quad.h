@@ -458,8 +458,8 @@ SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
     return vm_and(rays, vm_and(a, b));
 }
 
-/* Returns the rays that cross exactly one of a quad's two triangles. around[i]: sides of the quad's edges in cyclic
- * order from the begin of its diagonal; side: the side of the diagonal. */
+/* Returns the rays that cross exactly one of a quad's two triangles. around[i]: on which side of the quad's edges the
+ * ray lies, in cyclic order from the begin of the diagonal; side: the same for the diagonal. */
 SIMD_INLINE vm kernel_cross_one_triangle(const vm around[4], vm side)
 {
     const vm half0 = vm_andnot(vm_xor(around[1], side), vm_xor(around[0], around[1]));

@@ -25,7 +25,7 @@ typedef struct kernel_shape {
     struct {
         int count;
         signed char vertices[4];
-        /* for each side of the face, the number of its edge, and whether the edge runs the other way */
+        /* for each side of the face, the number of its edge, and whether the edge has the opposite direction */
         signed char sides[4][2];
     } faces[6];
     float corners[GRID_MAX_CELL_VERTICES][3]; /* reference coordinates of the vertices */
@@ -79,7 +79,8 @@ typedef struct kernel_curved_sides {
     vf least;
 } kernel_curved_sides;
 
-/* Returns the sides of a face's edges in cyclic order. For a triangle the fourth entry is meaningless. */
+/* Returns the sides of a face's edges in cyclic order: on which side of each edge the rays lie. For a triangle the
+ * fourth entry is meaningless. */
 SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_curved_sides *s, vi around[4])
 {
     for (int i = 0; i < 4; i++) {
@@ -127,8 +128,8 @@ SIMD_INLINE vm kernel_curved_on_quad(int type, int n, vi face)
                            n ? vm_none() : vf_lt(number, vf_set(0.5f)));
 }
 
-/* Calls a function whose last argument is the cell type with a constant for it: when inlined, its loops have constant
- * lengths. */
+/* Calls a function whose last argument is the cell type, and passes the type as a constant. If the function is inlined,
+ * its loops then have constant lengths. */
 #define KERNEL_OF_TYPE(type, function, ...)                                                                            \
     KERNEL_BY_SHAPE(type, function(__VA_ARGS__, GRID_HEX), function(__VA_ARGS__, GRID_WEDGE),                          \
                     function(__VA_ARGS__, GRID_PYRAMID))

@@ -14,7 +14,8 @@
 #include "kernel_tile_trace.h"
 #include "simd.h"
 
-/* A packet of rays with one tet, or rays with a vector of tets, of which each ray has the lane of its own. */
+/* Rays with tets: a packet of rays that share one tet, or rays that have a tet each, in the lane of a vector of
+ * tets. */
 typedef struct kernel_tets {
     bool is_one;
     const kernel_packet *packet;
@@ -23,7 +24,8 @@ typedef struct kernel_tets {
     const kernel_transformed_tets *transformed;
 } kernel_tets;
 
-/* Returns a number of each ray's tet: a member of kernel_cell, or one of kernel_transformed_tets. */
+/* Returns a number that belongs to each ray's tet: a member of kernel_cell if there is one tet, and otherwise one of
+ * kernel_transformed_tets. */
 #define KERNEL_TET_NUMBER(t, of_one, of_placed)                                                                        \
     ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->transformed->of_placed, (t)->lane_rays->lane))
 
@@ -57,7 +59,7 @@ SIMD_INLINE void kernel_tets_edges_projected(const kernel_tets *t, vf e[KERNEL_T
     }
 }
 
-/* Computes the edge functions whose sign is in doubt again, from projected vertices, so that their sign is exact. */
+/* Computes the edge functions whose sign is uncertain again, from projected vertices, so that their sign is exact. */
 static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
 {
     vf exact[KERNEL_TET_EDGES];
@@ -68,7 +70,8 @@ static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t
     }
 }
 
-/* Computes the edge functions on the rays. is_pencil: the edges have lines for these rays. */
+/* Computes the edge functions on the rays. is_pencil: the tile's own primary rays, for which edges have affine
+ * functions (kernel_cell.h). */
 SIMD_INLINE void kernel_tets_edges(const kernel_tets *t, vm rays, bool is_pencil, vf e[KERNEL_TET_EDGES])
 {
     const vf u = t->is_one ? t->packet->u : t->lane_rays->u, v = t->is_one ? t->packet->v : t->lane_rays->v;
@@ -100,7 +103,7 @@ SIMD_INLINE void kernel_tets_faces(vm rays, const vf e[KERNEL_TET_EDGES], vm hit
     }
 }
 
-/* Sums of a crossed triangle's vertex numbers, weighed by its edge functions (kernel_cell.h). */
+/* Sums of numbers at the vertices of a crossed triangle, weighted by the edge functions (kernel_cell.h). */
 typedef struct kernel_sums {
     vf depth, value, colour, weight;
 } kernel_sums;
@@ -110,7 +113,7 @@ typedef struct kernel_sums {
               vf_muladd(-(ik), KERNEL_TET_NUMBER(t, of_one[(int)(face)[1]], of_placed[(int)(face)[1]]),                \
                         (jk)*KERNEL_TET_NUMBER(t, of_one[(int)(face)[0]], of_placed[(int)(face)[0]])))
 
-/* has_colour: only with one tet. */
+/* Returns the weighted sums for a face. has_colour: the colour field is included, which only a single tet has. */
 SIMD_INLINE kernel_sums kernel_tets_sums(const kernel_tets *t, const signed char *face, vf ij, vf jk, vf ik,
                                          bool has_colour)
 {
@@ -126,7 +129,7 @@ SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const ker
                          vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
 }
 
-/* The two crossings of each ray with a tet, in either order. */
+/* The two crossings of each ray with a tet; either may be the nearer one. */
 typedef struct kernel_ends {
     kernel_sums a, b;
 } kernel_ends;
@@ -156,13 +159,14 @@ SIMD_INLINE void kernel_ends_order(const kernel_ends *ends, bool has_colour, ker
     out->w_out = vf_select(swap, w_a, w_b);
 }
 
-/* Returns the rays that cross face n and whose weights are not good enough. */
+/* Returns the rays that cross face n but whose sum of weights is too small to be accurate. */
 SIMD_INLINE vm kernel_tets_inaccurate(const kernel_tets *t, int n, vm hit, vf weight)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), KERNEL_TET_NUMBER(t, least[n], least[n])));
 }
 
-/* Chooses as kernel_tets_choose() does, with edges projected again for rays whose weights are not good enough. */
+/* Selects the crossings as kernel_tets_choose() does, with edge functions of projected vertices for rays whose weights
+ * are not accurate enough. */
 SIMD_INLINE kernel_ends kernel_tets_choose_in_double(const kernel_tets *t, vm rays, const vf e[KERNEL_TET_EDGES],
                                                      bool has_colour)
 {
@@ -186,7 +190,8 @@ SIMD_INLINE kernel_ends kernel_tets_choose_in_double(const kernel_tets *t, vm ra
     return kernel_tets_choose(hit, sums);
 }
 
-/* As above. is_one is made a constant, because one packet in some has such weights. */
+/* Calls kernel_tets_choose_in_double() with is_one as a constant. It is not inlined, because few packets have
+ * inaccurate weights. */
 static __attribute__((noinline, cold)) kernel_ends kernel_tets_recompute(const kernel_tets *t, vm rays,
                                                                          const vf e[KERNEL_TET_EDGES], bool has_colour)
 {

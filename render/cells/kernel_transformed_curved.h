@@ -1,8 +1,8 @@
-/* Hexes, wedges or pyramids, one a lane, placed for a tile, with lines for the triangles among their faces: the
- * operations of kernel_cell_relative(), kernel_transform_in_tile(), kernel_cell_order() and kernel_curved_lines(), and
- * so the same bits, for as many cells of one type at once as a vector has lanes. Vertices are turned into the order of
- * coordinates first, so that all else comes in order. What is computed in double is computed in two halves. A
- * function's type is a constant where it is called from, so that its loops have known lengths. */
+/* Reads, sorts and transforms hexes, wedges or pyramids of one type, one per lane, and computes the edge functions of
+ * their triangular faces. The operations are those of kernel_cell_relative(), kernel_transform_in_tile(),
+ * kernel_cell_order() and kernel_curved_lines(), and so the results have the same bits. Vertices are sorted by
+ * coordinates first, so that everything computed from them is in order. Computations in double are done in two halves
+ * of the lanes. Callers pass the type as a constant, so that loops have constant lengths. */
 #ifndef RENDER_KERNEL_TRANSFORMED_CURVED_H
 #define RENDER_KERNEL_TRANSFORMED_CURVED_H
 
@@ -30,10 +30,10 @@ typedef struct kernel_triangle_lines {
     float c[3][SIMD_WIDTH], cu[3][SIMD_WIDTH], cv[3][SIMD_WIDTH], bound[3][SIMD_WIDTH];
 } kernel_triangle_lines;
 
-/* Cells of one type in lanes. */
+/* Transformed cells of one type, one per lane. */
 typedef struct kernel_transformed_curved {
     float at[4][8][SIMD_WIDTH]; /* x, y, z in tile space, and the field minus the isovalue, scaled; by vertex */
-    /* Per face, a word that lists its corners, four bits each, in the order of kernel_quad_corners() or
+    /* For each face, a word that lists its corners, four bits each, in the order of kernel_quad_corners() or
      * kernel_triangle_order(). */
     int32_t corners[KERNEL_CURVED_FACES * SIMD_WIDTH];
     /* edge functions of the triangular faces, in the shape's order */
@@ -45,7 +45,7 @@ typedef struct kernel_transformed_curved {
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_transformed_curved;
 
-/* Returns the number of a type's first triangular face; its other triangles follow in the shape. */
+/* Returns the number of the type's first triangular face in its shape; further triangles follow it. */
 SIMD_INLINE int kernel_first_triangle(int type)
 {
     return kernel_has_apex(type) ? 1 : 0;
@@ -53,8 +53,9 @@ SIMD_INLINE int kernel_first_triangle(int type)
 
 /* ---- numbers of each ray's own cell ---- */
 
-/* Returns of[corner][lane] for each ray: a number of vertex (or face) `corner` of the cell in `lane`, which has `count`
- * of them. With 16 lanes, permutations of all rows are faster than a gather; with 8 they are slower. */
+/* Returns of[corner][lane] for each ray: the number that `of` contains for vertex (or face) `corner` of the cell in
+ * `lane`. Cells have `count` vertices (or faces). With 16 lanes, permutations of all rows are faster than a gather;
+ * with 8 they are slower. */
 SIMD_INLINE vf kernel_curved_gather_vertex(const float (*of)[SIMD_WIDTH], int count, vi lane, vi corner)
 {
     if (SIMD_WIDTH < 16) return vf_gather(of[0], corner * SIMD_WIDTH + lane);
@@ -213,16 +214,18 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
 
 /* ---- edge functions ---- */
 
-/* Returns the loop's corners from the least on, towards the lesser neighbour, four bits a corner. */
+/* Returns a word with the corners of a quad's loop, four bits each: from the least corner on, towards the lesser of its
+ * neighbours. */
 SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8])
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
-    /* Lanes in which 2 is smaller than 0, 3 is smaller than 1, and the smallest of all is 1 or 3. */
+    /* lanes in which corner 2 is smaller than 0, corner 3 is smaller than 1, and the smallest of all is 1 or 3 */
     const vm second = vf_lt(r[2], r[0]), fourth = vf_lt(r[3], r[1]),
              odd = vf_lt(vf_min(r[1], r[3]), vf_min(r[0], r[2]));
-    const vm far = vm_or(vm_and(odd, fourth), vm_andnot(second, odd)); /* the smallest vertex is number 2 or 3 */
-    /* Lanes in which the next vertex of the loop is smaller than the previous one. The neighbours of 0 and 2 are 1 and
-     * 3; those of 1 and 3 are 2 and 0. */
+    /* lanes in which the smallest vertex is number 2 or 3 */
+    const vm far = vm_or(vm_and(odd, fourth), vm_andnot(second, odd));
+    /* lanes in which the next vertex of the loop is smaller than the previous one; the neighbours of 0 and 2 are 1 and
+     * 3, those of 1 and 3 are 2 and 0 */
     const vm ahead = vm_xor(far, vm_or(vm_and(odd, second), vm_andnot(vm_not(fourth), odd)));
     const vi one = vi_set(1), none = vi_set(0);
     const vi first = vi_select(odd, one, none) + (vi_select(far, one, none) << 1);
@@ -257,7 +260,7 @@ SIMD_INLINE vi kernel_triangle_word(const signed char *loop, const vf rank[8], k
 }
 
 /* Permutes three numbers that belong to a triangle's sides, given by the opposite corner, into the order ij, jk, ik.
- * These sides are opposite to k, i and j. */
+ * The sides ij, jk and ik are opposite to the corners k, i and j. */
 SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposite[3], vf out[3])
 {
     out[0] = vf_select(o->last[0], opposite[0], vf_select(o->last[1], opposite[1], opposite[2]));
@@ -266,8 +269,8 @@ SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposi
     for (int i = 0; i < 2; i++) out[2] = vf_select(vm_not(vm_or(o->first[i], o->last[i])), opposite[i], out[2]);
 }
 
-/* The edges' lines with their bounds, each from the shape's first vertex to its second, and the errors and extents of
- * kernel_edge_error. */
+/* For each edge of the shape, from its first vertex to its second: the edge function with its bound, and the error and
+ * extent that kernel_edge_error defines. */
 typedef struct kernel_lanes_lines {
     vf line[KERNEL_CURVED_EDGES][4], error[KERNEL_CURVED_EDGES], extent[KERNEL_CURVED_EDGES];
 } kernel_lanes_lines;
@@ -289,7 +292,8 @@ SIMD_INLINE void kernel_lanes_lines_of(const kernel_transformed_curved *transfor
     }
 }
 
-/* Stores a triangle's corners in the order, its edges' lines, and the least sum of weights that is good enough. */
+/* Stores a triangle's corners in the order of coordinates, the edge functions of its edges, and the least sum of
+ * weights that is accurate enough. */
 SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int type, int face, const vf rank[8],
                                              const kernel_lanes_lines *lines)
 {
@@ -320,7 +324,7 @@ SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int
     vf_store(out->least[face - kernel_first_triangle(type)], error * extent * (0.5f / KERNEL_WEIGHT_ERROR));
 }
 
-/* Computes the faces' corners, and the triangles' lines. */
+/* Computes the corners of all faces, and the edge functions of the triangular ones. */
 SIMD_INLINE void kernel_transformed_faces(kernel_transformed_curved *out, const kernel_frame *f,
                                           const kernel_tile *tile, int type, const vf rank[8])
 {
@@ -377,7 +381,7 @@ static __attribute__((noinline)) vm kernel_transform_curved(kernel_transformed_c
 
 /* ---- extracting one cell ---- */
 
-/* Copies the cell in lane n, without lines. */
+/* Copies the cell in lane n to a kernel_cell, without edge functions. */
 static __attribute__((noinline)) void kernel_transformed_curved_cell(const kernel_transformed_curved *h, int type,
                                                                      int n, kernel_cell *c)
 {
@@ -395,8 +399,8 @@ static __attribute__((noinline)) void kernel_transformed_curved_cell(const kerne
     }
 }
 
-/* The rays that cross exactly two faces (`two`), with the numbers of these faces; and the rays that must be traced one
- * by one (`alone`). */
+/* Rays that cross exactly two faces (`two`), with the numbers of these faces, and rays that must be traced cell by cell
+ * (`alone`). */
 typedef struct kernel_curved_crossed {
     vm two, alone;
     vi first, last;
@@ -408,8 +412,8 @@ SIMD_INLINE vi kernel_least_bit(vi bits)
     return ((vi_from_bits(vf_from_vi(bits & -bits)) >> 23) - 127) & 7;
 }
 
-/* Finds the rays that cross exactly two faces. faces: a bit for each face that the ray crosses once. alone: rays that
- * must be traced one by one, whatever they cross; rays with more than two faces are added to them. */
+/* Finds the rays that cross exactly two faces. faces: per ray, one bit for each face that the ray crosses once. alone:
+ * rays that must be traced cell by cell whatever they cross; rays that cross more than two faces are added to them. */
 SIMD_INLINE void kernel_curved_count(vi faces, vm rays, vm alone, kernel_curved_crossed *out)
 {
     const vi others = faces & (faces - 1), more = others & (others - 1);

@@ -1,6 +1,7 @@
-/* Tets, one a lane, placed for a tile and given their lines: the operations of kernel_cell_move(), kernel_cell_order()
- * and kernel_tet_lines(), and so the same bits, for as many tets at once as a vector has lanes. Vertices are put in
- * order first, so that all else comes in order. What is computed in double is computed in two halves. */
+/* Reads, sorts and transforms tets, one per lane, and computes their edge functions. The operations are those of
+ * kernel_cell_move(), kernel_cell_order() and kernel_tet_lines(), and so the results have the same bits. Vertices are
+ * sorted by coordinates first, so that everything computed from them is in order. Computations in double are done in
+ * two halves of the lanes. */
 #ifndef RENDER_KERNEL_TRANSFORMED_TETS_H
 #define RENDER_KERNEL_TRANSFORMED_TETS_H
 
@@ -115,7 +116,7 @@ static __attribute__((noinline)) void kernel_transform_tets(kernel_transformed_t
     kernel_transformed_lines(out, f, tile);
 }
 
-/* Copies the tet in lane n, with all that rays need of a tet in float32. */
+/* Copies the tet in lane n to a kernel_cell, with all float32 data that rays need. */
 SIMD_INLINE void kernel_transformed_tets_cell(const kernel_transformed_tets *transformed, int n, kernel_cell *c)
 {
     c->type = GRID_TET;
@@ -134,7 +135,7 @@ SIMD_INLINE void kernel_transformed_tets_cell(const kernel_transformed_tets *tra
     c->doubt = transformed->doubt[n];
 }
 
-/* Sets the cell's places and values in double. */
+/* Copies the positions and values of the tet in lane n, in double, to a kernel_cell. */
 SIMD_INLINE void kernel_transformed_tets_double(const kernel_transformed_tets *transformed, int n, kernel_cell *c)
 {
     for (int i = 0; i < 4; i++) {

@@ -178,7 +178,8 @@ static int facet_compare(const closed_triangle *a, const closed_triangle *b)
 DEFINE_SORT(sort_vertices, work_vertex, vertex_compare)
 DEFINE_SORT(sort_facets, closed_triangle, facet_compare)
 
-/* Lays out the temporary arrays in the buffer (NULL: only computes the size). Returns their size in bytes. */
+/* Assigns each temporary array its part of the buffer, and returns the size of all arrays in bytes. If the buffer is
+ * NULL, only the size is computed. */
 static size_t lay_out(work *w, char *buffer)
 {
     base_arena at = {buffer, closed_faces_lay_out(&w->faces, buffer)};

@@ -11,13 +11,15 @@
 typedef struct polyhedron_facet {
     int vertex[3];
     int edge[3];
-    int quad;       /* number of the quad of which it is one half, or -1 */
+    int quad;       /* number of the quad that the triangle is a half of, or -1 */
     int other_half; /* number of the quad's other triangle, or -1 */
-    float sign; /* sign of the volume of the tet with the centre: 1; -1 if the tet is inverted; 0 if it has no volume */
+    /* sign of the volume of the tet between the triangle and the centre: 1; -1 if the tet is inverted; 0 if it has no
+     * volume */
+    float sign;
 } polyhedron_facet;
 
-/* A decomposed polyhedron. Vertices are numbered in the lexicographic order of coordinates, so that a < b tells which
- * of two comes first; the centre is number vertex_count, after all others. The order of everything depends on
+/* A decomposed polyhedron. Vertices are numbered in the lexicographic order of coordinates, so that a < b means that
+ * vertex a comes first; the centre is number vertex_count, after all others. The order of everything depends on
  * coordinates and values alone. */
 typedef struct polyhedron {
     struct polyhedron *next; /* next polyhedron in the same slot of the store's hash table */
@@ -27,7 +29,7 @@ typedef struct polyhedron {
     bool is_star; /* true if no tet's sign is negative: the cell is star-shaped from its centre */
     bool has_slopes;
     int vertex_count, edge_count, facet_count;
-    double (*world)[3]; /* arrays from `world` to `lines` have an entry per vertex, and one for the centre */
+    double (*world)[3]; /* the arrays from `world` to `lines` have one entry for each vertex, and one for the centre */
     double *values;
     float *x, *y, *z; /* vertices in tile space */
     /* vertex values of the layer's field, relative to an isovalue or in a transfer function's domain; values of the
