@@ -64,8 +64,8 @@ static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_til
     kernel_blocks_trace(t, blocks, part, c->index, c, value);
 }
 
-/* Makes the surface layer of a candidate's source current. Stores the source's mesh part, and returns the number of its
- * isovalue in that layer. */
+/* Makes the surface layer of the candidate the current layer. source: kernel_candidate.source. Stores the candidate's
+ * mesh part in *part, and returns the number of its isovalue in the layer. */
 SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *part)
 {
     const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
@@ -79,11 +79,11 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
     return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
 }
 
-/* Queue of a tile's cells before tracing: vectors of cells of one type, and cells that are traced one by one. */
+/* A tile's cells that are queued for tracing: vectors of cells of one type, and cells that are traced one by one. */
 enum { KERNEL_ALONE = SIMD_WIDTH };
 
 typedef struct kernel_tile_queue {
-    int layer, part;      /* the last queued cell's; -1: none yet */
+    int layer, part;      /* layer and mesh part of the last queued cell; -1: there is none yet */
     kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
     kernel_surface_cells pending[KERNEL_LANE_TYPES];
     kernel_batch batch;
@@ -104,7 +104,7 @@ static void kernel_tile_queue_begin(kernel_tile_queue *m)
     m->alone_count = 0;
 }
 
-/* Makes the current layer and the part those of the cells queued next. */
+/* Sets the mesh part of the cells that are queued next; their layer is the current one. */
 SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_tile_queue *m, int part)
 {
     if (m->layer == t->layer && m->part == part) return;
@@ -149,8 +149,8 @@ SIMD_INLINE void kernel_tile_queue_put(kernel_tile_trace *t, kernel_tile_queue *
     kernel_surface_cells_add(t, own, candidate, value);
 }
 
-/* Traces the cells that are queued in no vector. Traces the vectors first, because their cells were found earlier and
- * may hide these. */
+/* Traces the cells that are in no vector, one by one. The vectors are traced first, because their cells were found
+ * earlier and their hits may hide these cells. */
 static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     if (!m->alone_count) return;
@@ -186,9 +186,9 @@ static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_run(t, m, &m->pending[i]);
 }
 
-/* Per-thread state kept from tile to tile: the tree search, and the queue of cells to trace. */
+/* State of a thread that is kept from tile to tile: the tree search, and the queue of cells to be traced. */
 typedef struct kernel_tile_search {
-    kernel_tile_finder nodes; /* must be the first member, as the tile points to it */
+    kernel_tile_finder nodes; /* must be the first member, because the tile's pointer to it is cast to this struct */
     kernel_candidate_list list;
     kernel_tile_trace *tile;
     kernel_tile_queue queue;
@@ -203,14 +203,14 @@ SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_t
     kernel_prefetch_indices(f->job->parts[part].cells, candidate->cell);
 }
 
-/* Cells whose vertex indices are being prefetched. */
+/* Candidates whose cells' vertex indices are being prefetched. */
 typedef struct kernel_prefetch_queue {
     int count;
     const kernel_tile_candidate *items[SIMD_WIDTH];
 } kernel_prefetch_queue;
 
-/* Sorts pending cells by their part, and leaves them in order of depth within each: a batch holds cells of one part,
- * and those of blocks alternate in depth. */
+/* Sorts pending cells by their part, and leaves them in order of depth within each: a batch contains cells of one part
+ * only, and cells of different blocks of a mesh alternate in depth. */
 static void kernel_pending_sort(kernel_prefetch_queue *w)
 {
     for (int n = 1; n < w->count; n++) {
@@ -233,7 +233,7 @@ static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_t
         if (m->layer < 0) kernel_tile_queue_set_part(t, m, part);
         if (m->layer == t->layer && m->part == part &&
             kernel_is_for_vectors(m, w->items[n], kernel_arrays_type(&m->arrays, w->items[n]->cell)))
-            continue; /* vectors prefetch their own cells */
+            continue; /* cells in vectors are prefetched by their queue */
         kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
                                  w->items[n]->cell);
     }
@@ -299,7 +299,7 @@ static bool kernel_tile_find_flush(kernel_candidate_list *list)
     return true;
 }
 
-/* Makes another mesh part current for the search; the cells pending from the previous part are processed first. */
+/* Prepares the search for another mesh part. Pending cells of the previous part are processed first. */
 static void kernel_tile_find_set_part(kernel_tile_trace *t, kernel_tile_search *s, int part)
 {
     kernel_finder *finder = t->thread->finder;
@@ -465,8 +465,8 @@ static void find_candidates(const kernel_frame *f, kernel_thread *thread, const 
     kernel_find_candidates(finder, subtree->node);
 }
 
-/* Sets up a thread's memory. It has megabytes, most of which no tile of the frame may use: only members that are read
- * before they are written are set. */
+/* Sets up a thread's memory. The struct has a size of megabytes, most of which may stay unused in a frame, so that only
+ * members that are read before they are written are initialized. */
 static void begin(kernel_thread *thread)
 {
     kernel_memory *m = thread->memory;

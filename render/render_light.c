@@ -42,7 +42,7 @@ bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, re
 {
     double n[3];
     if (f->kind < FRAGMENT_SURFACE || !render_takes_light(&layer_of(job, f)->material)) return false;
-    /* The hit has a normal that is not finite, because its gradient is NaN or infinite. */
+    /* a gradient that is NaN or infinite gives a normal that is not finite */
     if (!isfinite(f->t_out) || !isfinite(f->transmittance)) return false;
     *hit = (render_hit){f->pixel, f->t_in, {f->t_out, f->transmittance}};
     *rays = (render_hit_rays){all_samples(job->occlusion->samples), 0, 0};
@@ -62,7 +62,7 @@ void render_hit_samples(const render_job *job, const render_hit *hit, double sta
 
 /* ---- tracing ------------------------------------------------------------------------------------------------- */
 
-/* Number of hits that a thread processes at once; it keeps the cells that it has fetched for one of them for the
+/* Number of hits that a thread processes at once; cells that it has read for one of these hits are cached for the
  * others. */
 enum { CHUNK_HITS = 64, CHUNK_RAYS = CHUNK_HITS * (RENDER_MAX_SAMPLES + RENDER_MAX_LIGHTS) };
 
@@ -84,8 +84,8 @@ typedef struct ray_name {
     int16_t hit, number;
 } ray_name;
 
-/* The state of a thread that traces rays from hits. Its frame is a copy with a job of its own, because the camera
- * changes from one tile space to the next. */
+/* The state of a thread that traces rays from hits. Each thread has a copy of the frame with a job of its own, because
+ * every tile space has another camera. */
 typedef struct tracer {
     const render_occluders *of;
     const kernel_table *kernels;
@@ -225,11 +225,12 @@ static void test_cell(tracer *t, int32_t occluder)
     t->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
-/* Marks a doubt (a ray that must be tested exactly in a cell) whose cell has already been tested with all its rays. */
+/* Marks an undecided pair (a ray that must be tested exactly in a cell) whose cell has been tested with all of its
+ * rays. */
 enum { TESTED = -1 };
 
-/* Tests a hit's rays into the hemisphere exactly in the cells of its `count` doubts, and closes the rays that are
- * blocked. */
+/* Tests a hit's rays into the hemisphere exactly, in the cells of its `count` undecided pairs, and closes the rays that
+ * are blocked. */
 static void trace_hemisphere(tracer *t, const render_hit *hit, kernel_undecided_pair *undecided, int64_t count)
 {
     uint64_t open = 0;
@@ -435,7 +436,7 @@ static bool meets_box(const double from[3], const double direction[3], double re
         const double low = box->lower[a] - margin - from[a], high = box->upper[a] + margin - from[a];
         if (!(low <= high)) return false;
         if (fabs(direction[a]) < 1e-9) {
-            /* The slope is so small that only a ray far longer than the scene could leave the slab. */
+            /* the slope is so small that a ray could leave the slab only if it were far longer than the scene */
             if (low > 0 || high < 0) return false;
             continue;
         }
@@ -479,7 +480,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 
 /* ---- colours ------------------------------------------------------------------------------------------------- */
 
-/* Computes the sums of diffuse and specular light of kernel_shade() over the lights in `lights` only, in double. */
+/* Computes the diffuse and specular light that kernel_shade() computes, in double, and only from the given lights. */
 static void shade(const render_job *job, const render_material *m, const hit_frame *p, uint32_t lights,
                   double diffuse[3], double specular[3])
 {

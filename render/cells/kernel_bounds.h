@@ -22,9 +22,9 @@
 #include "simd.h"
 
 /* Coefficients by which the only root of a ray is found (surface/kernel_contraction.h). Y = inverse (X - vertex 0) +
- * offset equals r + N(r), where r is counted from the domain's middle, or from the apex of a pyramid, and `bent` has
- * the coefficients of N. The field is L + middle + the terms `field`, which multiply the same products of
- * coordinates. */
+ * offset equals r + N(r), where r is counted from the domain's middle, or from the apex of a pyramid, and
+ * nonlinear_part has the coefficients of N. The field is L + middle + the terms `field`, which multiply the same
+ * products of coordinates. */
 typedef struct kernel_contractions {
     float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], nonlinear_part[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
     /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
@@ -115,7 +115,7 @@ SIMD_INLINE kernel_f64 kernel_f64_slope(int type, const kernel_f64 c[8], int a, 
 }
 
 /* Returns the difference between the derivative along axis a at the reference coordinates r and that at the domain's
- * centre, for a polynomial whose coefficients 4 to 7 are `bent`. */
+ * centre, for a polynomial whose coefficients 4 to 7 are nonlinear_part. */
 SIMD_INLINE kernel_f64 kernel_f64_bend(int type, const kernel_f64 nonlinear_part[4], int a, const double r[3])
 {
     const double *centre = kernel_domain_of(type)->centre;
@@ -341,15 +341,16 @@ typedef struct kernel_f64_rates {
 } kernel_f64_rates;
 
 /* Computes the contraction's constant K and the bounds of rounding, in reference coordinates r. With u = 6e-8, e the
- * vertices' largest distance from vertex 0 along an axis, and `wide` the maximum |x| and |y| of rays and vertices:
- * - y and w err by about 4 u |inverse| times `wide` across and times e, including the rounding of the inverse itself:
+ * vertices' largest distance from vertex 0 along an axis, and `wide` the maximum |x| and |y| of rays and vertices: - y
+ * and w err by about 4 u |inverse| times `wide` across and times e, including the rounding of the inverse itself:
  *   an eighth of the 2e-6 that kernel_f64_bounds() uses for the positions of faces, and 3e-7 e.
- * - L and E err by 4 u times 2, the bound of values (rim has a factor 2 for this), times the gradient times `wide`
+ * - L and E err by 4 u times 2, the bound of values (domain_margin has a factor 2 for this), times the gradient times
+ * `wide`
  *   across and e along the ray, and by as much for the gradient's own rounding: 5e-7. Divided by the field's
  *   derivative, and times |w|, that is an error of r.
- * - An iteration adds a few units in the last place of r, and near a pyramid's apex k is at least 1e-6: 1e-6.
- * The faces' crossings lie within `gap` of the ray, and the values there differ from the field by at most
- * KERNEL_FACE_BAND. Each error moves the root by itself / (1 - K). rim is twice the sum. */
+ * - An iteration adds a few units in the last place of r, and near a pyramid's apex k is at least 1e-6: 1e-6. The
+ * faces' crossings lie within `gap` of the ray, and the values there differ from the field by at most KERNEL_FACE_BAND.
+ * Each error moves the root by itself / (1 - K). domain_margin is twice the sum. */
 SIMD_INLINE void kernel_f64_rate(const kernel_bounds_lanes *b, int type, const kernel_f64_rates *r, int half,
                                  kernel_contractions *out)
 {

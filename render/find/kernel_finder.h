@@ -155,8 +155,8 @@ SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
 }
 
 /* Computes the pixels between the extent's ends, clipped to from .. to. Returns false if there are none. `zero` is the
- * pixel at extent 0. blur: the error bound of the extent, in pixels. The extent is widened by blur, by 1/100 pixel and
- * by 3e-5 of the numbers, which is more than the error of rays that hit only by rounding. */
+ * pixel at extent 0. error_bound: that of the extent, in pixels. The extent is widened by this bound, by 1/100 pixel
+ * and by 3e-5 of the numbers, which is more than the error of rays that hit only by rounding. */
 SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float error_bound, int from, int to, uint16_t *first,
                                      uint16_t *last)
 {

@@ -121,7 +121,7 @@ SIMD_INLINE void kernel_smooth_at(const kernel_smooth_cell *s, const double plac
     }
 }
 
-/* Computes the ray's point at depth t in tile space. */
+/* Computes each ray's point at depth t, in tile space. */
 SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, double out[3])
 {
     out[0] = (double)p->origin_x[ray] + (double)p->slope_x[ray] * (double)t;
@@ -241,7 +241,7 @@ static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p,
     f->transmittance = vf_select(is_below, (1.0f - vf_abs(u)) * side_v, v);
 }
 
-/* Computes the fragments' colours as the job's `paint` says: lit, unlit with the normal, or numbers. kind: the
+/* Computes the fragments' colours as the job's `paint` requests: lit, unlit with the normal, or numbers. kind: the
  * fragments' kind. Surfaces that take no light are finished at once even if the job is unlit. */
 SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind,
                               kernel_fragments *f)
@@ -258,7 +258,7 @@ SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const v
 }
 
 /* Emits hits with the same depth as the nearest ones, which folded cells may have, as fragments of their own.
- * Compositing chooses between them by their bits, so the result does not depend on the order of cells. */
+ * Compositing selects one of them by their bits, so that the result does not depend on the order of cells. */
 static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, int value,
                                                              vm tied, vf t, const vf normal[3], const vf colour[3])
 {
@@ -278,8 +278,8 @@ SIMD_INLINE kernel_shading_input kernel_shading_input_of(const vf normal[3], con
 }
 
 /* Moves hits whose normals need samples of other ranks to the thread's waiting list, and emits a placeholder fragment
- * for each, at which volumes are cut. Returns the remaining hits. reach: distance to the samples; hits with 0 do not
- * wait. */
+ * for each, at which volumes are cut. Returns the remaining hits. reach: distance to the samples; hits with reach 0
+ * need no samples and remain. */
 static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, const kernel_surface *s, int value,
                                                             vm hit, vf t, vf reach, const kernel_shading_input *look)
 {

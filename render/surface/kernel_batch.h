@@ -108,7 +108,8 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, float t_near, const kerne
     return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, far)));
 }
 
-/* Accepts the hits of one vector of rays. Returns the mask of blocks in which a ray has a nearer hit than before. */
+/* Accepts the hits of one vector of rays. Returns a mask of the blocks that contain a ray whose hit is nearer than its
+ * previous one. */
 static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi places, const uint8_t *lanes,
                                     unsigned hit, vf depth)
 {
@@ -154,7 +155,7 @@ static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, ker
                                                        kernel_surface_cells *queued)
 {
     const render_surface_layer *layer = t->surface->layer;
-    /* Layers that need more of a hit than its depth and normal are traced cell by cell. */
+    /* layers that need more of a hit than its depth and normal are traced cell by cell */
     const bool by_ray = kernel_tile_layer_batches(t) && !layer->colour_map && !layer->lines;
     const int most = by_ray ? KERNEL_BATCH_PIXELS : 0;
     kernel_surface_cells_close(queued);

@@ -16,11 +16,11 @@
  *     none    A root x in a convex part D of the domain satisfies |f(q) - x| <= K |q - x|, hence
  *             |s|^2 <= 2 s . (x - q), which is at most its maximum over the corners of D. If |s|^2 is larger, D has no
  *             root. With q = f(q) moved to the nearest point of D, that is the case whenever f(q) is outside.
- * Rounding: f has an error of at most `blur`, from positions, and from the field times |w| / |grad L . d|. Crossings of
- * faces have rounding errors of their own, which move a root by at most `rim`, including the factor 1 / (1 - K). A root
- * is accepted if it is inside by more than that, and excluded if the domain widened by rim has none. Rays with a root
- * closer to a face are decided by intersecting the faces. So the result agrees with that of the faces, in this cell and
- * in its neighbour. */
+ * Rounding: f has an error of at most error_bound, from positions, and from the field times |w| / |grad L . d|.
+ * Crossings of faces have rounding errors of their own, which move a root by at most domain_margin, including the
+ * factor 1 / (1 - K). A root is accepted if it is inside by more than that, and excluded if the domain widened by
+ * domain_margin has none. For rays with a root closer to a face, the faces are intersected. So the result agrees with
+ * that of the faces, in this cell and in its neighbour. */
 #ifndef RENDER_KERNEL_CONTRACTION_H
 #define RENDER_KERNEL_CONTRACTION_H
 
@@ -42,25 +42,26 @@ enum { KERNEL_CONTRACTION_STEPS = 7 };
  * K per unit length: 1.8e-7 at most. */
 #define KERNEL_CONTRACTION_END 1e-4f
 
-/* A ray in the coordinates of its cell: y and w as above, from the ray's point at the depth of vertex 0 on; L at that
- * point (level) and its derivative along the ray (rise). */
+/* A ray in the reference space of its cell. y and w are defined at the top of this file, and y is that of the ray's
+ * point at the depth of vertex 0. level: L at that point; rise: the derivative of L along the ray. */
 typedef struct kernel_cell_ray {
     vf y[3], w[3], level, rise;
 } kernel_cell_ray;
 
-/* The coefficients of kernel_contractions, gathered for each ray's own cell. */
+/* The coefficients and error bounds of kernel_contractions, gathered from each ray's own cell. */
 typedef struct kernel_contraction {
     vf offset[3], middle, nonlinear_part[4][3], field[4], grow, error_bound, domain_margin;
 } kernel_contraction;
 
-/* The result for each ray: whether it has exactly one crossing, or none. For rays in `one`, t is the depth relative to
- * vertex 0 and r the reference coordinates, accurate to KERNEL_CONTRACTION_END. */
+/* The result of the contraction test, per ray. one: rays with exactly one crossing; none: rays without a crossing. For
+ * rays in `one`, t is the depth relative to vertex 0 and r the reference coordinates, accurate to
+ * KERNEL_CONTRACTION_END. */
 typedef struct kernel_contracted {
     vm one, none;
     vf t, r[3];
 } kernel_contracted;
 
-/* Converts the rays to the coordinates of their cells. */
+/* Computes the rays in the reference spaces of their cells. */
 SIMD_INLINE void kernel_cell_ray_of(const kernel_curved *c, const kernel_rays *rays, vi lane, kernel_cell_ray *out)
 {
     vf origin[3], normal[3], g[3];
@@ -93,8 +94,8 @@ SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type
     out->domain_margin = kernel_gather_lane(c->domain_margin, lane);
 }
 
-/* Moves the reference coordinates r to the nearest point of the domain D, which for hexes and wedges is widened by
- * `rim`. For a pyramid the point is only close to the nearest one. */
+/* Moves the reference coordinates r to the nearest point of the domain D, which is widened by domain_margin for hexes
+ * and wedges. For a pyramid, r is moved to a point that is only close to the nearest one. */
 SIMD_INLINE void kernel_contraction_clamp(int type, vf domain_margin, vf r[3])
 {
     const vf half = 0.5f + domain_margin;
@@ -151,13 +152,13 @@ SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
 }
 
 /* Returns the rays for which the step s of the iteration at the point q proves that the reference domain D contains no
- * root. If there were a root, |s| would be at most two diameters of D; so 8 blur is an upper bound of the rounding, 2
- * blur times (|s| + 2), and a thousandth of |s|^2 covers the rest. */
+ * root. If there were a root, |s| would be at most two diameters of D; so 8 error_bound is an upper bound of the
+ * rounding error, 2 error_bound times (|s| + 2), and a thousandth of |s|^2 covers the rest. */
 SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
     const vf most = kernel_contraction_reach(type, c->domain_margin, s) - kernel_dot(s, q);
     vf error_bound = 8.0f * c->error_bound;
-    /* twice the error of crossings of faces, because for a pyramid the reference domain is not widened */
+    /* twice the error of crossings of faces, because the reference domain of a pyramid is not widened */
     if (kernel_has_apex(type)) error_bound = 4.0f * c->domain_margin;
     return vf_lt(2.0f * most + error_bound, 0.999f * kernel_dot(s, s));
 }

@@ -53,7 +53,7 @@ typedef struct kernel_curved_batch {
     unsigned ready; /* mask of the lanes whose cells have been copied to `cells` */
     kernel_cell cells[SIMD_WIDTH];
     kernel_pixel_list rays, met, found, others;
-    /* faces crossed by the rays in `met`: the number of the first plus 8 times that of the second */
+    /* for each ray in `met`, the two faces that it crosses: number of the first plus 8 times that of the second */
     uint8_t faces[KERNEL_LIST_ROOM];
     kernel_curved_ends found_ends, other_ends;
 } kernel_curved_batch;
@@ -75,7 +75,7 @@ SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h
 
 /* ---- single cells of the batch ---- */
 
-/* Copies the cell in lane n to h->cells[n], with lines, unless that is done. */
+/* Copies the cell in lane n to h->cells[n], with its edge functions, unless it has been copied before. */
 SIMD_INLINE void kernel_curved_ready(const kernel_tile_trace *t, kernel_curved_batch *h, int n)
 {
     if (h->ready >> n & 1) return;
@@ -88,8 +88,8 @@ SIMD_INLINE void kernel_curved_ready(const kernel_tile_trace *t, kernel_curved_b
     for (int i = 0; i < h->cells[n].count; i++) h->cells[n].vertices[i] = h->transformed.vertex[i][n];
 }
 
-/* Traces the rays in `wanted` one by one in their cells; rays of one cell and packet are traced together. Returns the
- * mask of blocks in which a ray has a nearer hit than before. */
+/* Traces the rays in `wanted` cell by cell; rays with the same cell and packet are traced together. Returns a mask of
+ * the blocks that contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                            const kernel_pixel_list *rays, int first,
                                                                            vi at_lanes, unsigned wanted)
@@ -144,8 +144,9 @@ SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane,
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
 }
 
-/* Moves the rays in at->one to the list of found crossings, with their depth and reference coordinates in found_ends;
- * keeps only the undecided ones of the other rays, from index `kept` on. Returns the new number of kept rays. */
+/* Appends the rays in at->one to the list of found crossings, and their depths and reference coordinates to found_ends.
+ * Of the other rays, the undecided ones are stored in the list from index `kept` on. Returns the new number of kept
+ * rays. */
 SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const kernel_contracted *at, vf depth,
                                          unsigned undecided, int kept)
 {
@@ -165,7 +166,7 @@ SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const ke
 }
 
 /* Decides as many rays as possible without intersecting faces: by the slab that contains the isosurface, and by
- * contractions. Found crossings go to `found`; undecided rays stay in `rays`. */
+ * contraction. Rays with a crossing are moved to `found`; undecided rays remain in `rays`. */
 SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     const kernel_curved cells = kernel_curved_batch_cells(h);
@@ -197,8 +198,8 @@ static __attribute__((noinline)) void kernel_curved_batch_contract(const kernel_
     KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_contract_of, t, h);
 }
 
-/* Lists the rays that cross two faces of their cells in `met`, with the numbers of these faces. Traces rays of other
- * cases one by one. Returns the mask of blocks in which a ray has a nearer hit than before. */
+/* Lists the rays that cross two faces of their cells in `met`, with the numbers of these faces. Other rays are traced
+ * cell by cell. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
 SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t, kernel_curved_batch *h, int type)
 {
     unsigned nearer = 0;
@@ -325,8 +326,8 @@ kernel_curved_batch_colours(const kernel_tile_trace *t, const kernel_curved_batc
     kernel_draw_lines(t->frame, &t->tile, t->surface, &p->rays, places->t, &along, colours);
 }
 
-/* Accepts the hits in `hit`, a mask of lanes. Returns the mask of blocks in which a ray has a nearer hit than
- * before. */
+/* Accepts the hits in `hit`, a mask of lanes. Returns a mask of the blocks that contain a ray whose hit is nearer than
+ * its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile_trace *t, const kernel_curved_batch *h,
                                                                      const kernel_pixel_list *rays, int first,
                                                                      const kernel_lane_rays *p, unsigned hit,
@@ -354,8 +355,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     return blocks;
 }
 
-/* Computes the field's gradients at the reference coordinates r, in camera axes. With RENDER_VERTEX it stores r
- * instead, from which kernel_vertex_normals() later computes normals. */
+/* Computes the field's gradients at the reference coordinates r, in camera axes. If the layer has normals from vertices
+ * (RENDER_VERTEX), r is stored instead, from which kernel_vertex_normals() computes normals later. */
 SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const kernel_map *map, const vf r[3],
                                             vf normal[3])
 {
@@ -367,7 +368,8 @@ SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const ke
     normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y;
 }
 
-/* Accepts hits of the rays in `found` from index n on. Returns the mask of blocks with a nearer hit. */
+/* Accepts the hits of a vector of the rays in `found`, from index n on. Returns a mask of the blocks that contain a ray
+ * whose hit is nearer than its previous one. */
 SIMD_INLINE unsigned kernel_curved_batch_accept_hits(kernel_tile_trace *t, kernel_curved_batch *h, int n,
                                                      const kernel_lane_rays *p, const kernel_map *map,
                                                      const kernel_point *at, vm hit)
@@ -379,8 +381,8 @@ SIMD_INLINE unsigned kernel_curved_batch_accept_hits(kernel_tile_trace *t, kerne
     return kernel_curved_batch_accept(t, h, &h->found, n, p, vm_bits(hit), &places);
 }
 
-/* Polishes the roots that are found, and takes those that are visible. is_contracted: the roots come from
- * kernel_curved_batch_contract(), which knows them so well that they need no bracket. */
+/* Refines the roots that have been found, and accepts those that are visible. is_contracted: the roots come from
+ * kernel_curved_batch_contract(), and are so accurate that they need no bracket. */
 SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_curved_batch *h, bool is_contracted,
                                                 int type)
 {
@@ -424,8 +426,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_hit_contracted(ker
     return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, true);
 }
 
-/* Searches the rays of `others` from index n on for their first visible root, and accepts it. Returns the mask of
- * blocks with a nearer hit. */
+/* Searches a vector of the rays in `others`, from index n on, for their first visible root, and accepts it. Returns a
+ * mask of the blocks that contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                      int n)
 {

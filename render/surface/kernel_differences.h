@@ -29,10 +29,10 @@
  * If other ranks have cells, their samples are needed too. Then hits wait for their normals (render_differences.h); the
  * second half of this file samples and lights hits of any pixels, in the tiles and packets in which they were hit. */
 
-/* The field at one point per ray, which is sampled for normals by central differences. */
+/* One point per ray at which the field is sampled, for normals by central differences, and the field there. */
 typedef struct kernel_probe {
     const kernel_surface *surface;
-    int layer; /* number of the layer, part of the key of cached cells */
+    int layer; /* number of the layer, which is part of the key of cached cells */
     double isovalue;
     vf z; /* depths of the points at which the field is sampled */
     vm found;
@@ -153,7 +153,7 @@ static __attribute__((noinline)) void kernel_sample_differences(const kernel_pac
                           .isovalue = s->layer->values[value]};
     for (int i = 0; i < RENDER_DIFFERENCE_SAMPLES; i++) {
         out->found[i] = kernel_probe_at(p, &probe, hit, t, i / 2, i % 2 ? reach : -reach);
-        /* turns -0 into 0, because the sign of a zero sample must not depend on the order of cells */
+        /* adding 0 turns -0 into 0, because the sign of a zero sample must not depend on the order of cells */
         out->values[i] = probe.sample + 0.0f;
     }
 }
@@ -199,7 +199,7 @@ SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_s
 
 /* ---- hits that wait for samples of other ranks ---- */
 
-/* A run of consecutive hits of a list: all are in one packet and of one isovalue, each in its own lane. */
+/* A run of consecutive hits of a list that belong to one packet and one isovalue, each in its own lane. */
 typedef struct kernel_pending_group {
     kernel_tile tile; /* the run's tile, which is kept for the next run */
     kernel_packet packet;

@@ -32,7 +32,7 @@ SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2])
     return x * x + y * y;
 }
 
-/* Computes the vertex's position relative to each ray, at the vertex's depth. */
+/* Computes a vertex's position relative to each ray, in the plane at the vertex's depth. */
 SIMD_INLINE void kernel_edge_position(const kernel_packet *p, float x, float y, float z, vf out[2])
 {
     out[0] = x - (p->origin_x + p->slope_x * z);

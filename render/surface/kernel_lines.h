@@ -78,7 +78,7 @@ static __attribute__((noinline)) void kernel_tet_line_field(const kernel_packet 
     double value[4], g[3];
     for (int i = 0; i < 4; i++) value[i] = kernel_lines_value(s, field, c->vertices[i]);
     kernel_tet_gradient(p->frame, corner, value, g);
-    /* In tile space the third axis is the tile's middle ray. */
+    /* in tile space the third axis is the direction of the tile's middle ray */
     const double shear[2] = {(double)p->tile->shear_x, (double)p->tile->shear_y};
     const vf x = (p->origin_x + p->slope_x * t) - c->x[3], y = (p->origin_y + p->slope_y * t) - c->y[3];
     const float along = (float)(g[2] + (g[0] * shear[0] + g[1] * shear[1]));

@@ -27,8 +27,8 @@
 #include "mmbvh.h"
 #include "simd.h"
 
-/* Indices of the rows of a leaf, each of which has one float per lane. There is one list of rows for triangles, and one
- * for slabs. */
+/* Indices of the rows of floats that a leaf consists of. A row has one float per lane. Triangles and slabs have
+ * different rows. */
 enum {
     KERNEL_TRIANGLE_CORNERS = 0, /* x, y, z of the three corners */
     KERNEL_TRIANGLE_REACH = 9,
@@ -45,11 +45,11 @@ enum {
     KERNEL_SLAB_ROWS
 };
 
-/* A hex's record: 8 vertices with their values less the isovalue, corners as in kernel_transformed_curved, and no more.
- */
+/* A hex's record: 8 vertices with their values less the isovalue, and the corners of its faces as in
+ * kernel_transformed_curved. */
 enum { KERNEL_CURVED_RECORD_QUADS = 32, KERNEL_CURVED_RECORD_WORDS = 40 };
 
-/* A cell, and one of the isovalues that cross it. */
+/* A cell that an opaque isosurface crosses, together with the isovalue. */
 typedef struct kernel_occluder {
     /* index of the surface in the frame, of the isovalue in the surface's layer, and of the mesh part */
     int32_t surface, value, part;

@@ -29,7 +29,7 @@ typedef struct kernel_occlusion {
     const kernel_surface *surface;
     int layer;
     const kernel_bundle *bundle;
-    int first; /* index in the bundle of the packet's first ray */
+    int first; /* index, in the bundle, of the packet's first ray */
     /* The cell in which the rays are traced: its vertices in world coordinates. */
     double (*world)[3];
     int vertex_count;

@@ -30,7 +30,7 @@ SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int
     return true;
 }
 
-/* Rays in lanes: origin and shear along each ray's own axes. */
+/* Vectors of rays, each with origin and shear along its own axes. */
 typedef struct kernel_prepared_ray_lanes {
     int32_t record[SIMD_WIDTH]; /* index of the first float of the hex's record */
     float axis[SIMD_WIDTH];     /* number of the axis kz, as a float; kx and ky follow it cyclically */
@@ -84,8 +84,8 @@ SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float 
         vf_store((float *)(void *)(h->corners + face * SIMD_WIDTH), words[face / 4][face % 4]);
 }
 
-/* The result for each ray-hex pair: the hex blocks the ray, or it is in doubt; in all other pairs the hex does not
- * block the ray. */
+/* The result for each ray-hex pair: the hex blocks the ray (`blocked`), or this is undecided (`doubt`). In all other
+ * pairs the hex does not block the ray. */
 typedef struct kernel_pair_result {
     vm blocked, doubt;
 } kernel_pair_result;

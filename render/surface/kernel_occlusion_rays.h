@@ -80,14 +80,14 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
 
 /* ---- slabs --------------------------------------------------------------------------------------------------- */
 
-/* The results of one ray for the cells of a leaf, one cell per lane. */
+/* The results of testing one ray against the cells of a leaf, one cell per lane. */
 typedef struct kernel_leaf_lanes {
     int ray;
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
 } kernel_leaf_lanes;
 
-/* Queues the ray-cell pair in lane i: with other hexes if it is a hex with a record, else as a pair to be traced
- * exactly. Returns false if memory ran out. */
+/* Adds the pair of a ray and the cell in lane i to a queue: to the ray-hex pairs if the cell is a hex with a record,
+ * and otherwise to the pairs that are traced exactly. Returns false if memory ran out. */
 static bool kernel_meets_slab(const kernel_occluders *o, kernel_secondary_rays *s, kernel_curved_pairs *pairs,
                               const kernel_leaf_lanes *lanes, int i, int32_t occluder)
 {
@@ -130,7 +130,8 @@ static bool kernel_meets_slabs(const kernel_occluders *o, kernel_secondary_rays 
     return is_well;
 }
 
-/* Closes the rays that are certainly blocked, and records the cells in which the other rays must be traced. */
+/* Closes the rays that opaque surfaces certainly block. For all other rays, lists the cells in which they must be
+ * traced exactly. */
 static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, const kernel_occluders *o,
                            kernel_secondary_rays *s)
 {

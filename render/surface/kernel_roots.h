@@ -47,14 +47,14 @@
 #define KERNEL_SMALLEST_PIECE 0x1p-12f
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
 
-/* What is known about a piece of the interval, per ray. */
+/* The result of testing a piece of the interval, per ray. */
 typedef struct kernel_piece_class {
     vm clear;    /* the piece has no root: the field has the sign `side` everywhere */
     vm monotone; /* the field is monotone, so the piece has at most one root */
-    vm tiny;     /* the field is so close to 0 everywhere that its sign is only rounding */
+    vm tiny;     /* the field is within rounding of 0 everywhere on the piece, so that its sign is not significant */
 } kernel_piece_class;
 
-/* The bounds of kernel_bounds, gathered for each ray's own cell. */
+/* The bounds of kernel_bounds, gathered from each ray's own cell. */
 typedef struct kernel_limits {
     vf nonlinear_part[3][8], inverse[3][3], stretch, slope, curve, twist;
     vf coarsest; /* pieces longer than this share of the interval are always halved */
@@ -108,8 +108,8 @@ SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, cons
     *slope = vf_sqrt(vf_max(largest, between));
 }
 
-/* Judges the piece between two points. side: the sign of the field at `from`, 1 or -1. gap: upper bound of the distance
- * of Y(from) and Y(to) from the ray. */
+/* Tests whether the field has a root on the piece between two points. side: the sign of the field at `from`, 1 or -1.
+ * gap: upper bound of the distance of Y(from) and Y(to) from the ray. */
 SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, const kernel_limits *b,
                                                      const kernel_point *from, const kernel_point *to, vf gap, vf side)
 {
@@ -125,7 +125,7 @@ SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, cons
     vf b1 = from->value + d0 * (1.0f / 3), b2 = to->value - d1 * (1.0f / 3), middle = 3.0f * (b2 - b1);
     vf scale = vf_set(1);
     if (is_pyramid) {
-        /* The tangents at both ends intersect at this fraction of the piece. */
+        /* the fraction of the piece at which the tangents at both ends intersect */
         const vf turn = d0 - d1;
         const vf at = vf_select(vf_eq(turn, vf_set(0)), vf_set(0), (rise - d1) / turn);
         b1 = b2 = from->value + d0 * vf_clamp(at, vf_set(0), vf_set(1));
@@ -147,15 +147,16 @@ SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, cons
     return out;
 }
 
-/* The state of a search for roots, per ray. The interval is divided into pieces from number * size to (number + 1) *
- * size, which are processed in order. */
+/* The state of a search for roots, per ray. The interval is divided into pieces, which are processed in order; the
+ * current piece extends from number * size to (number + 1) * size. */
 typedef struct kernel_search {
     kernel_rays rays;
-    kernel_map map; /* set only if the ends of the interval do not decide all rays; the same holds for `limits` */
+    /* map of the cell; set only if the values at the ends of the interval do not decide all rays, as is `limits` */
+    kernel_map map;
     kernel_limits limits;
     const kernel_interval *interval;
-    int64_t *failures; /* counter of failed inversions of the map */
-    vm open;           /* rays that have pieces left */
+    int64_t *failures; /* number of failed inversions of the map */
+    vm open;           /* rays that have unprocessed pieces */
     vm ended;          /* rays whose last piece has been processed; `side` is then the field's sign at its end */
     vf side;           /* sign of the field at `from`: 1 or -1 */
     vf number, size, pieces;
@@ -240,7 +241,7 @@ SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *ray
     return vm_andnot(left, vm_and(searched, far));
 }
 
-/* Judges the whole interval as one piece, by the coordinates and values at the faces; that decides most rays. */
+/* Tests the whole interval as one piece, by the coordinates and values at the faces, which decides most rays. */
 SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
 {
     const kernel_interval *i = s->interval;
@@ -256,8 +257,8 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     if (!vm_any(s->open)) return;
     kernel_search_face(s, s->open, i->v_in, &s->from);
     kernel_search_face(s, s->open, i->v_out, &s->end);
-    /* If the field just inside a warped face has the other sign than the face's value, there is a root at the face
-     * itself. */
+    /* the field just inside a warped face may have the other sign than the face's value: then there is a root at the
+     * face itself */
     const vm jumps = vm_andnot(s->open, vf_eq(kernel_side(s->from.value), s->side));
     kernel_point_move(jumps, &s->from, &s->low);
     kernel_point_move(jumps, &s->from, &s->high);
@@ -326,7 +327,7 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
         const vm decided = vm_and(going, vm_or(vm_or(certain, v.tiny), small));
         const vm roots = vm_andnot(decided, vf_eq(kernel_side(to.value), s->side));
         const vm halve = vm_andnot(going, decided);
-        /* counted per ray, so that a ray's result does not depend on the other rays */
+        /* divisions are counted per ray, so that a ray's result does not depend on the other rays */
         s->pieces += vf_select(going, vf_set(1), vf_set(0));
         kernel_point_move(roots, &s->from, &s->low);
         kernel_point_move(roots, &to, &s->high);
@@ -467,8 +468,8 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map *m
     kernel_residual residual;
     residual.m = kernel_product_at(map->is_pyramid, out->r);
     kernel_residuals(rays, map, out, residual.off, &residual.value);
-    /* At a double root the field's derivative is only rounding, so a step that uses it leads away; such a step is not
-     * taken. */
+    /* at a double root the field's derivative is only a rounding error, so that a step by it leads away and is not
+     * taken */
     const vm away = kernel_polish_step(rays, map, low, high, wanted, &residual, &last);
     kernel_point_move(vm_andnot(wanted, away), &last, out);
 }

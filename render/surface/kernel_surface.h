@@ -91,7 +91,7 @@ SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, kernel_surface_state *st
     hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + h->value)), hits->kind);
 }
 
-/* Lights the hits of a transparent surface and emits them as fragments. */
+/* Computes the lighting of a transparent surface's hits, and emits them as fragments. */
 SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_state *state, vm hit, kernel_accepted *h)
 {
     const kernel_surface *s = state->surface;
@@ -133,7 +133,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     kernel_accepted h = {.value = value, .t = at->t};
     for (int a = 0; a < 3; a++) h.look.normal[a] = at->normal[a];
     h.cells = (kernel_hit_cells){vi_set(c ? c->part : -1), vi_set(c ? (int32_t)c->index : -1)};
-    /* Polyhedra do not use differences: they have gradients of their own, or normals from their vertices. */
+    /* differences are not used for polyhedra, which have gradients of their own or normals from their vertices */
     h.reach = vf_set(s->layer->normal == RENDER_DIFFERENCES && c ? kernel_difference_reach(p, s->layer, c) : 0);
     kernel_base_colour(s, value, at->w, h.look.colour);
     if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
@@ -238,7 +238,8 @@ SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays 
     out->t += kernel_gather_lane(c->at[2][0], lane);
 }
 
-/* Decides the rays of a packet in one cell by contraction (kernel_contraction.h), without its faces. */
+/* Tests the rays of a packet in one cell by contraction (kernel_contraction.h), without intersecting the cell's
+ * faces. */
 static __attribute__((noinline)) void kernel_contract_packet(const kernel_curved *c, const kernel_rays *rays, vi lane,
                                                              vm wanted, kernel_contracted *out)
 {
@@ -444,8 +445,7 @@ static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_pack
 
 /* ---- selection of the rays to follow ---- */
 
-/* Computes upper bounds of the rates, per unit of depth, at which a tet's field falls and rises along the tile's
- * rays. */
+/* Computes upper bounds of how fast a tet's field falls and rises along the tile's rays, per unit of depth. */
 static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet, double spread, double *fall,
                               double *rise)
 {
@@ -464,8 +464,8 @@ static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet
     *rise = aside + g[2];
 }
 
-/* Computes the bounds of falling and rising rates over all tets of the cell. A tet without volume gives an infinite
- * bound. */
+/* Computes the maxima, over all tets of the cell, of how fast the field falls and rises along the tile's rays. They are
+ * infinite if a tet has no volume. */
 static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, const kernel_packet *p)
 {
     const double spread = p->frame->job->camera.is_orthographic ? 0 : (double)p->tile->radius;
@@ -479,7 +479,7 @@ static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, co
     }
 }
 
-/* Scales the bound like the values, and limits it so that products of two bounds are finite. */
+/* Scales the bound by the factor of the cell's values, and limits it so that products of two bounds are finite. */
 SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
 {
     const double scaled = slope * c->scale;
@@ -562,7 +562,7 @@ SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r,
     return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(polyhedron_interval, &next, inside)));
 }
 
-/* Returns a number that is one or two roundings above t. */
+/* Returns a number that is larger than t by one or two units in the last place. */
 SIMD_INLINE vf kernel_next_float(vf t)
 {
     return t + (vf_abs(t) * 2.4e-7f + 1e-30f);

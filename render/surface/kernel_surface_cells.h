@@ -11,7 +11,7 @@
 
 typedef struct kernel_surface_cells {
     int type, count;
-    int layer, part;      /* -1: none yet */
+    int layer, part;      /* layer and mesh part of the queued cells; -1: there are none yet */
     kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
     uint32_t cell[SIMD_WIDTH];
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
@@ -21,7 +21,7 @@ typedef struct kernel_surface_cells {
     int32_t vertex[8][SIMD_WIDTH];
 } kernel_surface_cells;
 
-/* Adds a cell of the current layer; the queue must not be full. */
+/* Adds a cell that the current layer's surface crosses; the queue must not be full. */
 SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_surface_cells *own,
                                           const kernel_tile_candidate *candidate, int value)
 {
@@ -35,7 +35,7 @@ SIMD_INLINE void kernel_surface_cells_add(const kernel_tile_trace *t, kernel_sur
     kernel_arrays_cells(&own->arrays, &candidate->cell, 1, grid_type_vertices(own->type), own->vertex, n);
 }
 
-/* Copies the first cell to the lanes that have none. */
+/* Fills the unused lanes with copies of the first cell. */
 SIMD_INLINE void kernel_surface_cells_close(kernel_surface_cells *own)
 {
     for (int n = own->count; n < SIMD_WIDTH; n++) {

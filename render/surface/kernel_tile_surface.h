@@ -36,7 +36,7 @@ typedef struct kernel_find_plane {
 } kernel_find_plane;
 
 typedef struct kernel_tile_finder {
-    /* Callback for a leaf's cells, for the current layer. */
+    /* Callback that searches a leaf's cells for the current layer's surface. */
     void (*look)(kernel_tile_trace *t, int part, const uint32_t *cells, int count);
     /* number of pixels per unit of slope or, if the camera is orthographic, per scaled unit */
     float column_scale, row_scale;
@@ -46,8 +46,8 @@ typedef struct kernel_tile_finder {
 
 /* ---- traversal of nodes ---- */
 
-/* Nodes are tested one per lane, with siblings in neighbouring lanes. While some are tested, the data of others are
- * prefetched. */
+/* Number of nodes that are tested at once, one per lane, with siblings in neighbouring lanes. While these are tested,
+ * the data of further nodes are prefetched. */
 enum { KERNEL_NODES_AT_ONCE = SIMD_WIDTH / 2, KERNEL_NODES_ROOM = (KERNEL_NODES_AT_ONCE + 1) * MMBVH_MAX_DEPTH };
 
 /* A node that may be visible. ref: its first cell if it is a leaf, else its left child. */
@@ -62,7 +62,7 @@ typedef struct kernel_node_lanes {
     vf low[3], high[3], range_low, range_high;
 } kernel_node_lanes;
 
-/* Reads boxes and ranges of nodes of any layout, one by one. */
+/* Reads the boxes and value ranges of nodes one by one, which works for every layout of nodes. */
 static __attribute__((noinline)) void kernel_nodes_slowly(const mmbvh *tree, const mmbvh_ranges *ranges,
                                                           const int64_t node[SIMD_WIDTH], kernel_node_lanes *out)
 {
@@ -113,8 +113,8 @@ SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *range
     out->range_high = vf_gather((const float *)(const void *)ranges->high, pair);
 }
 
-/* Where nodes are: their least depths, their boxes of pixels, their positions along the tile, and a mask of those that
- * may be visible. */
+/* The result of testing nodes, per lane: least depth, box of pixels, position along the tile's direction, and a mask of
+ * the nodes that may be visible. */
 typedef struct kernel_node_bounds {
     float near[SIMD_WIDTH];
     int32_t box[SIMD_WIDTH];
@@ -135,7 +135,7 @@ SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box,
     return vf_lt(vf_from_vi(from), vf_from_vi(to) + 0.5f);
 }
 
-/* Computes where the nodes are, and which of them may be visible. */
+/* Tests the nodes: computes their depths and boxes of pixels, and which of them may be visible. */
 SIMD_INLINE void kernel_tile_find_node_bounds(const kernel_tile_trace *t, const kernel_node_lanes *nodes,
                                               kernel_node_bounds *out)
 {

@@ -28,13 +28,13 @@ static void box_of(const occluder_pieces *p, int64_t i, float *lower, float *upp
     }
 }
 
-/* The data for converting a binary tree to a wide one. */
+/* The state of converting a binary tree to a tree with one child per lane. */
 typedef struct widening {
     const occluder_pieces *of;
     const mmbvh *binary;
-    /* per node, the index of the first of the pieces below it in the binary tree's list of cells, and their number */
+    /* for each node, the pieces below it: index of the first in the binary tree's list of cells, and their number */
     int64_t *first, *count;
-    float *boxes; /* per node, lower and upper corner of its box */
+    float *boxes; /* for each node, lower and upper corner of its box */
     int width;
     kernel_occluder_tree *out;
 } widening;
@@ -74,7 +74,7 @@ static float area_of(const float box[6])
 
 /* A range of pieces in the binary tree's order: all pieces below a node, or some pieces of a leaf. */
 typedef struct piece_range {
-    int64_t node; /* the node; -1 for some pieces of a leaf */
+    int64_t node; /* index of the node; -1 if the range is a part of a leaf's pieces */
     int64_t first, count;
     float box[6];
 } piece_range;
@@ -130,7 +130,7 @@ static int divide_all(const widening *w, const piece_range *whole, piece_range *
     return count;
 }
 
-/* Makes a leaf and returns ~index. Its sources are the pieces' indices. Lanes without a piece get NaN or empty boxes,
+/* Creates a leaf and returns ~index. Its sources are the pieces' indices. Lanes without a piece get NaN or empty boxes,
  * so that no ray meets them. */
 static int32_t make_leaf(widening *w, const piece_range *of)
 {

@@ -165,8 +165,8 @@ static void add_tet(subject *s, double isovalue)
             below[belows++] = i;
         else
             above[aboves++] = i;
-    /* The corners must be in cyclic order around the piece, so the second vertex below the isovalue takes those above
-     * in reverse. */
+    /* the crossings must be in cyclic order around the piece, so that the edges of every second vertex below the
+     * isovalue are visited in reverse */
     for (int i = 0; i < belows; i++)
         for (int k = 0; k < aboves; k++) {
             const int j = i % 2 ? aboves - 1 - k : k, p = below[i], q = above[j];
@@ -244,14 +244,14 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
         out->rows[KERNEL_SLAB_GRADIENT + a] = (float)gradient[a];
     }
     out->rows[KERNEL_SLAB_LEVEL] = (float)level;
-    /* Values are rounded to 6e-8 of the largest. Roots have an error of KERNEL_ROOT_BAND and of the rounding of
-     * positions. */
+    /* Error of L: values are rounded to 6e-8 of the largest, and roots have an error of KERNEL_ROOT_BAND and that of
+     * the rounding of positions. */
     out->rows[KERNEL_SLAB_THICKNESS] = (float)(off * 1.0001 + 1e-5);
     out->rows[KERNEL_SLAB_ERROR] = (float)(16 * 6e-8 * steep);
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
 }
 
-/* Faces' corners as kernel_transformed_curved has them. */
+/* Stores the corners of the hex's faces, in the form of kernel_transformed_curved.corners. */
 static void fill_faces(const kernel_cell *c, hex_record *out)
 {
     for (int face = 0; face < 6; face++) {

@@ -65,12 +65,12 @@ typedef struct kernel_exact_point {
     double t, v, r[3];
 } kernel_exact_point;
 
-/* State of the bisection of one ray's interval. */
+/* State of the bisection of a ray's interval in a cell. */
 typedef struct kernel_bisection {
     const kernel_segment_state *state;
     const kernel_cell_interval *cell_interval;
     const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
-    double u, v, slope, shift;   /* constants of the ray: at depth t it is at (u, v) * (slope * t + shift) */
+    double u, v, slope, shift;   /* constants of the ray: at depth t its point is (u, v) * (slope * t + shift) */
     kernel_exact_point in, out;  /* ends of the interval, at the crossings of the faces */
     /* unit distances per t; length of the interval; share of the light that reaches the current subinterval */
     double per_t, length, light;
@@ -83,7 +83,7 @@ static inline double kernel_between(double from, double to, double share)
     return from + (to - from) * share;
 }
 
-/* Returns the point at depth t by Newton's method from `guess`, as kernel_solve() does it. */
+/* Computes the ray's point at depth t, as kernel_solve() does: by Newton's method from the initial guess `guess`. */
 static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, double t, const double guess[3])
 {
     const double whole = h->out.t - h->in.t, share = whole > 0 ? (t - h->in.t) / whole : 0;
@@ -113,8 +113,8 @@ static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, 
     return kernel_exact_point_at(h, kernel_between(a->t, b->t, share), guess);
 }
 
-/* Returns the point between a and b, whose values lie on either side of x, at which the field is x. It uses regula
- * falsi that halves the value at an end that stays (the Illinois method). */
+/* Returns the point between a and b at which the field is x; the values at a and b lie on either side of x. It uses
+ * regula falsi in the Illinois variant, which halves the value of an end that is kept. */
 static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, const kernel_exact_point *a,
                                                    const kernel_exact_point *b, double x)
 {
@@ -214,7 +214,8 @@ static kernel_medium_range kernel_medium_range_of(const kernel_pieces *t, double
     return out;
 }
 
-/* A subinterval: its end and middle, its bisection depth, and whether the field is known to be monotone on it. */
+/* A subinterval of a ray: its end and middle, its bisection depth, and whether the field has been proved to be monotone
+ * on it. */
 typedef struct kernel_subinterval {
     kernel_exact_point end, middle;
     int depth;
@@ -244,8 +245,8 @@ static kernel_subinterval_values kernel_subinterval_sample(const kernel_bisectio
     return out;
 }
 
-/* Returns a bound of the light's error if the subinterval becomes one segment; *all: a bound for any deviation of the
- * field. */
+/* Returns a bound of the error of light if the subinterval becomes one segment. *all: the same bound for any deviation
+ * of the field from the segment's chord. */
 static double kernel_subinterval_error(const kernel_bisection *h, const kernel_subinterval_values *sub,
                                        const kernel_medium_range *s, double length, double *all)
 {
@@ -278,13 +279,13 @@ static kernel_side_values kernel_step_side(const kernel_bisection *h, double ins
     kernel_side_values out = {-3e38f, 3e38f};
     int n = 0;
     for (; n < h->state->pieces->step_count && steps[n].at <= inside; n++) out.low = steps[n].cut;
-    /* A segment that is constant at a step's value counts as above the step; rounding must not move another segment
-     * there. */
+    /* a segment whose constant value is a step's value lies above the step; rounding must not move other segments
+     * there */
     if (n < h->state->pieces->step_count) out.high = nextafterf(steps[n].cut, out.low);
     return out;
 }
 
-/* Rounds x to float and clamps it to its side of the steps; *rest: the rounding error. */
+/* Rounds x to float and clamps it to the range between two neighbouring steps; *rest: the rounding error. */
 static void kernel_step_round(const kernel_side_values *side, double x, float *v, double *rest)
 {
     const double active = fmax(fmin(x, (double)side->high), (double)side->low);
@@ -292,8 +293,8 @@ static void kernel_step_round(const kernel_side_values *side, double x, float *v
     *rest = side->low < *v && *v < side->high ? active - (double)*v : 0;
 }
 
-/* Returns bounds of the transfer function over the subinterval's values. inside: one of these values, which tells the
- * side of the steps; step: a step among the values, or NULL. */
+/* Returns bounds of the transfer function over the subinterval's values. inside: one of these values, by which the
+ * range between two steps is found; step: a step among the values, or NULL. */
 static kernel_medium_range kernel_subinterval_range(const kernel_bisection *h, const kernel_subinterval_values *values,
                                                     double inside, const kernel_step *step)
 {
@@ -570,7 +571,8 @@ SIMD_INLINE void kernel_cell_interval_integrate(kernel_packet *p, kernel_segment
     const kernel_interval *i = cell_interval->interval;
     const kernel_segments *list = state->list;
     vf from = vf_max(i->t_in, p->t_near);
-    /* Segments that are to be mixed are not cut at this rank's surfaces, so that they are the same on any partition. */
+    /* segments that compositing mixes with other volumes are not cut at this rank's surfaces, so that they are the same
+     * on any partition */
     const vf end = vf_min(i->t_out, state->mixing > 0 ? p->clip_out : p->t_far);
     vm open = vm_and(i->mask, vm_and(p->active, vm_and(vf_lt(from, end), vf_lt(from, p->t_far))));
     while (vm_any(open)) {
@@ -625,7 +627,7 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     if (!vm_any(mine)) return;
     kernel_precise_interval precise;
     if (list->is_double) {
-        /* A ray may have many segments whose ends are equal in float32, so lengths are compared in double. */
+        /* lengths are compared in double, because many segments of a ray may have ends that are equal in float32 */
         precise = kernel_tet_double(p, c, double_cell, &list->rays, &i);
         mine = vm_and(mine, vf_lt(vf_set(0), precise.length));
     }

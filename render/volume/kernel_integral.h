@@ -63,7 +63,7 @@ SIMD_INLINE vf kernel_exp(vf x)
     return vf_exp2(x * 1.4426950f);
 }
 
-/* Returns the offset, in floats, into the table `swings` of the entry with the bounds for the values from low to
+/* Returns the offset, in floats, into the table of variations of the entry with the bounds for the values from low to
  * high. */
 SIMD_INLINE vi kernel_light_variation_entry(const kernel_pieces *t, vf low, vf high)
 {
@@ -109,8 +109,8 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_of(vf length, vf v_in, vf v_
     return (kernel_unit_segment){length, v_in, v_out, vf_set(0), vf_set(0)};
 }
 
-/* The piece of the transfer function that each ray is in. If all rays are in the same piece, `common` points to it,
- * which saves gathers. */
+/* The piece of the transfer function that contains each ray's current value. If it is the same piece for all rays,
+ * `common` points to it, which saves gathers. */
 typedef struct kernel_piece_index {
     vi at;
     const kernel_piece *common;
@@ -199,7 +199,7 @@ SIMD_INLINE kernel_segment_constants kernel_segment_constants_of(const kernel_un
     return out;
 }
 
-/* Sets the positions of the rays in `fresh`, which enter the piece with the given ends. */
+/* Sets the positions of the rays in `fresh`, which enter a piece with the given ends. */
 SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *piece_state, const kernel_segment_constants *constants,
                                           vm fresh, const kernel_piece_ends *ends)
 {
@@ -233,8 +233,8 @@ SIMD_INLINE vf kernel_piece_state_interpolate(const kernel_piece_state *piece_st
 /* One step of the integration in a piece. */
 typedef struct kernel_integration_step {
     vf opacity, clear; /* opacity at the step's begin, and 1 - opacity */
-    vf rise;           /* change of the opacity over the rest of the ray's part in the piece */
-    vf share;          /* fraction of that rest that the step covers */
+    vf rise;           /* change of the opacity over the part of the piece that lies ahead of the ray */
+    vf share;          /* fraction of that part that the step covers */
     vf length;         /* length of the step, in unit distances */
     vm is_opaque;
 } kernel_integration_step;
@@ -271,8 +271,8 @@ SIMD_INLINE void kernel_integration_step_limit(kernel_integration_step *st, vf l
     st->length = left * st->share;
 }
 
-/* Computes the step's emitted light (*e0) and the first moment of the emission along the step (*e1). Returns the step's
- * optical depth. */
+/* Computes the light that a step emits (*e0), and the first moment of the emission along the step (*e1). Returns the
+ * step's optical depth. */
 SIMD_INLINE vf kernel_integration_step_sum(const kernel_integration_step *st, vf *e0, vf *e1)
 {
     vf sigma[KERNEL_NODES], depth = vf_set(0);
@@ -312,7 +312,7 @@ SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_in
     light->transmittance = kernel_exp(-light->depth);
 }
 
-/* Integrates the segment and adds its light behind that in *light. */
+/* Integrates the segment, and adds its light to *light, behind the light already there. */
 SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_unit_segment *run, kernel_light *light)
 {
     const kernel_segment_constants constants = kernel_segment_constants_of(run);

@@ -7,7 +7,7 @@
  * oscillation of T g times the integral of |v - f|. g depends on the value and on b. Over a range of values it is at
  * most `cost`, and varies by `swing` for fixed b; g is linear in b, so both follow from b's two bounds
  * (kernel_light_variation). Let D be the segment's depth and R the colours' contrast. Along the segment T falls by
- * min(D, 1), and b changes by R min(D, 1): changes by R min(D, 1):
+ * min(D, 1), and b changes by R min(D, 1):
  *
  *     oscillation of T g <= T (swing + min(D, 1) (cost + R |s'|)),      and no more than 2 T cost.
  *
@@ -54,11 +54,11 @@
 
 enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_PIECES = 32 };
 
-/* Share of the allowed error that the residual of Newton's method may use. */
+/* Share of the allowed error of light that the residual of Newton's method may cause. */
 #define KERNEL_LOCAL_SLACK 0.4f
 
-/* Bounds, per lane, of how a field error changes the light, over the values of the lane's cell
- * (kernel_light_variation). sway is the variation of that change, cost its maximum. */
+/* Bounds, per lane, of the change of light due to a field error, over the values of the lane's cell
+ * (kernel_light_variation). cost: maximum of that change; error_variation: its variation. */
 typedef struct kernel_local_bounds {
     float cost[SIMD_WIDTH];
     float error_variation[SIMD_WIDTH];
@@ -79,9 +79,10 @@ typedef struct kernel_local_budget {
 
 /* ---- cells ---- */
 
-/* Sets the lanes' bounds from the values at their vertices. The ends of chords may lie outside the cell's values: those
- * of one chord by at most three sixteenths of the values' range (kernel_local_leaves_range()), those of several by a
- * sixth of the parabola's maximum, which is less than that range. */
+/* Sets each lane's bounds from the values at its cell's vertices. They must also hold at the ends of chords, which may
+ * lie outside of these values. If there is one chord, its ends exceed them by at most three sixteenths of the values'
+ * range (kernel_local_leaves_range()). If there are several, their ends exceed them by a sixth of the parabola's
+ * maximum, which is less than that range. */
 SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values)[SIMD_WIDTH], int type)
 {
     const kernel_pieces *t = b->pieces;
@@ -102,7 +103,7 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
     vf_store(b->bounds.extinction, extinction);
     vf_store(b->bounds.low, low);
     vf_store(b->bounds.high, high);
-    /* The residual of Newton's method may use a share of the error that is allowed for the ray's length alone. */
+    /* the residual of Newton's method may cause a share of the error that is allowed for the ray's length alone */
     const vf slack = vf_set(KERNEL_LOCAL_SLACK * b->allowance / b->reach) / (cost * vf_load(b->nonlinear.sensitivity));
     const vf tolerance = vf_min(vf_max(slack, vf_set(1e-6f)), vf_load(b->nonlinear.residual_limit));
     vf_store(b->nonlinear.tolerance, tolerance);
@@ -110,7 +111,7 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
 
 /* ---- rays in cells ---- */
 
-/* A vector of rays, each with its cell. */
+/* A vector of rays, each with a cell of its own. */
 typedef struct kernel_local_pairs {
     kernel_lane_rays rays;
     kernel_point ends[2];
@@ -138,11 +139,11 @@ SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_budget *b, const ker
                  vf_lt(kernel_gather_lane(b->bounds.high, p->rays.lane), high));
 }
 
-/* Error terms, per ray, if one segment replaces the ray's whole interval in its cell. */
+/* Errors, per ray, that arise if one segment replaces the ray's whole interval in its cell. */
 typedef struct kernel_local_errors {
     vf mean;    /* mean of |v - f|; with n segments it is divided by n^2 */
     vf quartic; /* upper bound E of the quartic part of the field's deviation from its chord */
-    vf unknown; /* error of the field due to the residual of Newton's method */
+    vf unknown; /* error of the field that the residual of Newton's method causes */
     vf length;  /* length of the interval in unit distances */
     /* variation of the error's weight g (see the top of this file) that is caused by the changes of T and b along the
      * segment */
@@ -201,7 +202,7 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
         opacities += 0.25f * kernel_opacity(transfer, value);
     }
     kernel_local_ray_bound(b->pieces, p, wrong->quartic, &error_variation, &cost);
-    /* The error allowed per unit distance. */
+    /* The error of light that is allowed per unit distance. */
     const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(wrong->length, opacities, one));
     const vm few = vf_le(kernel_local_single_segment_error(wrong, error_variation, cost), allowed);
     const vf half = vf_min(0.5f * (error_variation + wrong->fade), cost), made = half * wrong->mean;

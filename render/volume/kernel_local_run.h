@@ -12,7 +12,7 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Processes the first cells of a queue. */
+/* Processes the first vector of cells in a queue. */
 static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, kernel_local_lanes *l, int queue)
 {
     const int type = kernel_curved_types[queue];
@@ -46,7 +46,7 @@ SIMD_INLINE void kernel_local_end(kernel_tile_trace *t, kernel_local_lanes *l)
         while (l->queues[i].count) kernel_local_run(t, l, i);
 }
 
-/* Queues a hex, wedge or pyramid. */
+/* Adds a hex, wedge or pyramid to the queue of its type. */
 SIMD_INLINE void kernel_local_enqueue(kernel_tile_trace *t, kernel_local_lanes *l, int part, int type, uint32_t cell,
                                       unsigned blocks, unsigned box)
 {

@@ -1,6 +1,6 @@
 /* Computes samples of volumes, one sample per lane, for any rays and cells. A cell of a few pixels leaves most lanes of
  * a packet idle, and a sample's value requires an inverse map. So samples of several cells are processed side by side:
- *     cells of one type       where are they, and what map have they?     kernel_local.h
+ *     cells of one type       where are they, and what are their maps?     kernel_local.h
  *     pixels of their boxes   which samples may be in the cell?           by planes around it
  *     samples                 where in the cell, and what is the field?   Newton's method
  * A sample belongs to the cell that contains it by the cell's reference coordinates. At a face one of these is at its
@@ -48,13 +48,13 @@ enum {
 };
 
 typedef struct kernel_local_batch {
-    kernel_local_lanes lanes;         /* must be the first member, as callbacks get it alone */
+    kernel_local_lanes lanes;         /* must be the first member, because callbacks cast its address to the batch */
     kernel_tile_ray_samples *packets; /* packets of the tile */
-    int first, count;                 /* number of the window's first sample, and number of samples */
+    int first, count;                 /* number of the window's first sample, and number of samples in the window */
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
-    /* By packet and lane: depth of sample 0 and distance between samples, side by side; and the depth at which the
-     * window ends on the ray. */
+    /* For each packet and lane: depth of sample 0 and distance between samples, side by side; and the depth at which
+     * the window ends on the ray. */
     float steps[2 * KERNEL_TILE_PIXELS], far[KERNEL_TILE_PIXELS];
     float pad; /* error bound of sample numbers, as in kernel_samples */
 } kernel_local_batch;
@@ -68,8 +68,8 @@ SIMD_INLINE bool kernel_local_fits(const kernel_frame *f, int type)
 
 /* ---- samples ---- */
 
-/* Decides by the crossings of the cell's faces whether a sample near its border belongs to the cell, and if so sets its
- * value. */
+/* Decides, by the crossings of the cell's faces, whether a sample near the cell's border belongs to the cell, and sets
+ * its value if it does. */
 static __attribute__((noinline, cold)) void kernel_local_decide(kernel_tile_trace *t, kernel_local_batch *b,
                                                                 const kernel_local_queue *q, int lane, int at,
                                                                 int number)
@@ -197,7 +197,7 @@ static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, kernel_local_
 static const kernel_local_stages kernel_sample_stages = {true, kernel_local_transform_lanes, kernel_local_cast,
                                                          kernel_local_fill};
 
-/* Begins the samples of a volume in a window. The packets of the given blocks must be set up. */
+/* Prepares the sampling of a volume in a window, for the packets of the given blocks, which must be set up. */
 SIMD_INLINE void kernel_local_samples_begin(const kernel_tile_trace *t, kernel_local_batch *b,
                                             kernel_tile_ray_samples *packets, unsigned blocks, int volume,
                                             kernel_tile_trace_cell *take)

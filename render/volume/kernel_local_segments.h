@@ -50,14 +50,14 @@ typedef struct kernel_local_list {
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
 
 typedef struct kernel_local_segment_batch {
-    kernel_local_lanes lanes;            /* must be the first member, as callbacks get it alone */
+    kernel_local_lanes lanes;            /* must be the first member, because callbacks cast its address to the batch */
     kernel_tile_ray_segments *packets;   /* packets of the tile */
     unsigned blocks;                     /* blocks of the current window */
     kernel_ray_segments_callback *alone; /* callback that processes rays in a single cell */
     kernel_local_faces faces;
     kernel_local_budget budget;
     kernel_local_list met, crossed[2];
-    /* By packet and lane: begin and end of the window, side by side; likewise begin and end of the ray. */
+    /* For each packet and lane: begin and end of the window, side by side; likewise begin and end of the ray. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
 } kernel_local_segment_batch;
 
@@ -67,8 +67,8 @@ SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
     return kernel_segments_fit(f) && f->pieces[0].variations && kernel_local_queue_of(type) >= 0;
 }
 
-/* Adds a segment to the list of the ray at `at`, if it begins before the window's end. It must not begin before the
- * window. */
+/* Adds a segment to a ray's list if it begins before the end of the ray's window; it must not begin before the window.
+ * at: position of the ray's pixel among the packets. */
 SIMD_INLINE void kernel_local_put(const kernel_local_segment_batch *b, int at, const kernel_segment *s)
 {
     kernel_tile_ray_segments *r = &b->packets[at / SIMD_WIDTH];
@@ -189,8 +189,8 @@ SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_loca
 }
 
 /* Adds the segments of rays for which one polynomial is not accurate enough: their intervals are divided into halves,
- * quarters or eighths, with a polynomial for each part. Returns the rays for which eighths are not accurate enough
- * either. */
+ * quarters or eighths, with a polynomial for each part. Returns the rays for which even eighths are not accurate
+ * enough. */
 SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_local_segment_batch *b,
                                      const kernel_local_pairs *whole, vm rays, int type)
 {
@@ -219,7 +219,7 @@ static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_til
 
 /* ---- rays ---- */
 
-/* Processes the rays in `wanted` in single cells; rays of the same cell and packet are processed together. */
+/* Processes the rays in `wanted` cell by cell; rays with the same cell and packet are processed together. */
 static __attribute__((noinline)) void
 kernel_local_segments_process_singly(kernel_tile_trace *t, kernel_local_segment_batch *b, const kernel_local_queue *q,
                                      const kernel_lane_rays *rays, unsigned wanted)
@@ -254,7 +254,7 @@ SIMD_INLINE void kernel_local_list_add(kernel_local_list *list, vm rays, vi word
     list->count += vf_compress(list->words + list->count, rays, vf_from_bits(words));
 }
 
-/* Loads the rays of a list from index n on; returns the lanes that have one. */
+/* Loads a vector of rays of a list, from index n on. Returns the lanes that contain a ray. */
 SIMD_INLINE vm kernel_local_list_load(const kernel_local_list *list, const kernel_tile *tile, int n, vi *words,
                                       kernel_lane_rays *rays)
 {
@@ -266,7 +266,7 @@ SIMD_INLINE vm kernel_local_list_load(const kernel_local_list *list, const kerne
 }
 
 /* Finds, for a vector of rays from index n on, the faces of their cells that they cross. Rays that cross two faces are
- * listed in `crossed`; uncertain rays are processed in single cells. */
+ * listed in `crossed`; rays for which this is uncertain are processed cell by cell. */
 SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_segment_batch *b,
                                              const kernel_local_queue *q, int type, int n)
 {
@@ -394,7 +394,7 @@ SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kern
     return vf_reduce_max(end);
 }
 
-/* Lowers the far limit of the blocks in which a ray's window has been shortened. */
+/* Lowers the farthest depth of the blocks in which the window of a ray has been shortened. */
 SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_local_segment_batch *b)
 {
     for (unsigned blocks = b->blocks; blocks; blocks &= blocks - 1) {
@@ -419,7 +419,7 @@ static void kernel_local_segments_finish(kernel_tile_trace *t, kernel_local_lane
 static const kernel_local_stages kernel_segment_stages = {false, kernel_local_segments_transform,
                                                           kernel_local_segments_cast, kernel_local_segments_finish};
 
-/* Copies the packets' windows and the limits of their rays into arrays per pixel. */
+/* Copies, for each pixel, the window and the ends of the ray from the packets into arrays. */
 static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_segment_batch *b,
                                         kernel_tile_ray_segments *packets, unsigned blocks,
                                         kernel_tile_trace_cell *take, kernel_ray_segments_callback *alone)

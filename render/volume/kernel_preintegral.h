@@ -43,14 +43,15 @@
 typedef struct kernel_preint_end {
     /* place: position within the bin, 0 .. 1; it may be outside this range in the first and the last bin */
     vf value, bin, place;
-    vf own[4], table_error; /* own: the bin's sums of extinction and emission; rough: the error bound of the bin */
-    vi before[4], colour;   /* before: the sums of all earlier bins */
+    vf own[4], table_error; /* own: the bin's sums of extinction and emission; table_error: error bound of these */
+    vi before[4], colour;   /* sums over all bins before it */
 } kernel_preint_end;
 
 /* The light of a segment or of a subinterval of it, and bounds of its error. */
 typedef struct kernel_preint_subinterval {
     vf colour[3], depth, absorbed;
-    /* error: due to absorption within the segment; rough: due to the tables; allowed: error budget */
+    /* error: bound of the error of absorption within the segment; table_error: bound of the error of the tables' sums;
+     * allowed: the error budget */
     vf error, table_error, allowed;
 } kernel_preint_subinterval;
 
@@ -178,7 +179,7 @@ SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_preint_subinterv
     return out;
 }
 
-/* Integrates the rays for which one subinterval is not accurate enough. */
+/* Integrates the rays for which a single subinterval is not accurate enough. */
 static __attribute__((noinline)) void kernel_preint_finely(const kernel_pieces *pieces, vm rays,
                                                            const kernel_preint_end *from,
                                                            const kernel_unit_segment *run,
@@ -208,8 +209,8 @@ static __attribute__((noinline)) void kernel_preint_finely(const kernel_pieces *
 }
 
 /* Returns the light of the segment alone, within the error budget; kernel_integrate() would compute it exactly. *end:
- * table position of the end of the rays' previous segments, which is reused if it is the begin of this one; it becomes
- * the end of this one. */
+ * position in the tables of the ends of the previous segments. It is reused where a segment begins at the end of the
+ * previous one, and is then replaced by the position of this segment's end. */
 SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_unit_segment *run,
                                               kernel_preint_end *end)
 {

@@ -150,7 +150,7 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
     if (begin < end) kernel_fill_some(p, state, map, i, begin, end);
 }
 
-/* The fragment under construction of each ray, to which samples or segments are added front to back. */
+/* For each ray, the fragment to which samples or segments are being added front to back. */
 typedef struct kernel_blend {
     vm open;
     vf t_first, t_last, contact_in, contact_out;
@@ -158,9 +158,9 @@ typedef struct kernel_blend {
     /* used for segments: -ln(transmittance), and the accumulated rounding errors of the colour sums */
     vf depth, lost[3];
     vf light; /* share of the light that passes all of this rank's samples so far */
-    /* Used if all samples and segments are folded (render_fold.h). stretch: number of the last sample's interval of
-     * length 1 / FRAGMENT_INTERVALS; within: light that passes all samples so far. `light` is then the light at the end
-     * of the last interval. */
+    /* Used if all samples and segments of a ray are folded into few fragments (render_fold.h). interval_number: index
+     * of the interval, of length 1 / FRAGMENT_INTERVALS, that contains the last sample; within: light that passes all
+     * samples so far. `light` is then the light at the end of the last interval. */
     vf interval_number, within;
 } kernel_blend;
 
@@ -175,8 +175,9 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
     b->open = vm_andnot(b->open, closing);
 }
 
-/* Emits each sample or segment as a fragment for the fold, and marks those in front of which another rank may have
- * fragments. The current fragment then has no light of its own, so that nothing is emitted when it ends. */
+/* Emits each sample or segment as a fragment of its own, which render_fold.h folds later, and marks those in front of
+ * which another rank may have fragments. The current fragment then has no light of its own, so that nothing is emitted
+ * when it ends. */
 SIMD_INLINE void kernel_blend_separate(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out, const vf colour[3],
                                        vf clear)
 {
@@ -228,8 +229,8 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
         all += through * absorbed;
         through *= left;
     }
-    /* Several media at one position share the light that they absorb together, in proportion to what each would absorb
-     * alone. */
+    /* several media at one position absorb a common share of the light, which is divided among them in proportion to
+     * what each would absorb alone */
     const vf share = f->volume_count == 1 ? vf_set(1) : vf_select(vf_lt(vf_set(0), weight), all / weight, vf_set(0));
     for (int a = 0; a < 3; a++) colour[a] = sum[a] * share;
     *clear = through;

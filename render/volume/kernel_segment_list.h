@@ -44,14 +44,14 @@ typedef struct kernel_segments {
     int count[SIMD_WIDTH];
     kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* segments of each ray, unsorted */
     kernel_segment_double precise[SIMD_WIDTH][KERNEL_WINDOW];
-    bool is_double; /* whether the segments' ends are known in double */
+    bool is_double; /* set if the ends of segments are stored in double */
     int room;       /* capacity of each ray's list; half as large in double, so that a tile's lists stay in the cache */
     kernel_double_rays rays;
     /* Light of the segments that do not fit into a list because too many begin at the same t, as in meshes that overlap
      * many times. Such segments have no order; they are integrated here at once, and blended behind the window. */
     kernel_light unsorted_light;
     vf t_begin, t_end; /* depth interval of each ray's window */
-    bool is_shortened; /* set when t_end has been lowered since the flag was last cleared */
+    bool is_shortened; /* set if t_end has been lowered since the flag was last cleared */
     vf per_t;          /* number of unit distances (of the transfer function) per unit of t on each ray */
     kernel_cuts cuts;
 } kernel_segments;
@@ -104,8 +104,8 @@ SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_
     }
 }
 
-/* Finds the next depth at which transparent surfaces cut each ray, by searching all of the tile's fragments. It is used
- * if some ray has more such depths than there are rows. */
+/* Finds the next depth at which transparent surfaces cut each ray, by a search of all of the tile's fragments. It is
+ * used if a ray has more such depths than there are rows for them. */
 static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts, vf from, bool beyond)
 {
     float start[SIMD_WIDTH], next[SIMD_WIDTH];
@@ -323,19 +323,21 @@ typedef struct kernel_segment_state {
     float reach; /* upper bound of a ray's length in the cells, in unit distances */
 } kernel_segment_state;
 
-/* A ray's interval in the current cell: how the field is computed on it, and how accurate it must be. */
+/* The interval of a ray in the current cell, how the field is computed along it, and the accuracy that is required. */
 typedef struct kernel_cell_interval {
-    const kernel_map *map;   /* inverse map of the cell; NULL if the field is linear */
-    const kernel_cell *cell; /* the cell; NULL for a tet or a polyhedron; without a map the cell is constant */
+    const kernel_map *map; /* inverse map of the cell; NULL if the field is linear */
+    /* the cell; NULL for a tet or a polyhedron; if `map` is NULL, the cell's field is constant */
+    const kernel_cell *cell;
     const kernel_interval *interval;
     const kernel_precise_interval *precise; /* exact length and values of a tet's interval, or NULL */
     float cost; /* change of light per unit distance for a field error of 1; 0 if neither error nor mixing is limited */
-    int first_step, step_count; /* the opacity's steps that lie within the range of the cell's values */
-    /* whether a steep ramp, and a narrow ramp, lies within the range of the cell's values */
+    /* first of the opacity's steps that lie within the range of the cell's values, and their number */
+    int first_step, step_count;
+    /* set if a steep ramp, or a narrow ramp, lies within the range of the cell's values */
     bool is_steep, is_narrow;
 } kernel_cell_interval;
 
-/* Returns bounds of the transfer function over the values from low to high, except at steps. */
+/* Returns bounds of the transfer function over the values from low to high. Steps of the opacity are not included. */
 SIMD_INLINE kernel_bound kernel_bound_between(const kernel_pieces *t, float low, float high)
 {
     const float last = KERNEL_BOUND_BINS - 1;
@@ -358,7 +360,8 @@ SIMD_INLINE float kernel_bound_cost(const kernel_pieces *t, const kernel_bound *
     return simd_min(t->contrast * b->extinction_slope + b->extinction_high * b->colour_slope, 1e30f);
 }
 
-/* Computes the maximum of this cost over the cell's values, and finds the steps and ramps within these values. */
+/* Computes the maximum of this change of light over the cell's values, and finds the steps and ramps within these
+ * values. */
 SIMD_INLINE void kernel_cell_interval_bound(const kernel_segment_state *state, const float *values, int count,
                                             kernel_cell_interval *out)
 {
@@ -483,7 +486,7 @@ SIMD_INLINE vf kernel_cell_interval_subdivisions_curved(kernel_packet *p, const 
     const vf bend = vf_max(off.most, off.bend - 0.5f * KERNEL_VALUE_ROUNDING * largest);
     const vf distance = length * state->list->per_t, depth = distance * off.opacity;
     const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
-    const vf made = bend * cell_interval->cost * distance; /* the product of 3/2 and 2/3 is 1 */
+    const vf made = bend * cell_interval->cost * distance; /* a factor 3/2 and a factor 2/3 cancel each other */
     *deviation = off.most;
     const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
     const vf subdivisions = vf_min(wanted, vf_set(KERNEL_MAX_SUBDIVISIONS));
@@ -545,7 +548,7 @@ SIMD_INLINE vf kernel_cell_interval_subdivisions(kernel_packet *p, const kernel_
     return vf_clamp(-vf_floor(-subdivisions), vf_set(1), most);
 }
 
-/* Returns a + b; *lost: the rounding error of the sum, computed exactly (Knuth). */
+/* Returns the rounded sum a + b; *lost becomes the rounding error, computed exactly (Knuth). */
 SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
 {
     const vf sum = a + b, other = sum - a;
@@ -553,7 +556,7 @@ SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
     return sum;
 }
 
-/* Returns the part of a segment from `from` to `to`, which are shares of its length. */
+/* Returns the part of a segment between two positions, which are given as shares of the segment's length. */
 SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segment *whole, vf from, vf to)
 {
     const vf rise = (whole->v_out - whole->v_in) + (whole->rest_out - whole->rest_in);

@@ -1,6 +1,6 @@
-/* Small tets, one pixel-tet pair per lane: of a packet's rays most would miss such a tet. Tets are transformed
- * SIMD_WIDTH at a time in any case (kernel_transformed_tets.h). The pixels of their bounding boxes are listed, and
- * their crossings computed by the operations of kernel_crossings.h, to the same bits (kernel_tets.h). */
+/* Processes small tets with one pixel-tet pair per lane, because most of a packet's rays would miss such a tet. Tets
+ * are transformed SIMD_WIDTH at a time in any case (kernel_transformed_tets.h). The pixels of their bounding boxes are
+ * listed, and their crossings computed by the operations of kernel_crossings.h, to the same bits (kernel_tets.h). */
 #ifndef RENDER_KERNEL_SMALL_TETS_H
 #define RENDER_KERNEL_SMALL_TETS_H
 

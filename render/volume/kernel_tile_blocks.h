@@ -47,8 +47,9 @@ static inline void kernel_block_rays_setup(kernel_block_rays *r, const kernel_fr
 }
 
 /* Returns the blocks that may have a ray inside the tet, whose edge functions must be set. The middle's edge function
- * errs by at most as much as a ray's; on doubtful or projected rays the sign is decided within the same bound: twice
- * the bound is more than both together. NaN counts as met. */
+ * errs by at most as much as a ray's; for rays on which the sign is uncertain, or is computed from projected vertices,
+ * it is decided within the same bound: twice the bound is more than both together. If a number is NaN, the block counts
+ * as met. */
 SIMD_INLINE unsigned kernel_tet_blocks(const kernel_block_rays *r, const kernel_cell *c)
 {
     unsigned blocks = 0;

@@ -46,7 +46,7 @@ typedef struct kernel_tile_cells {
     kernel_tile_candidate *items;
     int count, open_count, next;
     int sorted, end_count, ends[KERNEL_SORT_ENDS];
-    kernel_cell cell;     /* the cell that is being traced */
+    kernel_cell cell;     /* the cell that is being traced on its own */
     kernel_map map;       /* inverse map of that cell */
     kernel_arrays arrays; /* arrays of the volume's field on the current mesh part */
     int plain_volume, plain_part;
@@ -56,8 +56,8 @@ typedef struct kernel_tile_cells {
     kernel_tile_trace_tets *trace_tets; /* NULL if each tet is processed on its own */
 } kernel_tile_cells;
 
-/* Transforms the fetched cell and prepares it for the rays of the blocks. Returns the blocks in which it may be
- * visible. is_pencil: the rays are the tile's own primary rays (kernel_packet.h). */
+/* Transforms the cell that has been read, and prepares it for the rays of the blocks. Returns the blocks in which it
+ * may be visible. is_pencil: the rays are the tile's own primary rays (kernel_packet.h). */
 SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_cells *cells, const grid *g,
                                             const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
 {
@@ -76,9 +76,9 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
     return meets;
 }
 
-/* Makes a batch's cell the tile's current cell, ready for the rays of all blocks, unless it already is. cell: its
- * index; lane: its lane in the batch. Returns false if it is invisible. *alone: the lane whose cell is the current one,
- * or -1. */
+/* Makes a cell of a batch the tile's current cell, which is traced on its own by the rays of all blocks. Does nothing
+ * if it already is the current cell. cell: the cell's index; lane: its lane in the batch. Returns false if it is
+ * invisible. *alone is the lane of the current cell, or -1. */
 static __attribute__((noinline, cold)) bool kernel_tile_ready_single(kernel_tile_trace *t, int volume, int part,
                                                                      uint32_t cell, bool is_pencil, int lane,
                                                                      int *alone)
@@ -214,9 +214,9 @@ SIMD_INLINE void kernel_tile_process_pending(kernel_tile_trace *t, kernel_tile_c
     while (cells->tets.count) kernel_tile_process_vector(t, cells, take);
 }
 
-/* Makes the volume and mesh part those of the pending tets; tets of another part are processed first. Returns whether
- * the part's tets are processed in lanes: they are not if the field is constant per cell, because it is not
- * interpolated then. */
+/* Sets the volume and the mesh part of the tets that are queued from now on; queued tets of another part are processed
+ * first. Returns whether the part's tets are processed in lanes. They are not if the field is constant per cell,
+ * because nothing is interpolated then. */
 SIMD_INLINE bool kernel_tile_set_tet_part(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
                                           kernel_tile_trace_cell *take)
 {
@@ -244,8 +244,8 @@ SIMD_INLINE void kernel_tile_enqueue_tet(kernel_tile_trace *t, kernel_tile_cells
 typedef struct kernel_cell_visitor {
     bool is_pencil;
     kernel_tile_trace_cell *take;
-    /* Queues a cell if its type is processed in lanes; else returns false. box: its pixels, in a candidate's format, or
-     * KERNEL_ALL_PIXELS for all of the blocks. */
+    /* Queues a cell, if cells of its type are processed in lanes; otherwise returns false. box: the cell's pixels, in a
+     * candidate's format, or KERNEL_ALL_PIXELS for all pixels of the blocks. */
     bool (*queue)(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box);
 } kernel_cell_visitor;
 
@@ -439,13 +439,13 @@ SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visit
 
 /* ---- windows of depth ---- */
 
-/* Returns the depth at which the tile's first cell begins; +inf if the cells are not known before. */
+/* Returns the depth at which the tile's first cell begins; +inf if cells are found only by traversing the trees. */
 SIMD_INLINE float kernel_tile_cells_near(const kernel_tile_trace *t)
 {
     return t->frame->volume_candidates ? t->thread->tile_cells->items[0].near : INFINITY;
 }
 
-/* Returns the blocks that some tree's bounding box may meet, and the range of depths of these boxes. */
+/* Returns the blocks that the bounding box of some tree may meet, and the range of these boxes' depths. */
 SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;

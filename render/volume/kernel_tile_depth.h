@@ -23,16 +23,17 @@
 #include "simd.h"
 
 typedef struct kernel_tile_depth {
-    /* Depth, relative to the last tile's begin, at which at least half of its rays that lost light were dark; +inf if
-     * they did not become dark. */
+    /* Depth, relative to the begin of the last tile, at which at least half of those of its rays that lost light were
+     * dark; +inf if they did not become dark. */
     float dark;
-    /* The state of the current tile: */
+    /* The following members describe the current tile. */
     float own_dark; /* depth, relative to `begin`, at which this tile became dark; +inf until it is known */
     float begin;    /* depth of the first cell if it is known, else of the first sample; +inf before any sample */
     bool has_met;   /* set if some ray of the tile has lost light */
-    float expected; /* expected further depth until the rays are dark, from the light left after the last window */
-    float before;   /* light of the brightest ray before the last window */
-    /* Numbers of the last window's rays that have lost light, and of those that are dark: */
+    /* expected further depth until the rays are dark, computed from the light left after the last window */
+    float expected;
+    float before; /* light of the brightest ray before the last window */
+    /* number of the last window's rays that have lost light, and number of those that are dark */
     int met, ended;
     /* first: least depth of their samples; last: greatest depth at which one of them became dark */
     float brightest, first, last;
@@ -94,7 +95,8 @@ SIMD_INLINE void kernel_depth_end_window(kernel_tile_depth *d, float depth)
     d->before = d->brightest > 0 ? d->brightest : 1;
     d->begin = simd_min(d->first, d->begin);
     d->has_met = d->has_met || d->met;
-    if (d->begin == INFINITY) d->dark *= 2; /* there is no sample yet, so the last tile's depth is a poor estimate */
+    /* the depth of the last tile is a poor estimate, because this tile has no sample yet */
+    if (d->begin == INFINITY) d->dark *= 2;
     if (d->own_dark == INFINITY && d->ended > 0 && 2 * d->ended >= d->met) d->own_dark = d->last - d->begin;
     kernel_depth_begin_window(d);
 }

@@ -47,7 +47,7 @@ typedef struct kernel_tile_segments {
     kernel_double_cell precise;
     kernel_local_segment_batch stretches;
     int volume;  /* index of the current volume */
-    float depth; /* depth of the next window; 0 if it is not known yet */
+    float depth; /* depth of the next window; 0 if it has not been determined yet */
 } kernel_tile_segments;
 
 /* ---- cells ---- */
@@ -106,9 +106,9 @@ static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const u
 
 /* ---- small tets ---- */
 
-/* Returns whether tets may be processed one ray-tet pair per lane. They may not in double, in which ends are computed
- * per packet; nor if tets are few enough to be binned by tile, because they are then so large that packets are as
- * fast. */
+/* Returns whether tets may be processed one ray-tet pair per lane. They may not if the ends of segments are computed in
+ * double, because that is done per packet. They also may not if they are few enough to be binned by tile, because tets
+ * are then so large that packets are as fast. */
 SIMD_INLINE bool kernel_tet_segments_fit(const kernel_frame *f)
 {
     return kernel_segments_fit(f) && !f->is_double && !f->volume_candidates;
@@ -178,7 +178,7 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_seg
     kernel_segments_set_double(p, &r->list, f->is_double && !f->job->separate_samples);
 }
 
-/* Makes the volume the packet's current one: sets its error limits and unit distances. */
+/* Prepares the packet for a volume: sets its error limits and its unit distances. */
 SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_tile_ray_segments *r, int volume)
 {
     const kernel_frame *f = p->frame;
@@ -202,7 +202,7 @@ SIMD_INLINE float kernel_tile_segments_front(kernel_tile_trace *t, kernel_tile_s
     return vf_reduce_min(front);
 }
 
-/* Collects the segments of the window that ends at `end`. */
+/* Stores, for all blocks, the segments of the window that ends at depth `end`. */
 SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_segments *s, unsigned blocks, float end)
 {
     for (int b = 0; b < KERNEL_BLOCKS; b++) {
@@ -240,8 +240,8 @@ SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, cons
     s->depth = (vf_reduce_min(least) - begin) * (0.75f * (float)room) / (float)most;
 }
 
-/* Makes the volume the current one of all packets. Sets the tile's t_near to the least depth at which a ray's window
- * begins; +inf if all rays have ended. */
+/* Prepares all packets for the volume. Sets the tile's t_near to the least depth at which a ray's window begins; +inf
+ * if all rays have ended. */
 SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets, int count,
                                          int volume, float near)
 {

@@ -189,8 +189,8 @@ static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uin
     kernel_tile_volume_trees(t, t->thread->tile_volume->volume, parts, count, blocks, kernel_tile_volume_leaf);
 }
 
-/* Sets up the packet for samples. Extends *first .. *last to include the numbers of its rays' samples between the
- * depths near and far. */
+/* Prepares the packet for samples of a volume. Extends *first .. *last to include the numbers of its rays' samples
+ * between the depths near and far. */
 SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samples *r, float near, float far,
                                           int *first, int *last)
 {
@@ -224,7 +224,7 @@ SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_tile_ray_samples *r
     return vf_reduce_max(vf_select(p->active, t_end, vf_set(-INFINITY)));
 }
 
-/* Collects the samples with numbers first .. last for all blocks. Returns false if no ray is lit any more. */
+/* Computes the samples with numbers first .. last for all blocks. Returns false if no ray receives light any more. */
 SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v, unsigned blocks, int first, int last)
 {
     const render_job *job = t->frame->job;

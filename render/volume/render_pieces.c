@@ -64,7 +64,7 @@ static int next_entry(const render_transfer *t, int i, double tolerance)
     return next;
 }
 
-/* An entry of the colour table that is kept, and its position in the domain. */
+/* An entry of the colour table that is not dropped, and its position in the domain. */
 typedef struct kept_entry {
     int index;
     double place;
@@ -72,7 +72,7 @@ typedef struct kept_entry {
 
 /* ---- ramps along a nonlinear scale ---- */
 
-/* Relative error of the extinction of ramps if the job allows no error. */
+/* Error bound of the extinction of ramps, relative to the extinction, if the job allows no error. */
 static const double exact_share = 1e-4;
 
 static double extinction_of(double opacity)
@@ -80,7 +80,7 @@ static double extinction_of(double opacity)
     return opacity < 1 ? fmin(-log1p(-opacity), steepest) : steepest;
 }
 
-/* A part of the ramp from point `ramp` to the next one. */
+/* A part of a ramp; the ramp goes from the opacity point with index `ramp` to the next one. */
 typedef struct ramp_part {
     const render_transfer *transfer;
     int ramp;
@@ -386,7 +386,8 @@ static void unite_variations(value_variation *a, const value_variation *b)
     a->extinction = b->extinction > a->extinction ? b->extinction : a->extinction;
 }
 
-/* Widens the swing by the piece's bounds between two of its values. behind: the minimum and maximum of light. */
+/* Widens the swing by the piece's bounds between two of its values. behind: the minimum and maximum of the light from
+ * behind. */
 static void variation_in_piece(value_variation *variation, const kernel_piece *p, double from, double to,
                                const double behind[2])
 {
@@ -446,8 +447,8 @@ static void sum_up_variation(const value_variation *s, double contrast, kernel_l
                                     .steepness = (float)fmin(fmax(-s->low[0], s->high[0]) * contrast, 1e30)};
 }
 
-/* Fills the table of bounds by the class of a range's width and its first bin. Wherever in its first bin a range of
- * this class begins, it ends in bin `wanted` or before it. */
+/* Fills the table of bounds, which is indexed by the class of a range's width and by the bin in which the range begins.
+ * Wherever in its first bin a range of this class begins, it ends in bin `wanted` or before it. */
 static void fill_variations(kernel_pieces *out, const double behind[2])
 {
     value_variation bins[KERNEL_VARIATION_BINS];

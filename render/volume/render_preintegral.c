@@ -14,7 +14,7 @@ enum { LEAST_BINS = 1024, MOST_BINS = 32768, CHANNELS = 4, COLOUR_LEVELS = 1023 
 
 /* Upper bound of the sum over all bins, in units, so that differences of sums fit in 32 bits. */
 static const double most_units = 0x1p30;
-static const double steepest = 1e6; /* the value of KERNEL_OPAQUE in kernel_integral.h */
+static const double steepest = 1e6; /* same value as KERNEL_OPAQUE in kernel_integral.h */
 static const double absorbed_share = 0.15, length_share = 0.05;
 
 /* Returns the number of bins for an error bound. Segments whose ends are closer than a distance proportional to the
@@ -27,7 +27,7 @@ static int bin_count_for(double max_error)
     return count;
 }
 
-/* The integrals over a bin, before they are rounded to integers. */
+/* The integrals of the transfer function over a bin, before they are rounded to integers. */
 typedef struct bin_sums {
     double sum[CHANNELS], low, high; /* minimum and maximum of the extinction in the bin */
     double colour_low[3], colour_high[3];
@@ -147,12 +147,13 @@ static int fill_bin(const kernel_pieces *pieces, int first, double begin, double
  * one bin. */
 static void fill_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
 {
-    last_extinction last = {-1, 0}; /* no transmittance is -1, so the cache begins empty */
+    /* an invalid value, because a transmittance is never -1; the cache is empty at the beginning */
+    last_extinction last = {-1, 0};
     int piece = 0;
     for (int i = 0; i < count + 2; i++)
         piece = fill_bin(pieces, piece, low + (i - 1) * width, low + i * width, &last, &bins[i]);
-    /* Computes the outermost bins again from the outermost pieces alone, so that rounding of the border does not
-     * include a neighbouring piece. */
+    /* The outermost bins are computed again from the outermost pieces alone, so that they do not include a part of a
+     * neighbouring piece by rounding of their border. */
     for (int end = 0; end < 2; end++) {
         const kernel_piece *p = &pieces->pieces[end ? pieces->count - 1 : 0];
         const double x = end ? low + (count + 0.5) * width : low - 0.5 * width;
@@ -201,7 +202,7 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
             e->own[n] = (float)((int32_t)(before[n] / units[n > 0]) - begin);
         }
         e->colour = pack_colour(bin, contrast);
-        /* a bin without extinction has no rounding */
+        /* the integrals of a bin without extinction are exactly 0 */
         const double rounding = 2 * (units[0] * contrast + units[1]) / width;
         e->table_error = (float)fmin((bin->high - bin->low) * 2 * contrast + bin->high * colour_change(bin) +
                                          (bin->high > 0 ? rounding : 0),
@@ -285,7 +286,7 @@ insitu_status render_preintegral_build(kernel_pieces *pieces, const render_trans
 {
     kernel_pieces exact;
     if (has_negative_colours(t)) return INSITU_OK;
-    /* With a nonlinear scale, pieces are not exact: their error replaces that of merged colours. */
+    /* with a nonlinear scale pieces are not exact, and their error replaces the error of merged colours */
     const double tolerance = t->scale == RENDER_LINEAR ? 0 : max_error / 8;
     const insitu_status status = render_pieces_build(&exact, t, tolerance, error);
     if (status != INSITU_OK) return status;
