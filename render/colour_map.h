@@ -2,7 +2,7 @@
 #ifndef RENDER_COLOUR_MAP_H
 #define RENDER_COLOUR_MAP_H
 
-/* Lists every built-in map: the suffix of its constant, and its name. */
+/* Lists every built-in map, by the suffix of its constant and by its name. */
 #define COLOUR_MAPS(X)                                                                                                 \
     X(VIRIDIS, "viridis")                                                                                              \
     X(PLASMA, "plasma")                                                                                                \

@@ -32,7 +32,8 @@ static double now(void)
  * memory of its own. */
 enum { TILE_FRAGMENTS = KERNEL_TILE * KERNEL_TILE };
 
-/* The destination of fragments: each writer's piece of a list, or a callback that receives them tile by tile. */
+/* The destination of fragments: a list, of which each writer has a piece, or a callback that receives them tile by
+ * tile. */
 typedef struct frame_end {
     fragment_writer *writers; /* one writer per thread */
     fragment_callback *take;  /* callback that receives fragments; NULL: fragments stay in the writers' lists */

@@ -172,8 +172,8 @@ void render_surface_range(const render_job *job, int surface, double range[2])
     }
 }
 
-/* Returns 1 / the width of the field's range on all parts, rounded to a power of two. If differences use samples of
- * other ranks, the range is that of all ranks. */
+/* Returns 1 / the width of the field's range on all parts, rounded to a power of two. The range is that of all ranks if
+ * normals by differences use samples of other ranks. */
 static double value_scale(const render_job *job, int surface)
 {
     double range[2];
@@ -387,7 +387,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     if (segments != INSITU_OK) render_unprepare(frame);
     const bool bins = job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
-    /* A tile's list of cells can be used by one turn only, because tracing consumes it. */
+    /* a tile's list of cells can be traced only once, because tracing consumes it */
     frame->bins_volume = bins && job->volume_count == 1 && frame->volume_intervals <= 1 &&
                          !(frame->has_segments && job->separate_samples);
     return segments;

@@ -59,7 +59,7 @@ SIMD_INLINE void kernel_local_rank(double (*const world)[8][SIMD_WIDTH], int cou
 }
 
 /* Does one step of a transposition of 16 × 16 floats, after vf_transpose() has transposed the 4 × 4 blocks: exchanges
- * blocks that are `apart` (4 or 8) vectors and lanes from each other. number: 0 .. 15, one per lane. */
+ * blocks whose distance from each other is `apart` (4 or 8) vectors and lanes. number: 0 .. 15, one per lane. */
 SIMD_INLINE void kernel_local_transpose(vf v[KERNEL_LOCAL_ROW], vi number, int apart)
 {
     const vi odd = -(number / apart & 1), low = number + (odd & (SIMD_WIDTH - apart)), high = low + apart;
@@ -158,11 +158,11 @@ typedef struct kernel_local_corners {
     vf at[4][4];
 } kernel_local_corners;
 
-/* The one or two cells to which the rays of a vector of 16 mostly belong, because rays are listed cell by cell. Any
- * number of each ray's own vertex is then read from the two cells' rows by one permutation. */
+/* The one or two cells to which the rays of a vector of 16 mostly belong, because rays are listed cell by cell. One
+ * permutation of the two cells' rows then reads a number of a vertex for each ray. */
 typedef struct kernel_local_pair {
     const float (*rows[2])[KERNEL_LOCAL_ROW]; /* the rows of data of the two cells */
-    /* per ray: SIMD_WIDTH if its cell is the second one, else 0; added to the index of a permutation */
+    /* added to the index of a permutation: SIMD_WIDTH for rays whose cell is the second one, and 0 for all others */
     vi second;
 } kernel_local_pair;
 

@@ -21,7 +21,8 @@
 #include "simd.h"
 
 enum {
-    /* prefetch distance in cells: vertex indices are prefetched that far ahead, then coordinates and values */
+    /* prefetch distance in cells: vertex indices are prefetched that many cells ahead, coordinates and values after
+     * them */
     KERNEL_LOCAL_AHEAD = 8,
     KERNEL_LOCAL_ROOM = SIMD_WIDTH + 2 * KERNEL_LOCAL_AHEAD
 };
@@ -38,12 +39,13 @@ typedef struct kernel_local_lanes kernel_local_lanes;
 
 /* Callbacks that process a vector of a queue's cells (kernel_local_run.h). */
 typedef struct kernel_local_stages {
-    bool is_pencil; /* the rays of cells that are processed alone are a pencil (kernel_packet.h) */
+    /* set if the rays of cells that are processed alone are the tile's own primary rays (kernel_packet.h) */
+    bool is_pencil;
     /* Transforms the fetched cells; returns the visible ones. *lanes: those of them that can be processed in lanes. */
     unsigned (*place)(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes);
     /* Processes the listed pixels, and empties the list. */
     void (*cast)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
-    /* Called when all pixels of the vector have been listed and processed. */
+    /* called after all pixels of a vector of cells have been listed and processed */
     void (*finish)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
 } kernel_local_stages;
 

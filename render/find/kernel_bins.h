@@ -5,7 +5,7 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* A range of rows or columns of pixels, relative to the tile's first one. */
+/* Rows or columns of pixels from `first` to `last`, counted from the tile's first one. */
 typedef struct kernel_tile_range {
     unsigned first, last;
 } kernel_tile_range;

@@ -32,7 +32,8 @@ typedef struct kernel_curved_lanes {
     /* at: vertex positions relative to the eye, along the camera's axes; f: vertex values minus the isovalue, scaled as
      * by kernel_cell_relative() */
     vf at[8][3], f[8];
-    /* lanes whose numbers are neither too large, too small nor NaN; cells of other lanes are tested one by one */
+    /* lanes whose numbers are neither too large nor too small for float32 nor NaN; cells of other lanes are tested one
+     * by one */
     vm usual;
 } kernel_curved_lanes;
 
@@ -123,7 +124,7 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, k
 static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lanes *l, int type,
                                                                kernel_curved_slab *out)
 {
-    if (kernel_is_box(type)) /* A constant type gives loops of constant length, which compilers unroll. */
+    if (kernel_is_box(type)) /* the type is a constant, so that loops have constant lengths and compilers unroll them */
         kernel_curved_lanes_slab_of(l, kernel_curved_types[KERNEL_SHAPE_HEX], out);
     else
         kernel_curved_lanes_slab_of(l, type, out);
@@ -254,8 +255,8 @@ SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int ver
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     kernel_curved_lanes_transform(s, c, vertices, &l);
     const vf size = kernel_curved_lanes_values(s, v, vertices, &level, &l);
-    /* `power` has the bits of the power of two that scales the largest value to near 1: its exponent is the negated
-     * one. */
+    /* the bits of the power of two that scales the largest value to near 1: its exponent is the negated exponent of the
+     * value */
     const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
     kernel_curved_lanes_slab(&l, c->type, &slab);

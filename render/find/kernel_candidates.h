@@ -29,7 +29,7 @@
 #include "mmbvh.h"
 #include "simd.h"
 
-/* Adds those of the pending cells, which are all of one type, to the candidates that may be visible. */
+/* Adds those of the pending cells that may be visible to the candidates. The pending cells are all of one type. */
 static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
@@ -103,7 +103,7 @@ static void kernel_find_flush(kernel_finder *s)
     kernel_find_all_crossed(s);
 }
 
-/* Nodes are tested KERNEL_FRONT at a time, so that their prefetches overlap in time. */
+/* Number of nodes that are tested at a time, so that their prefetches overlap in time. */
 enum { KERNEL_FRONT = 16, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
 
 /* A list of nodes, each stored as 2 * node, plus 1 if the node lies completely in the picture. */

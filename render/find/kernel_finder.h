@@ -76,7 +76,7 @@ typedef struct kernel_finder {
     bool (*grow)(kernel_candidate_list *list);
     int part;
     uint32_t source;     /* candidates' `source` number for the layer's first isovalue */
-    kernel_tile picture; /* The whole picture, treated as one tile whose axis is the direction of view. */
+    kernel_tile picture; /* the whole picture as a single tile whose axis is the direction of view */
     kernel_planes planes;
     float t_near, column_scale, row_scale, column_0, row_0;
     int first[2], last[2]; /* first and last column, and row, of pixels to which candidates are clipped */
@@ -180,7 +180,7 @@ SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent 
     if (depth.high + pad < s->t_near) return false;
     out->near = depth.low - pad;
     out->far = depth.high + pad;
-    if (!(out->near > -INFINITY)) out->near = -INFINITY; /* the comparison also replaces NaN */
+    if (!(out->near > -INFINITY)) out->near = -INFINITY; /* the comparison is negated so that it also replaces NaN */
     if (!(out->far < INFINITY)) out->far = INFINITY;
     if (!camera->is_orthographic && !(depth.low - s->t_near > 0.01f * size)) {
         out->x0 = (uint16_t)s->first[0];
@@ -239,7 +239,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     const grid *g = s->frame->job->parts[s->part].cells;
     kernel_outline o = {0};
     kernel_candidate candidate = {.cell = index, .source = s->source};
-    /* The outline of a polyhedron is the eight corners of its vertices' bounding box. */
+    /* the outline is the eight corners of the bounding box of the polyhedron's vertices */
     float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     grid_walk walk = grid_walk_cell(g, index);
     int64_t vertex;

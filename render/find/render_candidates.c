@@ -20,7 +20,7 @@
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
 
-/* Number of cells per pixel of their trees' bounding boxes above which cells count as small. For surfaces only the
+/* Number of cells per pixel of their trees' bounding boxes above which cells are called small. For surfaces only the
  * cells in leaves that isovalues may cross are counted (docs/development/decisions/find.md). */
 enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
 
@@ -84,7 +84,7 @@ typedef struct bin_list {
 } bin_list;
 
 struct kernel_bins {
-    int list_count; /* number of lists: one per thread that searched */
+    int list_count; /* number of threads that have searched, each of which has a list */
     bin_list lists[];
 };
 
@@ -127,7 +127,8 @@ static bool bin_list_fill(bin_list *bin, const kernel_candidate_list *list, int6
     uint64_t sum = 0;
     for (int64_t tile = 0; tile < tiles; tile++) {
         const uint32_t count = starts[1 + tile];
-        starts[1 + tile] = (uint32_t)sum; /* after bin_tiles() has advanced it, it is the begin of the next tile */
+        /* bin_tiles() advances this from the begin of the tile's cells to that of the next tile's cells */
+        starts[1 + tile] = (uint32_t)sum;
         sum += count;
     }
     if (sum > (uint64_t)most) return false;
@@ -261,7 +262,7 @@ static bool is_of_small_cells(const kernel_frame *f)
     return measure_parts(f, f->job->volumes[0].field.ranges, &c) && c.cells > SMALL_CELLS * c.pixels;
 }
 
-/* Counts over sampled leaves: their cells, and the cells that isovalues may cross, counted once per isovalue. */
+/* Counts over a sample of leaves: cells, and cells that isovalues may cross, once per isovalue. */
 typedef struct leaf_sample {
     double cells, crossed;
 } leaf_sample;
@@ -285,8 +286,8 @@ static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int pa
     }
 }
 
-/* If opaque surfaces have several cells per pixel, most of them are hidden or lie between pixels; tiles that traverse
- * the trees themselves then fetch fewer. */
+/* Returns whether opaque surfaces have several cells per pixel. Most of these cells are hidden or lie between pixels,
+ * so that tiles which traverse the trees themselves read fewer of them. */
 bool render_surfaces_are_small(const kernel_frame *f)
 {
     coverage c;
@@ -294,13 +295,13 @@ bool render_surfaces_are_small(const kernel_frame *f)
     int values = 0;
     if (f->has_transparent || !measure_parts(f, NULL, &c)) return false;
     const double all = (c.all[0].high - c.all[0].low) * (c.all[1].high - c.all[1].low);
-    /* at least one tile, because parts may be seen edge on */
+    /* area of at least one tile, because parts may be seen edge on */
     const double pixels = fmax(fmin(c.pixels, all), KERNEL_TILE * KERNEL_TILE);
     for (int s = 0; s < f->surface_count; s++) values += f->surfaces[s].layer->value_count;
     if (!(values * c.cells > SMALL_CROSSED * pixels)) return false;
     for (int s = 0; s < f->surface_count; s++) {
         leaf_sample leaves = {0, 0};
-        double own = 0; /* number of cells of the parts that have the field */
+        double own = 0; /* number of cells of the parts on which the field exists */
         for (int part = 0; part < f->job->part_count; part++) {
             const double held = (double)f->job->parts[part].tree->cell_count;
             if (!f->surfaces[s].layer->field.ranges[part].low) continue;

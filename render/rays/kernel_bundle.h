@@ -2,9 +2,10 @@
  *
  * The cells that such a ray meets must not depend on the partition. Rays are traced by the functions for primary rays,
  * which decide everything about a face from its vertices alone once these are in tile space. So the tile space must
- * depend only on the ray. For a hit's hemisphere the eye is the hit, and depth is along its normal. For a light, depth
- * is along the light's direction, and tiles form a lattice across it; a ray belongs to the tile in which it lies. Rays
- * of one tile space are a bundle, and the result does not depend on which of them are traced together. */
+ * depend only on the ray. For the rays of a hit's hemisphere, the eye of the tile space is the hit, and depth is
+ * measured along the hit's normal. For rays to a light, depth is measured along the light's direction, and tiles form a
+ * lattice across it; a ray belongs to the tile in which it lies. Rays of one tile space are a bundle, and the result
+ * does not depend on which of them are traced together. */
 #ifndef RENDER_KERNEL_BUNDLE_H
 #define RENDER_KERNEL_BUNDLE_H
 
@@ -17,7 +18,8 @@
 enum { KERNEL_BUNDLE_RAYS = 64 };
 
 typedef struct kernel_bundle {
-    kernel_tile tile; /* Only the tile's centre and radius are used; the bundle has its own rays. */
+    /* tile of the bundle; only its centre and radius are used, because the bundle has rays of its own */
+    kernel_tile tile;
     int count;
     /* One bit per ray: set while the ray is not blocked. Only these rays are traced; in the end they are the unblocked
      * ones. */

@@ -94,7 +94,7 @@ static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel
     return count + 1;
 }
 
-/* Returns interval `number`, counted from 0, of those that a set of clips keeps of a ray behind the depth `begin`;
+/* Returns interval `number`, counted from 0, among those that a set of clips leaves of a ray behind the depth `begin`;
  * KERNEL_NO_PART if there are fewer. clips: one bit per clip of the job. */
 static inline kernel_ray_part kernel_clip_part(const render_job *job, uint32_t clips, const kernel_clip_ray *ray,
                                                double begin, int number)

@@ -11,8 +11,8 @@
 #include "render.h"
 #include "simd.h"
 
-/* Returns the transmittance of a sample with this opacity per unit distance, (1 - opacity)^exponent; *absorbed: 1 minus
- * it, without cancellation. */
+/* Returns the transmittance of a sample with this opacity per unit distance, (1 - opacity)^exponent. *absorbed becomes
+ * 1 minus the transmittance, computed without cancellation. */
 SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
 {
     const vf clear = 1.0f - opacity;
@@ -64,7 +64,7 @@ SIMD_INLINE void kernel_table_at(const kernel_transfer *t, vf along, vf out[3])
     const vf part = place - whole;
     const vi index = vi_from_vf(whole) * 3;
     int32_t at[SIMD_WIDTH];
-    vf first[4], last[4]; /* three colour numbers of each of two neighbouring table entries */
+    vf first[4], last[4]; /* red, green and blue of each of two neighbouring table entries */
     vi_store(at, index);
     vf_gather_rows(t->colours, at, first);
     vf_gather_rows(t->colours + 2, at, last);
@@ -98,7 +98,8 @@ SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)
 
 SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
 {
-    /* Scaling the vector by its largest component first prevents overflow for gradients of fields of 1e30 or 1e-30. */
+    /* the vector is divided by its largest component first, which prevents overflow for gradients of fields of 1e30 or
+     * 1e-30 */
     const vf largest = vf_max(vf_abs(v[0]), vf_max(vf_abs(v[1]), vf_abs(v[2])));
     *is_zero = vm_not(vf_lt(vf_set(0), largest));
     const vf scale = 1.0f / vf_select(*is_zero, vf_set(1), largest);

@@ -16,8 +16,8 @@ typedef struct kernel_hit_cells {
 
 typedef struct kernel_hits {
     vm found;
-    /* Direction of the gradient in camera axes, of any length. With normals from vertices (RENDER_VERTEX) it holds the
-     * hit's reference coordinates in its cell until the tile ends. */
+    /* A vector of any length along the gradient, in camera axes. With normals from vertices (RENDER_VERTEX) it holds
+     * the hit's reference coordinates in its cell until the tile ends. */
     vf normal[3];
     kernel_hit_cells cells; /* set only with normals from vertices (RENDER_VERTEX) */
     vf colour[3];           /* colour of each hit before lighting */

@@ -27,19 +27,19 @@ typedef struct kernel_packet {
     bool is_pencil;
     vf u, v;
     vf t_near; /* depth at which the rays begin: that of the eye's plane, or clip_in if that is farther */
-    vf t_far;  /* depth of the nearest opaque hit so far; initially +inf or clip_out */
+    vf t_far;  /* depth at which the rays end: that of the nearest opaque hit so far; initially +inf or clip_out */
     uint32_t pixel[SIMD_WIDTH];
     /* unit vector from the scene to the eye in camera axes, for shading; valid if has_view is set */
     vf view[3];
-    /* Members from here on are set by kernel_packet_complete(), only if rays of the packet traverse trees on their own.
-     * In tree space the ray meets a plane at t = plane * inverse - shift. */
+    /* The members from here on are needed only by rays that traverse trees packet by packet; kernel_packet_complete()
+     * sets them. In tree space a ray meets a plane at t = plane * inverse - shift. */
     vf inverse[3], shift[3];
     float pad; /* margin by which boxes are extended: more than all rounding in the box test */
     float centre_direction[3];
     /* samples are at t = sample_base + m * sample_step for integers m >= sample_first */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
-    /* The interval of the ray's depths that clips keep for volumes; -inf and +inf without clips. */
+    /* The interval of depths that clips leave of each ray for volumes; -inf and +inf if there are no clips. */
     vf clip_in, clip_out;
     /* Exact length of that interval, divided by the rounded one, clip_out - clip_in. The two differ much if a ray
      * grazes a sphere. */
@@ -152,8 +152,9 @@ static inline void kernel_packet_view(kernel_packet *p)
     for (int a = 0; a < 3; a++) p->view[a] = vf_load(view[a]);
 }
 
-/* Returns the number of the first sample, which is the one at the eye and at most 0. Samples are numbered from one near
- * the depth origin, so that float32 represents their depths well; the numbers depend only on the camera. */
+/* Returns the number of the first sample of a ray, which is the sample at the eye; it is at most 0. Numbers are counted
+ * from a sample near the depth origin, so that float32 represents the samples' depths well. They depend only on the
+ * camera. */
 static inline int kernel_sample_first(const kernel_frame *f)
 {
     const double count = floor(f->depth_shift / f->scaled_step);
@@ -210,8 +211,8 @@ static inline void kernel_packet_clip(kernel_packet *p)
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
 }
 
-/* Restricts the packet's rays to interval number `turn`, counted from 0, of those that the clips of volumes keep. All
- * surfaces must have been traced before. */
+/* Restricts each of the packet's rays to interval number `turn`, counted from 0, of the intervals that the clips of
+ * volumes leave. All surfaces must have been traced before. */
 static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
 {
     if (turn == 0) {

@@ -107,7 +107,7 @@ static inline double kernel_border_y(const kernel_frame *f, const kernel_tile *t
     return kernel_row(f, tile->y0 + n * KERNEL_BLOCK - 0.5) - tile->centre_y;
 }
 
-/* Slopes (perspective) or offsets (orthographic) of all borders and of the tile's central direction. */
+/* Slopes (perspective) or offsets (orthographic) of all borders between blocks, and of the tile's central direction. */
 typedef struct kernel_borders {
     double x[KERNEL_BLOCKS_ACROSS + 1], y[KERNEL_BLOCKS_ACROSS + 1];
     double centre_x, centre_y;

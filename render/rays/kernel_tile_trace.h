@@ -21,15 +21,16 @@ typedef struct kernel_tile_trace {
     kernel_thread *thread;
     kernel_tile tile;
     kernel_planes tree_planes, tile_planes;
-    unsigned wanted;        /* mask of the blocks with pixels to trace */
-    unsigned begun;         /* mask of the blocks whose packets have been set up */
-    int turn;               /* number of the interval of each ray on which volumes are being traced (kernel_clip.h) */
+    unsigned wanted; /* mask of the blocks with pixels to trace */
+    unsigned begun;  /* mask of the blocks whose packets have been set up */
+    /* number of the interval, counted from 0, in which volumes are being traced on each ray (kernel_clip.h) */
+    int turn;
     int64_t first_fragment; /* index of the tile's first fragment in the thread's list */
     float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* farthest t_far of the rays of each block, one block per lane */
     /* t_far of each pixel, row by row; kept only if the tile traverses the trees for surfaces */
     float pixel_far[KERNEL_TILE * KERNEL_TILE];
-    /* The surface layer that is being traced: */
+    /* The following members describe the surface layer that is being traced. */
     const kernel_surface *surface;
     int layer;
     struct kernel_cell *cell;
@@ -39,7 +40,7 @@ typedef struct kernel_tile_trace {
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;
 
-/* Returns the mask of blocks in which some ray has no hit nearer than this depth. */
+/* Returns a mask of the blocks that contain a ray without a hit nearer than this depth. */
 SIMD_INLINE unsigned kernel_blocks_beyond(const kernel_tile_trace *t, float near)
 {
     unsigned bits = 0;
@@ -94,8 +95,8 @@ SIMD_INLINE void kernel_block_update_far(kernel_tile_trace *t, int block)
     }
 }
 
-/* Returns whether some pixel of the box has no hit nearer than this depth. The box has four bits each for first and
- * last column, first and last row. */
+/* Returns whether a box of pixels contains a pixel without a hit nearer than this depth. The box has four bits each for
+ * first and last column, first and last row. */
 SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, float near)
 {
     const unsigned columns = (2u << (box >> 4 & 15)) - (1u << (box & 15));
@@ -183,7 +184,7 @@ SIMD_INLINE kernel_placement kernel_tile_classify_node(const kernel_tile_trace *
     placement = kernel_box_placement(&t->tree_planes, tree, node);
     placement.blocks &= placement.far < t->t_near ? 0 : blocks;
     if (placement.blocks) {
-        /* Prefetches what is read next: a leaf's cells, or an inner node's children. */
+        /* Prefetches what the traversal reads next: the cells of a leaf, or the children of an inner node. */
         const int64_t ref = mmbvh_node_ref(tree, node);
         if (mmbvh_node_count(tree, node)) {
             __builtin_prefetch(tree->cells + ref);
@@ -293,11 +294,11 @@ SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
                      at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
 }
 
-/* Rays of pixels, each with its own cell. */
+/* Rays of a vector of pixels, each with a cell of its own. */
 typedef struct kernel_lane_rays {
     vi lane, at; /* lane that holds the ray's cell; position of its pixel among the tile's packets */
     kernel_rays rays;
-    /* for rays of a list */
+    /* lanes that have a ray; set, like u and v, if the rays are those of a list */
     vm active;
     vf u, v; /* slope of the ray or, if the camera is orthographic, its origin */
     vf far;  /* nearest hit so far; set only when surfaces are traced */
@@ -336,7 +337,7 @@ static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
 SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
 {
     const render_surface_layer *l = t->surface->layer;
-    /* Rays with clips begin at different depths, which only packets store. */
+    /* rays with clips are not processed in lanes, because they begin at different depths, which only packets store */
     if (t->frame->common_clips || t->surface->own_clips || t->frame->job->paint == RENDER_VALUES) return false;
     if (l->lines && l->lines->is_alone) return false;
     return t->layer < t->frame->opaque_count && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;

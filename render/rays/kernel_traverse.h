@@ -31,7 +31,7 @@ typedef struct kernel_descent {
     vf t_low;
     const vf *t_high;
     kernel_leaf *leaf;
-    void *state; /* passed to leaf() */
+    void *state; /* argument that is passed to leaf() */
 } kernel_descent;
 
 SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbvh_ranges *ranges,

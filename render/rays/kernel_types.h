@@ -11,10 +11,11 @@
 
 enum {
     KERNEL_TILE = 16,
-    KERNEL_TILES_PER_TASK = 4, /* number of consecutive tiles, row by row, that one thread draws before it takes more */
+    KERNEL_TILES_PER_TASK = 4, /* number of consecutive tiles, row by row, that a thread draws as one task */
     KERNEL_BLOCK = 4,          /* pixels along a block's side */
     KERNEL_MAX_GROUP = RENDER_MAX_GROUP,
-    KERNEL_MAX_INTERVALS = RENDER_MAX_ISOVALUES /* of a volume's visible values, or of a layer's isovalues */
+    /* maximum number of intervals of visible values of a volume, or of isovalues of a layer */
+    KERNEL_MAX_INTERVALS = RENDER_MAX_ISOVALUES
 };
 
 _Static_assert((int)KERNEL_MAX_INTERVALS >= (int)RENDER_MAX_INTERVALS, "a volume's intervals fit");
@@ -40,7 +41,7 @@ enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64, KERNEL_VARIATION_BINS = 
 enum {
     KERNEL_PIECE_LOW,
     KERNEL_PIECE_HIGH,
-    KERNEL_PIECE_LOW_REST, /* what rounding the piece's ends to kernel_real has lost; 0 unless has_rests */
+    KERNEL_PIECE_LOW_REST, /* rounding errors of the piece's two ends as kernel_real; 0 unless has_rests is set */
     KERNEL_PIECE_HIGH_REST,
     KERNEL_PIECE_OPACITY,
     KERNEL_PIECE_OPACITY_HIGH, /* opacity at the upper end */
@@ -151,8 +152,10 @@ typedef struct kernel_visible_values {
  * shift. */
 typedef struct kernel_scale {
     render_scale kind;
-    float threshold; /* symlog: s is linear for magnitudes up to it; log: smaller values are raised to it */
-    float inverse;   /* 1 / threshold */
+    /* symmetric logarithmic scale: s is linear for magnitudes up to it; logarithmic scale: smaller values are raised to
+     * it */
+    float threshold;
+    float inverse; /* 1 / threshold */
     float slope, shift;
 } kernel_scale;
 
@@ -161,7 +164,7 @@ typedef struct kernel_scale {
  * digits. Opacity is the first point's plus a sum of ramps (a step is a ramp of infinite slope), by position in the
  * colour table. */
 typedef struct kernel_transfer {
-    double low, inverse_width; /* map a value x to the domain: (x - low) * inverse_width */
+    double low, inverse_width; /* a value x is mapped to the domain by (x - low) * inverse_width */
     const float *colours;
     int colour_count;
     kernel_scale scale;
@@ -179,7 +182,7 @@ typedef struct kernel_transfer {
 /* The levels of contour lines, in a domain in which the first level is 0 and the last, if there are several, is 1. gap:
  * distance from each level to its nearest neighbour, infinite if there is none. */
 typedef struct kernel_lines {
-    double low, inverse_width; /* map a value x to the domain: (x - low) * inverse_width */
+    double low, inverse_width; /* a value x is mapped to the domain by (x - low) * inverse_width */
     int count;
     float level[RENDER_MAX_LINES], gap[RENDER_MAX_LINES];
 } kernel_lines;
@@ -187,8 +190,8 @@ typedef struct kernel_lines {
 typedef struct kernel_surface {
     const render_surface_layer *layer;
     kernel_visible_values visible_values; /* the visible values: the layer's isovalues */
-    kernel_transfer colour;               /* transfer function of the colour field; set if layer->colour_map */
-    kernel_lines lines;                   /* contour lines on the surface; set if layer->lines */
+    kernel_transfer colour;               /* transfer function of the colour field; set if the layer has a colour_map */
+    kernel_lines lines;                   /* contour lines on the surface; set if the layer has lines */
     uint32_t own_clips;  /* one bit per clip of this layer that is not among the frame's common_clips */
     uint32_t first_kind; /* fragment kind of the layer's first isovalue */
     double value_scale;  /* power of two that scales the field's range to near 1, for differences */
@@ -203,8 +206,8 @@ typedef struct kernel_candidate {
     uint16_t x0, x1, y0, y1;
 } kernel_candidate;
 
-/* A candidate in one tile. blocks: one bit per block that it may meet. box: first and last column, first and last row
- * of its pixels within the tile, 4 bits each, from bit 0 on. */
+/* A candidate as stored for one tile. blocks: one bit per block that it may meet. box: first and last column, first and
+ * last row of its pixels within the tile, 4 bits each, from bit 0 on. */
 typedef struct kernel_tile_candidate {
     float near;
     union {
@@ -227,7 +230,7 @@ typedef struct kernel_bin {
 /* Returns a mask with the bit of each block that lies in one of the given columns and rows of blocks. */
 static inline unsigned kernel_blocks_at(unsigned columns, unsigned rows)
 {
-    /* spread[rows] has a bit for each row, at the row's first block. */
+    /* spread[rows] is a mask that has, for each row in the mask `rows`, the bit of the row's first block */
     static const uint16_t spread[1 << KERNEL_TILE / KERNEL_BLOCK] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101,
                                                                      0x0110, 0x0111, 0x1000, 0x1001, 0x1010, 0x1011,
                                                                      0x1100, 0x1101, 0x1110, 0x1111};
@@ -237,7 +240,7 @@ static inline unsigned kernel_blocks_at(unsigned columns, unsigned rows)
 /* A list of candidates is a chain of chunks, which are never moved in memory. */
 typedef struct kernel_candidate_chunk {
     struct kernel_candidate_chunk *before;
-    int64_t count; /* set when the chunk is full */
+    int64_t count; /* number of items; set when the chunk is full */
     kernel_candidate items[];
 } kernel_candidate_chunk;
 
@@ -248,7 +251,8 @@ typedef struct kernel_candidate_list {
     /* number of candidates, over all chunks, that meet each of the picture's tiles, row by row */
     uint32_t *counts;
     int tile_columns;
-    bool is_full;   /* set if no more candidates are added: memory ran out, or the bound is reached */
+    /* set if no more candidates can be added, because memory ran out or the maximum number is reached */
+    bool is_full;
     int64_t *bound; /* number of candidates that may still be added, shared by all threads' lists */
 } kernel_candidate_list;
 
@@ -287,12 +291,12 @@ typedef struct kernel_frame {
      * own. */
     int volume_intervals;
     bool has_transparent;
-    bool is_binned;     /* whether surfaces' cells are binned by tile, if that pays */
-    bool bins_volume;   /* whether the cells of the only volume are binned by tile */
-    bool needs_planes;  /* whether tiles traverse the trees, for which they need planes */
-    bool needs_packets; /* whether single packets traverse trees too, which normals by differences need */
-    bool has_segments;  /* whether volumes are integrated by segments; otherwise they are sampled */
-    /* whether ends of intervals in tets and of bisected intervals are computed in double (kernel_double.h) */
+    bool is_binned;     /* set if the cells of surfaces are binned by tile, unless there are too many */
+    bool bins_volume;   /* set if the cells of the only volume are binned by tile */
+    bool needs_planes;  /* set if tiles traverse the trees, for which they need planes */
+    bool needs_packets; /* set if single packets traverse trees as well, which normals by differences require */
+    bool has_segments;  /* set if volumes are integrated by segments; otherwise they are sampled */
+    /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_double.h) */
     bool is_double;
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
     /* Limits for segments: the error allowed for the field and for mixing with other volumes; length of the scene in
@@ -315,7 +319,7 @@ typedef struct kernel_thread {
     struct kernel_finder *finder;
     /* current tile's candidates of surfaces and of the volume; used only if the frame bins them */
     kernel_bin bin, volume_bin;
-    uint32_t serial; /* the tile's number, from 1; cached cells with another number are stale */
+    uint32_t serial; /* number of the current tile, counted from 1; cached cells of other tiles are out of date */
     fragment_list *out;
     /* Ensures space for `more` more items in the list; returns false if memory ran out. */
     bool (*reserve)(fragment_list *list, int64_t more);

@@ -2,7 +2,8 @@
 
 #include "render.h"
 
-/* hypot() is used because it also works for vectors whose squares overflow or underflow. */
+/* Returns the length of a vector. hypot() is used because it also works for vectors whose squares overflow or
+ * underflow. */
 static double length3(const double v[3])
 {
     return hypot(hypot(v[0], v[1]), v[2]);
@@ -50,8 +51,8 @@ void render_camera_ray(const render_camera *camera, int x, int y, double base[3]
     }
 }
 
-/* Sample k lies in column k of a grid of count × count cells, with one sample per row; rows are chosen so that samples
- * in neighbouring columns are far apart. */
+/* sample k lies in column k of a grid of count × count cells, with one sample per row; rows are chosen so that samples
+ * in neighbouring columns are far apart */
 void render_camera_sample(int count, int k, double offset[2])
 {
     static const unsigned char few[4] = {1, 3, 0, 2};

@@ -24,7 +24,7 @@ static inline double hit_dot(const double a[3], const double b[3])
  * is_wanted() has values. */
 render_box hit_box(const render_job *job, bool (*has_active_pixel)(const render_surface_layer *layer));
 
-/* Returns axes of unit length, of which `forward` is the unit vector n. */
+/* Returns an orthonormal set of axes whose `forward` is the unit vector n. */
 hit_axes hit_axes_around(const double n[3]);
 
 /* Unpacks the unit normal of an unlit fragment from its octahedral encoding. */
