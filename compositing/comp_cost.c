@@ -28,8 +28,8 @@ comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const com
         cost.messages += partners;
         cost.bytes += share * bytes;
         cost.seconds += latency + 2 * overhead * partners + (is_within ? m->node_gap : m->gap) * share * bytes;
-        /* A sparse round ends with a barrier, modelled as a dissemination barrier: log2(ranks) exchanges between pairs
-         * of ranks. */
+        /* a sparse round ends with a barrier, which is modelled as log2(ranks) exchanges between pairs of ranks (a
+         * dissemination barrier) */
         if (!comp_route_is_dense(route, i)) cost.seconds += ceil(log2(route->ranks)) * (m->latency + 2 * m->overhead);
     }
     if (route->ranks > route->owners) {

@@ -37,8 +37,8 @@ comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const com
 /* Returns the route that takes the least time. radix is the same as for comp_route_of(). */
 comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine);
 
-/* Returns the exact number of messages that a place sends in the rounds of a route if all rounds are dense and no
- * message has to be divided. */
+/* Returns the exact number of messages that the rank at a place sends in all rounds of a route, if all rounds are dense
+ * and no message has to be divided. */
 int64_t comp_route_messages(const comp_route *route, int place);
 
 #endif

@@ -158,8 +158,8 @@ static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *err
     }
     in->pixels = base_alloc((size_t)pixels * sizeof *in->pixels);
     if (samples > out->capacity) {
-        const int64_t capacity = out->count ? samples + samples / 2 : samples; /* where a frame is composited in turns
-                                                                                  (session_frame.c), it grows again */
+        /* a frame that is composited in turns (session_frame.c) adds samples in each turn, so that some are spare */
+        const int64_t capacity = out->count ? samples + samples / 2 : samples;
         insitu_deep_sample *grown = base_realloc(out->samples, (size_t)capacity * sizeof *grown);
         if (grown) {
             out->samples = grown;

@@ -9,8 +9,8 @@
  * thread may process. */
 enum { ROWS = 32 };
 
-/* Stores for each channel, in one byte each, whether two rows of pixels differ. sRGB codes are nearly the square root
- * of the light, and |root a - root b| > c if (a - b)^2 > 2 c^2 (a + b), which needs no square root. */
+/* Compares two rows of pixels, and stores one byte per channel, nonzero if the channel differs. sRGB codes are nearly
+ * the square root of the light, and |root a - root b| > c if (a - b)^2 > 2 c^2 (a + b), which needs no square root. */
 static void compare_rows(const float *restrict a, const float *restrict b, int64_t pixels, unsigned char *restrict out)
 {
     const float limit = 0.0018f;

@@ -11,7 +11,7 @@ enum {
     COMP_ROWS = 32, /* maximum number of rows of a strip */
     COMP_STRIP_PIXELS = COMP_LANES * COMP_ROWS,
     COMP_TARGET_BLOCKS = 2048,    /* target number of blocks, so that a message of all claims is small */
-    COMP_BLOCKS_PER_RANK = 60,    /* many ranks get at least this many blocks each, on average */
+    COMP_BLOCKS_PER_RANK = 60,    /* minimum number of blocks per rank, on average, if there are many ranks */
     COMP_COUNTED_RANKS_MAX = 1024 /* beyond this number of ranks the number of blocks does not increase */
 };
 
@@ -111,7 +111,7 @@ static inline int32_t comp_priority_with_rank(int32_t priority, int rank)
     return (int32_t)(((uint32_t)priority & ~0xfffffu) | ((uint32_t)rank & 0xfffff));
 }
 
-/* Combines the claim with the sum. */
+/* Adds the claim to the combined claim of several ranks. */
 static inline void comp_claim_add(const comp_claim *claim, comp_claim *sum)
 {
     const uint32_t fragments = sum->fragments + claim->fragments;

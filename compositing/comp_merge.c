@@ -395,7 +395,7 @@ void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_interval_
     }
 }
 
-/* Fragments in darkness do not count, because only some partitions produce them. */
+/* Fragments in darkness are not tested, because only some partitions produce them. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count)
 {
     float transmittance = 1;

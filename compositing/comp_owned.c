@@ -12,14 +12,14 @@
 #include "memory.h"
 #include "region.h"
 
-/* The work space of a thread; its lists are kept from strip to strip. */
+/* Working memory of a thread; its lists are kept from strip to strip. */
 typedef struct merge_scratch {
     comp_sheet joined, other,
         pixels; /* sheet with all fragments merged so far, the sheet that is merged next, and the finished pixels */
     fragment_list remaining,
         listed;                /* fragments that do not fit in the sheet; their .pixel is the index in the strip */
     uint16_t mixed[COMP_ROWS]; /* bit mask per row: pixels that have fragments in the list `remaining` */
-    /* Number of fragments of each mixed pixel, and the end of its fragments in listed. */
+    /* number of fragments of each mixed pixel, and the index in `listed` at which they end */
     uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS];
     comp_writer writer;
 } merge_scratch;

@@ -52,7 +52,7 @@ typedef struct comp_route {
  * round of COMP_RADIX. */
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
-/* These convert a rank to its place, and a place to its rank. */
+/* These functions convert a rank to its place, and a place to its rank. */
 int comp_route_place(const comp_route *route, int rank);
 int comp_route_rank(const comp_route *route, int place);
 
@@ -77,8 +77,8 @@ static inline bool comp_route_is_dense(const comp_route *route, int round)
     return route->radix[round] <= route->longest_dense;
 }
 
-/* Converts the owners in the claims from ranks to places. Ranks beyond the route's owners own nothing: their partners
- * own their blocks. */
+/* Converts the owners in the claims from ranks to places. A rank beyond the route's owners owns nothing; its blocks are
+ * owned by its partner. */
 void comp_route_fold(const comp_route *route, comp_claim *claims, uint32_t blocks);
 
 /* Returns "direct", "nodes", "radix" or "binary". */

@@ -33,7 +33,7 @@ struct comp_tile_scratch {
     buffer pixel_fragments; /* copies of one pixel's fragments, which are sorted there */
     int64_t fragments;
     double seconds;
-    char padding[64]; /* prevents two threads from writing to the same cache line */
+    char padding[64]; /* padding that prevents two threads from writing to the same cache line */
 };
 
 static void *reserve_buffer(buffer *r, int64_t count, size_t size)

@@ -252,7 +252,7 @@ static float_mapping float_mapping_make(const bounds_source *source, const item_
     return m;
 }
 
-/* Rounds to the nearest step. NaN becomes 0. */
+/* Rounds a position to the nearest step of the grid. NaN becomes 0. */
 static inline ivec4 round_to_steps(const float_mapping *m, vec4 x)
 {
     const vec4 steps = (x - m->origin) * m->factor + 0.5f;

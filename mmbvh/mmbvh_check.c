@@ -179,7 +179,7 @@ static insitu_status check_inner(check_state *w, int64_t index)
 
 static insitu_status check_nodes(check_state *w)
 {
-    /* The nodes that are still to be visited: the right child of each pair on the current path. */
+    /* Stack of nodes to be visited: the right child of each pair on the current path. */
     struct {
         int64_t index;
         int depth;

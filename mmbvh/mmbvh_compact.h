@@ -28,7 +28,7 @@ enum {
 
 typedef struct mmbvh_compact_node {
     uint32_t axis[3];
-    uint32_t link; /* count in the 3 low bits and ref in the others, both as in mmbvh_node */
+    uint32_t link; /* number of cells in the 3 low bits, and reference in the others, both as in mmbvh_node */
     float range_low;
     float range_high;
 } mmbvh_compact_node;

@@ -58,7 +58,7 @@ double cost_of_area(const mmbvh *tree, double area)
     float lower[4], upper[4];
     mmbvh_node_box(tree, 0, lower, upper);
     const double root_area = cost_half_area(lower, upper);
-    if (root_area > 0) return 1 + area / root_area; /* 1 is the test of the root's own box */
+    if (root_area > 0) return 1 + area / root_area; /* the 1 counts the test of the root's own box */
     double tests = 0;
     for (int64_t i = 0; i < tree->node_count; i++) {
         const int count = mmbvh_node_count(tree, i);

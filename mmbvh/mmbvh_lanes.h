@@ -74,7 +74,7 @@ static inline lanes lanes_pack(ivec4 a, ivec4 b)
 #endif
 }
 
-/* Multiplies the lanes and returns the sum of each even lane's product and the next one's. */
+/* Multiplies the lanes, and returns the sums of the products of each even lane and the next one. */
 static inline ivec4 lanes_multiply_add(lanes a, lanes b)
 {
 #if defined(__SSE2__)

@@ -9,7 +9,8 @@
 enum {
     RUN_MAX = 4096,
     PREFETCH_CELLS = 48,
-    PREFETCH_TETS = 96 /* longer, because a tet's connectivity takes half as many bytes as a hex's */
+    /* prefetch distance of tets; it is longer, because a tet's connectivity takes half as many bytes as a hex's */
+    PREFETCH_TETS = 96
 };
 
 int sweep_threads(const mmbvh_options *options)
@@ -41,7 +42,7 @@ static int64_t find_right_subtree(const sweep *s, int64_t first, int64_t end)
     return mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
 }
 
-/* Sweeps a pair and its descendants, nodes[first .. end), in runs of at most s->run_max nodes. */
+/* Sweeps a pair and its descendants, nodes[first .. end), in runs of at most s->range_max nodes. */
 static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
 {
     if (!s->range_max || end - first <= s->range_max) return sweep_range_with_followers(s, first, end);

@@ -17,7 +17,7 @@ typedef struct part {
     int64_t first;
     int64_t unusable;     /* number of cells with non-finite values */
     int64_t outside_grid; /* number of boxes that the tree's grid cannot represent */
-    double area_change;   /* change of the tree's area, as in sweep_sum */
+    double area_change;   /* change of the tree's area, as defined in sweep_sum */
     fetch_float_box float_boxes[PART_CELLS];
 } part;
 
@@ -91,10 +91,8 @@ MMBVH_INLINE void store_leaf(const sweep *s, part *p, int64_t node, int64_t firs
     vec4 lower, upper;
     fetch_float_box_round(&all, tree->origin, tree->scale, &lower, &upper);
     store_measured(s, node, lower, upper, &p->outside_grid, &p->area_change);
-    if (pass.with_values)
-        set_range(s, node,
-                  (range){all.lower[3] + 0.0f,
-                          all.upper[3] + 0.0f}); /* adding 0 makes a negative zero positive, as in bounds */
+    /* adding 0 makes a negative zero positive, as the bounds of other meshes are */
+    if (pass.with_values) set_range(s, node, (range){all.lower[3] + 0.0f, all.upper[3] + 0.0f});
 }
 
 MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t end, const pass_constants pass)

@@ -19,7 +19,7 @@ struct drawing {
     const insitu_image &image;
     const insitu_decorations &decorations;
     std::vector<float> &rgba;
-    typeface *font; /* font of the text; NULL if there is no text */
+    typeface *font; /* font of all text; NULL if there is no text to draw */
 };
 
 /* ---- pixels ----------------------------------------------------------------------------------------------------- */
@@ -30,7 +30,7 @@ float *pixel_at(drawing &s, int x, int y)
                         static_cast<std::size_t>(x))];
 }
 
-/* Blends a colour with this opacity over the pixel, or behind it. */
+/* Blends a colour of the given opacity over the pixel, or behind it. */
 void blend(float *pixel, const float colour[3], double opacity, bool is_behind)
 {
     const double seen = is_behind ? opacity * (1 - std::min(1.0, static_cast<double>(pixel[3]))) : opacity;

@@ -72,7 +72,7 @@ encoded_file::encoded_file(const char *name, const OIIO::ImageSpec &spec, const 
 void encoded_file::open(const char *name, const OIIO::ImageSpec &spec, const std::string &path)
 {
     OIIO::attribute("threads", 1);
-    OIIO::attribute("exr_threads", -1); /* OpenEXR then uses only the caller's thread */
+    OIIO::attribute("exr_threads", -1); /* so that OpenEXR uses only the caller's thread */
     output_ = OIIO::ImageOutput::create(name, memory_.get());
     if (!output_) fail_with(OIIO::geterror());
     output_->threads(1);

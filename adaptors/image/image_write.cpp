@@ -198,7 +198,8 @@ void write_pixels(const insitu_image &image, const layout &l, const void *pixels
         static_cast<std::size_t>(image.width) * static_cast<std::size_t>(l.channels) * l.type.size();
     const std::size_t raw = row * static_cast<std::size_t>(image.height);
     std::vector<unsigned char> bytes;
-    bytes.reserve(raw + raw / 8 + ADDED); /* random data does not compress, and formats add headers */
+    /* the size of random data is an upper bound, because it does not compress; file formats add headers to it */
+    bytes.reserve(raw + raw / 8 + ADDED);
     const memory_reserve reserve(TABLES + ROWS * row);
     encode_file(l.file_name, l.describe(image, l), pixels, bytes);
     if (l.describe == describe_exr) check_exr_rows(bytes.data(), bytes.size(), image.height, EXR_ZIP_ROWS);

@@ -117,7 +117,7 @@ std::size_t bytes_that_fit(const layout_state &s, const std::string &word, int s
     return bytes;
 }
 
-/* Wraps text at blanks. A word that is wider than the available width is split. */
+/* Wraps text at blanks. A word that is wider than the available width is divided. */
 std::vector<std::string> wrap_text(const layout_state &s, const std::string &text, int size, double available_width)
 {
     std::vector<std::string> lines;
@@ -206,7 +206,7 @@ struct bar_group {
     int size;
     double width, head;
     std::vector<std::vector<std::string>> labels;
-    bool is_readable; /* true if the labels have few lines and no split words */
+    bool is_readable; /* set if the labels have few lines and no divided words */
 };
 
 bar_group make_group(const layout_state &s, const std::vector<int> &bars, insitu_anchor at, int size)
@@ -264,7 +264,8 @@ block make_bar(const layout_state &s, const bar_group &g, std::size_t n, const a
     align_lines(s, g.labels[n], INSITU_LEFT, b);
     const double spare = std::floor(g.head - pixels(padding, g.size) - 0.5 * g.size -
                                     line_height * g.size * static_cast<double>(b.lines.size()));
-    for (placed_line &line : b.lines) line.baseline += spare; /* labels with fewer lines are aligned to the bar */
+    /* moves a label that has fewer lines than the others down to its bar */
+    for (placed_line &line : b.lines) line.baseline += spare;
     b.gradient = {left, bounds.y0 + g.head, left + thickness * g.size, bounds.y1 - edge};
     b.ticks = choose_ticks(bar, b.gradient.y1 - b.gradient.y0, g.size);
     for (const int i : b.ticks)
@@ -348,7 +349,8 @@ std::string quoted_name(const char *decorations, const char *text)
     if (name.size() > NAMED) {
         name.erase(std::size_t{NAMED});
         while (!name.empty() && (static_cast<unsigned char>(name.back()) & 0xC0) == 0x80) name.pop_back();
-        if (!name.empty()) name.pop_back(); /* removes the first byte of the cut character, or the last letter */
+        /* removes the first byte of a character that was cut in the middle, or the last letter */
+        if (!name.empty()) name.pop_back();
         name += "...";
     }
     return std::string(decorations) + " \"" + name + "\"";

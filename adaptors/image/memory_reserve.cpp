@@ -10,7 +10,7 @@ namespace
 
 std::atomic<void *> reserve;
 std::atomic<std::new_handler> handler_before;
-std::mutex lock; /* locked while a reserve exists, because there may be only one */
+std::mutex lock; /* locked while a reserve exists, because there can be only one at a time */
 
 /* Number of bytes left free in addition to the reserve, for allocations that do not use operator new: the loader
  * terminates the process if it has no memory for a thread's variables, and compressors fail. */

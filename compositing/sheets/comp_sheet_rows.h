@@ -180,7 +180,7 @@ ROWS_INLINE lanes expand_lanes(lanes from, unsigned mask)
     return load_lanes(gapped);
 }
 
-/* These compress and expand a row in memory. They may read and write all 16 values of `to` or `from`. */
+/* Compress and expand a row in memory. They may read and write all 16 values of `to` or `from`. */
 ROWS_INLINE void compress_row(const uint32_t *row, unsigned mask, uint32_t *to)
 {
 #if defined(__AVX512F__)

@@ -218,7 +218,8 @@ static void receive_sparse(round *r)
     check_mpi(r, code);
 }
 
-/* Marks the last message to the rank as the last one; returns false if there is no message to the rank. */
+/* Marks the last message to a rank with the flag that no more follow. Returns false if there is no message to the
+ * rank. */
 static bool mark_last(const comp_messages *out, int rank)
 {
     comp_message *last = NULL;

@@ -169,7 +169,7 @@ static bool make_folders(char *path)
     return true;
 }
 
-/* A file's folder and its name in this folder. Both strings share the memory at `path`. */
+/* The folder and the file name of a path. Both strings are in the memory at `path`. */
 typedef struct file_place {
     char *path;
     const char *name;
@@ -207,7 +207,7 @@ static bool try_to_replace(const file_place *place, const char *temporary, const
 {
     const int file = openat(place->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (file < 0) return false;
-    /* The lock prevents other picture writers from taking the file for one that a killed run has left. */
+    /* the lock prevents other writers of pictures from deleting the file as one that a killed run has left */
     flock(file, LOCK_EX | LOCK_NB);
     bool is_written = write_all(file, bytes, size);
     int code = errno;

@@ -79,13 +79,14 @@ typedef enum grid_unusual_type {
 /* A strided array. is_wide: its elements have 8 bytes (double or int64), else 4 bytes (float or int32). */
 typedef struct grid_array {
     const char *data;
-    int64_t stride; /* distance between elements in bytes; 0: all elements are the same one */
+    int64_t stride; /* distance between elements in bytes; if it is 0, all elements are read from the first one */
     bool is_wide;
     bool is_integer;            /* elements must not be read as float or double: they are integers or odd */
     unsigned char unusual_type; /* one of the values of grid_unusual_type */
-    int64_t base;               /* for indices and offsets: the entry that means 0 */
-    int64_t implied_end_count;  /* for offsets without the last entry: their number; else 0 */
-    int64_t implied_end;        /* the omitted last offset, counted from 0 */
+    int64_t base;               /* in an array of indices or offsets, the number that stands for 0 */
+    /* if the last entry of an array of offsets is omitted, the number of the others; else 0 */
+    int64_t implied_end_count;
+    int64_t implied_end; /* the omitted last offset, counted from 0 */
     /* if not NULL, coordinates are computed from this axis by vertex number, and there is no data */
     const grid_axis *axis;
 } grid_array;
@@ -98,7 +99,7 @@ typedef struct grid_lattice {
     int64_t drawn_first[3], drawn_end[3]; /* index range of the cells that are not in ghost layers */
     int64_t cell_count;                   /* number of cells, without padding */
     bool has_ghosts;                      /* set if some cell numbers are padding or belong to ghost layers */
-    /* coordinates along the axes; without places if coordinates are given by vertex */
+    /* coordinates along the axes; they have no data if coordinates are given by vertex */
     grid_axis axes[3];
 } grid_lattice;
 
@@ -188,7 +189,8 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
 {
     const char *p = a->data + i * a->stride;
     const int64_t index = a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
-    return (int64_t)((uint64_t)index - (uint64_t)a->base); /* unsigned subtraction is well defined for any index */
+    /* the subtraction is unsigned, so that it is well defined for any index */
+    return (int64_t)((uint64_t)index - (uint64_t)a->base);
 }
 
 /* Returns the end of the i-th cell or face, by an array of offsets. */

@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Returns the number of bytes of a set. Bits beyond the image's last pixel must be 0. */
+/* Returns the size in bytes of a set of this many pixels. Bits beyond the image's last pixel must be 0. */
 static inline size_t pixel_set_bytes(int64_t pixel_count)
 {
     return (size_t)((pixel_count + 7) >> 3);

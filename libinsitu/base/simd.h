@@ -113,7 +113,7 @@ SIMD_INLINE vm vm_xor(vm a, vm b)
 SIMD_INLINE vm vm_andnot(vm a, vm b)
 {
     return (vm)(a & ~b);
-} /* returns a and not b */
+} /* returns the lanes in a that are not in b */
 SIMD_INLINE vm vm_none(void)
 {
     return 0;

@@ -15,7 +15,8 @@ bin_mapping bin_mapping_make(lanes centroids, int64_t item_count)
     /* If the quotient is below 2^15, its rounding error is too small to reach the next integer; larger quotients are
      * clamped. */
     const vec4 quotient = vec4_set1((float)(count * 65536)) / vec4_from_int(extent + 1);
-    const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768))); /* limits a grid step to one bin */
+    /* the limit makes a bin at least as wide as a step of the grid */
+    const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768)));
     return (bin_mapping){(ulanes)lanes_pack(least, least),
                          lanes_pack(factor - 32768, factor - 32768) ^ lanes_set1(INT16_MIN), count};
 }
@@ -162,7 +163,7 @@ bin_split bins_choose(const bins *b, const bin_mapping *m)
     return cheapest_axis(best, best_border);
 }
 
-/* The box of a side is at least as large as that of each of its items, so no plane costs less than the sum of the
+/* The box of a side is at least as large as that of each of its items. So no plane costs less than the sum of the
  * items' areas. */
 float bins_least_cost(const item *items, int64_t count)
 {
@@ -178,12 +179,12 @@ int64_t bins_partition(const bin_mapping *m, bin_split split, item *items, int64
     enum { SIZE = sizeof(item), SIGN_TO_SIZE = 27 };
     const int factor = (uint16_t)m->factor[split.axis];
     const int first = (int16_t)m->origin[split.axis] +
-                      (split.border * 65536 + factor - 1) / factor; /* lowest value of the right side */
+                      (split.border * 65536 + factor - 1) / factor; /* lowest value among the items of the right side */
     const int16_t *lower = (const int16_t *)(const void *)items + split.axis, *upper = lower + 4;
     char *base = (char *)items;
     int64_t left = 0; /* size of the left side in bytes */
     for (int64_t i = 0; i < count; i++) {
-        const int before = upper[8 * i] - lower[8 * i] - first; /* is negative if the item belongs to the left side */
+        const int before = upper[8 * i] - lower[8 * i] - first; /* negative if the item belongs to the left side */
         const item moved = items[i];
         item *place = (item *)(void *)(base + left);
         items[i] = *place;

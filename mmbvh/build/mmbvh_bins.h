@@ -13,7 +13,8 @@
 enum {
     BINS_MAX = 16,
     BINS_SAMPLED = 2048, /* nodes of at least this many items are sampled */
-    BINS_STRIDE = 7      /* a sampled node bins one item in this many; the splits are as good */
+    /* of a sampled node, one item in this many is binned; the resulting splits are as good as those of all items */
+    BINS_STRIDE = 7
 };
 
 /* Maps twice the centroid minus ITEM_TOP to a bin on each axis. Lanes 4 to 6 repeat lanes 0 to 2, so that two items are
@@ -30,7 +31,9 @@ bin_mapping bin_mapping_make(lanes centroids, int64_t item_count);
 typedef struct bin_split {
     int axis; /* axis of the split; -1 if no plane leaves items on both sides */
     int border;
-    float cost; /* sum over both sides of half the surface area (in squared grid steps) times the number of items */
+    /* cost of the split: the sum over both sides of half the surface area (in squared grid steps) times the number of
+     * items */
+    float cost;
 } bin_split;
 
 /* The bin of each of the three axes. It fills one cache line. */
@@ -58,7 +61,7 @@ void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, 
 /* Returns the plane of lowest SAH cost for the items in the bins; of equal planes, the first. */
 bin_split bins_choose(const bins *b, const bin_mapping *m);
 
-/* Returns a lower bound of the SAH cost of any plane that separates the items. */
+/* Returns a lower bound of the SAH cost of all planes that separate the items. */
 float bins_least_cost(const item *items, int64_t count);
 
 /* Checks whether a split at this cost is cheaper than a leaf. The split adds two box tests. Items that do not fit in a

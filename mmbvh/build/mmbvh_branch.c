@@ -27,19 +27,19 @@ typedef struct branch_node {
     int depth;
 } branch_node;
 
-/* The state of the split of one node. */
+/* The state of splitting one node. */
 typedef struct node_split {
     item *items;
     int64_t count;
     int64_t chunk_size;
     int chunk_count;
     int64_t left_counts[CHUNKS_MAX]; /* number of left items in each chunk */
-    int64_t left_count;              /* number of items of the left child */
+    int64_t left_count;              /* number of items that go to the left child */
     branch_node node;
     bin_mapping mapping;
     int64_t stride; /* one item in this many is binned (bins_stride()) */
     bin_split split;
-    bins all_bins;     /* bins of all chunks together */
+    bins all_bins;     /* bins of all chunks, merged */
     item_set sides[2]; /* bounds of the items of the left and of the right child */
 } node_split;
 
@@ -159,7 +159,7 @@ static void halve_items(node_split *s)
     for (int64_t i = 0; i < s->count; i++) item_set_add(&s->sides[i >= s->left_count], s->items[i]);
 }
 
-/* Chooses the plane from a sample of the items, or from all items if the sample allows no split. */
+/* Chooses the split plane from a sample of the items. If the sample allows no split, all items are used. */
 static void choose_splits(node_split *s, const branch_builder *builder)
 {
     s->mapping = bin_mapping_make(s->node.set.centroids, s->count);

@@ -12,7 +12,8 @@ typedef struct branch_builder {
     int64_t count;
 } branch_builder;
 
-/* Builds the tree; returns NULL if an allocation failed. `set` has the bounds of all items, in steps of the grid. */
+/* Builds the tree; returns NULL if an allocation failed. `set` contains the bounds of all items, in steps of the
+ * grid. */
 topology *branch_build(const branch_builder *builder, const item_set *set, const item_grid *grid);
 
 #endif

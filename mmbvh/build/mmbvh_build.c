@@ -28,7 +28,7 @@ typedef struct build {
     int64_t candidate_count; /* length of selected, or the number of all cells including ghosts */
     mmbvh_options options;
     int threads;
-    int64_t starts[FILL_CHUNKS + 1]; /* first position of each chunk's cells, not counting cells that are left out */
+    int64_t starts[FILL_CHUNKS + 1]; /* for each chunk, the position of its first cell among the cells that are used */
     int64_t count;
     item *items;
     uint64_t *keys, *other_keys;

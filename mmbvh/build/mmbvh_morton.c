@@ -13,7 +13,8 @@ enum {
     CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
     DIGIT_BITS = 11, /* number of output streams whose ends fit in a core's cache */
     DIGITS = 1 << DIGIT_BITS,
-    SORT_CHUNKS = 4, /* chunks per thread, so that other threads can take those of a delayed one */
+    /* number of chunks per thread; there are several, so that other threads can take chunks of a delayed one */
+    SORT_CHUNKS = 4,
     SORT_CHUNKS_MAX = 64,
     SORT_LARGE = 16, /* parts above 1/SORT_LARGE of all keys are sorted by all threads together */
     SORT_LARGE_MIN = 16384,
@@ -185,7 +186,7 @@ typedef struct digit_counts {
 typedef struct sorting {
     int64_t large; /* parts with more keys than this are sorted by all threads together */
     int chunks, threads;
-    digit_counts *counts; /* numbers of keys by digit */
+    digit_counts *counts; /* for each digit, the number of keys with it */
 } sorting;
 
 static inline int extract_digit(uint64_t key, int shift)

@@ -28,7 +28,7 @@ typedef struct subtree {
     bins bins;
 } subtree;
 
-/* Chooses the plane from a sample if there are many items, or from all items if the sample allows no split. */
+/* Chooses the split plane from a sample if there are many items. If the sample allows no split, all items are used. */
 static bin_split choose_split(subtree *s, lanes centroids, const item *items, int64_t count, bin_mapping *mapping)
 {
     *mapping = bin_mapping_make(centroids, count);

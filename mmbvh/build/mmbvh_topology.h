@@ -75,7 +75,7 @@ int64_t topology_node_count(const topology *t);
  * written. */
 void topology_write(topology *t, const mmbvh *tree, int threads);
 
-/* t may be NULL. */
+/* Frees the tree under construction. t may be NULL. */
 void topology_free(topology *t);
 
 #endif

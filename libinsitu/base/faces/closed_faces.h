@@ -39,7 +39,7 @@ typedef struct closed_faces {
     int *piece; /* number of the connected piece to which each face belongs */
     closed_triangle *triangles;
     closed_edge *edges; /* hash table of edges with 2 * table_size entries */
-    /* Work space of the functions below. */
+    /* working memory of the functions below */
     double (*corners)[3];
     int (*cuts)[3];
     void *polygon;

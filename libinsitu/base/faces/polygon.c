@@ -14,7 +14,7 @@ static const double fan_slack = 0x1p-20;
  * few 2^-53; areas have errors of about ten times as much. */
 static const double line_slack = 0x1p-46;
 
-/* The corners of a polygon, numbered by their rank in the order of cutting. */
+/* The corners of a polygon, numbered in the order in which they are cut off. */
 typedef struct polygon_work {
     int count;
     int step; /* 1 if that order runs in the direction of the caller's list, else -1 */
@@ -212,8 +212,8 @@ static int find_ear(const polygon_work *w, int first)
     return -1;
 }
 
-/* Tests all corners again and returns an ear: a corner may have become one because the corner that blocked it has been
- * cut off. */
+/* Tests all corners again and returns an ear. A corner may have become an ear because another one, which was inside its
+ * triangle, has been cut off. */
 static int find_ear_anew(polygon_work *w, int first)
 {
     int i = first;

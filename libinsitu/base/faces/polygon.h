@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Returns the number of bytes, aligned to 8, of work space for a polygon of `count` corners. */
+/* Returns the number of bytes, aligned to 8, of the working memory that a polygon of `count` corners needs. */
 size_t polygon_work_bytes(int count);
 
 /* Cuts a polygon of count corners, at least 3, into count - 2 triangles of corner numbers, each of which runs in the
