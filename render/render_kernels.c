@@ -37,7 +37,7 @@
 /* ---- a tile's cells, between search and tracing ---- */
 
 /* Sorts a transformed cell's vertices and computes its edge functions and colours, ready for tracing. */
-SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
+SIMD_INLINE void kernel_tile_prepare_cell(kernel_tile_trace *t, int part)
 {
     t->cell->part = part;
     kernel_cell_order(t->cell);
@@ -59,14 +59,14 @@ static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_til
     }
     kernel_cell_move(c, t->frame, &t->tile, g);
     kernel_cell_relative(c, layer->values[value]);
-    kernel_tile_ready(t, part);
+    kernel_tile_prepare_cell(t, part);
     t->curved->bounds = NULL;
     kernel_blocks_trace(t, blocks, part, c->index, c, value);
 }
 
 /* Makes the surface layer of the candidate the current layer. source: kernel_candidate.source. Stores the candidate's
  * mesh part in *part, and returns the number of its isovalue in the layer. */
-SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *part)
+SIMD_INLINE int kernel_tile_set_source(kernel_tile_trace *t, uint32_t source, int *part)
 {
     const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
     *part = (int)(source / RENDER_MAX_ISOVALUES);
@@ -116,7 +116,8 @@ SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_t
 /* Returns whether a cell of the queue's layer and part is queued in a vector of its type; polyhedra are not. In a mesh
  * of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because their hits
  * then hide other cells sooner. */
-SIMD_INLINE bool kernel_is_for_vectors(const kernel_tile_queue *m, const kernel_tile_candidate *candidate, int type)
+SIMD_INLINE bool kernel_is_traced_in_vectors(const kernel_tile_queue *m, const kernel_tile_candidate *candidate,
+                                             int type)
 {
     if (!m->arrays.has_lanes || kernel_has_own_faces(type)) return false;
     return kernel_is_linear(type) || kernel_is_box(type) || m->arrays.type != GRID_NO_TYPE ||
@@ -124,28 +125,28 @@ SIMD_INLINE bool kernel_is_for_vectors(const kernel_tile_queue *m, const kernel_
 }
 
 /* Traces the pending cells of a type. */
-static void kernel_tile_queue_run(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own)
+static void kernel_tile_queue_trace(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own)
 {
     const int layer = t->layer;
     if (!own->count) return;
     kernel_tile_set_layer(t, own->layer);
     if (kernel_is_linear(own->type))
-        kernel_batch_run(t, &m->batch, own);
+        kernel_batch_process(t, &m->batch, own);
     else
-        kernel_curved_batch_run(t, &m->curved_batch, own);
+        kernel_curved_batch_process(t, &m->curved_batch, own);
     kernel_tile_set_layer(t, layer);
 }
 
-SIMD_INLINE void kernel_tile_queue_put(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own,
-                                       const kernel_tile_candidate *candidate, int value)
+SIMD_INLINE void kernel_tile_queue_append(kernel_tile_trace *t, kernel_tile_queue *m, kernel_surface_cells *own,
+                                          const kernel_tile_candidate *candidate, int value)
 {
     if (own->layer != m->layer || own->part != m->part) {
-        kernel_tile_queue_run(t, m, own);
+        kernel_tile_queue_trace(t, m, own);
         own->layer = m->layer;
         own->part = m->part;
         own->arrays = m->arrays;
     }
-    if (own->count == SIMD_WIDTH) kernel_tile_queue_run(t, m, own);
+    if (own->count == SIMD_WIDTH) kernel_tile_queue_trace(t, m, own);
     kernel_surface_cells_add(t, own, candidate, value);
 }
 
@@ -154,10 +155,10 @@ SIMD_INLINE void kernel_tile_queue_put(kernel_tile_trace *t, kernel_tile_queue *
 static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     if (!m->alone_count) return;
-    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_run(t, m, &m->pending[i]);
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
     for (int n = 0; n < m->alone_count; n++) {
         int part;
-        const int value = kernel_tile_source(t, m->alone[n].source, &part);
+        const int value = kernel_tile_set_source(t, m->alone[n].source, &part);
         const unsigned blocks = kernel_candidate_blocks(t, &m->alone[n]);
         if (blocks) kernel_tile_process_candidate(t, &m->alone[n], part, value, blocks);
     }
@@ -171,8 +172,8 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *
 {
     kernel_tile_queue_set_part(t, m, part);
     const int type = kernel_arrays_type(&m->arrays, candidate->cell);
-    if (kernel_is_for_vectors(m, candidate, type)) {
-        kernel_tile_queue_put(t, m, &m->pending[kernel_lane_type_index(type)], candidate, value);
+    if (kernel_is_traced_in_vectors(m, candidate, type)) {
+        kernel_tile_queue_append(t, m, &m->pending[kernel_lane_type_index(type)], candidate, value);
         return;
     }
     if (m->alone_count == KERNEL_ALONE) kernel_tile_queue_trace_singly(t, m);
@@ -183,7 +184,7 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *
 static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     kernel_tile_queue_trace_singly(t, m);
-    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_run(t, m, &m->pending[i]);
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
 }
 
 /* State of a thread that is kept from tile to tile: the tree search, and the queue of cells to be traced. */
@@ -229,17 +230,17 @@ static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_t
     kernel_pending_sort(w);
     for (int n = 0; n < w->count; n++) {
         int part;
-        kernel_tile_source(t, w->items[n]->source, &part);
+        kernel_tile_set_source(t, w->items[n]->source, &part);
         if (m->layer < 0) kernel_tile_queue_set_part(t, m, part);
         if (m->layer == t->layer && m->part == part &&
-            kernel_is_for_vectors(m, w->items[n], kernel_arrays_type(&m->arrays, w->items[n]->cell)))
+            kernel_is_traced_in_vectors(m, w->items[n], kernel_arrays_type(&m->arrays, w->items[n]->cell)))
             continue; /* cells in vectors are prefetched by their queue */
         kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
                                  w->items[n]->cell);
     }
     for (int n = 0; n < w->count; n++) {
         int part;
-        const int value = kernel_tile_source(t, w->items[n]->source, &part);
+        const int value = kernel_tile_set_source(t, w->items[n]->source, &part);
         if (kernel_candidate_blocks(t, w->items[n])) kernel_tile_queue_add(t, m, w->items[n], part, value);
     }
     w->count = 0;
@@ -288,7 +289,7 @@ static bool kernel_tile_find_flush(kernel_candidate_list *list)
     for (int n = 0; n < list->count; n++) {
         const kernel_candidate *found = &list->items[n];
         int part;
-        const int value = kernel_tile_source(t, found->source, &part);
+        const int value = kernel_tile_set_source(t, found->source, &part);
         const kernel_tile_candidate candidate =
             kernel_candidate_in_tile(found, kernel_range_in_tile(found->x0, found->x1, t->tile.x0),
                                      kernel_range_in_tile(found->y0, found->y1, t->tile.y0));

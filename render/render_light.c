@@ -80,9 +80,9 @@ struct render_occluders {
 
 /* Identifies a ray in a chunk. hit: index of the hit in the chunk; number: index of the ray in the hemisphere, or
  * RENDER_MAX_SAMPLES plus the index of a light. */
-typedef struct ray_name {
+typedef struct ray_id {
     int16_t hit, number;
-} ray_name;
+} ray_id;
 
 /* The state of a thread that traces rays from hits. Each thread has a copy of the frame with a job of its own, because
  * every tile space has another camera. */
@@ -96,7 +96,7 @@ typedef struct tracer {
     kernel_bundle bundle;
     kernel_secondary_rays secondary_rays;
     kernel_secondary_ray rays[CHUNK_RAYS];
-    ray_name names[CHUNK_RAYS];
+    ray_id names[CHUNK_RAYS];
 } tracer;
 
 static bool grow_undecided(kernel_secondary_rays *s)
@@ -116,7 +116,7 @@ static void add_ray(tracer *t, int hit, int number, const double start[3], const
     const render_space *space = &t->job->space;
     const int i = t->secondary_rays.count++;
     kernel_secondary_ray *ray = &t->rays[i];
-    t->names[i] = (ray_name){(int16_t)hit, (int16_t)number};
+    t->names[i] = (ray_id){(int16_t)hit, (int16_t)number};
     for (int a = 0; a < 3; a++) {
         ray->origin[a] = (float)((start[a] - space->origin[a]) * space->scale);
         ray->direction[a] = (float)direction[a];
@@ -277,9 +277,9 @@ static void trace_undecided(tracer *t, const render_hit *hits)
     qsort(s->undecided, (size_t)s->undecided_count, sizeof *s->undecided, by_ray);
     for (int64_t first = 0, end; first < s->undecided_count; first = end) {
         kernel_undecided_pair *from = &s->undecided[first];
-        const ray_name name = t->names[from->ray];
+        const ray_id name = t->names[from->ray];
         for (end = first + 1; end < s->undecided_count && name.number < RENDER_MAX_SAMPLES; end++) {
-            const ray_name next = t->names[s->undecided[end].ray];
+            const ray_id next = t->names[s->undecided[end].ray];
             if (next.hit != name.hit || next.number >= RENDER_MAX_SAMPLES) break;
         }
         if (name.number < RENDER_MAX_SAMPLES)
@@ -300,7 +300,7 @@ static void trace_chunk(tracer *t, const render_hit *hits, render_hit_rays *rays
     t->kernels->occlude(&t->frame, &t->thread, &t->of->trees, s);
     if (s->undecided_count) trace_undecided(t, hits);
     for (int i = 0; i < s->count; i++) {
-        const ray_name name = t->names[i];
+        const ray_id name = t->names[i];
         if (t->rays[i].is_open) continue;
         if (name.number < RENDER_MAX_SAMPLES)
             rays[name.hit].samples &= ~((uint64_t)1 << name.number);

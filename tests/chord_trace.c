@@ -42,7 +42,7 @@ static void chord_polyhedron(kernel_packet *p, const chord_state *state, const g
         kernel_polyhedron_transform(c, p);
         for (int i = 0; i <= c->vertex_count; i++) c->f[i] = 0;
     }
-    if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
     while (kernel_poly_next(&r, &stay)) chord_note(state, stay.interval.mask, stay.interval.t_in, stay.interval.t_out);
 }
 

@@ -73,7 +73,7 @@ static inline vm bundle_hits(bundle *b, const kernel_curved *curved, const kerne
     kernel_search s;
     vm hit = vm_none();
     *t = *hits = vf_set(0);
-    if (!kernel_search_in(&s, curved, &rays, vi_set(0), i, i->mask, &b->thread.map_failures)) return hit;
+    if (!kernel_search_cells(&s, curved, &rays, vi_set(0), i, i->mask, &b->thread.map_failures)) return hit;
     do {
         kernel_point place;
         if (!vm_any(s.found)) continue;
@@ -81,7 +81,7 @@ static inline vm bundle_hits(bundle *b, const kernel_curved *curved, const kerne
         *t = vf_select(vm_andnot(s.found, hit), place.t, *t);
         *hits += vf_select(s.found, vf_set(1), vf_set(0));
         hit = vm_or(hit, s.found);
-    } while (kernel_search_on(&s));
+    } while (kernel_search_continue(&s));
     return hit;
 }
 

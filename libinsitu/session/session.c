@@ -191,7 +191,7 @@ insitu_status insitu_parameter(insitu_session *session, const char *name, double
 {
     base_error error = {.status = INSITU_OK};
     if (!session || is_in_fill(session, "insitu_parameter")) return INSITU_ERROR_ARGUMENT;
-    session_read_parameter(&session->scene_file, &session->asked_parameters, name, value, &error);
+    session_read_parameter(&session->scene_file, &session->requested_parameters, name, value, &error);
     return store_error(session, &error);
 }
 

@@ -28,7 +28,7 @@ struct insitu_session {
     session_team team;
     session_threads threads;
     session_scene_file scene_file;
-    session_asked asked_parameters;
+    session_requested_names requested_parameters;
     session_meshes meshes;
     session_catalogue catalogue;
     session_space space;

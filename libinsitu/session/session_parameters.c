@@ -9,22 +9,22 @@ static uint64_t hash_name(const char *name)
     return key;
 }
 
-static bool is_asked(const session_asked *asked, const char *name)
+static bool is_requested(const session_requested_names *asked, const char *name)
 {
     const uint64_t key = hash_name(name);
-    for (int i = 0; i < asked->count && i < SESSION_MOST_ASKED; i++)
+    for (int i = 0; i < asked->count && i < SESSION_MOST_REQUESTED; i++)
         if (asked->names[i] == key) return true;
-    return asked->count > SESSION_MOST_ASKED;
+    return asked->count > SESSION_MOST_REQUESTED;
 }
 
-static void add_asked(session_asked *asked, const char *name)
+static void add_asked(session_requested_names *asked, const char *name)
 {
-    if (is_asked(asked, name)) return;
-    if (asked->count < SESSION_MOST_ASKED) asked->names[asked->count] = hash_name(name);
+    if (is_requested(asked, name)) return;
+    if (asked->count < SESSION_MOST_REQUESTED) asked->names[asked->count] = hash_name(name);
     asked->count++;
 }
 
-insitu_status session_read_parameter(const session_scene_file *file, session_asked *asked, const char *name,
+insitu_status session_read_parameter(const session_scene_file *file, session_requested_names *asked, const char *name,
                                      double *value, base_error *error)
 {
     char others[512];
@@ -41,11 +41,11 @@ insitu_status session_read_parameter(const session_scene_file *file, session_ask
                      file->path, others);
 }
 
-void session_warn_of_parameters(const scene *scene, const session_asked *asked, session_report *report)
+void session_warn_of_parameters(const scene *scene, const session_requested_names *asked, session_report *report)
 {
     for (int i = 0; i < scene->parameter_count; i++) {
         const char *name = scene->parameters[i].name;
-        session_warn_locally(report, &(session_warning){WARNING_PARAMETER, name, NULL, 0}, !is_asked(asked, name),
+        session_warn_locally(report, &(session_warning){WARNING_PARAMETER, name, NULL, 0}, !is_requested(asked, name),
                              "parameter \"%s\" of the scene changes nothing: the code has not asked for it on rank 0",
                              name);
     }

@@ -5,21 +5,21 @@
 #include "session_report.h"
 #include "session_scene_file.h"
 
-enum { SESSION_MOST_ASKED = 256 };
+enum { SESSION_MOST_REQUESTED = 256 };
 
 /* The names of parameters that the simulation has requested on this rank. */
-typedef struct session_asked {
-    /* number of names that were requested; names after the first SESSION_MOST_ASKED are not recorded, and then no
+typedef struct session_requested_names {
+    /* number of names that were requested; names after the first SESSION_MOST_REQUESTED are not recorded, and then no
      * parameter is reported as unused */
     int count;
-    uint64_t names[SESSION_MOST_ASKED]; /* hashes of the recorded names */
-} session_asked;
+    uint64_t names[SESSION_MOST_REQUESTED]; /* hashes of the recorded names */
+} session_requested_names;
 
 /* Finds a parameter by its name, and records that it was requested. On an error *value is unchanged. Local. */
-insitu_status session_read_parameter(const session_scene_file *file, session_asked *asked, const char *name,
+insitu_status session_read_parameter(const session_scene_file *file, session_requested_names *asked, const char *name,
                                      double *value, base_error *error);
 
 /* Warns of parameters that were never requested on this rank. Local. */
-void session_warn_of_parameters(const scene *scene, const session_asked *asked, session_report *report);
+void session_warn_of_parameters(const scene *scene, const session_requested_names *asked, session_report *report);
 
 #endif

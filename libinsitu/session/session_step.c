@@ -347,7 +347,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_writer_collect(&session->writer, &session->report);
     warn_of_environment(&session->team, &session->report);
     if (session->has_stepped && session->team.rank == 0)
-        session_warn_of_parameters(&session->scene_file.scene, &session->asked_parameters, &session->report);
+        session_warn_of_parameters(&session->scene_file.scene, &session->requested_parameters, &session->report);
     insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
     if (!status && changes.reporting_rank >= 0)
         status = session_share_lines(&session->report, changes.reporting_rank, &session->team, &session->error);

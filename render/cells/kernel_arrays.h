@@ -206,7 +206,8 @@ static void kernel_axis_coordinates(const grid_axis *axis, vi vertex, kernel_wid
     memcpy(out, places, sizeof places);
 }
 
-static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers *c, vi index, kernel_wide_doubles *out)
+static __attribute__((noinline)) void kernel_numbers_gather_scalar(const kernel_numbers *c, vi index,
+                                                                   kernel_wide_doubles *out)
 {
     double v[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
@@ -234,7 +235,7 @@ SIMD_INLINE void kernel_numbers_gather_raw(const kernel_numbers *c, vi index, ke
     } else if (c->data) {
         for (int half = 0; half < 2; half++) out->wide.half[half] = vd_gather(c->data, index * c->stride, half);
     } else {
-        kernel_numbers_slowly(c, index, &out->wide);
+        kernel_numbers_gather_scalar(c, index, &out->wide);
     }
 }
 

@@ -254,7 +254,7 @@ SIMD_INLINE void kernel_local_sort_vertices(int type, vf (*at)[8], int lists)
 }
 
 /* Returns the distance of r from the cell's border, in reference coordinates; it is negative outside. */
-SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
+SIMD_INLINE vf kernel_local_border_distance(int type, const vf r[3])
 {
     if (kernel_is_box(type)) return 0.5f - vf_max(vf_max(vf_abs(r[0]), vf_abs(r[1])), vf_abs(r[2]));
     if (kernel_is_prism(type)) {
@@ -268,7 +268,7 @@ SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
 /* ---- cells ---- */
 
 /* Returns the square of the largest Frobenius norm of n's derivative over the cell's corners. */
-SIMD_INLINE vf kernel_local_bent(int type, const vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3])
+SIMD_INLINE vf kernel_local_nonlinearity(int type, const vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3])
 {
     static const float corners[2][8][3] = {{{-0.5f, -0.5f, -0.5f},
                                             {0.5f, -0.5f, -0.5f},
@@ -323,8 +323,8 @@ SIMD_INLINE void kernel_local_invert(const vf m[3][8], vf inverse[3][3])
 /* Computes bounds of the affine approximation y of the reference coordinates: its range over all vertices, widened by
  * the error bound of kernel_local_error_bound(). No point of the cell is outside of these bounds, because each is a
  * mean of the vertices with non-negative weights. */
-SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inverse[3][3], const vf offset[3],
-                                    kernel_local_cells *out)
+SIMD_INLINE void kernel_local_affine_bounds(int count, const vf at[3][8], const vf inverse[3][3], const vf offset[3],
+                                            kernel_local_cells *out)
 {
     const vf pad = 1e-3f + vf_load(out->error_bound);
     for (int i = 0; i < 3; i++) {
@@ -385,10 +385,10 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
         }
     }
     kernel_local_error_bound(count, places, (const vf(*)[3])inverse, out);
-    kernel_local_reach(count, (const vf(*)[8])at, (const vf(*)[3])inverse, offset, out);
+    kernel_local_affine_bounds(count, (const vf(*)[8])at, (const vf(*)[3])inverse, offset, out);
     const vm sharp = vf_lt(vf_load(out->error_bound), vf_set(0.05f));
     if (!bends) return sharp;
-    const vf bend = kernel_local_bent(type, (const vf(*)[3])nonlinear_part);
+    const vf bend = kernel_local_nonlinearity(type, (const vf(*)[3])nonlinear_part);
     vf_store(out->bend, bend);
     return vm_and(sharp, vf_lt(bend, vf_set(most_bent)));
 }
@@ -405,7 +405,7 @@ typedef struct kernel_local_points {
 
 /* Computes the residual y - (r + n(r)) of Newton's method, where y is the affine approximation of the reference
  * coordinates r and n the map's nonlinear part. */
-SIMD_INLINE void kernel_local_left(int type, const kernel_local_points *p, vf out[3])
+SIMD_INLINE void kernel_local_newton_residual(int type, const kernel_local_points *p, vf out[3])
 {
     for (int a = 0; a < 3; a++) {
         out[a] = p->y[a] - p->r[a];
@@ -442,7 +442,7 @@ SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
 {
     const vf most = vf_set(1), far = vf_set(1.25f);
     vf left[3], largest = vf_set(0);
-    kernel_local_left(type, p, left);
+    kernel_local_newton_residual(type, p, left);
     for (int i = 0; i < 3; i++) {
         const vf *c = p->column[i];
         const vf sum = vf_muladd(c[0], left[0], vf_muladd(c[1], left[1], c[2] * left[2]));
@@ -472,7 +472,7 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
         for (int a = 0; a < 3; a++) p->nonlinear_part[k][a] = kernel_gather_lane(cells->nonlinear_part[k][a], lane);
     vf left[3];
     kernel_nonlinear_terms_at(type, p->r, &p->bend);
-    kernel_local_left(type, p, left);
+    kernel_local_newton_residual(type, p, left);
     for (int i = 0; i < 3; i++) p->r[i] += left[i];
     kernel_nonlinear_terms_at(type, p->r, &p->bend);
     kernel_local_derive(type, p);

@@ -262,7 +262,7 @@ SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map *map,
 }
 
 /* Returns how far r lies outside the reference domain [0, 1]^3, as the largest excess of a coordinate. */
-SIMD_INLINE vf kernel_map_beyond(const vf r[3])
+SIMD_INLINE vf kernel_map_distance_outside(const vf r[3])
 {
     vf most = vf_set(0);
     for (int a = 0; a < 3; a++) most = vf_max(most, vf_max(-r[a], r[a] - 1.0f));
@@ -281,11 +281,11 @@ SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map *map,
 {
     const vf most = vf_set(KERNEL_MAP_BEYOND);
     const vm failed = kernel_map_newton(rays, map, wanted, t, r);
-    const vm again = vm_or(failed, vm_and(wanted, vf_lt(most, kernel_map_beyond(r))));
+    const vm again = vm_or(failed, vm_and(wanted, vf_lt(most, kernel_map_distance_outside(r))));
     if (__builtin_expect(!vm_any(again), 1)) return failed;
     vf middle[3] = {vf_set(0.4f), vf_set(0.4f), vf_set(0.5f)};
     const vm worse = kernel_map_newton(rays, map, again, t, middle);
-    const vm better = vm_andnot(vm_andnot(again, worse), vf_lt(most, kernel_map_beyond(middle)));
+    const vm better = vm_andnot(vm_andnot(again, worse), vf_lt(most, kernel_map_distance_outside(middle)));
     for (int a = 0; a < 3; a++) r[a] = vf_select(better, middle[a], r[a]);
     return vm_andnot(again, better);
 }

@@ -101,7 +101,7 @@ SIMD_INLINE void *kernel_scratch_alloc(char **at, size_t bytes)
 
 /* Carves the arrays for the cell's crossings out of the thread's scratch memory. Returns false if there is no
  * memory. */
-static bool kernel_poly_open(const kernel_packet *p, const polyhedron *c, kernel_poly_crossings *out)
+static bool kernel_poly_allocate(const kernel_packet *p, const polyhedron *c, kernel_poly_crossings *out)
 {
     const size_t points = (size_t)c->vertex_count + 1, edges = (size_t)c->edge_count, facets = (size_t)c->facet_count;
     const size_t pieces = 11, spare = 64 * pieces;
@@ -530,8 +530,8 @@ SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r,
 }
 
 /* Returns those of the given rays on which the field has further linear pieces behind the given one. */
-SIMD_INLINE vm kernel_profile_open(const kernel_polyhedron_interval *polyhedron_interval,
-                                   const kernel_profile_piece *piece, vm mask)
+SIMD_INLINE vm kernel_profile_continues(const kernel_polyhedron_interval *polyhedron_interval,
+                                        const kernel_profile_piece *piece, vm mask)
 {
     return vm_and(mask, vf_lt(piece->t1, polyhedron_interval->interval.t_out));
 }

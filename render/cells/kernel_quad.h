@@ -192,7 +192,7 @@ static inline kernel_scalar_quad kernel_scalar_of(const kernel_quad *q, int lane
     return flat;
 }
 
-static inline void kernel_quad_put(kernel_quad_point *out, int lane, const double place[3])
+static inline void kernel_quad_store_point(kernel_quad_point *out, int lane, const double place[3])
 {
     out->s[lane] = (float)place[0];
     out->r[lane] = (float)place[1];
@@ -278,7 +278,7 @@ static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad 
         const kernel_scalar_quad flat = kernel_scalar_of(q, lane);
         double place[3];
         kernel_scalar_single_point(&flat, place);
-        kernel_quad_put(out, lane, place);
+        kernel_quad_store_point(out, lane, place);
     }
 }
 
@@ -309,8 +309,8 @@ static __attribute__((noinline, cold)) vm kernel_quad_two_points(const kernel_qu
         const kernel_scalar_quad flat = kernel_scalar_of(q, lane);
         double places[2][3];
         if (!kernel_scalar_two_points(&flat, places)) continue;
-        kernel_quad_put(&out[0], lane, places[0]);
-        kernel_quad_put(&out[1], lane, places[1]);
+        kernel_quad_store_point(&out[0], lane, places[0]);
+        kernel_quad_store_point(&out[1], lane, places[1]);
         found |= 1u << lane;
     }
     return vm_from_bits(found);

@@ -131,9 +131,10 @@ SIMD_INLINE void kernel_local_faces_of(const kernel_tile *tile, vf (*const lists
 
 /* ---- rays ---- */
 
-static __attribute__((noinline)) void kernel_local_find_dented(const kernel_local_faces *f, const kernel_lane_rays *own,
-                                                               const vi *nonconvex, vm rays, int type,
-                                                               kernel_curved_crossed *out)
+static __attribute__((noinline)) void kernel_local_find_faces_nonconvex(const kernel_local_faces *f,
+                                                                        const kernel_lane_rays *own,
+                                                                        const vi *nonconvex, vm rays, int type,
+                                                                        kernel_curved_crossed *out)
 {
     KERNEL_OF_TYPE(type, kernel_curved_find, (const float(*)[8][SIMD_WIDTH])f->at, own, nonconvex, rays, out);
 }
@@ -144,7 +145,7 @@ SIMD_INLINE void kernel_local_find_faces(const kernel_local_faces *f, const kern
 {
     const vi nonconvex = vi_from_bits(kernel_gather_lane(f->nonconvex, own->lane));
     if (vm_any(vm_and(rays, vm_sign(-nonconvex))))
-        kernel_local_find_dented(f, own, &nonconvex, rays, type, out);
+        kernel_local_find_faces_nonconvex(f, own, &nonconvex, rays, type, out);
     else
         kernel_curved_find((const float(*)[8][SIMD_WIDTH])f->at, own, NULL, rays, out, type);
 }

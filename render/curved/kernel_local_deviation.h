@@ -61,14 +61,14 @@ typedef struct kernel_local_deviations {
 /* ---- cells ---- */
 
 /* Returns an upper bound of the gradient of nonlinear term number `term` in cells of this type. */
-SIMD_INLINE float kernel_local_bent_slope(int type, int term)
+SIMD_INLINE float kernel_local_nonlinear_slope(int type, int term)
 {
     return kernel_is_prism(type) ? 0.88f : kernel_has_apex(type) ? 0.79f : term < 3 ? 0.74f : 0.47f;
 }
 
 /* Returns the factor e of kernel_local_budget.h: the part of the field's deviation that the three sampled places may
  * miss is at most e times its bound. */
-SIMD_INLINE float kernel_local_bent_unseen(int type)
+SIMD_INLINE float kernel_local_nonlinear_unsampled(int type)
 {
     return kernel_is_box(type) ? 0.0011f : kernel_is_prism(type) ? 0.0004f : 0;
 }
@@ -81,11 +81,11 @@ SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type
         vf own = vf_load(c->field[4 + k]);
         for (int a = 0; a < 3; a++) own = vf_muladd(-vf_load(c->field[1 + a]), vf_load(c->nonlinear_part[k][a]), own);
         vf_store(out->terms[k], own);
-        most += vf_abs(own) * kernel_local_bent_slope(type, k);
+        most += vf_abs(own) * kernel_local_nonlinear_slope(type, k);
     }
     const vf bend = vf_sqrt(vf_load(c->bend)), room = 1.0f - 1.082f * bend;
     vf_store(out->bend, vf_load(c->bend));
-    vf_store(out->unseen, kernel_local_bent_unseen(type) * vf_load(c->bend) * most);
+    vf_store(out->unseen, kernel_local_nonlinear_unsampled(type) * vf_load(c->bend) * most);
     vf_store(out->sensitivity, most / room);
     vf_store(out->residual_limit, KERNEL_DEVIATION_MARGIN * room);
 }
@@ -107,7 +107,7 @@ typedef struct kernel_local_iterate {
     vf r[3], residual[3], deviation;
 } kernel_local_iterate;
 
-SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_NONLINEAR_TERMS])
+SIMD_INLINE void kernel_local_nonlinear_at(int type, const vf r[3], vf out[KERNEL_NONLINEAR_TERMS])
 {
     kernel_nonlinear_terms b;
     kernel_nonlinear_terms_at(type, r, &b);
@@ -117,7 +117,7 @@ SIMD_INLINE void kernel_local_bent_at(int type, const vf r[3], vf out[KERNEL_NON
 /* Returns the rays whose reference coordinates r lie in the cell, or outside by at most KERNEL_DEVIATION_MARGIN. */
 SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
 {
-    if (kernel_is_prism(type)) return vf_le(vf_set(-KERNEL_DEVIATION_MARGIN), kernel_local_inside(type, r));
+    if (kernel_is_prism(type)) return vf_le(vf_set(-KERNEL_DEVIATION_MARGIN), kernel_local_border_distance(type, r));
     const vf most = vf_max(vf_abs(r[0]), vf_abs(r[1])), half = vf_set(0.5f + KERNEL_DEVIATION_MARGIN);
     if (kernel_is_box(type)) return vf_le(vf_max(most, vf_abs(r[2])), half);
     return vm_and(vf_le(most, half * r[2]), vf_le(r[2], vf_set(1 + KERNEL_DEVIATION_MARGIN)));
@@ -127,8 +127,8 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
                                        vi lane, const kernel_point ends[2], int type, kernel_local_chord *out)
 {
     vf first[KERNEL_NONLINEAR_TERMS], last[KERNEL_NONLINEAR_TERMS];
-    kernel_local_bent_at(type, ends[0].r, first);
-    kernel_local_bent_at(type, ends[1].r, last);
+    kernel_local_nonlinear_at(type, ends[0].r, first);
+    kernel_local_nonlinear_at(type, ends[1].r, last);
     for (int a = 0; a < 3; a++) {
         out->middle[a] = 0.5f * (ends[0].r[a] + ends[1].r[a]);
         out->span[a] = ends[1].r[a] - ends[0].r[a];
@@ -148,7 +148,7 @@ SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const ke
 SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, int type, kernel_local_iterate *p)
 {
     vf term[KERNEL_NONLINEAR_TERMS];
-    kernel_local_bent_at(type, p->r, term);
+    kernel_local_nonlinear_at(type, p->r, term);
     for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(c->span[a], vf_set(u), c->middle[a]) - p->r[a];
     for (int k = 0; k < kernel_nonlinear_count(type); k++) {
         term[k] -= vf_muladd(c->rise[k], vf_set(u), c->mean[k]);
@@ -166,7 +166,7 @@ SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)
 /* Refines the reference coordinates r at `count` places from initial guesses by Newton's method. *residual receives the
  * largest residual left at any place. Returns the rays for which r is valid at all places: in the cell or slightly
  * outside, with a small enough residual. */
-SIMD_INLINE vm kernel_local_settle(const kernel_local_chord *c, const float *places, int count, vm rays, int type,
+SIMD_INLINE vm kernel_local_newton(const kernel_local_chord *c, const float *places, int count, vm rays, int type,
                                    kernel_local_iterate *at, vf *residual)
 {
     for (int n = 0;; n++) {
@@ -203,7 +203,7 @@ SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, con
         for (int a = 0; a < 3; a++)
             iterates[q].r[a] =
                 vf_muladd(chord.span[a], vf_set(places[q]), 0.25f * chord.middle[a]) + 0.75f * middle->r[a];
-    out->has_diverged = vm_not(kernel_local_settle(&chord, places, 3, rays, type, iterates, &out->residual));
+    out->has_diverged = vm_not(kernel_local_newton(&chord, places, 3, rays, type, iterates, &out->residual));
     for (int i = 0; i < 3; i++) out->field[i] = iterates[i].deviation;
 }
 
@@ -236,7 +236,7 @@ SIMD_INLINE void kernel_local_part_next(const kernel_local_chord *c, float share
         places[i] = part->u + along;
         for (int a = 0; a < 3; a++) at[i].r[a] = vf_muladd(c->span[a], vf_set(along), part->r[a]);
     }
-    out->has_diverged = vm_not(kernel_local_settle(c, places, 4, rays, type, at, &residual));
+    out->has_diverged = vm_not(kernel_local_newton(c, places, 4, rays, type, at, &residual));
     part->u = places[3];
     part->deviation = part->u < 0.5f ? at[3].deviation : vf_set(0);
     part->residual = vf_max(residual, part->residual);

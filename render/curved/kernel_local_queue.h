@@ -165,7 +165,7 @@ SIMD_INLINE void kernel_local_pixels(const kernel_tile_trace *t, int count, cons
 
 /* Clips a box of pixels (four bits each: first and last column, first and last row) to the columns and rows in which
  * the lane's cell may be visible. Returns false if nothing is left. */
-SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigned *box)
+SIMD_INLINE bool kernel_local_clip_box(int32_t ends[4][SIMD_WIDTH], int lane, unsigned *box)
 {
     int end[4];
     for (int a = 0; a < 2; a++) {

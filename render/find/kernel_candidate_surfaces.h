@@ -135,7 +135,7 @@ static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lan
 static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l,
                                                                const kernel_curved_slab *slab, kernel_ends_lanes *e)
 {
-    *e = kernel_no_ends();
+    *e = kernel_empty_ends();
     for (int i = 0; i < l->count; i++) {
         kernel_ends_add(s, e, l->at[i], vf_le(vf_abs(slab->at[i]), slab->thickness));
         for (int j = 0; j < i; j++) {
@@ -157,7 +157,7 @@ static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_find
 SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l, const vm negative[4],
                                        kernel_ends_lanes *e)
 {
-    *e = kernel_no_ends();
+    *e = kernel_empty_ends();
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         const vm crossed = vm_xor(negative[i], negative[j]);
@@ -177,7 +177,7 @@ SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const ker
     for (int i = 0; i < count; i++) {
         vf from_eye[3];
         kernel_finder_positions(s, kernel_cells_vertex(c, i), from_eye);
-        l->usual = kernel_usual_position(l->usual, from_eye);
+        l->usual = kernel_positions_fit_lanes(l->usual, from_eye);
         kernel_rotate_to_camera(s, from_eye, l->at[i]);
     }
 }
@@ -244,7 +244,7 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 /* ---- hexes, wedges and pyramids ---- */
 
 /* Adds the queue's cells to the candidates, with the bounds of the isosurface in them. */
-SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int vertices)
+SIMD_INLINE void kernel_crossed_add_candidates(kernel_finder *s, kernel_crossed *h, int vertices)
 {
     const kernel_level level = kernel_level_of(s->surface->layer->values[h->value]);
     const kernel_cells *c = &h->cells;
@@ -269,9 +269,9 @@ static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kern
     if (!h->cells.count) return;
     kernel_cells_fill(&h->cells);
     if (h->cells.vertices == 8)
-        kernel_crossed_run(s, h, 8);
+        kernel_crossed_add_candidates(s, h, 8);
     else
-        kernel_crossed_run(s, h, h->cells.vertices);
+        kernel_crossed_add_candidates(s, h, h->cells.vertices);
     h->cells.count = 0;
 }
 

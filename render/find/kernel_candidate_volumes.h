@@ -20,7 +20,7 @@ SIMD_INLINE void kernel_finder_fetch_cell(kernel_finder *s, uint32_t cell)
 /* Adds those of the cells, which are all of one type, to the candidates whose values are visible in the volume. */
 static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, const kernel_cells *c)
 {
-    kernel_ends_lanes e = kernel_no_ends();
+    kernel_ends_lanes e = kernel_empty_ends();
     vm usual = vm_all_lanes();
     vf v[8] = {vf_set(0)};
     for (int i = 0; i < c->vertices; i++) {
@@ -31,7 +31,7 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
         v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_wide_doubles_narrow(&value.wide);
         usual = vm_and(usual, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
         kernel_finder_positions(s, vertex, place);
-        usual = kernel_usual_position(usual, place);
+        usual = kernel_positions_fit_lanes(usual, place);
         kernel_rotate_to_camera(s, place, at);
         kernel_ends_add(s, &e, at, vm_all_lanes());
     }

@@ -146,8 +146,8 @@ SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, 
 
 /* Splits the selected nodes into leaves and the left children of inner nodes, and prefetches the leaves' cells and the
  * children's ranges of values. */
-SIMD_INLINE void kernel_front_open(const mmbvh *tree, const mmbvh_ranges *ranges, const kernel_front *front,
-                                   kernel_front *leaves, kernel_front *children)
+SIMD_INLINE void kernel_front_expand(const mmbvh *tree, const mmbvh_ranges *ranges, const kernel_front *front,
+                                     kernel_front *leaves, kernel_front *children)
 {
     leaves->count = children->count = 0;
     for (int n = 0; n < front->count; n++) {
@@ -180,7 +180,7 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
         int64_t next[KERNEL_FRONT];
         for (int n = 0; n < count; n++) next[n] = stack[--top];
         kernel_front_choose(s, tree, ranges, &front, next, count);
-        kernel_front_open(tree, ranges, &front, &leaves, &children);
+        kernel_front_expand(tree, ranges, &front, &leaves, &children);
         for (int n = 0; n < leaves.count; n++) {
             const int64_t leaf = leaves.entries[n];
             kernel_find_leaf(s, tree->cells + mmbvh_node_ref(tree, leaf), mmbvh_node_count(tree, leaf));

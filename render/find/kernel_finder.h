@@ -305,7 +305,7 @@ SIMD_INLINE void kernel_finder_positions(const kernel_finder *s, vi vertex, vf o
 
 /* Returns the lanes of `usual` whose coordinates are small enough for float32 lanes and not NaN. Other cells are tested
  * one by one. */
-SIMD_INLINE vm kernel_usual_position(vm usual, const vf place[3])
+SIMD_INLINE vm kernel_positions_fit_lanes(vm usual, const vf place[3])
 {
     for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
     return usual;
@@ -335,7 +335,7 @@ SIMD_INLINE void kernel_ends_add(const kernel_finder *s, kernel_ends_lanes *e, c
     e->bottom = vf_max(e->bottom, vf_select(lanes, y, -most));
 }
 
-SIMD_INLINE kernel_ends_lanes kernel_no_ends(void)
+SIMD_INLINE kernel_ends_lanes kernel_empty_ends(void)
 {
     const vf most = vf_set(INFINITY);
     return (kernel_ends_lanes){most, -most, most, -most, most, -most};

@@ -31,14 +31,14 @@ static inline double kernel_clip_dot(const double a[3], const double b[3])
 }
 
 /* Returns the scaled distance from the ray's point at t = 0 to the clip plane. */
-static inline double kernel_clip_left(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
+static inline double kernel_clip_plane_distance(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
 {
     return (c->distance - kernel_clip_dot(c->normal, s->origin)) * s->scale - kernel_clip_dot(c->normal, ray->base);
 }
 
 static inline kernel_ray_part kernel_clip_plane(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
 {
-    const double left = kernel_clip_left(c, s, ray), along = kernel_clip_dot(c->normal, ray->direction);
+    const double left = kernel_clip_plane_distance(c, s, ray), along = kernel_clip_dot(c->normal, ray->direction);
     if (along > 0) return (kernel_ray_part){-INFINITY, left / along};
     if (along < 0) return (kernel_ray_part){left / along, INFINITY};
     return left < 0 ? KERNEL_NO_PART : (kernel_ray_part){-INFINITY, INFINITY};
@@ -125,7 +125,7 @@ static inline bool kernel_clip_has(const render_clip *c, const render_space *s, 
     double square = 0;
     bool is_within = true;
     if (c->kind == RENDER_CLIP_PLANE)
-        return kernel_clip_dot(c->normal, ray->direction) * t <= kernel_clip_left(c, s, ray);
+        return kernel_clip_dot(c->normal, ray->direction) * t <= kernel_clip_plane_distance(c, s, ray);
     for (int a = 0; a < 3; a++) {
         const double place = (ray->base[a] + t * ray->direction[a]) / s->scale + s->origin[a];
         is_within = is_within && c->lower[a] <= place && place <= c->upper[a];

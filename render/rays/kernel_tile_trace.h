@@ -112,7 +112,8 @@ SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, 
 
 /* Returns those of the given blocks in which a body with this outline may be visible: it meets the block, and is not
  * hidden by nearer hits. */
-SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_outline *outline, unsigned blocks)
+SIMD_INLINE unsigned kernel_tile_visible_blocks(const kernel_tile_trace *t, const kernel_outline *outline,
+                                                unsigned blocks)
 {
     const kernel_placement placement = kernel_outline_placement(&t->tile_planes, outline);
     if (placement.far < t->t_near) return 0;

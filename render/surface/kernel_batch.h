@@ -151,8 +151,8 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
 
 /* ---- batches ---- */
 
-static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b,
-                                                       kernel_surface_cells *queued)
+static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t, kernel_batch *b,
+                                                           kernel_surface_cells *queued)
 {
     const render_surface_layer *layer = t->surface->layer;
     /* layers that need more of a hit than its depth and normal are traced cell by cell */

@@ -121,7 +121,7 @@ SIMD_INLINE void kernel_contraction_clamp(int type, vf domain_margin, vf r[3])
 }
 
 /* Returns the maximum of the dot product s . x over all points x of the reference domain D. */
-SIMD_INLINE vf kernel_contraction_reach(int type, vf domain_margin, const vf s[3])
+SIMD_INLINE vf kernel_contraction_support(int type, vf domain_margin, const vf s[3])
 {
     const vf half = 0.5f + domain_margin;
     if (kernel_is_box(type)) return half * ((vf_abs(s[0]) + vf_abs(s[1])) + vf_abs(s[2]));
@@ -143,20 +143,20 @@ SIMD_INLINE void kernel_contraction_local(int type, const vf r[3], vf out[3])
 
 /* Returns a lower bound of the distance from the reference coordinates r to the domain's border. It is negative if r is
  * outside of the domain. */
-SIMD_INLINE vf kernel_contraction_inside(int type, const vf r[3])
+SIMD_INLINE vf kernel_contraction_border_distance(int type, const vf r[3])
 {
     vf local[3];
     kernel_contraction_local(type, r, local);
-    const vf inside = kernel_local_inside(type, local);
+    const vf inside = kernel_local_border_distance(type, local);
     return inside * (kernel_is_box(type) ? 1.0f : 0.7f);
 }
 
 /* Returns the rays for which the step s of the iteration at the point q proves that the reference domain D contains no
  * root. If there were a root, |s| would be at most two diameters of D; so 8 error_bound is an upper bound of the
  * rounding error, 2 error_bound times (|s| + 2), and a thousandth of |s|^2 covers the rest. */
-SIMD_INLINE vm kernel_contraction_none(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
+SIMD_INLINE vm kernel_contraction_excludes_root(int type, const kernel_contraction *c, const vf q[3], const vf s[3])
 {
-    const vf most = kernel_contraction_reach(type, c->domain_margin, s) - kernel_dot(s, q);
+    const vf most = kernel_contraction_support(type, c->domain_margin, s) - kernel_dot(s, q);
     vf error_bound = 8.0f * c->error_bound;
     /* twice the error of crossings of faces, because the reference domain of a pyramid is not widened */
     if (kernel_has_apex(type)) error_bound = 4.0f * c->domain_margin;
@@ -192,13 +192,13 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_
             out->r[i] = at;
         }
         if (n == 1 || n == KERNEL_CONTRACTION_STEPS - 1) {
-            out->none = vm_or(out->none, vm_and(sure, kernel_contraction_none(type, c, q, s)));
+            out->none = vm_or(out->none, vm_and(sure, kernel_contraction_excludes_root(type, c, q, s)));
             if (!vm_any(vm_andnot(sure, out->none))) return;
         }
         for (int i = 0; i < 3; i++) q[i] = out->r[i];
     }
     const vf off = c->grow * vf_sqrt(kernel_dot(s, s)) + (1.0f + c->grow) * c->error_bound;
-    const vm inside = vf_lt(off + c->domain_margin, kernel_contraction_inside(type, out->r));
+    const vm inside = vf_lt(off + c->domain_margin, kernel_contraction_border_distance(type, out->r));
     out->one = vm_andnot(vm_and(sure, vm_and(inside, vf_lt(off, vf_set(KERNEL_CONTRACTION_END)))), out->none);
     vf e = ray->level + c->middle;
     for (int k = 0; k < terms; k++) e += c->field[k] * bend.term[k];

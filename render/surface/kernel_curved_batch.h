@@ -449,7 +449,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
         i.r_out[a] = vf_load(ends->r[1][a] + n);
     }
     const kernel_curved cells = kernel_curved_batch_cells(h);
-    if (!kernel_search_in(&s, &cells, &p.rays, p.lane, &i, p.active, &t->thread->map_failures)) return 0;
+    if (!kernel_search_cells(&s, &cells, &p.rays, p.lane, &i, p.active, &t->thread->map_failures)) return 0;
     do {
         kernel_point at;
         vf normal[3];
@@ -464,7 +464,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
         places.t = vf_select(hit, at.t, places.t);
         hits = vm_or(hits, hit);
         kernel_search_close(&s, hit);
-    } while (kernel_search_on(&s));
+    } while (kernel_search_continue(&s));
     return vm_any(hits) ? kernel_curved_batch_accept(t, h, &h->others, n, &p, vm_bits(hits), &places) : 0;
 }
 
@@ -527,8 +527,8 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
     t->curved = alone;
 }
 
-static __attribute__((noinline)) void kernel_curved_batch_run(kernel_tile_trace *t, kernel_curved_batch *h,
-                                                              kernel_surface_cells *queued)
+static __attribute__((noinline)) void kernel_curved_batch_process(kernel_tile_trace *t, kernel_curved_batch *h,
+                                                                  kernel_surface_cells *queued)
 {
     kernel_curved_batch_transform(t, h, queued);
     if (h->rays.count) kernel_curved_batch_trace(t, h);

@@ -86,13 +86,13 @@ SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion
 {
     const kernel_rays rays = kernel_packet_rays(p);
     kernel_search s;
-    if (!kernel_search_in(&s, curved, &rays, vi_set(0), i, wanted, &p->thread->map_failures)) return;
+    if (!kernel_search_cells(&s, curved, &rays, vi_set(0), i, wanted, &p->thread->map_failures)) return;
     do {
         kernel_point at;
         if (!vm_any(s.found)) continue;
         kernel_polish(&s, &at);
         kernel_search_close(&s, kernel_occlusion_block(p, o, s.found, at.t));
-    } while (kernel_search_on(&s));
+    } while (kernel_search_continue(&s));
 }
 
 static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, const kernel_occlusion *o,
@@ -129,7 +129,7 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
 {
     kernel_poly_crossings r;
     kernel_polyhedron_interval polyhedron_interval;
-    if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
     while (kernel_poly_next(&r, &polyhedron_interval)) {
         const vm changes = kernel_changes_sign(&polyhedron_interval.interval);
         const vm wanted = vm_and(kernel_is_near(p, &polyhedron_interval.interval),

@@ -147,8 +147,8 @@ SIMD_INLINE kernel_pair_result kernel_pairs_classify(const kernel_curved_pairs *
     return out;
 }
 
-static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o, kernel_secondary_rays *s,
-                                                       kernel_curved_pairs *pairs)
+static __attribute__((noinline)) bool kernel_pairs_process(const kernel_occluders *o, kernel_secondary_rays *s,
+                                                           kernel_curved_pairs *pairs)
 {
     kernel_prepared_ray_lanes rays;
     bool is_well = true;

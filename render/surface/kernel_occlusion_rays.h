@@ -99,7 +99,7 @@ static bool kernel_meets_slab(const kernel_occluders *o, kernel_secondary_rays *
     pairs->rise[n] = lanes->rise[i];
     pairs->thickness[n] = lanes->thickness[i];
     pairs->reach[n] = lanes->reach[i];
-    return pairs->count < SIMD_WIDTH || kernel_pairs_run(o, s, pairs);
+    return pairs->count < SIMD_WIDTH || kernel_pairs_process(o, s, pairs);
 }
 
 static bool kernel_meets_slabs(const kernel_occluders *o, kernel_secondary_rays *s, kernel_curved_pairs *pairs, int ray)
@@ -143,7 +143,7 @@ static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, const k
             s->rays[i].is_open = false;
     for (int i = 0; i < s->count && o->slabs.node_count; i++)
         if (s->rays[i].is_open) is_well = kernel_meets_slabs(o, s, &pairs, i) && is_well;
-    is_well = kernel_pairs_run(o, s, &pairs) && is_well;
+    is_well = kernel_pairs_process(o, s, &pairs) && is_well;
     if (!is_well) thread->out_of_memory = true;
 }
 

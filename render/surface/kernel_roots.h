@@ -267,9 +267,10 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
 }
 
 /* Begins a search for rays, each in its own cell. Returns false if no ray has a root. */
-static __attribute__((noinline, unused)) bool kernel_search_in(kernel_search *s, const kernel_curved *c,
-                                                               const kernel_rays *rays, vi lane,
-                                                               const kernel_interval *i, vm wanted, int64_t *failures)
+static __attribute__((noinline, unused)) bool kernel_search_cells(kernel_search *s, const kernel_curved *c,
+                                                                  const kernel_rays *rays, vi lane,
+                                                                  const kernel_interval *i, vm wanted,
+                                                                  int64_t *failures)
 {
     s->rays = *rays;
     s->interval = i;
@@ -351,7 +352,7 @@ SIMD_INLINE void kernel_search_end(kernel_search *s)
 }
 
 /* Continues the search with the next roots. Returns false if there are none. */
-static __attribute__((noinline, unused)) bool kernel_search_on(kernel_search *s)
+static __attribute__((noinline, unused)) bool kernel_search_continue(kernel_search *s)
 {
     if (vm_any(s->open))
         kernel_search_next(s);

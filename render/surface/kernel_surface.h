@@ -217,14 +217,14 @@ SIMD_INLINE void kernel_curved_robust(kernel_packet *p, kernel_surface_state *st
 {
     const kernel_rays rays = kernel_packet_rays(p);
     kernel_search s;
-    if (!kernel_search_in(&s, curved, &rays, vi_set(curved->lane), i, wanted, &p->thread->map_failures)) return;
+    if (!kernel_search_cells(&s, curved, &rays, vi_set(curved->lane), i, wanted, &p->thread->map_failures)) return;
     do {
         kernel_point at;
         if (!vm_any(s.found)) continue;
         kernel_polish(&s, &at);
         const vm hit = kernel_curved_accept(p, state, c, curved, value, &s.map, s.found, &at);
         if (state->is_opaque) kernel_search_close(&s, hit);
-    } while (kernel_search_on(&s));
+    } while (kernel_search_continue(&s));
 }
 
 SIMD_INLINE void kernel_contract_rays(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
@@ -552,14 +552,14 @@ SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r,
 {
     kernel_profile_piece next = walk->piece;
     const vf zero = vf_set(0);
-    const vm inside = kernel_profile_open(polyhedron_interval, &next, left);
+    const vm inside = kernel_profile_continues(polyhedron_interval, &next, left);
     kernel_profile_next(r, polyhedron_interval,
                         vf_select(inside, polyhedron_interval->u_out, polyhedron_interval->interval.v_out), &next);
-    const vm rounding = vm_and(kernel_profile_open(polyhedron_interval, &next, inside),
+    const vm rounding = vm_and(kernel_profile_continues(polyhedron_interval, &next, inside),
                                vf_le(vf_abs(next.v1), vf_set(KERNEL_ROOT_BAND)));
     next.v1 = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v1);
     kernel_piece_select(left, &next, &walk->piece);
-    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(polyhedron_interval, &next, inside)));
+    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_continues(polyhedron_interval, &next, inside)));
 }
 
 /* Returns a number that is larger than t by one or two units in the last place. */
@@ -668,7 +668,7 @@ static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *st
     const render_surface_layer *layer = state->surface->layer;
     kernel_poly_crossings r;
     kernel_polyhedron_interval polyhedron_interval;
-    if (!kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, layer->colour_map != NULL)) return;
+    if (!kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, layer->colour_map != NULL)) return;
     while (kernel_poly_next(&r, &polyhedron_interval)) {
         const vm near = kernel_is_near(p, &polyhedron_interval.interval);
         if (!vm_any(near)) continue;

@@ -63,8 +63,8 @@ typedef struct kernel_node_lanes {
 } kernel_node_lanes;
 
 /* Reads the boxes and value ranges of nodes one by one, which works for every layout of nodes. */
-static __attribute__((noinline)) void kernel_nodes_slowly(const mmbvh *tree, const mmbvh_ranges *ranges,
-                                                          const int64_t node[SIMD_WIDTH], kernel_node_lanes *out)
+static __attribute__((noinline)) void kernel_nodes_fetch_scalar(const mmbvh *tree, const mmbvh_ranges *ranges,
+                                                                const int64_t node[SIMD_WIDTH], kernel_node_lanes *out)
 {
     float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH], range[2][SIMD_WIDTH];
     for (int n = 0; n < SIMD_WIDTH; n++) {
@@ -91,7 +91,7 @@ SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *range
                                     kernel_node_lanes *out)
 {
     if (!tree->compact || tree->node_count > INT32_MAX / 10) {
-        kernel_nodes_slowly(tree, ranges, node, out);
+        kernel_nodes_fetch_scalar(tree, ranges, node, out);
         return;
     }
     int32_t index[SIMD_WIDTH];

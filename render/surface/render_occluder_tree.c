@@ -179,7 +179,7 @@ static bool reserve(const widening *w, size_t nodes, size_t leaves)
     return w->out->boxes && w->out->children && w->out->leaves && w->out->sources;
 }
 
-static void count_use(const widening *w)
+static void count_used_bytes(const widening *w)
 {
     const size_t width = (size_t)w->width, nodes = (size_t)w->out->node_count, leaves = (size_t)w->out->leaf_count;
     base_set_used_bytes(w->out->boxes, nodes * 6 * width * sizeof(float));
@@ -199,7 +199,7 @@ static bool widen(widening *w)
         sum_up(w);
         const piece_range all = node_range(w, 0);
         make_node(w, &all);
-        count_use(w);
+        count_used_bytes(w);
         for (int k = 0; k < 6; k++) w->out->size = fmaxf(w->out->size, fabsf(w->boxes[k]));
     }
     base_free(w->first);

@@ -332,9 +332,9 @@ static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h,
 
 /* Adds the subinterval's segments, on its chord. They are not raised to the field's mean, as equal subintervals are,
  * because they might then reach values that have not been checked. */
-static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_exact_point *from,
-                                   const kernel_subinterval *sub, const kernel_subinterval_values *values,
-                                   const kernel_medium_range *s)
+static void kernel_subinterval_add_segments(kernel_packet *p, const kernel_bisection *h, vm lane,
+                                            const kernel_exact_point *from, const kernel_subinterval *sub,
+                                            const kernel_subinterval_values *values, const kernel_medium_range *s)
 {
     kernel_segments *list = h->state->list;
     const double inside = sub->middle.v;
@@ -399,7 +399,8 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
         const bool is_last = sub.depth >= KERNEL_BISECTION_DEPTH || h->count >= KERNEL_BISECTION_SEGMENTS ||
                              count + 2 > KERNEL_BISECTION_ROOM;
         if (is_last || kernel_subinterval_is_good(h, &values, &s, length, step != NULL, sub.is_monotone)) {
-            if (list->t_begin[lane] <= (float)from.t) kernel_subinterval_put(p, h, only, &from, &sub, &values, &s);
+            if (list->t_begin[lane] <= (float)from.t)
+                kernel_subinterval_add_segments(p, h, only, &from, &sub, &values, &s);
             const double depth = s.least * length;
             h->light /= 1 + depth * (1 + 0.5 * depth);
             h->count++;
@@ -692,7 +693,7 @@ static void kernel_polyhedron_interval_integrate(kernel_packet *p, kernel_volume
     if (begin >= end) return;
     if (!r->cell->is_constant) kernel_poly_profile(r, polyhedron_interval);
     kernel_profile_piece piece = kernel_profile_begin(polyhedron_interval, polyhedron_interval->u_in);
-    while (vm_any(kernel_profile_open(polyhedron_interval, &piece, i->mask))) {
+    while (vm_any(kernel_profile_continues(polyhedron_interval, &piece, i->mask))) {
         kernel_profile_next(r, polyhedron_interval, polyhedron_interval->u_out, &piece);
         kernel_polyhedron_fill(p, state, polyhedron_interval, &piece, begin, end);
     }
@@ -700,7 +701,7 @@ static void kernel_polyhedron_interval_integrate(kernel_packet *p, kernel_volume
 
 /* Returns the polyhedron in tile space, with its values in the transfer function's domain; NULL if it is invisible or
  * memory ran out. */
-static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int part, uint32_t index)
+static polyhedron *kernel_polyhedron_prepare(kernel_packet *p, int volume, int part, uint32_t index)
 {
     const kernel_transfer *transfer = &p->frame->volumes[volume];
     const grid_field *field = &p->frame->job->volumes[volume].field.fields[part];
@@ -717,10 +718,10 @@ static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int par
 
 static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *state, int part, uint32_t index, vm rays)
 {
-    const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
+    const polyhedron *c = kernel_polyhedron_prepare(p, state->volume, part, index);
     kernel_poly_crossings r;
     kernel_polyhedron_interval polyhedron_interval;
-    if (!c || !kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
     while (kernel_poly_next(&r, &polyhedron_interval))
         kernel_polyhedron_interval_integrate(p, state, &r, &polyhedron_interval);
 }
@@ -728,23 +729,23 @@ static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *stat
 /* Adds the segments of a polyhedron: the pieces of the ray's profile, on which the field is exactly linear. */
 static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *state, int part, uint32_t index, vm rays)
 {
-    const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
+    const polyhedron *c = kernel_polyhedron_prepare(p, state->volume, part, index);
     kernel_poly_crossings r;
     kernel_polyhedron_interval polyhedron_interval;
-    if (!c || !kernel_poly_open(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
+    if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
     kernel_cell_interval cell_interval = {.map = NULL};
     if (state->mixing > 0) kernel_cell_interval_bound(state, c->f, c->vertex_count, &cell_interval);
     while (kernel_poly_next(&r, &polyhedron_interval)) {
         if (!c->is_constant) kernel_poly_profile(&r, &polyhedron_interval);
         kernel_profile_piece piece = kernel_profile_begin(&polyhedron_interval, polyhedron_interval.u_in);
-        vm open = kernel_profile_open(&polyhedron_interval, &piece, polyhedron_interval.interval.mask);
+        vm open = kernel_profile_continues(&polyhedron_interval, &piece, polyhedron_interval.interval.mask);
         while (vm_any(open)) {
             kernel_profile_next(&r, &polyhedron_interval, polyhedron_interval.u_out, &piece);
             const kernel_interval i = {
                 .mask = open, .t_in = piece.t0, .t_out = piece.t1, .v_in = piece.v0, .v_out = piece.v1};
             cell_interval.interval = &i;
             kernel_cell_interval_integrate(p, state, &cell_interval);
-            open = kernel_profile_open(&polyhedron_interval, &piece, open);
+            open = kernel_profile_continues(&polyhedron_interval, &piece, open);
         }
     }
 }

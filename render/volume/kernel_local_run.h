@@ -13,7 +13,7 @@
 #include "simd.h"
 
 /* Processes the first vector of cells in a queue. */
-static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, kernel_local_lanes *l, int queue)
+static __attribute__((noinline)) void kernel_local_process_queue(kernel_tile_trace *t, kernel_local_lanes *l, int queue)
 {
     const int type = kernel_curved_types[queue];
     const kernel_local_stages *stages = l->stages;
@@ -27,7 +27,7 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
     for (unsigned lanes = transformed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         unsigned box = q->box[n];
-        if (!kernel_local_cut(l->ends, n, &box)) continue;
+        if (!kernel_local_clip_box(l->ends, n, &box)) continue;
         kernel_pixel_list_add_box(&l->rays, box, n);
         if (l->rays.count >= KERNEL_LIST_PIXELS) stages->cast(t, l, type);
     }
@@ -43,7 +43,7 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
 SIMD_INLINE void kernel_local_end(kernel_tile_trace *t, kernel_local_lanes *l)
 {
     for (int i = 0; i < KERNEL_CURVED_TYPES; i++)
-        while (l->queues[i].count) kernel_local_run(t, l, i);
+        while (l->queues[i].count) kernel_local_process_queue(t, l, i);
 }
 
 /* Adds a hex, wedge or pyramid to the queue of its type. */
@@ -56,7 +56,7 @@ SIMD_INLINE void kernel_local_enqueue(kernel_tile_trace *t, kernel_local_lanes *
         kernel_local_lanes_set_part(t, l, part);
     }
     if (KERNEL_OF_TYPE(type, kernel_local_push, &l->arrays, &l->queues[queue], cell, blocks, box))
-        kernel_local_run(t, l, queue);
+        kernel_local_process_queue(t, l, queue);
 }
 
 #endif

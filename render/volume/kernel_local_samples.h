@@ -70,16 +70,17 @@ SIMD_INLINE bool kernel_local_fits(const kernel_frame *f, int type)
 
 /* Decides, by the crossings of the cell's faces, whether a sample near the cell's border belongs to the cell, and sets
  * its value if it does. */
-static __attribute__((noinline, cold)) void kernel_local_decide(kernel_tile_trace *t, kernel_local_batch *b,
-                                                                const kernel_local_queue *q, int lane, int at,
-                                                                int number)
+static __attribute__((noinline, cold)) void kernel_local_sample_by_crossings(kernel_tile_trace *t,
+                                                                             kernel_local_batch *b,
+                                                                             const kernel_local_queue *q, int lane,
+                                                                             int at, int number)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_packet *p = &t->packets[at / SIMD_WIDTH];
     kernel_volume_state state = {b->lanes.volume, &b->packets[at / SIMD_WIDTH].samples};
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_local_lanes *l = &b->lanes;
-    if (!kernel_tile_ready_single(t, l->volume, l->part, q->cell[lane], true, lane, &l->alone)) return;
+    if (!kernel_tile_make_current(t, l->volume, l->part, q->cell[lane], true, lane, &l->alone)) return;
     const vm ray = vm_and(p->active, vm_from_bits(1u << at % SIMD_WIDTH));
     const int intervals = kernel_curved_intervals(p, &cells->cell, ray, list);
     for (int k = 0; k < intervals; k++)
@@ -102,7 +103,7 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batc
     const vf place[3] = {rays.rays.origin_x + rays.rays.slope_x * depth, rays.rays.origin_y + rays.rays.slope_y * depth,
                          depth};
     const vm known = kernel_local_find(type, &b->lanes.cells, rays.lane, place, &points);
-    const vf inside = kernel_local_inside(type, points.r),
+    const vf inside = kernel_local_border_distance(type, points.r),
              error_bound = kernel_gather_lane(b->lanes.cells.error_bound, rays.lane);
     const vm own = vm_and(vm_and(active, known), vf_lt(error_bound, inside));
     const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -error_bound)));
@@ -121,7 +122,7 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batc
     }
     for (; __builtin_expect(undecided, 0); undecided &= undecided - 1) {
         const int i = __builtin_ctz(undecided);
-        kernel_local_decide(t, b, q, lane[i], at[i], number[i]);
+        kernel_local_sample_by_crossings(t, b, q, lane[i], at[i], number[i]);
     }
 }
 
@@ -153,7 +154,7 @@ SIMD_INLINE vf kernel_local_first(const kernel_local_batch *b, vf negated)
 }
 
 /* Queues the samples of the list's rays n .. n + SIMD_WIDTH - 1 that may lie inside their cells. */
-SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batch *b, int type, int n)
+SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, kernel_local_batch *b, int type, int n)
 {
     const int left = b->lanes.rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
@@ -179,10 +180,11 @@ SIMD_INLINE void kernel_local_cast_lanes(kernel_tile_trace *t, kernel_local_batc
     }
 }
 
-static __attribute__((noinline)) void kernel_local_cast(kernel_tile_trace *t, kernel_local_lanes *l, int type)
+static __attribute__((noinline)) void kernel_local_queue_samples(kernel_tile_trace *t, kernel_local_lanes *l, int type)
 {
     kernel_pixel_list_close(&l->rays);
-    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_cast_lanes(t, (kernel_local_batch *)l, type, n);
+    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH)
+        kernel_local_queue_samples_lanes(t, (kernel_local_batch *)l, type, n);
     l->rays.count = 0;
 }
 
@@ -194,7 +196,7 @@ static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, kernel_local_
     return KERNEL_OF_TYPE(type, kernel_local_transform, t, l, lists, 4, KERNEL_LOCAL_BENT, lanes);
 }
 
-static const kernel_local_stages kernel_sample_stages = {true, kernel_local_transform_lanes, kernel_local_cast,
+static const kernel_local_stages kernel_sample_stages = {true, kernel_local_transform_lanes, kernel_local_queue_samples,
                                                          kernel_local_fill};
 
 /* Prepares the sampling of a volume in a window, for the packets of the given blocks, which must be set up. */

@@ -69,14 +69,14 @@ SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
 
 /* Adds a segment to a ray's list if it begins before the end of the ray's window; it must not begin before the window.
  * at: position of the ray's pixel among the packets. */
-SIMD_INLINE void kernel_local_put(const kernel_local_segment_batch *b, int at, const kernel_segment *s)
+SIMD_INLINE void kernel_local_store_segment(const kernel_local_segment_batch *b, int at, const kernel_segment *s)
 {
     kernel_tile_ray_segments *r = &b->packets[at / SIMD_WIDTH];
     kernel_segments *list = &r->list;
     const int lane = at % SIMD_WIDTH;
     if (!(s->t_in < list->t_end[lane])) return;
     const kernel_segment_double precise = {s->t_out - s->t_in, 0, 0, 0};
-    if (__builtin_expect(kernel_segments_put(list, lane, s, &precise), 1)) return;
+    if (__builtin_expect(kernel_segments_insert(list, lane, s, &precise), 1)) return;
     const kernel_unit_segment run =
         kernel_unit_segment_of((vf_set(s->t_out) - s->t_in) * list->per_t, vf_set(s->v_in), vf_set(s->v_out));
     kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->unsorted_light);
@@ -102,7 +102,7 @@ SIMD_INLINE vf kernel_local_primitive(const kernel_local_polynomial *p, vf u)
 
 /* Adds one segment per lane to the lists of the given rays. ends: t_in, t_out, v_in, v_out; places: position of each
  * ray's pixel among the packets. */
-SIMD_INLINE void kernel_local_put_all(const kernel_local_segment_batch *b, vi places, vm rays, const vf ends[4])
+SIMD_INLINE void kernel_local_store_segments(const kernel_local_segment_batch *b, vi places, vm rays, const vf ends[4])
 {
     kernel_segment all[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
@@ -110,7 +110,7 @@ SIMD_INLINE void kernel_local_put_all(const kernel_local_segment_batch *b, vi pl
     vf_store_rows(&all[0].t_in, ends);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
-        kernel_local_put(b, at[i], &all[i]);
+        kernel_local_store_segment(b, at[i], &all[i]);
     }
 }
 
@@ -119,7 +119,7 @@ SIMD_INLINE void kernel_local_emit_one(const kernel_local_segment_batch *b, cons
 {
     const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_chord_offset(p);
     const vf ends[4] = {t0, t1, p->ends[0].value + lift, p->ends[1].value + lift};
-    kernel_local_put_all(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
+    kernel_local_store_segments(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
 }
 
 /* Adds the segments of rays that need several: equal subintervals of the interval, with chords that have the mean of
@@ -142,7 +142,7 @@ static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_
         const vf lift = (sum1 - sum0) * p->count - 0.5f * (off0 + off1);
         const vf in = (v0 + (u0 + 0.5f) * rise) + (off0 + lift), out = (v1 - (0.5f - u1) * rise) + (off1 + lift);
         const vf ends[4] = {from, to, in, out};
-        kernel_local_put_all(b, p->rays.at, vm_and(open, vm_and(vf_le(p->begin, from), vf_lt(from, to))), ends);
+        kernel_local_store_segments(b, p->rays.at, vm_and(open, vm_and(vf_le(p->begin, from), vf_lt(from, to))), ends);
         from = to;
         u0 = u1;
         off0 = off1;
@@ -239,7 +239,7 @@ kernel_local_segments_process_singly(kernel_tile_trace *t, kernel_local_segment_
         }
         kernel_local_lanes *l = &b->lanes;
         const uint32_t cell = q->cell[lane[first]];
-        if (!kernel_tile_ready_single(t, l->volume, l->part, cell, false, lane[first], &l->alone)) continue;
+        if (!kernel_tile_make_current(t, l->volume, l->part, cell, false, lane[first], &l->alone)) continue;
         const kernel_cell *c = &t->thread->tile_cells->cell;
         kernel_packet *p = &t->packets[packet];
         const vm active = p->active;

@@ -180,7 +180,7 @@ SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_preint_subinterv
 }
 
 /* Integrates the rays for which a single subinterval is not accurate enough. */
-static __attribute__((noinline)) void kernel_preint_finely(const kernel_pieces *pieces, vm rays,
+static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *pieces, vm rays,
                                                            const kernel_preint_end *from,
                                                            const kernel_unit_segment *run,
                                                            const kernel_preint_subinterval *whole, kernel_light *light)
@@ -222,7 +222,7 @@ SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm ra
     kernel_preint_between(pieces->preintegral, end, &next, run->length, &sub);
     const vm good = vf_le(sub.error + sub.table_error, sub.allowed);
     light = kernel_light_select(good, &sub, &light);
-    if (vm_any(vm_andnot(rays, good))) kernel_preint_finely(pieces, vm_andnot(rays, good), end, run, &sub, &light);
+    if (vm_any(vm_andnot(rays, good))) kernel_preint_refine(pieces, vm_andnot(rays, good), end, run, &sub, &light);
     *end = next;
     return light;
 }

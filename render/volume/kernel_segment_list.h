@@ -106,7 +106,7 @@ SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_
 
 /* Finds the next depth at which transparent surfaces cut each ray, by a search of all of the tile's fragments. It is
  * used if a ray has more such depths than there are rows for them. */
-static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts, vf from, bool beyond)
+static vf kernel_next_cut_by_search(const kernel_packet *p, const kernel_cuts *cuts, vf from, bool beyond)
 {
     float start[SIMD_WIDTH], next[SIMD_WIDTH];
     vf_store(start, from);
@@ -127,7 +127,7 @@ static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts
 SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, vf t, bool beyond)
 {
     vf next = vf_set(INFINITY);
-    if (!cuts->is_whole) return kernel_next_cut_slowly(p, cuts, t, beyond);
+    if (!cuts->is_whole) return kernel_next_cut_by_search(p, cuts, t, beyond);
     for (int i = cuts->row_count; i-- > 0;) {
         const vf cut = vf_load(cuts->row[i]);
         next = vf_select(beyond ? vf_lt(t, cut) : vf_le(t, cut), cut, next);
@@ -195,8 +195,8 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
 }
 
 /* Adds a segment to a ray's list. Returns false if the list is full and all its segments begin at the same t. */
-SIMD_INLINE bool kernel_segments_put(kernel_segments *list, int lane, const kernel_segment *s,
-                                     const kernel_segment_double *precise)
+SIMD_INLINE bool kernel_segments_insert(kernel_segments *list, int lane, const kernel_segment *s,
+                                        const kernel_segment_double *precise)
 {
     if (__builtin_expect(list->count[lane] == list->room, 0)) {
         if (!kernel_segments_shorten(list, lane, s)) return false;
@@ -230,7 +230,7 @@ SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segment
     }
     for (; bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        if (!kernel_segments_put(list, lane, &all[lane], &doubles[lane])) left |= bits & -bits;
+        if (!kernel_segments_insert(list, lane, &all[lane], &doubles[lane])) left |= bits & -bits;
     }
     if (__builtin_expect(left != 0, 0)) {
         kernel_unit_segment run = kernel_unit_segment_of((i->t_out - i->t_in) * list->per_t, i->v_in, i->v_out);

@@ -29,7 +29,7 @@ static unsigned kernel_small_tets_list(const kernel_tile_trace *t, unsigned lane
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         unsigned box = cells->tets.box[n];
-        if (!kernel_local_cut(l->ends, n, &box)) continue;
+        if (!kernel_local_clip_box(l->ends, n, &box)) continue;
         if (kernel_box_pixels(box) > most)
             others |= 1u << n;
         else

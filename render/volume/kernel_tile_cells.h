@@ -58,15 +58,15 @@ typedef struct kernel_tile_cells {
 
 /* Transforms the cell that has been read, and prepares it for the rays of the blocks. Returns the blocks in which it
  * may be visible. is_pencil: the rays are the tile's own primary rays (kernel_packet.h). */
-SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_cells *cells, const grid *g,
-                                            const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
+SIMD_INLINE unsigned kernel_tile_transform_cell(kernel_tile_trace *t, kernel_tile_cells *cells, const grid *g,
+                                                const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
 {
     kernel_cell *c = &cells->cell;
     kernel_outline outline;
     if (!c->is_finite || !kernel_cell_is_visible(c, transfer)) return 0;
     kernel_cell_move(c, t->frame, &t->tile, g);
     kernel_vertex_outline(c, &outline);
-    const unsigned meets = kernel_tile_keep(t, &outline, blocks);
+    const unsigned meets = kernel_tile_visible_blocks(t, &outline, blocks);
     if (!meets) return 0;
     kernel_cell_order(c);
     kernel_cell_domain(c, transfer);
@@ -79,7 +79,7 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
 /* Makes a cell of a batch the tile's current cell, which is traced on its own by the rays of all blocks. Does nothing
  * if it already is the current cell. cell: the cell's index; lane: its lane in the batch. Returns false if it is
  * invisible. *alone is the lane of the current cell, or -1. */
-static __attribute__((noinline, cold)) bool kernel_tile_ready_single(kernel_tile_trace *t, int volume, int part,
+static __attribute__((noinline, cold)) bool kernel_tile_make_current(kernel_tile_trace *t, int volume, int part,
                                                                      uint32_t cell, bool is_pencil, int lane,
                                                                      int *alone)
 {
@@ -88,7 +88,8 @@ static __attribute__((noinline, cold)) bool kernel_tile_ready_single(kernel_tile
     if (*alone == lane) return true;
     *alone = -1;
     kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[volume].field.fields[part], cell);
-    if (!kernel_tile_ready_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, KERNEL_ALL_BLOCKS)) return false;
+    if (!kernel_tile_transform_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, KERNEL_ALL_BLOCKS))
+        return false;
     *alone = lane;
     return true;
 }
@@ -105,7 +106,7 @@ SIMD_INLINE void kernel_tile_process_cell(kernel_tile_trace *t, int volume, int 
         take(t, part, c, NULL, blocks);
         return;
     }
-    blocks = kernel_tile_ready_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, blocks);
+    blocks = kernel_tile_transform_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, blocks);
     if (blocks) take(t, part, c, kernel_is_linear(c->type) || c->is_constant ? NULL : &cells->map, blocks);
 }
 
@@ -376,7 +377,7 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_trace
 }
 
 /* Moves the cells that overlap the window to the front of the list and sets open_count to their number. */
-SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_cells *cells)
+SIMD_INLINE void kernel_tile_cells_select_window(const kernel_tile_trace *t, kernel_tile_cells *cells)
 {
     kernel_tile_candidate *items = cells->items;
     const float far = kernel_tile_far(t);
@@ -406,7 +407,7 @@ SIMD_INLINE void kernel_tile_process_item(kernel_tile_trace *t, kernel_tile_cell
 
 /* Prefetches the next cells of the window: the vertex indices of 2 * KERNEL_OPEN_PIECE cells, and the vertices of
  * KERNEL_OPEN_PIECE cells. */
-SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const kernel_tile_cells *cells, int first)
+SIMD_INLINE void kernel_tile_prefetch_window(const kernel_tile_trace *t, const kernel_tile_cells *cells, int first)
 {
     const render_job *job = t->frame->job;
     for (int pass = 0; pass < 2; pass++) {
@@ -423,13 +424,13 @@ SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const ker
 }
 
 /* Processes all candidates of the tile that overlap the window. */
-SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visitor *visitor, unsigned blocks)
+SIMD_INLINE void kernel_visit_window(kernel_tile_trace *t, const kernel_cell_visitor *visitor, unsigned blocks)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_tile_cells_open(t, cells);
+    kernel_tile_cells_select_window(t, cells);
     for (int n = 0; n < cells->open_count; n++) {
         const kernel_tile_candidate *item = &cells->items[n];
-        if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
+        if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_window(t, cells, n);
         const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
         if (met && !visitor->queue(t, (int)item->source, item->cell, met, item->box))
             kernel_tile_process_item(t, cells, item, visitor->is_pencil, met, visitor->take);
@@ -446,7 +447,7 @@ SIMD_INLINE float kernel_tile_cells_near(const kernel_tile_trace *t)
 }
 
 /* Returns the blocks that the bounding box of some tree may meet, and the range of these boxes' depths. */
-SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)
+SIMD_INLINE kernel_placement kernel_tile_trees_placement(const kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
     kernel_placement all = {.near = INFINITY, .far = -INFINITY};

@@ -151,7 +151,7 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
         const vm cut = vm_and(met, vm_or(vf_lt(i.t_in, near), vf_lt(far, i.t_out)));
         const vm own = vm_and(vm_andnot(met, cut), vm_and(vf_le(begin, i.t_in), vf_lt(i.t_in, i.t_out)));
         const vf ends[4] = {i.t_in, i.t_out, i.v_in, i.v_out};
-        if (vm_any(own)) kernel_local_put_all(b, at, own, ends);
+        if (vm_any(own)) kernel_local_store_segments(b, at, own, ends);
         if (__builtin_expect(vm_any(cut), 0)) kernel_tet_segments_cut(t, s, at, r.lane, vm_bits(cut));
     }
     b->lanes.rays.count = 0;
@@ -217,7 +217,7 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
     kernel_local_segments_begin(t, &s->stretches, s->packets, blocks, kernel_tile_cell_segments,
                                 kernel_curved_segments);
     if (t->frame->volume_candidates)
-        kernel_visit_open(t, &kernel_segments_visitor, blocks);
+        kernel_visit_window(t, &kernel_segments_visitor, blocks);
     else
         kernel_tile_all_trees(t, blocks, kernel_tile_segments_parts, kernel_tile_cell_segments);
     kernel_local_end(t, &s->stretches.lanes);
@@ -287,7 +287,7 @@ static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
     if (!kernel_tile_cells_begin(t, kernel_tet_segments_fit(t->frame) ? kernel_tet_segments_small : NULL)) return;
-    const kernel_placement reach = kernel_tile_reach(t);
+    const kernel_placement reach = kernel_tile_trees_placement(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
     for (int n = 0; n < count; n++)

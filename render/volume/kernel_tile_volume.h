@@ -118,8 +118,8 @@ static __attribute__((noinline, cold)) void kernel_tet_sample_separate(kernel_ti
 
 /* Stores the values of samples, one per lane, in the window. Samples that already have a value from another cell are
  * emitted instead. */
-SIMD_INLINE void kernel_tet_samples_put(kernel_tile_trace *t, kernel_local_batch *b, vm own, vi places, vi numbers,
-                                        vf depth, vf value)
+SIMD_INLINE void kernel_tet_samples_store(kernel_tile_trace *t, kernel_local_batch *b, vm own, vi places, vi numbers,
+                                          vf depth, vf value)
 {
     int32_t at[SIMD_WIDTH], number[SIMD_WIDTH];
     float values[SIMD_WIDTH];
@@ -152,7 +152,7 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batc
         const vf depth = base + step * vf_from_vi(whole + b->first);
         const vm own = vm_and(more, vm_andnot(vf_lt(depth, i->t_out), vf_lt(depth, i->t_in)));
         const vf value = i->v_in + slope * (depth - i->t_in);
-        if (vm_any(own)) kernel_tet_samples_put(t, b, own, at, whole, depth, value);
+        if (vm_any(own)) kernel_tet_samples_store(t, b, own, at, whole, depth, value);
         number += 1.0f;
     }
 }
@@ -244,7 +244,7 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
     for (v->volume = 0; v->volume < job->volume_count; v->volume++) {
         kernel_local_samples_begin(t, &v->batch, v->packets, blocks, v->volume, kernel_tile_samples);
         if (t->frame->volume_candidates)
-            kernel_visit_open(t, &kernel_samples_visitor, blocks);
+            kernel_visit_window(t, &kernel_samples_visitor, blocks);
         else
             kernel_tile_all_trees(t, blocks, kernel_tile_volume_parts, kernel_tile_samples);
         kernel_local_end(t, &v->batch.lanes);
@@ -279,7 +279,7 @@ static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
     if (!kernel_tile_cells_begin(t, kernel_tet_samples_fit(t->frame) ? kernel_tet_samples_small : NULL)) return;
-    kernel_placement reach = kernel_tile_reach(t);
+    kernel_placement reach = kernel_tile_trees_placement(t);
     const unsigned blocks = reach.blocks;
     const float cells_near = kernel_tile_cells_near(t);
     if (cells_near < INFINITY) reach.near = fmaxf(reach.near, cells_near);

@@ -214,7 +214,7 @@ static int find_ear(const polygon_work *w, int first)
 
 /* Tests all corners again and returns an ear. A corner may have become an ear because another one, which was inside its
  * triangle, has been cut off. */
-static int find_ear_anew(polygon_work *w, int first)
+static int find_ear_again(polygon_work *w, int first)
 {
     int i = first;
     do w->is_ear[i] = (char)is_ear(w, i);
@@ -236,10 +236,10 @@ static int find_straight(const polygon_work *w, int first)
 static void cut_ears(polygon_work *w)
 {
     int first = 0, left = w->count;
-    find_ear_anew(w, first);
+    find_ear_again(w, first);
     for (; left > 3; left--) {
         int ear = find_ear(w, first);
-        if (ear < 0) ear = find_ear_anew(w, first);
+        if (ear < 0) ear = find_ear_again(w, first);
         if (ear < 0) ear = find_straight(w, first);
         if (ear < 0) break;
         const int a = w->previous[ear], c = w->next[ear];

@@ -23,7 +23,7 @@ int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, i
 
 /* Marks the cores that belong to OpenMP's places. If there are places, the set of cores of this thread cannot be used,
  * because OpenMP has already bound it to the first place. */
-static void mark_place_cores(int32_t may_run[MOST_CORES])
+static void mark_openmp_cores(int32_t may_run[MOST_CORES])
 {
     for (int place = 0; place < omp_get_num_places(); place++) {
         int cores[MOST_CORES];
@@ -42,7 +42,7 @@ static bool find_allowed_cores(int32_t may_run[MOST_CORES])
     CPU_ZERO(&set);
     memset(may_run, 0, MOST_CORES * sizeof *may_run);
     if (omp_get_num_places() > 0) {
-        mark_place_cores(may_run);
+        mark_openmp_cores(may_run);
         return true;
     }
     if (sched_getaffinity(0, sizeof set, &set)) return false;

@@ -31,27 +31,27 @@ enum {
 
 /* ---- number of threads requested ----------------------------------------------------------------------------- */
 
-typedef struct team_cap {
+typedef struct thread_limit {
     int threads;
     const char *reason;
-} team_cap;
+} thread_limit;
 
 /* Returns the maximum number of threads and the reason for it. Inside a parallel region of the caller, GNU's OpenMP
  * would start new threads for every region of the library, so the maximum is 1. */
-static team_cap cap_of_team(void)
+static thread_limit find_thread_limit(void)
 {
     const int cores = omp_get_num_procs(), limit = omp_get_thread_limit();
-    if (omp_get_level() > 0) return (team_cap){1, "insitu_step() was called within a parallel region"};
+    if (omp_get_level() > 0) return (thread_limit){1, "insitu_step() was called within a parallel region"};
     if (limit < cores)
-        return (team_cap){limit > 1 ? limit : 1, "OpenMP's thread limit (OMP_THREAD_LIMIT) is no higher"};
-    return (team_cap){cores > 1 ? cores : 1, "this rank may run on no more cores"};
+        return (thread_limit){limit > 1 ? limit : 1, "OpenMP's thread limit (OMP_THREAD_LIMIT) is no higher"};
+    return (thread_limit){cores > 1 ? cores : 1, "this rank may run on no more cores"};
 }
 
 static int requested_threads(int asked, int cores)
 {
     const int most = omp_get_max_threads(), usual = cores < most ? cores : most;
     const int wanted = asked > 0 ? asked : usual;
-    const int cap = cap_of_team().threads;
+    const int cap = find_thread_limit().threads;
     return wanted > cap ? cap : wanted > 1 ? wanted : 1;
 }
 
@@ -186,7 +186,8 @@ static int choose_threads(const session_threads *threads, int asked, int wanted,
 {
     const bool are_enough = threads->count >= wanted;
     session_warn_locally(report, &(session_warning){WARNING_THREADS, NULL, NULL, 0}, asked > wanted,
-                         "the scene asks for %d threads, at most %d are used: %s", asked, wanted, cap_of_team().reason);
+                         "the scene asks for %d threads, at most %d are used: %s", asked, wanted,
+                         find_thread_limit().reason);
     session_warn_locally(
         report, &(session_warning){WARNING_THREADS, NULL, NULL, 1}, !are_enough,
         "%d of %d threads are used: no more can be started, by the limits of memory, processes or threads",

@@ -317,7 +317,7 @@ static session_catalogue_field *add_field(session_catalogue_mesh *mesh, const ch
     *field = (session_catalogue_field){.name = base_strdup(name),
                                        .first_rank = -1,
                                        .last_rank = -1,
-                                       .odd_rank = -1,
+                                       .differing_rank = -1,
                                        .lacking_rank = mesh->first_rank,
                                        .derived_index = -1};
     if (!field->name) return NULL;
@@ -334,8 +334,8 @@ static session_catalogue_field *record_field(session_catalogue_mesh *mesh, bool 
         field->first_rank = rank;
         field->component_count = components;
         field->centring = centring;
-    } else if (field->odd_rank < 0 && (field->component_count != components || field->centring != centring)) {
-        field->odd_rank = rank;
+    } else if (field->differing_rank < 0 && (field->component_count != components || field->centring != centring)) {
+        field->differing_rank = rank;
     }
     if (has_cells) field->last_rank = rank;
     return field;
@@ -524,7 +524,7 @@ static bool read_tables(int ranks, const gathered_tables *tables, session_catalo
     return true;
 }
 
-static void put_faulty_aside(const session_catalogue *catalogue, session_meshes *meshes)
+static void exclude_faulty_meshes(const session_catalogue *catalogue, session_meshes *meshes)
 {
     for (int i = 0; i < catalogue->mesh_count; i++) {
         if (!catalogue->meshes[i].fault) continue;
@@ -560,7 +560,7 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
     session_catalogue_free(catalogue);
     *catalogue = found;
     meshes->are_names_changed = false;
-    put_faulty_aside(catalogue, meshes);
+    exclude_faulty_meshes(catalogue, meshes);
     return INSITU_OK;
 }
 

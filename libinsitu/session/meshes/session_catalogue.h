@@ -12,12 +12,12 @@ typedef struct session_catalogue_field {
     char *name;
     int component_count;
     insitu_centring centring;
-    int first_rank;    /* lowest rank that has the field */
-    int last_rank;     /* highest rank that has both the field and cells of the mesh; -1: there is none */
-    int odd_rank;      /* a rank on which the field has another centring or number of components; -1: there is none */
-    int lacking_rank;  /* a rank that has cells of the mesh but not the field; -1: there is none */
-    int derived_index; /* index among the scene's derived fields; -1: the field is the caller's */
-    base_error *fault; /* error on the lowest rank on which the field has one; NULL: there is none */
+    int first_rank;     /* lowest rank that has the field */
+    int last_rank;      /* highest rank that has both the field and cells of the mesh; -1: there is none */
+    int differing_rank; /* a rank on which the field has another centring or number of components; -1: there is none */
+    int lacking_rank;   /* a rank that has cells of the mesh but not the field; -1: there is none */
+    int derived_index;  /* index among the scene's derived fields; -1: the field is the caller's */
+    base_error *fault;  /* error on the lowest rank on which the field has one; NULL: there is none */
 } session_catalogue_field;
 
 /* A vertex that hangs on a face: its value is the weighted sum of the values at the face's corners. */

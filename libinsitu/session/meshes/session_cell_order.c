@@ -26,7 +26,7 @@ bool session_is_reordered(const insitu_mesh *given)
 }
 
 /* Returns whether a mesh of mixed cells contains a cell whose vertices are in another order than VTK's. */
-static bool has_turned_cells(const session_mesh *mesh)
+static bool has_reordered_cells(const session_mesh *mesh)
 {
     const grid *g = &mesh->cells;
     int64_t cell = 0;
@@ -98,7 +98,7 @@ static void reorder_cell(const session_mesh *mesh, int64_t cell, int64_t entries
     for (int i = 0; i < count; i++) session_store_index(out, first + i, vertices[i]);
 }
 
-void session_turn_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out)
+void session_permute_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out)
 {
 #pragma omp parallel num_threads(threads)
     {
@@ -113,7 +113,7 @@ insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *e
 {
     session_topology *t = &mesh->topology;
     const cell_rows rows = make_cell_rows(mesh);
-    if (mesh->cells.cell_types && !has_turned_cells(mesh)) return INSITU_OK;
+    if (mesh->cells.cell_types && !has_reordered_cells(mesh)) return INSITU_OK;
     const int64_t largest = fit_in_32_bits(&rows, threads) ? 0 : INT64_MAX;
     if (!session_make_indices(mesh, "cells' vertices in VTK's order", rows.count, largest, &t->connectivity, error))
         return error->status;
@@ -124,7 +124,7 @@ insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *e
         for (int64_t i = 0; i < rows.count; i++) session_store_index(&t->connectivity, i, read_entry(&rows, i));
         region_leave();
     }
-    session_turn_cells(mesh, rows.count, threads, &t->connectivity);
+    session_permute_cells(mesh, rows.count, threads, &t->connectivity);
     t->has_own_order = true;
     t->connectivity_count = rows.count;
     t->cell_bytes = (rows.count + 1) * t->connectivity.stride;

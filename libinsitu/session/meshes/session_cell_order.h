@@ -17,6 +17,6 @@ insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *e
 
 /* Permutes the entries of each cell between the caller's order and VTK's; the permutation is the same in both
  * directions. out: that many entries, cell by cell. */
-void session_turn_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out);
+void session_permute_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out);
 
 #endif

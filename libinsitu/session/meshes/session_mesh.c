@@ -13,7 +13,7 @@ bool session_is_aligned(const insitu_array *array)
     return array->stride_bytes % size == 0 && (uintptr_t)array->data % (uintptr_t)size == 0;
 }
 
-static grid_unusual_type find_odd_type(const insitu_array *array)
+static grid_unusual_type find_unusual_type(const insitu_array *array)
 {
     const bool is_aligned = session_is_aligned(array);
     switch (array->type) {
@@ -38,7 +38,7 @@ grid_array session_grid_array(const insitu_array *array)
     out.data = array->data;
     out.stride = array->stride_bytes ? array->stride_bytes : session_type_size(array->type);
     out.is_wide = session_type_size(array->type) == 8;
-    out.unusual_type = (unsigned char)find_odd_type(array);
+    out.unusual_type = (unsigned char)find_unusual_type(array);
     out.is_integer = out.unusual_type || array->type == INSITU_INT32 || array->type == INSITU_INT64;
     return out;
 }

@@ -8,7 +8,7 @@ static bool has_axis(int axes, int axis)
 }
 
 /* Returns whether there are coordinates along exactly these axes, with these types. */
-static bool are_as_asked(const insitu_array coordinates[3], int axes, const insitu_type types[3])
+static bool have_axes_and_types(const insitu_array coordinates[3], int axes, const insitu_type types[3])
 {
     bool are_so = true;
     for (int axis = 0; axis < 3; axis++)
@@ -30,7 +30,7 @@ bool session_reserve_places(char **places, insitu_array coordinates[3], int64_t 
         used++;
     }
     *bytes = used * count * largest;
-    if (*places && are_as_asked(coordinates, axes, types)) return true;
+    if (*places && have_axes_and_types(coordinates, axes, types)) return true;
     base_free(*places);
     *places = base_calloc((size_t)*bytes + 1, 1);
     *is_new = true;

@@ -27,7 +27,7 @@ typedef struct split_work {
     /* index of the first piece and of its first entry, for each cell, and the totals; first_entries is NULL if pieces
      * have one type */
     int64_t *first_pieces, *first_entries;
-    bool gives_entries;       /* set if pieces store entries of the caller's connectivity instead of vertices */
+    bool stores_entries;      /* set if pieces store entries of the caller's connectivity instead of vertices */
     grid_array piece_entries; /* connectivity of the pieces */
 } split_work;
 
@@ -253,8 +253,8 @@ static void store_corner(const split_work *w, int64_t cell, int64_t at, int plac
 {
     const int64_t first = session_row_first(&w->rows, cell);
     session_store_index(&w->piece_entries, at,
-                        w->gives_entries ? session_row_entry(&w->rows, cell, place)
-                                         : session_row_vertex(&w->rows, first + place));
+                        w->stores_entries ? session_row_entry(&w->rows, cell, place)
+                                          : session_row_vertex(&w->rows, first + place));
 }
 
 static void store_cell(const split_work *w, int64_t cell)
@@ -360,7 +360,7 @@ insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_
     insitu_status status = find_patterns(&w, error);
     const int64_t nodes = session_cell_nodes(&mesh->given), cells = mesh->given.cell_count;
     const int64_t largest = w.rows.cells.offsets.data ? mesh->given.connectivity_count : cells * nodes;
-    w.gives_entries = true;
+    w.stores_entries = true;
     if (!status) status = count_all_pieces(&w, threads, error);
     if (!status && !session_make_indices(mesh, "cells' corners", entry_count(&w), largest, out, error))
         status = error->status;

@@ -376,7 +376,7 @@ static void add_rim_bounds(const outer_work *w, const session_outer *outer, oute
     }
 }
 
-static bool make_polygon_room(face_polygon *p, int64_t corners)
+static bool allocate_polygon(face_polygon *p, int64_t corners)
 {
     const size_t count = (size_t)corners;
     p->vertices = base_alloc(count * sizeof *p->vertices);
@@ -422,7 +422,7 @@ static bool work_create(const session_mesh *whole, session_outer *out, outer_wor
     w->vertex_map = base_alloc((size_t)g->vertex_count * sizeof *w->vertex_map);
     return out->mesh && out->coordinates && out->connectivity && out->vertex_origins && out->offsets && out->types &&
            (out->loops || !loops) && out->cell_origins && w->heights && w->vertex_map &&
-           make_polygon_room(&w->polygon, most.largest_corner_count);
+           allocate_polygon(&w->polygon, most.largest_corner_count);
 }
 
 /* Returns the mesh as a grid. If all cells have one type, types and offsets are omitted, so that vectorized code can be

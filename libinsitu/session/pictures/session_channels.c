@@ -7,7 +7,7 @@
 #include "region.h"
 #include "session_agree.h"
 
-bool session_wants_channels(const scene_image *image)
+bool session_needs_channels(const scene_image *image)
 {
     for (int i = 0; i < image->output_count; i++)
         if (image->outputs[i].has_data) return true;

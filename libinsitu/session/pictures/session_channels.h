@@ -18,7 +18,7 @@ typedef struct session_channels {
 } session_channels;
 
 /* Returns whether an output of the image contains these channels. */
-bool session_wants_channels(const scene_image *image);
+bool session_needs_channels(const scene_image *image);
 
 /* Draws the channels in two frames, which contain the job's surfaces, all of them opaque, sampled at the pixels'
  * centres. *taken receives the cost of the frames. The channels must be freed even after an error. Collective. */

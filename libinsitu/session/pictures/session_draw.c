@@ -103,7 +103,7 @@ static insitu_status canvas_create(const session_drawing *d, const scene_image *
     if (!out->frame.rgba || (is_summed && !out->frame_sum))
         return session_fail_for_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->frame_sum : 0)),
                                        "a picture");
-    return session_wants_deep(image) ? session_begin_deep(&out->deep, image, error) : INSITU_OK;
+    return session_needs_deep(image) ? session_begin_deep(&out->deep, image, error) : INSITU_OK;
 }
 
 static void canvas_add(canvas *c, int threads)
@@ -334,13 +334,13 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
                           {d->team->comm, compositing, background, overlap_fragments},
                           canvas,
                           0,
-                          session_wants_deep(image) ? &canvas->deep : NULL};
+                          session_needs_deep(image) ? &canvas->deep : NULL};
     render_job job = make_job(d, image, view, layers);
     const insitu_status status = draw_all_frames(&basis, image, &job, error);
     if (status) return status;
     warn_of_overlaps(d->report, image, basis.overlap_count);
     canvas_finish(canvas, image->frames, &view->space, d->team->threads);
-    if (!session_wants_channels(image)) return INSITU_OK;
+    if (!session_needs_channels(image)) return INSITU_OK;
     session_frame taken;
     const insitu_status drawn =
         session_draw_channels(&basis.target, d->team, image, &job, &canvas->channels, &taken, error);

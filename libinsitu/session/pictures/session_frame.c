@@ -175,7 +175,7 @@ static int64_t turn_order_pixel(const set_row_major_strides *order, int64_t k)
 
 /* Moves up to `most` pixels of a set into `taken`, beginning at position `first` of the order. Returns the position at
  * which to continue. */
-static int64_t take_turn_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
+static int64_t move_turn_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
                                 unsigned char *taken)
 {
     const set_row_major_strides order = make_turn_order(out);
@@ -253,7 +253,7 @@ static insitu_status redraw_overlaps(const session_frame_target *t, const render
     for (int64_t left = overlaps->count, at = 0; left > 0;) {
         const int64_t before = frame->fragments;
         comp_overlaps found = {0};
-        at = take_turn_pixels(out, overlaps->pixels, at, most, second->turn_pixels);
+        at = move_turn_pixels(out, overlaps->pixels, at, most, second->turn_pixels);
         if (out->deep && out->deep->counts) remove_samples(second->turn_pixels, out);
         insitu_status status = draw(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
         doubled += found.count;
@@ -287,7 +287,8 @@ static bool is_mixed_throughout(const render_job *job)
     return (job->integration == RENDER_SEGMENTS || job->reproducible) && job->volume_count > 1;
 }
 
-static insitu_status take_all(const session_frame_target *t, const image *out, comp_overlaps *all, base_error *error)
+static insitu_status mark_all_pixels(const session_frame_target *t, const image *out, comp_overlaps *all,
+                                     base_error *error)
 {
     all->count = (int64_t)out->width * out->height;
     all->pixels = base_calloc(pixel_set_bytes(all->count), 1);
@@ -304,7 +305,7 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
     insitu_status status = INSITU_OK;
     *frame = (session_frame){0};
     if (is_mixed_throughout(job)) {
-        status = take_all(t, out, &overlaps, error);
+        status = mark_all_pixels(t, out, &overlaps, error);
     } else {
         out->is_folded = job->reproducible && job->volume_count > 0;
         status = draw(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);

@@ -107,7 +107,7 @@ static void keep_memory(session_writer *w, session_picture *memory)
 
 /* Takes a kept block of at least `bytes` bytes. If none is large enough, *memory stays empty, and one block that is too
  * small is freed. The mutex must be held. */
-static void take_memory(session_writer *w, size_t bytes, session_picture *memory)
+static void reuse_memory(session_writer *w, size_t bytes, session_picture *memory)
 {
     int small = -1;
     for (int i = 0; i < SESSION_FREE_PICTURES && !memory->pixels; i++) {
@@ -128,7 +128,7 @@ session_picture session_writer_reserve(session_writer *w, size_t bytes)
     while (w->first && w->queued_bytes + (int64_t)bytes > most_waiting_bytes)
         pthread_cond_wait(&w->has_changed, &w->mutex);
     for (;;) {
-        take_memory(w, bytes, &out);
+        reuse_memory(w, bytes, &out);
         if (out.pixels || session_reserve_picture(&out, bytes) || !w->first) break;
         pthread_cond_wait(&w->has_changed, &w->mutex);
     }

@@ -125,8 +125,8 @@ static bool recentre_input(derive_work *w, const session_catalogue_mesh *mesh, c
 {
     if (!is_recentred(w, mesh, input)) return true;
     const int count = session_catalogue_find(mesh, input->name)->component_count;
-    const int first = session_takes_vector(w->derived) ? 0 : input_component(input, count);
-    const int end = session_takes_vector(w->derived) ? count : first + 1;
+    const int first = session_needs_vector(w->derived) ? 0 : input_component(input, count);
+    const int end = session_needs_vector(w->derived) ? count : first + 1;
     session_joint *joint = session_find_joint(w->basis->catalogue, find_joint_name(mesh, input));
     bool is_done = joint != NULL;
     for (int c = first; c < end && is_done; c++) {
@@ -282,7 +282,7 @@ typedef struct block_buffer {
     double *values; /* values of the inputs, followed by the program's stack */
 } block_buffer;
 
-static bool rooms_create(const scene_derived *derived, int threads, block_buffer **out)
+static bool block_buffers_create(const scene_derived *derived, int threads, block_buffer **out)
 {
     const size_t inputs = (size_t)derived->input_count, rows = inputs + (size_t)derived->expression.depth;
     block_buffer *rooms = *out = base_calloc((size_t)threads, sizeof *rooms);
@@ -295,7 +295,7 @@ static bool rooms_create(const scene_derived *derived, int threads, block_buffer
     return rooms != NULL;
 }
 
-static void rooms_free(block_buffer *rooms, int threads)
+static void block_buffers_free(block_buffer *rooms, int threads)
 {
     for (int t = 0; t < threads && rooms; t++) {
         base_free(rooms[t].inputs);
@@ -332,14 +332,14 @@ static bool make_expression(const derive_work *w, const session_catalogue_mesh *
     session_field *field = &part->fields[index];
     block_buffer *rooms = NULL;
     grid_field *inputs = base_alloc((size_t)w->derived->input_count * sizeof *inputs);
-    const bool is_done = inputs && rooms_create(w->derived, threads, &rooms) && allocate_values(w, part, field);
+    const bool is_done = inputs && block_buffers_create(w->derived, threads, &rooms) && allocate_values(w, part, field);
     for (int k = 0; k < w->derived->input_count && is_done; k++) {
         const scene_field *input = &w->derived->inputs[k];
         const int count = part->fields[session_find_field(part, input->name)].given.component_count;
         inputs[k] = input_values(w, mesh, part, k, input_component(input, count));
     }
     if (is_done) evaluate(w->derived, inputs, rooms, field, count_values(part, field), threads);
-    rooms_free(rooms, threads);
+    block_buffers_free(rooms, threads);
     base_free(inputs);
     if (is_done) mark_values_new(w, mesh, part, index);
     return is_done;
@@ -415,10 +415,10 @@ static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh
 {
     const scene_derived *derived = w->derived;
     const int first = session_find_field(part, derived->inputs[0].name);
-    const int count = session_takes_vector(derived) ? part->fields[first].given.component_count : derived->input_count;
+    const int count = session_needs_vector(derived) ? part->fields[first].given.component_count : derived->input_count;
     for (int c = 0; c < count; c++)
-        out[c] = input_values(w, mesh, part, session_takes_vector(derived) ? 0 : c,
-                              session_takes_vector(derived) ? c : input_component(&derived->inputs[c], 1));
+        out[c] = input_values(w, mesh, part, session_needs_vector(derived) ? 0 : c,
+                              session_needs_vector(derived) ? c : input_component(&derived->inputs[c], 1));
     return count;
 }
 
@@ -434,7 +434,7 @@ static const session_catalogue_mesh *find_first_faultless(const derive_work *w, 
 /* Returns the number of scalars whose gradients are computed; ranks without a part of a mesh need it, too. */
 static int count_scalars(const derive_work *w, const session_joint *joint)
 {
-    if (!session_takes_vector(w->derived)) return w->derived->input_count;
+    if (!session_needs_vector(w->derived)) return w->derived->input_count;
     return session_catalogue_find(find_first_faultless(w, joint), w->derived->inputs[0].name)->component_count;
 }
 

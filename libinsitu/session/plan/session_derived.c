@@ -6,7 +6,7 @@
 #include "session_agree.h"
 #include "session_events.h"
 
-bool session_takes_vector(const scene_derived *derived)
+bool session_needs_vector(const scene_derived *derived)
 {
     return derived->kind != SCENE_EXPRESSION && derived->kind != SCENE_GRADIENT_OF && derived->input_count == 1;
 }
@@ -119,7 +119,7 @@ static insitu_status check_components(const derived_place *at, const scene_field
                                       const session_catalogue_field *found, base_error *error)
 {
     const int count = found->component_count;
-    if (session_takes_vector(at->derived)) {
+    if (session_needs_vector(at->derived)) {
         if (count == 2 || count == 3) return check_other_meshes(at, input, found, error);
         return base_fail(error, INSITU_ERROR_FIELD,
                          AT "field \"%s\" has %d component%s on mesh \"%s\", expected a vector of 2 or 3, or a list of "
@@ -140,11 +140,11 @@ static insitu_status check_input(const derived_place *at, const scene_field *inp
         *error = *found->fault;
         return error->status;
     }
-    if (found->odd_rank >= 0)
+    if (found->differing_rank >= 0)
         return base_fail(error, INSITU_ERROR_FIELD,
                          AT "rank %d: mesh \"%s\": field \"%s\" has another centring or number of components than on "
                             "rank %d",
-                         OF(at), found->odd_rank, at->mesh->name, input->name, found->first_rank);
+                         OF(at), found->differing_rank, at->mesh->name, input->name, found->first_rank);
     if (found->lacking_rank >= 0)
         return base_fail(error, INSITU_ERROR_FIELD,
                          AT "rank %d: mesh \"%s\": field \"%s\" is not set, other ranks have it", OF(at),

@@ -24,6 +24,6 @@ uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool image
 void session_mark_sources(const scene *scene, uint64_t needed, const session_meshes *meshes);
 
 /* Returns whether the field is computed from one vector, by the gradients of its components. */
-bool session_takes_vector(const scene_derived *derived);
+bool session_needs_vector(const scene_derived *derived);
 
 #endif

@@ -148,11 +148,11 @@ static insitu_status check_on_mesh(const session_plan_basis *basis, const scene_
                                    base_error *error)
 {
     if (refuse_fault(mesh->fault, error) || refuse_fault(found->fault, error)) return error->status;
-    if (found->odd_rank >= 0)
+    if (found->differing_rank >= 0)
         return base_fail(error, INSITU_ERROR_FIELD,
                          "rank %d: mesh \"%s\": field \"%s\" has another centring or number of components than on "
                          "rank %d",
-                         found->odd_rank, mesh->name, field->name, found->first_rank);
+                         found->differing_rank, mesh->name, field->name, found->first_rank);
     if (found->lacking_rank >= 0)
         return base_fail(error, INSITU_ERROR_FIELD,
                          "rank %d: mesh \"%s\": field \"%s\" is not set, other ranks have it (%s:%d asks for it)",
@@ -195,7 +195,7 @@ static insitu_status check_layer_field(const session_plan_basis *basis, const sc
     return status;
 }
 
-static const char *colour_without(const scene_colour_map *map)
+static const char *describe_missing_colour(const scene_colour_map *map)
 {
     return map->has_nan ? "of the colour nan" : "grey";
 }
@@ -212,7 +212,7 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
         session_warn(report, &warning, is_grey,
                      "image \"%s\": mesh \"%s\" does not have the field \"%s\": its isosurface of \"%s\" is %s",
                      image->name, mesh->name, layer->colour_by.name, layer->field.name,
-                     colour_without(&layer->colour_map));
+                     describe_missing_colour(&layer->colour_map));
     }
 }
 
@@ -349,7 +349,7 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
         const session_warning warning = {WARNING_GREY, image->name, mesh->name, layer->colour_by.line};
         session_warn(report, &warning, is_grey,
                      "image \"%s\": mesh \"%s\" does not have the field \"%s\": its outer surface is %s", image->name,
-                     mesh->name, layer->colour_by.name, colour_without(&layer->colour_map));
+                     mesh->name, layer->colour_by.name, describe_missing_colour(&layer->colour_map));
     }
 }
 
@@ -390,8 +390,8 @@ static void warn_of_shells(const session_catalogue *catalogue, const scene_image
 
 /* Warns of a mesh with global vertex ids if a layer shows it, by means at vertices, together with other meshes: its
  * vertices are not matched with those of the others. */
-static void warn_of_apart(const session_catalogue *catalogue, const scene_image *image, const char *layer,
-                          const scene_field *field, session_report *report)
+static void warn_of_unjoined_mesh(const session_catalogue *catalogue, const scene_image *image, const char *layer,
+                                  const scene_field *field, session_report *report)
 {
     const char *name = NULL;
     int count = 0;
@@ -416,7 +416,7 @@ static void warn_of_fields(const session_catalogue *catalogue, const scene_image
         const char *layer = scene_layer_word(walk.kind);
         if (walk.role == SCENE_SHOWN && walk.kind != SCENE_ISOSURFACE)
             warn_of_shells(catalogue, image, layer, field, report);
-        if (walk.role == SCENE_SHOWN) warn_of_apart(catalogue, image, layer, field, report);
+        if (walk.role == SCENE_SHOWN) warn_of_unjoined_mesh(catalogue, image, layer, field, report);
     }
 }
 

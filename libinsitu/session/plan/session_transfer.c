@@ -85,7 +85,7 @@ static void copy_colour(float *to, const float *from)
     memcpy(to, from, 3 * sizeof *to);
 }
 
-bool session_takes_memory(const scene_colour_map *map, const scene_volume *volume)
+bool session_transfer_allocates(const scene_colour_map *map, const scene_volume *volume)
 {
     return volume && (map->is_banded || map->has_below || map->has_above);
 }
@@ -147,7 +147,7 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
                               .constant = constant};
     if (volume) {
         set_opacity(volume, half_diagonal, out);
-        return !session_takes_memory(map, volume) || expand_table(map, out);
+        return !session_transfer_allocates(map, volume) || expand_table(map, out);
     }
     out->transfer.is_banded = map->is_banded;
     if (map->has_below || map->has_above || map->has_nan) out->transfer.outside = map->outside_colours[0];

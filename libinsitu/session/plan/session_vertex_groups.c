@@ -9,7 +9,7 @@ typedef session_vertex_groups_basis groups_basis;
 
 /* ---- groups --------------------------------------------------------------------------------------------------- */
 
-static session_key key_of_place(const double place[3])
+static session_key key_of_point(const double place[3])
 {
     session_key key;
     for (int axis = 0; axis < 3; axis++) {
@@ -36,7 +36,7 @@ static void group_part(const groups_basis *basis, int part, session_vertex_group
         while (grid_walk_next(&walk, &vertex)) {
             if (of_vertex[vertex] < 0) {
                 const int64_t twin = -2 - of_vertex[vertex];
-                const session_key key = twin >= 0 ? key_of_place(border->twins[twin].position)
+                const session_key key = twin >= 0 ? key_of_point(border->twins[twin].position)
                                                   : session_vertex_key(mesh, vertex, basis->by_id);
                 of_vertex[vertex] = session_keys_add(&out->keys, &key);
                 if (one_vertex) one_vertex[of_vertex[vertex]] = out->first_vertices[part] + vertex;
@@ -70,8 +70,8 @@ static bool group_vertices(const groups_basis *basis, session_vertex_groups *out
 
 /* ---- groups that other ranks may have, too --------------------------------------------------------------------- */
 
-static void place_of_vertex(const groups_basis *basis, const session_vertex_groups *groups, int64_t number,
-                            double place[3])
+static void find_vertex_position(const groups_basis *basis, const session_vertex_groups *groups, int64_t number,
+                                 double place[3])
 {
     int part = 0, end = basis->part_count;
     while (end - part > 1) {
@@ -88,7 +88,7 @@ static void find_group_position(const groups_basis *basis, const session_vertex_
                                 const int64_t *one_vertex, int64_t group, double place[3])
 {
     if (one_vertex)
-        place_of_vertex(basis, groups, one_vertex[group], place);
+        find_vertex_position(basis, groups, one_vertex[group], place);
     else
         memcpy(place, groups->keys.keys[group].words, 3 * sizeof *place);
 }

@@ -78,7 +78,7 @@ insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *er
 typedef struct sums_messages {
     double (*positions)[3];
     session_mail requests, received_requests, answers, received_answers;
-    int64_t *own_numbers, *asked_numbers;
+    int64_t *own_numbers, *requested_numbers;
 } sums_messages;
 
 static void mail_free(sums_messages *mail)
@@ -89,7 +89,7 @@ static void mail_free(sums_messages *mail)
     session_mail_free(&mail->answers);
     session_mail_free(&mail->received_answers);
     base_free(mail->own_numbers);
-    base_free(mail->asked_numbers);
+    base_free(mail->requested_numbers);
 }
 
 /* For each of this rank's keys, finds the position of a vertex that has it. */
@@ -177,7 +177,7 @@ static insitu_status send_requests(const session_homes *homes, const session_tea
         session_fail_for_memory(error, sums->own_count * 24, "gradients at vertices that ranks share");
     const insitu_status status =
         session_mail_deliver(team->comm, SESSION_MAIL_THERE, &mail->requests, &mail->received_requests, error);
-    if (!status && !error->status && !read_requests(&mail->received_requests, sums, &mail->asked_numbers))
+    if (!status && !error->status && !read_requests(&mail->received_requests, sums, &mail->requested_numbers))
         session_fail_for_memory(error, mail->received_requests.total * 24, "gradients at vertices that ranks share");
     return status;
 }
@@ -191,8 +191,8 @@ static bool write_answers(const session_vertex_sums *sums, const sums_messages *
     if (!out->counts || !out->words) return false;
     for (int rank = 0; rank < ranks; rank++) out->counts[rank] = requests->counts[rank] / KEY_WORDS * words;
     for (int64_t i = 0; i < count; i++)
-        if (mail->asked_numbers[i] >= 0)
-            memcpy(out->words + i * words, sums->sums + mail->asked_numbers[i] * words,
+        if (mail->requested_numbers[i] >= 0)
+            memcpy(out->words + i * words, sums->sums + mail->requested_numbers[i] * words,
                    (size_t)words * sizeof *out->words);
     out->total = count * words;
     return true;

@@ -19,7 +19,7 @@ enum { ALL_AXES = 7 };
 
 /* The fill function of a mirror image's field, which returns the values of the source's field. That field is filled
  * first. */
-static insitu_status take_filled(void *of_image, insitu_field *field)
+static insitu_status copy_source_values(void *of_image, insitu_field *field)
 {
     session_mesh *image = of_image;
     const int index = session_find_field(image, field->name), at = session_find_field(image->source, field->name);
@@ -50,7 +50,7 @@ static insitu_field describe_field(session_mesh *image, const session_field *fro
     out.name = from->given.name;
     out.component_count = from->given.component_count;
     out.centring = from->given.centring;
-    out.fill = take_filled;
+    out.fill = copy_source_values;
     out.fill_data = image;
     return out;
 }

@@ -105,7 +105,7 @@ static insitu_status number_corners(const session_mesh *mesh, int threads, sessi
     if (!session_make_indices(mesh, "cells' corners", torn->corner_count, torn->corner_count, &torn->corners, error))
         return error->status;
     for (int64_t i = 0; i < torn->corner_count; i++) session_store_index(&torn->corners, i, i);
-    session_turn_cells(mesh, torn->corner_count, threads, &torn->corners);
+    session_permute_cells(mesh, torn->corner_count, threads, &torn->corners);
     torn->bytes = torn->corner_count * torn->corners.stride;
     return INSITU_OK;
 }

@@ -246,7 +246,7 @@ static void set_linear_rgb(float to[3], const double *srgb)
     for (int c = 0; c < 3; c++) to[c] = colour_linear_from_srgb((float)srgb[c]);
 }
 
-static void convert_outside(const scene_file_colour_map *in, scene_colour_map *out)
+static void convert_outside_colours(const scene_file_colour_map *in, scene_colour_map *out)
 {
     static const double grey[3] = {0.6, 0.6, 0.6};
     out->has_below = in->below != NULL;
@@ -336,7 +336,7 @@ insitu_status scene_convert_colour_map(const scene_document *d, const char *path
         return scene_fail_at_key(d, path, "discrete", "given beside a map of %d bands, expected one of the two",
                                  out->count);
     if (in->discrete) status = cut_into_bands(d, *in->discrete, out);
-    if (status == INSITU_OK) convert_outside(in, out);
+    if (status == INSITU_OK) convert_outside_colours(in, out);
     if (status == INSITU_OK) status = convert_range(d, path, &out->range);
     return status == INSITU_OK ? convert_scale(d, path, in, out) : status;
 }

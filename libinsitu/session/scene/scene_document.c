@@ -319,8 +319,8 @@ insitu_status scene_fail_at_key(const scene_document *d, const char *parent, con
 /* ---- tree against schema ---- */
 
 /* Writes a question that suggests the candidate nearest to the word, or "" if none is near. */
-static void ask_for_meant(const yaml_node_t *word, const char *const *candidates, int count,
-                          char question[question_size])
+static void suggest_candidate(const yaml_node_t *word, const char *const *candidates, int count,
+                              char question[question_size])
 {
     const char *meant = word->type == YAML_SCALAR_NODE ? scene_nearest_word(node_text(word), candidates, count) : NULL;
     question[0] = '\0';
@@ -373,8 +373,8 @@ static bool read_number(const char *text, double *number)
 
 /* Writes a question that suggests why a value is empty: an unquoted #ff0000 is read as a comment, and keys below it may
  * lack their indentation. */
-static void ask_of_nothing(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
-                           char question[question_size])
+static void suggest_for_empty_value(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
+                                    char question[question_size])
 {
     size_t length;
     const char *colour = scene_syntax_comment(d->text, d->size, (size_t)node_line(node), &length);
@@ -385,7 +385,7 @@ static void ask_of_nothing(const scene_document *d, const yaml_node_t *node, con
 }
 
 /* Writes "did you mean ...?" if the value would be valid in quotes, as a list, or as an entry of a list. */
-static void ask_for_form(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
+static void suggest_form(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                          const scene_key *key, char question[question_size])
 {
     const bool is_list = value->type == CYAML_SEQUENCE || value->type == CYAML_SEQUENCE_FIXED;
@@ -393,7 +393,7 @@ static void ask_for_form(const scene_document *d, const yaml_node_t *node, const
     char list[list_size] = "";
     double number;
     if (node->type == YAML_SCALAR_NODE && node->data.scalar.length == 0) {
-        ask_of_nothing(d, node, value, question);
+        suggest_for_empty_value(d, node, value, question);
     } else if (node->type == YAML_SCALAR_NODE && is_list) {
         const char *text = node_text(node), *digits = text + (strncmp(text, "0x", 2) == 0 ? 2 : 0);
         if (entry == CYAML_INT || entry == CYAML_FLOAT) list_of_numbers(text, value, list);
@@ -424,8 +424,8 @@ static insitu_status fail_for_value(const scene_document *d, const char *path, c
     int count = list_choices(value, key, words, most_words);
     const bool is_switch = count == 0 && strstr(expected, "true or false");
     if (is_switch) words[count++] = "true", words[count++] = "false";
-    ask_for_meant(node, words, count, question);
-    if (!*question) ask_for_form(d, node, value, key, question);
+    suggest_candidate(node, words, count, question);
+    if (!*question) suggest_form(d, node, value, key, question);
     const bool is_entry = *path && path[strlen(path) - 1] == ']';
     if (!*question && is_entry && value->type == CYAML_SEQUENCE_FIXED && node->type == YAML_SCALAR_NODE)
         snprintf(question, question_size, " (each entry is a list of its own, in [ ])");
@@ -635,7 +635,7 @@ static insitu_status check_named(scene_document *d, const char *path, const yaml
 
 /* Writes the question whether an unknown key belongs elsewhere: at the top of the file, or in the only mapping below
  * this one that has such a key. */
-static void ask_for_place(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
+static void suggest_place(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
 {
     const char *text = name->type == YAML_SCALAR_NODE ? node_text(name) : "", *holder = NULL;
     int holders = 0;
@@ -664,8 +664,8 @@ static insitu_status fail_for_key(scene_document *d, const char *path, const yam
     quote_node(name, quoted);
     scene_value_words(&value, &holder, expected);
     for (const cyaml_schema_field_t *f = mapping->fields; f->key && count < most_words; f++) words[count++] = f->key;
-    ask_for_meant(name, words, count, question);
-    if (!*question) ask_for_place(name, mapping, question);
+    suggest_candidate(name, words, count, question);
+    if (!*question) suggest_place(name, mapping, question);
     return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key %s is %s%s, expected %s", d->file_name,
                      node_line(name), path, *path ? ": " : "", quoted, fault, question, expected);
 }

@@ -37,8 +37,8 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
 }
 
 /* Uses the field that colours the layer if the scene gives contour lines without a field. */
-static insitu_status take_field_of_colours(const scene_document *d, const char *layer, const char *path,
-                                           const scene_file_lines *in, const scene_field *colours, scene_lines *out)
+static insitu_status use_field_of_colours(const scene_document *d, const char *layer, const char *path,
+                                          const scene_file_lines *in, const scene_field *colours, scene_lines *out)
 {
     if (in->component) return scene_fail_at_key(d, path, "component", "given without field, expected both");
     if (!colours)
@@ -69,6 +69,6 @@ insitu_status scene_convert_lines(const scene_document *d, const char *layer, co
     out->field.joins_corners = colours && colours->joins_corners;
     const insitu_status status = convert_values(d, path, in, out);
     if (status) return status;
-    if (!in->field) return take_field_of_colours(d, layer, path, in, colours, out);
+    if (!in->field) return use_field_of_colours(d, layer, path, in, colours, out);
     return scene_convert_field(d, layer, path, in->field, in->component, &out->field);
 }
