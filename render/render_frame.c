@@ -129,7 +129,7 @@ static void begin_threads(const kernel_frame *frame, const frame_end *end, kerne
                                     .find_polyhedron = polyhedra_find,
                                     .polyhedron_scratch = polyhedra_scratch,
                                     .grow_pending = grow_pending,
-                                    .now = now};
+                                    .clock_seconds = now};
     for (int i = 0; i < threads && has_polyhedra; i++) states[i].out_of_memory = !states[i].polyhedra;
 }
 
@@ -140,8 +140,8 @@ static bool end_threads(const render_job *job, kernel_thread *states, int thread
     for (int i = 0; i < threads; i++) {
         polyhedra_free(states[i].polyhedra);
         base_free(states[i].memory);
-        base_free(states[i].bin.room);
-        base_free(states[i].volume_bin.room);
+        base_free(states[i].bin.buffer);
+        base_free(states[i].volume_bin.buffer);
         has_memory = has_memory && !states[i].out_of_memory;
         if (has_memory && job->waiting) has_memory = append_pending(&job->waiting->list, &states[i].waiting);
         base_free(states[i].waiting.items);

@@ -76,7 +76,7 @@ SIMD_INLINE int kernel_tile_set_source(kernel_tile_trace *t, uint32_t source, in
 
 SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const kernel_tile_candidate *candidate)
 {
-    return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
+    return candidate->blocks & t->traced_blocks & kernel_blocks_beyond(t, candidate->near);
 }
 
 /* A tile's cells that are queued for tracing: vectors of cells of one type, and cells that are traced one by one. */
@@ -325,7 +325,7 @@ static void kernel_tile_find_leaf(kernel_tile_trace *t, int part, const uint32_t
 static void kernel_tile_surfaces(kernel_tile_trace *t)
 {
     kernel_tile_search *s = (kernel_tile_search *)t->search;
-    s->nodes.look = kernel_tile_find_leaf;
+    s->nodes.search_leaf = kernel_tile_find_leaf;
     s->tile = t;
     s->list = (kernel_candidate_list){.items = s->items, .capacity = 2 * SIMD_WIDTH};
     t->thread->finder->frame = NULL;
@@ -384,7 +384,7 @@ static unsigned active_blocks(const render_job *job, int x0, int y0)
 
 static void trace_tile_surfaces(kernel_tile_trace *t)
 {
-    const double start = t->thread->now();
+    const double start = t->thread->clock_seconds();
     if (t->frame->candidates)
         kernel_tile_surface_candidates(t);
     else
@@ -394,21 +394,23 @@ static void trace_tile_surfaces(kernel_tile_trace *t)
             const int i = __builtin_ctz(begun) * KERNEL_BLOCK_PACKETS + n;
             kernel_emit_opaque(&t->packets[i], &t->hits[i]);
         }
-    t->thread->surface_seconds += t->thread->now() - start;
+    t->thread->surface_seconds += t->thread->clock_seconds() - start;
 }
 
 static void trace_tile_segments(kernel_tile_trace *t)
 {
-    const double start = t->thread->now();
-    for (t->turn = 0; t->turn < volume_intervals(t->frame); t->turn++) kernel_tile_segments_trace(t);
-    t->thread->volume_seconds += t->thread->now() - start;
+    const double start = t->thread->clock_seconds();
+    for (t->clip_interval = 0; t->clip_interval < volume_intervals(t->frame); t->clip_interval++)
+        kernel_tile_segments_trace(t);
+    t->thread->volume_seconds += t->thread->clock_seconds() - start;
 }
 
 static void trace_tile_samples(kernel_tile_trace *t)
 {
-    const double start = t->thread->now();
-    for (t->turn = 0; t->turn < volume_intervals(t->frame); t->turn++) kernel_tile_volumes(t);
-    t->thread->volume_seconds += t->thread->now() - start;
+    const double start = t->thread->clock_seconds();
+    for (t->clip_interval = 0; t->clip_interval < volume_intervals(t->frame); t->clip_interval++)
+        kernel_tile_volumes(t);
+    t->thread->volume_seconds += t->thread->clock_seconds() - start;
 }
 
 /* Returns whether the tile meets the part of the picture in which some tree may be visible. */
@@ -479,7 +481,7 @@ static void begin(kernel_thread *thread)
     thread->finder = &m->finder;
     m->tile.cell = &m->tile_cell;
     m->tile.curved = &m->tile_curved;
-    m->tile_curved.room = &m->tile_curved_room;
+    m->tile_curved.storage = &m->tile_curved_room;
     m->tile.search = &m->search.nodes;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
     m->segments.depth = 0;

@@ -90,7 +90,7 @@ typedef struct tracer {
     const render_occluders *of;
     const kernel_table *kernels;
     const render_job *job; /* the job that the caller gave */
-    render_job moved;
+    render_job moved_job;
     kernel_frame frame;
     kernel_thread thread;
     kernel_bundle bundle;
@@ -145,16 +145,16 @@ static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_ra
 
 static void tracer_set_camera(tracer *t, const double eye[3], const hit_axes *a, bool is_orthographic)
 {
-    render_camera *c = &t->moved.camera;
+    render_camera *c = &t->moved_job.camera;
     memcpy(c->eye, eye, sizeof c->eye);
     memcpy(c->right, a->right, sizeof c->right);
     memcpy(c->up, a->up, sizeof c->up);
     memcpy(c->forward, a->forward, sizeof c->forward);
     c->is_orthographic = is_orthographic;
     for (int k = 0; k < 3; k++) {
-        t->frame.scaled_axes[0][k] = a->right[k] * t->moved.space.scale;
-        t->frame.scaled_axes[1][k] = a->up[k] * t->moved.space.scale;
-        t->frame.scaled_axes[2][k] = a->forward[k] * t->moved.space.scale;
+        t->frame.scaled_axes[0][k] = a->right[k] * t->moved_job.space.scale;
+        t->frame.scaled_axes[1][k] = a->up[k] * t->moved_job.space.scale;
+        t->frame.scaled_axes[2][k] = a->forward[k] * t->moved_job.space.scale;
     }
 }
 
@@ -321,10 +321,10 @@ static tracer *tracer_create(const render_occluders *of)
     t->of = of;
     t->kernels = of->kernels;
     t->job = &of->job;
-    t->moved = of->surfaces;
+    t->moved_job = of->surfaces;
     t->frame = of->frame;
-    t->frame.job = &t->moved;
-    t->frame.depth_shift = t->moved.space.depth_origin = 0;
+    t->frame.job = &t->moved_job;
+    t->frame.depth_shift = t->moved_job.space.depth_origin = 0;
     t->secondary_rays = (kernel_secondary_rays){.rays = t->rays, .grow = grow_undecided};
     t->thread = (kernel_thread){.memory = base_alloc(t->kernels->memory_bytes),
                                 .polyhedra = has_polyhedra ? polyhedra_create() : NULL,

@@ -244,7 +244,7 @@ static void verify_bundle(bundle *b, rates *r)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_curved_storage room;
-    kernel_curved curved = {.room = &room};
+    kernel_curved curved = {.storage = &room};
     const int intervals = bundle_intervals(b, list, &curved);
     r->monotone += room.bounds.jump[0] >= 0;
     for (int n = 0; n < intervals; n++) {

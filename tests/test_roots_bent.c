@@ -402,7 +402,7 @@ static void verify_bundle(bundle *b, const reference_cell *cell, ray_profile *c,
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_map map;
     kernel_curved_storage room;
-    kernel_curved curved = {.room = &room};
+    kernel_curved curved = {.storage = &room};
     const int intervals = bundle_intervals(b, list, &curved);
     kernel_map_setup(&map, &b->cell);
     for (int i = 0; i < intervals; i++) {

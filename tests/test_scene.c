@@ -1432,14 +1432,14 @@ static void derived_fields_are_sorted_and_read(void **state)
     const scene_derived *curl = find_derived(&s, "last", &last);
     find_derived(&s, "late_w", &late_w);
     assert_true(late > last && late > speed && last > late_w);
-    assert_true(of->kind == SCENE_EXPRESSION && of->input_count == 2 && of->made_by[0] == last &&
-                of->made_by[1] == speed);
+    assert_true(of->kind == SCENE_EXPRESSION && of->input_count == 2 && of->derived_indices[0] == last &&
+                of->derived_indices[1] == speed);
     assert_true(of->inputs[0].component == 2 && of->inputs[1].component == SCENE_COMPONENT_ONLY);
     int line = 1;
     for (const char *c = every_key; c < strstr(every_key, "  late:"); c++) line += *c == '\n';
     assert_int_equal(of->line, line);
     assert_true(curl->kind == SCENE_VORTICITY && curl->component == SCENE_COMPONENT_DEFAULT && curl->input_count == 3);
-    assert_true(curl->made_by[0] == -1 && curl->inputs[1].component == 1 && curl->made_by[2] == late_w);
+    assert_true(curl->derived_indices[0] == -1 && curl->inputs[1].component == 1 && curl->derived_indices[2] == late_w);
     assert_string_equal(s.derived[late_w].inputs[1].name, "a b");
     assert_true(s.derived[speed].inputs[0].component == SCENE_COMPONENT_MAGNITUDE);
     assert_true(find_derived(&s, "y", &at)->inputs[0].component == 1);

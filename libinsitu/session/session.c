@@ -202,7 +202,7 @@ insitu_status insitu_keep_pictures(insitu_session *session, int keep)
     session_drop_kept(&session->kept_pictures);
     int is_on = keep != 0;
     if (session_check_mpi(&error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast") == INSITU_OK)
-        session->kept_pictures.is_on = is_on;
+        session->kept_pictures.is_enabled = is_on;
     return store_error(session, &error);
 }
 

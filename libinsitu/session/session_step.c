@@ -222,8 +222,8 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     const double start = MPI_Wtime();
     const session_team *team = &s->team;
     const session_extent *extent = &s->space.extent;
-    session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path,    moment, 0, &s->catalogue, extent,
-                                changes->is_filled,   s->kept_pictures.is_on};
+    session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path,         moment, 0, &s->catalogue, extent,
+                                changes->is_filled,   s->kept_pictures.is_enabled};
     base_error of_events = {.status = INSITU_OK};
     const session_drawing drawing = {
         .team = team,

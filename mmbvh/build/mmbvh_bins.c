@@ -178,8 +178,8 @@ int64_t bins_partition(const bin_mapping *m, bin_split split, item *items, int64
 {
     enum { SIZE = sizeof(item), SIGN_TO_SIZE = 27 };
     const int factor = (uint16_t)m->factor[split.axis];
-    const int first = (int16_t)m->origin[split.axis] +
-                      (split.border * 65536 + factor - 1) / factor; /* lowest value among the items of the right side */
+    const int first = (int16_t)m->origin[split.axis] + (split.first_right_bin * 65536 + factor - 1) /
+                                                           factor; /* lowest value among the items of the right side */
     const int16_t *lower = (const int16_t *)(const void *)items + split.axis, *upper = lower + 4;
     char *base = (char *)items;
     int64_t left = 0; /* size of the left side in bytes */

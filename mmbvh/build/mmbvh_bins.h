@@ -30,7 +30,7 @@ bin_mapping bin_mapping_make(lanes centroids, int64_t item_count);
 /* A plane between two bins. Items whose bin on the axis is below the border belong to the left side. */
 typedef struct bin_split {
     int axis; /* axis of the split; -1 if no plane leaves items on both sides */
-    int border;
+    int first_right_bin;
     /* cost of the split: the sum over both sides of half the surface area (in squared grid steps) times the number of
      * items */
     float cost;

@@ -29,7 +29,7 @@ typedef struct kernel_contractions {
     float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], nonlinear_part[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
     /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
      * iteration is not a contraction */
-    float grow[SIMD_WIDTH];
+    float error_growth[SIMD_WIDTH];
     float error_bound[SIMD_WIDTH], domain_margin[SIMD_WIDTH];
 } kernel_contractions;
 
@@ -50,7 +50,7 @@ typedef struct kernel_bounds {
     float stretch[SIMD_WIDTH], slope[SIMD_WIDTH];
     /* upper bounds H and K from kernel_roots.h, of the second derivatives of the field and the map; for a pyramid they
      * are multiplied by its coordinate k */
-    float curve[SIMD_WIDTH], twist[SIMD_WIDTH];
+    float field_curvature[SIMD_WIDTH], map_curvature[SIMD_WIDTH];
     kernel_contractions contractions;
 } kernel_bounds;
 
@@ -374,7 +374,7 @@ SIMD_INLINE void kernel_f64_rate(const kernel_bounds_lanes *b, int type, const k
     const kernel_f64 domain_margin = 2 * ((face + error_bound) / rest) + 4e-6;
     const kernel_f64_mask contracts = r->is_regular & (kernel_f64_mask)(r->rise > 0) & (kernel_f64_mask)(rate < 0.9) &
                                       (kernel_f64_mask)(domain_margin < 0.015625);
-    kernel_f64_store(out->grow, half,
+    kernel_f64_store(out->error_growth, half,
                      kernel_f64_select(contracts, 1.0001 * rate / rest, kernel_f64_set((double)INFINITY)));
     kernel_f64_store(out->error_bound, half, error_bound);
     kernel_f64_store(out->domain_margin, half, domain_margin);
@@ -434,8 +434,8 @@ SIMD_INLINE void kernel_f64_limits(const kernel_bounds_lanes *b, int type, kerne
     for (int j = 0; j < 4; j++) field[j] = kernel_f64_rounded(b->exact[3][4 + j]);
     kernel_f64_store(out->stretch, half, stretch);
     kernel_f64_store(out->slope, half, slope);
-    kernel_f64_store(out->curve, half, kernel_f64_sqrt(kernel_f64_hessian(type, field)));
-    kernel_f64_store(out->twist, half, kernel_f64_sqrt(twist));
+    kernel_f64_store(out->field_curvature, half, kernel_f64_sqrt(kernel_f64_hessian(type, field)));
+    kernel_f64_store(out->map_curvature, half, kernel_f64_sqrt(twist));
 }
 
 static __attribute__((noinline)) void kernel_f64_contraction(const kernel_bounds_lanes *b, const kernel_f64_rates *r,
@@ -527,7 +527,7 @@ typedef struct kernel_curved {
     const float (*colours)[SIMD_WIDTH]; /* colour field by vertex and lane (kernel_cell.g), set if the layer has one */
     /* bounds of the cells; NULL if those of a single cell have not been computed yet */
     const kernel_bounds *bounds;
-    struct kernel_curved_storage *room; /* memory for the data and bounds of a single cell */
+    struct kernel_curved_storage *storage; /* memory for the data and bounds of a single cell */
 } kernel_curved;
 
 /* Memory for a single cell, whose data are copied to all lanes. */
@@ -548,7 +548,7 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
 static __attribute__((noinline, unused)) void kernel_curved_single_bounds(const kernel_cell *c, const kernel_beam *beam,
                                                                           kernel_curved *out)
 {
-    kernel_curved_storage *room = out->room;
+    kernel_curved_storage *room = out->storage;
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
     for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, room->at[n]);
     kernel_map_spread(c->g, c->count, room->colours);

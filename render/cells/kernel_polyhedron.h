@@ -65,8 +65,8 @@ typedef struct kernel_poly_crossings {
     vf *x, *y;       /* vertices and centre, projected along the rays */
     vf *edge;        /* edge functions of the edges, then of the lines from each vertex to the centre */
     kernel_triangle_crossings
-        *facets; /* crossings of surface triangles by number; only those listed in `met` are set */
-    vm *left;    /* for each surface triangle, the rays whose crossing has not been assigned to an interval yet */
+        *facets;    /* crossings of surface triangles by number; only those listed in `met` are set */
+    vm *unassigned; /* for each surface triangle, the rays whose crossing has not been assigned to an interval yet */
     /* rays that cross both triangles of a quad but not its bilinear patch, or the patch twice but no triangle */
     vm uneven;
     int *met;
@@ -120,7 +120,7 @@ static bool kernel_poly_allocate(const kernel_packet *p, const polyhedron *c, ke
     out->y = kernel_scratch_alloc(&at, points * sizeof(vf));
     out->edge = kernel_scratch_alloc(&at, (edges + points) * sizeof(vf));
     out->facets = kernel_scratch_alloc(&at, facets * sizeof(kernel_triangle_crossings));
-    out->left = kernel_scratch_alloc(&at, facets * sizeof(vm));
+    out->unassigned = kernel_scratch_alloc(&at, facets * sizeof(vm));
     out->met = kernel_scratch_alloc(&at, facets * sizeof(int));
     out->sheets = kernel_scratch_alloc(&at, edges * sizeof(kernel_triangle_crossings));
     out->met_sheets = kernel_scratch_alloc(&at, edges * sizeof(int));
@@ -296,7 +296,7 @@ static void kernel_poly_quad(kernel_poly_crossings *r, int first)
             kernel_facet_face(c, corner, &places[half], places[1].mask, r->has_colour, m[half]);
             left = vm_or(left, places[1].mask);
         }
-        r->left[half_of[half]] = left;
+        r->unassigned[half_of[half]] = left;
         if (vm_any(left)) r->met[r->met_count++] = half_of[half];
     }
 }
@@ -318,8 +318,8 @@ static bool kernel_poly_cross(kernel_poly_crossings *r, vm rays, bool has_colour
             if (i < c->facets[i].other_half) kernel_poly_quad(r, i);
             continue;
         }
-        r->left[i] = kernel_poly_facet(r, &c->facets[i], &w, &r->facets[i]);
-        if (vm_any(r->left[i])) r->met[r->met_count++] = i;
+        r->unassigned[i] = kernel_poly_facet(r, &c->facets[i], &w, &r->facets[i]);
+        if (vm_any(r->unassigned[i])) r->met[r->met_count++] = i;
     }
     return r->met_count > 0;
 }
@@ -333,7 +333,7 @@ SIMD_INLINE bool kernel_poly_take_nearest(kernel_poly_crossings *r, kernel_trian
     *out = (kernel_triangle_crossings){vm_none(), zero, zero, zero, vf_set(INFINITY), zero, zero};
     for (int n = 0; n < r->met_count; n++) {
         const kernel_triangle_crossings *m = &r->facets[r->met[n]];
-        const vm nearer = vm_and(r->left[r->met[n]], vf_lt(m->t_face, out->t_face));
+        const vm nearer = vm_and(r->unassigned[r->met[n]], vf_lt(m->t_face, out->t_face));
         out->mask = vm_or(out->mask, nearer);
         out->t = vf_select(nearer, m->t, out->t);
         out->v = vf_select(nearer, m->v, out->v);
@@ -344,7 +344,7 @@ SIMD_INLINE bool kernel_poly_take_nearest(kernel_poly_crossings *r, kernel_trian
         taken = vf_select(nearer, vf_set((float)n), taken);
     }
     for (int n = 0; n < r->met_count; n++)
-        r->left[r->met[n]] = vm_andnot(r->left[r->met[n]], vf_eq(taken, vf_set((float)n)));
+        r->unassigned[r->met[n]] = vm_andnot(r->unassigned[r->met[n]], vf_eq(taken, vf_set((float)n)));
     return vm_any(out->mask);
 }
 

@@ -30,10 +30,10 @@ typedef struct store_block {
 
 struct polyhedron_store {
     polyhedron *table[1 << TABLE_BITS];
-    store_block *blocks;  /* list of memory blocks; the block in use comes first */
-    store_block *unused;  /* free blocks, each of BLOCK_BYTES bytes */
-    size_t bytes;         /* size of all blocks in `blocks` */
-    char *work, *scratch; /* buffers for decomposing a cell, and for the kernels' temporary arrays */
+    store_block *blocks;      /* list of memory blocks; the block in use comes first */
+    store_block *free_blocks; /* free blocks, each of BLOCK_BYTES bytes */
+    size_t bytes;             /* size of all blocks in `blocks` */
+    char *work, *scratch;     /* buffers for decomposing a cell, and for the kernels' temporary arrays */
     size_t work_bytes, scratch_bytes;
 };
 
@@ -55,7 +55,7 @@ void polyhedra_free(polyhedron_store *store)
 {
     if (!store) return;
     free_blocks(store->blocks);
-    free_blocks(store->unused);
+    free_blocks(store->free_blocks);
     base_free(store->work);
     base_free(store->scratch);
     base_free(store);
@@ -69,8 +69,8 @@ void polyhedra_reset(polyhedron_store *store)
         store_block *block = store->blocks;
         store->blocks = block->next;
         if (block->size == BLOCK_BYTES) {
-            block->next = store->unused;
-            store->unused = block;
+            block->next = store->free_blocks;
+            store->free_blocks = block;
         } else {
             base_free(block);
         }
@@ -88,9 +88,9 @@ static bool add_block(polyhedron_store *store, size_t bytes)
 {
     const size_t head = rounded(sizeof(store_block));
     store_block *block = NULL;
-    if (head + bytes <= BLOCK_BYTES && store->unused) {
-        block = store->unused;
-        store->unused = block->next;
+    if (head + bytes <= BLOCK_BYTES && store->free_blocks) {
+        block = store->free_blocks;
+        store->free_blocks = block->next;
     } else {
         const size_t size = head + bytes > BLOCK_BYTES ? head + bytes : BLOCK_BYTES;
         block = base_alloc(size);

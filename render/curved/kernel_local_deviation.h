@@ -44,7 +44,7 @@ typedef struct kernel_local_nonlinear {
     float bend[SIMD_WIDTH];
     /* lower bound of the part of the field's deviation that is not visible at the three sampled places (the error E of
      * kernel_local_budget.h) */
-    float unseen[SIMD_WIDTH];
+    float unsampled[SIMD_WIDTH];
     float sensitivity[SIMD_WIDTH];    /* error bound of the field per unit of the residual */
     float residual_limit[SIMD_WIDTH]; /* largest residual for which the field's value is valid */
     float tolerance[SIMD_WIDTH];      /* Newton's method stops at a residual of at most this */
@@ -85,7 +85,7 @@ SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type
     }
     const vf bend = vf_sqrt(vf_load(c->bend)), room = 1.0f - 1.082f * bend;
     vf_store(out->bend, vf_load(c->bend));
-    vf_store(out->unseen, kernel_local_nonlinear_unsampled(type) * vf_load(c->bend) * most);
+    vf_store(out->unsampled, kernel_local_nonlinear_unsampled(type) * vf_load(c->bend) * most);
     vf_store(out->sensitivity, most / room);
     vf_store(out->residual_limit, KERNEL_DEVIATION_MARGIN * room);
 }

@@ -29,7 +29,8 @@ enum {
 
 /* A queue of cells of one type. When it is full, its first SIMD_WIDTH cells are processed together. */
 typedef struct kernel_local_queue {
-    int count, known; /* number of cells; of these, the first `known` have their vertex indices in `vertex` */
+    /* number of cells; the first indexed_count of them have their vertex indices in `vertex` */
+    int count, indexed_count;
     uint32_t cell[KERNEL_LOCAL_ROOM];
     uint16_t blocks[KERNEL_LOCAL_ROOM], box[KERNEL_LOCAL_ROOM];
     int32_t vertex[8][KERNEL_LOCAL_ROOM];
@@ -42,9 +43,9 @@ typedef struct kernel_local_stages {
     /* set if the rays of cells that are processed alone are the tile's own primary rays (kernel_packet.h) */
     bool is_pencil;
     /* Transforms the fetched cells; returns the visible ones. *lanes: those of them that can be processed in lanes. */
-    unsigned (*place)(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes);
+    unsigned (*transform)(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes);
     /* Processes the listed pixels, and empties the list. */
-    void (*cast)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
+    void (*process_pixels)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
     /* called after all pixels of a vector of cells have been listed and processed */
     void (*finish)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
 } kernel_local_stages;
@@ -72,7 +73,7 @@ SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, const kernel_lo
     l->take = take;
     l->volume = volume;
     l->part = -1;
-    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) l->queues[i].count = l->queues[i].known = 0;
+    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) l->queues[i].count = l->queues[i].indexed_count = 0;
 }
 
 /* Makes the mesh part with index `part` the one whose cells are queued from now on. The queues must be empty. */
@@ -203,8 +204,8 @@ SIMD_INLINE unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_l
 /* Reads the vertex indices of all queued cells before index `end` that have not been read yet. */
 SIMD_INLINE void kernel_local_read_indices(const kernel_arrays *p, kernel_local_queue *q, int end, int type)
 {
-    for (; q->known < end; q->known++)
-        kernel_arrays_vertices(p, q->cell[q->known], grid_type_vertices(type), q->vertex[0] + q->known,
+    for (; q->indexed_count < end; q->indexed_count++)
+        kernel_arrays_vertices(p, q->cell[q->indexed_count], grid_type_vertices(type), q->vertex[0] + q->indexed_count,
                                KERNEL_LOCAL_ROOM);
 }
 
@@ -228,7 +229,7 @@ SIMD_INLINE void kernel_local_pop(kernel_local_queue *q)
 {
     enum { LEFT = KERNEL_LOCAL_ROOM - SIMD_WIDTH };
     q->count = q->count > SIMD_WIDTH ? q->count - SIMD_WIDTH : 0;
-    q->known = q->known > SIMD_WIDTH ? q->known - SIMD_WIDTH : 0;
+    q->indexed_count = q->indexed_count > SIMD_WIDTH ? q->indexed_count - SIMD_WIDTH : 0;
     if (!q->count) return;
     memmove(q->cell, q->cell + SIMD_WIDTH, LEFT * sizeof *q->cell);
     memmove(q->blocks, q->blocks + SIMD_WIDTH, LEFT * sizeof *q->blocks);

@@ -34,7 +34,7 @@ typedef struct kernel_curved_lanes {
     vf at[8][3], f[8];
     /* lanes whose numbers are neither too large nor too small for float32 nor NaN; cells of other lanes are tested one
      * by one */
-    vm usual;
+    vm fitting_lanes;
 } kernel_curved_lanes;
 
 /* The linear function L of kernel_outline.h at the vertices. The isosurface lies in the slab |L| <= thickness; the
@@ -75,7 +75,8 @@ SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const 
 
 /* Computes the linear function L (kernel_outline.h) at the vertices, and the thickness of the slab that contains the
  * isosurface. |f| is at most about 1. Positions have an error of at most one rounding, r, of their coordinates, and
- * their mean has an error of at most 8 r. Lanes whose volume is near float32's minimum are removed from `usual`. */
+ * their mean has an error of at most 8 r. Lanes whose volume is near float32's minimum are removed from
+ * fitting_lanes. */
 SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, kernel_curved_slab *out)
 {
     const kernel_differential *differential = kernel_cell_differential(type);
@@ -97,7 +98,7 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, k
         }
     }
     const vf volume = (d[0][0] * n[0][0] + d[1][0] * n[0][1]) + d[2][0] * n[0][2];
-    l->usual = vm_and(l->usual, vf_lt(vf_set(1e-30f), vf_abs(volume)));
+    l->fitting_lanes = vm_and(l->fitting_lanes, vf_lt(vf_set(1e-30f), vf_abs(volume)));
     const vf inverse = 1.0f / volume;
     for (int i = 0; i < 3; i++)
         for (int a = 0; a < 3; a++) n[i][a] *= inverse;
@@ -173,17 +174,17 @@ SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const ker
                                                kernel_curved_lanes *l)
 {
     l->count = count;
-    l->usual = vm_all_lanes();
+    l->fitting_lanes = vm_all_lanes();
     for (int i = 0; i < count; i++) {
         vf from_eye[3];
         kernel_finder_positions(s, kernel_cells_vertex(c, i), from_eye);
-        l->usual = kernel_positions_fit_lanes(l->usual, from_eye);
+        l->fitting_lanes = kernel_positions_fit_lanes(l->fitting_lanes, from_eye);
         kernel_rotate_to_camera(s, from_eye, l->at[i]);
     }
 }
 
-/* Sets f to the values minus the isovalue, and removes lanes whose values are too large, too small or NaN from `usual`.
- * Returns the largest |f| of each lane. */
+/* Sets f to the values minus the isovalue, and removes lanes whose values are too large, too small or NaN from
+ * fitting_lanes. Returns the largest |f| of each lane. */
 SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_raw_numbers *v, int count,
                                           const kernel_level *level, kernel_curved_lanes *l)
 {
@@ -191,9 +192,9 @@ SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_r
     for (int i = 0; i < count; i++) {
         l->f[i] = kernel_raw_minus(&s->arrays.values, &v[i], level);
         size = vf_max(vf_abs(l->f[i]), size);
-        l->usual = vm_and(l->usual, vf_lt(vf_abs(l->f[i]), vf_set(1e30f)));
+        l->fitting_lanes = vm_and(l->fitting_lanes, vf_lt(vf_abs(l->f[i]), vf_set(1e30f)));
     }
-    l->usual = vm_and(l->usual, vf_lt(vf_set(1e-30f), size));
+    l->fitting_lanes = vm_and(l->fitting_lanes, vf_lt(vf_set(1e-30f), size));
     return size;
 }
 
@@ -222,12 +223,12 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
     kernel_raw_numbers v[4];
     for (int i = 0; i < 4; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     kernel_curved_lanes_transform(s, c, 4, &l);
-    const vm usual = l.usual;
+    const vm usual = l.fitting_lanes;
     for (int value = 0; value < s->surface->layer->value_count; value++) {
         const kernel_level level = kernel_level_of(s->surface->layer->values[value]);
         vm negative[4], any = vm_none(), every = vm_all_lanes();
         kernel_ends_lanes e;
-        l.usual = usual;
+        l.fitting_lanes = usual;
         kernel_curved_lanes_values(s, v, 4, &level, &l);
         for (int i = 0; i < 4; i++) {
             negative[i] = kernel_raw_below(&s->arrays.values, &v[i], &level);
@@ -237,7 +238,7 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
         const unsigned crossed = all & vm_bits(vm_andnot(any, every));
         if (!crossed) continue;
         kernel_tet_lanes_ends(s, &l, negative, &e);
-        kernel_add_crossed(s, c, value, l.usual, crossed, &e);
+        kernel_add_crossed(s, c, value, l.fitting_lanes, crossed, &e);
     }
 }
 
@@ -261,7 +262,7 @@ SIMD_INLINE void kernel_crossed_add_candidates(kernel_finder *s, kernel_crossed 
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
     kernel_curved_lanes_slab(&l, c->type, &slab);
     kernel_curved_lanes_ends(s, &l, &slab, &e);
-    kernel_add_crossed(s, c, h->value, l.usual, (1u << c->count) - 1, &e);
+    kernel_add_crossed(s, c, h->value, l.fitting_lanes, (1u << c->count) - 1, &e);
 }
 
 static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kernel_crossed *h)

@@ -142,10 +142,10 @@ static bool bin_list_fill(bin_list *bin, const kernel_candidate_list *list, int6
 static bool ensure_room(kernel_bin *bin, int64_t count)
 {
     if (count <= bin->capacity) return true;
-    base_free(bin->room);
-    bin->room = base_alloc((size_t)(2 * count) * sizeof *bin->room);
-    bin->capacity = bin->room ? 2 * count : 0;
-    return bin->room != NULL;
+    base_free(bin->buffer);
+    bin->buffer = base_alloc((size_t)(2 * count) * sizeof *bin->buffer);
+    bin->capacity = bin->buffer ? 2 * count : 0;
+    return bin->buffer != NULL;
 }
 
 static int count_in_tile(const bin_list *list, int64_t tile)
@@ -169,7 +169,7 @@ static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin
     if (!last) return true;
     const bool is_shared = count_in_tile(last, tile) < count;
     if (is_shared && !ensure_room(bin, count)) return false;
-    bin->items = is_shared ? bin->room : last->items + last->starts[tile];
+    bin->items = is_shared ? bin->buffer : last->items + last->starts[tile];
     bin->count = (int)count;
     kernel_tile_candidate *to = bin->items;
     for (const bin_list *list = bins->lists; is_shared && list <= last; list++) {

@@ -21,10 +21,10 @@ typedef struct kernel_tile_trace {
     kernel_thread *thread;
     kernel_tile tile;
     kernel_planes tree_planes, tile_planes;
-    unsigned wanted; /* mask of the blocks with pixels to trace */
-    unsigned begun;  /* mask of the blocks whose packets have been set up */
+    unsigned traced_blocks; /* mask of the blocks with pixels to trace */
+    unsigned begun;         /* mask of the blocks whose packets have been set up */
     /* number of the interval, counted from 0, in which volumes are being traced on each ray (kernel_clip.h) */
-    int turn;
+    int clip_interval;
     int64_t first_fragment; /* index of the tile's first fragment in the thread's list */
     float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* farthest t_far of the rays of each block, one block per lane */
@@ -126,7 +126,7 @@ SIMD_INLINE float kernel_tile_far(const kernel_tile_trace *t)
     const unsigned lanes = (1u << SIMD_WIDTH) - 1;
     vf far = vf_set(-INFINITY);
     for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) {
-        const vm wanted = vm_from_bits(t->wanted >> v * SIMD_WIDTH & lanes);
+        const vm wanted = vm_from_bits(t->traced_blocks >> v * SIMD_WIDTH & lanes);
         far = vf_max(far, vf_select(wanted, t->far[v], vf_set(-INFINITY)));
     }
     return vf_reduce_max(far);
@@ -137,7 +137,7 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
 {
     t->frame = f;
     t->thread = thread;
-    t->wanted = wanted;
+    t->traced_blocks = wanted;
     t->begun = 0;
     t->first_fragment = thread->out->count;
     t->t_near = (float)-f->depth_shift;

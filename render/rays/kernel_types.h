@@ -223,7 +223,7 @@ typedef struct kernel_bin {
     kernel_tile_candidate *items;
     int count;
     /* buffer in which candidates found by several threads are put together; `capacity` items */
-    kernel_tile_candidate *room;
+    kernel_tile_candidate *buffer;
     int64_t capacity;
 } kernel_bin;
 
@@ -336,7 +336,7 @@ typedef struct kernel_thread {
                                           int part, int layer, uint32_t index);
     void *(*polyhedron_scratch)(struct polyhedron_store *store, size_t bytes);
     double surface_seconds, volume_seconds;
-    double (*now)(void);
+    double (*clock_seconds)(void);
 } kernel_thread;
 
 struct kernel_bundle;

@@ -50,7 +50,7 @@ typedef struct kernel_cell_ray {
 
 /* The coefficients and error bounds of kernel_contractions, gathered from each ray's own cell. */
 typedef struct kernel_contraction {
-    vf offset[3], middle, nonlinear_part[4][3], field[4], grow, error_bound, domain_margin;
+    vf offset[3], middle, nonlinear_part[4][3], field[4], error_growth, error_bound, domain_margin;
 } kernel_contraction;
 
 /* The result of the contraction test, per ray. one: rays with exactly one crossing; none: rays without a crossing. For
@@ -89,7 +89,7 @@ SIMD_INLINE void kernel_contraction_of(const kernel_bounds *b, vi lane, int type
         out->field[k] = kernel_gather_lane(c->field[k], lane);
     }
     out->middle = kernel_gather_lane(c->middle, lane);
-    out->grow = kernel_gather_lane(c->grow, lane);
+    out->error_growth = kernel_gather_lane(c->error_growth, lane);
     out->error_bound = kernel_gather_lane(c->error_bound, lane);
     out->domain_margin = kernel_gather_lane(c->domain_margin, lane);
 }
@@ -177,7 +177,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_
         const vf rate = c->field[k] * over;
         for (int i = 0; i < 3; i++) slope[k][i] = c->nonlinear_part[k][i] + ray->w[i] * rate;
     }
-    const vm sure = vm_and(rays, vf_lt(c->grow, vf_set(INFINITY)));
+    const vm sure = vm_and(rays, vf_lt(c->error_growth, vf_set(INFINITY)));
     for (int n = 0; n < KERNEL_CONTRACTION_STEPS; n++) {
         kernel_contraction_clamp(type, c->domain_margin, q);
         kernel_contraction_local(type, q, local);
@@ -197,7 +197,7 @@ SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_
         }
         for (int i = 0; i < 3; i++) q[i] = out->r[i];
     }
-    const vf off = c->grow * vf_sqrt(kernel_dot(s, s)) + (1.0f + c->grow) * c->error_bound;
+    const vf off = c->error_growth * vf_sqrt(kernel_dot(s, s)) + (1.0f + c->error_growth) * c->error_bound;
     const vm inside = vf_lt(off + c->domain_margin, kernel_contraction_border_distance(type, out->r));
     out->one = vm_andnot(vm_and(sure, vm_and(inside, vf_lt(off, vf_set(KERNEL_CONTRACTION_END)))), out->none);
     vf e = ray->level + c->middle;

@@ -50,7 +50,7 @@ typedef struct kernel_curved_batch {
     float colours[8][SIMD_WIDTH];
     float lines[8][SIMD_WIDTH]; /* field of the contour lines by vertex and lane; set only if the layer has lines */
     kernel_bounds bounds;
-    unsigned ready; /* mask of the lanes whose cells have been copied to `cells` */
+    unsigned copied_lanes; /* mask of the lanes whose cells have been copied to `cells` */
     kernel_cell cells[SIMD_WIDTH];
     kernel_pixel_list rays, met, found, others;
     /* for each ray in `met`, the two faces that it crosses: number of the first plus 8 times that of the second */
@@ -78,8 +78,8 @@ SIMD_INLINE kernel_curved kernel_curved_batch_cells(const kernel_curved_batch *h
 /* Copies the cell in lane n to h->cells[n], with its edge functions, unless it has been copied before. */
 SIMD_INLINE void kernel_curved_ready(const kernel_tile_trace *t, kernel_curved_batch *h, int n)
 {
-    if (h->ready >> n & 1) return;
-    h->ready |= 1u << n;
+    if (h->copied_lanes >> n & 1) return;
+    h->copied_lanes |= 1u << n;
     kernel_transformed_curved_cell(&h->transformed, h->queued->type, n, &h->cells[n]);
     kernel_cell_lines(&h->cells[n], t->frame, &t->tile);
     h->cells[n].part = h->queued->part;
@@ -509,12 +509,12 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
     kernel_bounds_of(queued->type, (const float(*)[8][SIMD_WIDTH])h->transformed.at, &beam, &h->bounds);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
-    h->ready = 0;
+    h->copied_lanes = 0;
     kernel_curved *const alone = t->curved;
     kernel_curved cells = kernel_curved_batch_cells(h);
     t->curved = &cells;
     for (int n = 0; n < queued->count; n++) {
-        const unsigned blocks = queued->blocks[n] & t->wanted & kernel_blocks_beyond(t, queued->near[n]);
+        const unsigned blocks = queued->blocks[n] & t->traced_blocks & kernel_blocks_beyond(t, queued->near[n]);
         if (!blocks) continue;
         if (by_ray && !(vm_bits(collapsed) >> n & 1)) {
             kernel_curved_batch_rays_of(t, h, n, queued->box[n], queued->blocks[n]);

@@ -49,14 +49,14 @@ enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS =
 
 /* The result of testing a piece of the interval, per ray. */
 typedef struct kernel_piece_class {
-    vm clear;    /* the piece has no root: the field has the sign `side` everywhere */
-    vm monotone; /* the field is monotone, so the piece has at most one root */
-    vm tiny;     /* the field is within rounding of 0 everywhere on the piece, so that its sign is not significant */
+    vm clear;      /* the piece has no root: the field has the sign `side` everywhere */
+    vm monotone;   /* the field is monotone, so the piece has at most one root */
+    vm negligible; /* the field is within rounding of 0 everywhere on the piece, so that its sign is not significant */
 } kernel_piece_class;
 
 /* The bounds of kernel_bounds, gathered from each ray's own cell. */
 typedef struct kernel_limits {
-    vf nonlinear_part[3][8], inverse[3][3], stretch, slope, curve, twist;
+    vf nonlinear_part[3][8], inverse[3][3], stretch, slope, field_curvature, map_curvature;
     vf coarsest; /* pieces longer than this share of the interval are always halved */
     vm is_monotone;
 } kernel_limits;
@@ -72,8 +72,8 @@ SIMD_INLINE void kernel_limits_of(const kernel_bounds *b, vi lane, kernel_limits
         for (int a = 0; a < 3; a++) out->inverse[i][a] = kernel_gather_lane(b->normal[i][a], lane);
     out->stretch = kernel_gather_lane(b->stretch, lane);
     out->slope = kernel_gather_lane(b->slope, lane);
-    out->curve = kernel_gather_lane(b->curve, lane);
-    out->twist = kernel_gather_lane(b->twist, lane);
+    out->field_curvature = kernel_gather_lane(b->field_curvature, lane);
+    out->map_curvature = kernel_gather_lane(b->map_curvature, lane);
     const vm is_proved = vf_lt(kernel_gather_lane(b->thickness, lane), vf_set(INFINITY));
     out->coarsest = vf_select(is_proved, vf_set(1), vf_set(0.125f));
     out->is_monotone = vf_le(vf_set(0), kernel_gather_lane(b->jump, lane));
@@ -137,13 +137,14 @@ SIMD_INLINE kernel_piece_class kernel_classify_piece(const kernel_map *map, cons
     const vf least = vf_min(vf_min(from->value * side, to->value * side), vf_min(b1 * side, b2 * side));
     const vf most = vf_max(vf_max(vf_abs(from->value), vf_abs(to->value)), vf_max(vf_abs(b1), vf_abs(b2)));
     const vf length = vf_sqrt(kernel_dot(move, move));
-    const vf off_slope = b->stretch * (b->twist * scale * off * length + 3.0f * bend_slope + 2.0f * gap);
-    const vf tolerance = b->curve * scale * off * (length + off_slope) + b->slope * off_slope + KERNEL_ROOT_BAND;
+    const vf off_slope = b->stretch * (b->map_curvature * scale * off * length + 3.0f * bend_slope + 2.0f * gap);
+    const vf tolerance =
+        b->field_curvature * scale * off * (length + off_slope) + b->slope * off_slope + KERNEL_ROOT_BAND;
     const vf low = vf_min(middle, vf_min(d0, d1)), high = vf_max(middle, vf_max(d0, d1));
     kernel_piece_class out;
     out.clear = vf_lt(bound, least);
     out.monotone = vm_or(vf_lt(tolerance, low), vf_lt(tolerance, -high));
-    out.tiny = vf_le(most + wrong, vf_set(KERNEL_ROOT_BAND));
+    out.negligible = vf_le(most + wrong, vf_set(KERNEL_ROOT_BAND));
     return out;
 }
 
@@ -325,7 +326,7 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
         const vm small =
             vm_or(vf_le(s->size, vf_set(KERNEL_SMALLEST_PIECE)), vf_lt(vf_set(KERNEL_ROOT_PIECES), s->pieces));
         const vm certain = vm_and(vm_or(v.monotone, v.clear), vf_le(s->size, s->limits.coarsest));
-        const vm decided = vm_and(going, vm_or(vm_or(certain, v.tiny), small));
+        const vm decided = vm_and(going, vm_or(vm_or(certain, v.negligible), small));
         const vm roots = vm_andnot(decided, vf_eq(kernel_side(to.value), s->side));
         const vm halve = vm_andnot(going, decided);
         /* divisions are counted per ray, so that a ray's result does not depend on the other rays */
@@ -427,7 +428,7 @@ SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map *map
  * has the isovalue, and the map's product m there. */
 typedef struct kernel_residual {
     kernel_product m;
-    vf off[3], value;
+    vf distance[3], value;
 } kernel_residual;
 
 /* Does a step of Newton's method for the four equations at once; t stays between low and high. Returns the rays that
@@ -437,7 +438,7 @@ SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map *map
                                   kernel_point *out)
 {
     const kernel_product *m = &residual->m;
-    const vf *off = residual->off;
+    const vf *off = residual->distance;
     const vf zero = vf_set(0);
     kernel_jacobian j;
     vf gradient[3], step[3], speed[3], largest = zero;
@@ -468,7 +469,7 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map *m
     kernel_point last = *out;
     kernel_residual residual;
     residual.m = kernel_product_at(map->is_pyramid, out->r);
-    kernel_residuals(rays, map, out, residual.off, &residual.value);
+    kernel_residuals(rays, map, out, residual.distance, &residual.value);
     /* at a double root the field's derivative is only a rounding error, so that a step by it leads away and is not
      * taken */
     const vm away = kernel_polish_step(rays, map, low, high, wanted, &residual, &last);
@@ -503,7 +504,7 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map *ma
         residual.m = kernel_product_at(map->is_pyramid, out->r);
         kernel_rays_at(rays, map, out->t, target);
         for (int a = 0; a < 3; a++)
-            residual.off[a] = target[a] - kernel_value_of(map->position[a], map->is_pyramid, m, out->r);
+            residual.distance[a] = target[a] - kernel_value_of(map->position[a], map->is_pyramid, m, out->r);
         residual.value = kernel_value_of(map->field, map->is_pyramid, m, out->r);
         open = kernel_polish_step(rays, map, low, high, open, &residual, out);
     }

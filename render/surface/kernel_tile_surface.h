@@ -37,7 +37,7 @@ typedef struct kernel_find_plane {
 
 typedef struct kernel_tile_finder {
     /* Callback that searches a leaf's cells for the current layer's surface. */
-    void (*look)(kernel_tile_trace *t, int part, const uint32_t *cells, int count);
+    void (*search_leaf)(kernel_tile_trace *t, int part, const uint32_t *cells, int count);
     /* number of pixels per unit of slope or, if the camera is orthographic, per scaled unit */
     float column_scale, row_scale;
     float pad[2]; /* margins by which columns and rows are extended, in pixels */
@@ -119,7 +119,7 @@ typedef struct kernel_node_bounds {
     float near[SIMD_WIDTH];
     int32_t box[SIMD_WIDTH];
     vf along;
-    unsigned shown;
+    unsigned visible_mask;
 } kernel_node_bounds;
 
 /* Adds the first and last column (shift 0) or row (shift 8) to the boxes of pixels. low: lower bound of the distance
@@ -167,7 +167,7 @@ SIMD_INLINE void kernel_tile_find_node_bounds(const kernel_tile_trace *t, const 
     vf_store(out->near, vf_max(at[KERNEL_FIND_DEPTH] - reach[KERNEL_FIND_DEPTH], vf_set(-INFINITY)));
     memcpy(out->box, &box, sizeof box);
     out->along = at[KERNEL_FIND_ALONG];
-    out->shown = vm_bits(shown);
+    out->visible_mask = vm_bits(shown);
 }
 
 /* Pushes a node on the stack if it may be visible, and prefetches what is read next. Returns the number of nodes
@@ -175,7 +175,7 @@ SIMD_INLINE void kernel_tile_find_node_bounds(const kernel_tile_trace *t, const 
 SIMD_INLINE int kernel_tile_find_push(const mmbvh *tree, const mmbvh_ranges *ranges, int64_t node,
                                       const kernel_node_bounds *places, int lane, kernel_tile_node *to)
 {
-    if (!(places->shown >> lane & 1)) return 0;
+    if (!(places->visible_mask >> lane & 1)) return 0;
     const int64_t ref = mmbvh_node_ref(tree, node);
     const int count = mmbvh_node_count(tree, node);
     if (count) {
@@ -233,7 +233,7 @@ SIMD_INLINE void kernel_tile_find_cells(kernel_tile_trace *t, int part)
             const kernel_tile_node e = stack[--top];
             if (!kernel_pixels_beyond(t, e.box, e.near)) continue;
             if (e.count) {
-                t->search->look(t, part, tree->cells + e.ref, e.count);
+                t->search->search_leaf(t, part, tree->cells + e.ref, e.count);
             } else {
                 inner[inner_count++] = e.ref;
             }
@@ -255,10 +255,11 @@ SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
     if (job->parent) {
-        kernel_tile_traverse(t, job->parent, NULL, NULL, t->wanted, 0, kernel_tile_parts);
+        kernel_tile_traverse(t, job->parent, NULL, NULL, t->traced_blocks, 0, kernel_tile_parts);
         return;
     }
-    for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) kernel_tile_parts(t, 0, &part, 1, t->wanted);
+    for (uint32_t part = 0; part < (uint32_t)job->part_count; part++)
+        kernel_tile_parts(t, 0, &part, 1, t->traced_blocks);
 }
 
 /* Copies six of the tile's planes out of the vectors in which kernel_planes stores them. */
@@ -281,7 +282,7 @@ SIMD_INLINE void kernel_tile_find_planes(const kernel_planes *q, kernel_find_pla
     }
 }
 
-/* Sets up the search for a tile. The callback `look` must already be set. */
+/* Sets up the search for a tile. The callback search_leaf must already be set. */
 SIMD_INLINE void kernel_tile_find_begin(kernel_tile_trace *t)
 {
     kernel_tile_finder *s = t->search;

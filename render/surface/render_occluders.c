@@ -39,7 +39,7 @@ typedef struct hex_record {
 
 /* A growing list of items of one size. */
 typedef struct list {
-    int64_t count, room;
+    int64_t count, capacity;
     void *items;
 } list;
 
@@ -52,15 +52,15 @@ typedef struct occluder_list {
 /* Appends an item to a list and returns it; NULL if memory ran out. */
 static void *add(occluder_list *f, list *l, size_t size)
 {
-    if (l->count == l->room) {
-        const int64_t room = l->room + l->room / 2 + 256;
+    if (l->count == l->capacity) {
+        const int64_t room = l->capacity + l->capacity / 2 + 256;
         void *items = base_realloc(l->items, (size_t)room * size);
         if (!items) {
             f->out_of_memory = true;
             return NULL;
         }
         l->items = items;
-        l->room = room;
+        l->capacity = room;
     }
     return (char *)l->items + (size_t)l->count++ * size;
 }

@@ -70,8 +70,8 @@ typedef struct kernel_bisection {
     const kernel_segment_state *state;
     const kernel_cell_interval *cell_interval;
     const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
-    double u, v, slope, shift;   /* constants of the ray: at depth t its point is (u, v) * (slope * t + shift) */
-    kernel_exact_point in, out;  /* ends of the interval, at the crossings of the faces */
+    double u, v, slope, depth_offset; /* constants of the ray: at depth t its point is (u, v) * (slope * t + shift) */
+    kernel_exact_point in, out;       /* ends of the interval, at the crossings of the faces */
     /* unit distances per t; length of the interval; share of the light that reaches the current subinterval */
     double per_t, length, light;
     int64_t *map_failures;
@@ -89,7 +89,7 @@ static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, doubl
     const double whole = h->out.t - h->in.t, share = whole > 0 ? (t - h->in.t) / whole : 0;
     kernel_exact_point out = {.t = t, .v = kernel_between(h->in.v, h->out.v, share)};
     if (!h->map) return out;
-    const double reach = h->slope * t + h->shift, target[3] = {h->u * reach, h->v * reach, t};
+    const double reach = h->slope * t + h->depth_offset, target[3] = {h->u * reach, h->v * reach, t};
     double slopes[3];
     memcpy(out.r, guess, sizeof out.r);
     if (!kernel_exact_newton(h->map, target, out.r) || !kernel_exact_is_near(out.r)) {
@@ -223,7 +223,7 @@ typedef struct kernel_subinterval {
 } kernel_subinterval;
 
 typedef struct kernel_subinterval_values {
-    double off, low, high;
+    double deviation, low, high;
 } kernel_subinterval_values;
 
 /* Computes the subinterval's largest sampled deviation from its chord, and the range of its values, from the field at
@@ -235,12 +235,12 @@ static kernel_subinterval_values kernel_subinterval_sample(const kernel_bisectio
     const double a = from->v, b = sub->end.v, rise = b - a;
     kernel_subinterval_values out = {0, fmin(a, b), fmax(a, b)};
     if (!h->map) return out;
-    out.off = fmax(fmax(fabs(a + 0.25 * rise - first->v), fabs(a + 0.75 * rise - third->v)),
-                   fabs(a + 0.5 * rise - sub->middle.v));
-    sub->is_monotone = sub->is_monotone || fabs(rise) >= 12 * out.off;
+    out.deviation = fmax(fmax(fabs(a + 0.25 * rise - first->v), fabs(a + 0.75 * rise - third->v)),
+                         fabs(a + 0.5 * rise - sub->middle.v));
+    sub->is_monotone = sub->is_monotone || fabs(rise) >= 12 * out.deviation;
     if (!sub->is_monotone) {
-        out.low -= 1.5 * out.off;
-        out.high += 1.5 * out.off;
+        out.low -= 1.5 * out.deviation;
+        out.high += 1.5 * out.deviation;
     }
     return out;
 }
@@ -254,7 +254,8 @@ static double kernel_subinterval_error(const kernel_bisection *h, const kernel_s
     const double seen = fmin(length, 1 / fmax(s->least, 1e-30)), lit = fmin(s->most * length, 1);
     const double change = s->most - s->least, tint = fmin(s->colour_slope * (sub->high - sub->low), contrast);
     *all = fmin(contrast * change * seen + tint * lit, contrast * lit);
-    return fmin(contrast * (s->slope * sub->off) * seen + fmin(s->colour_slope * sub->off, contrast) * lit, *all);
+    return fmin(contrast * (s->slope * sub->deviation) * seen + fmin(s->colour_slope * sub->deviation, contrast) * lit,
+                *all);
 }
 
 /* ---- steps ---- */
@@ -441,7 +442,7 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
                               .u = at.px[n] - p->tile->centre_x,
                               .v = at.py[n] - p->tile->centre_y,
                               .slope = is_flat ? 0 : 1,
-                              .shift = is_flat ? f->job->space.scale : p->tile->depth_shift,
+                              .depth_offset = is_flat ? f->job->space.scale : p->tile->depth_shift,
                               .in = {.t = (double)i->t_in[n], .v = (double)i->v_in[n]},
                               .out = {.t = (double)i->t_out[n], .v = (double)i->v_out[n]},
                               .per_t = (double)state->list->per_t[n],

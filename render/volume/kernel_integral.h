@@ -171,10 +171,10 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
 
 /* A ray's position in a piece of the transfer function. */
 typedef struct kernel_piece_state {
-    vf below, above; /* distances of the value to the piece's low and high end */
-    vf remaining;    /* remaining change of the value within this piece */
-    vf left;         /* length of the ray over which this change takes place, in unit distances */
-    vf shortest;     /* lower limit of a step's length, in unit distances */
+    vf below, above;     /* distances of the value to the piece's low and high end */
+    vf remaining;        /* remaining change of the value within this piece */
+    vf remaining_length; /* length of the ray over which this change takes place, in unit distances */
+    vf shortest;         /* lower limit of a step's length, in unit distances */
     /* value at the end of the piece that the ray is approaching, and its rounding error; initially the value at the
      * segment's begin */
     vf edge, rest;
@@ -184,7 +184,7 @@ typedef struct kernel_piece_state {
 /* Properties of a segment that are the same in all its pieces. */
 typedef struct kernel_segment_constants {
     vm falling, level;
-    vf turn; /* sign of the value's change along the ray: 1 or -1 */
+    vf sign; /* sign of the value's change along the ray: 1 or -1 */
     vf v_out, rest_out, length, per_value;
 } kernel_segment_constants;
 
@@ -194,7 +194,7 @@ SIMD_INLINE kernel_segment_constants kernel_segment_constants_of(const kernel_un
     kernel_segment_constants out = {.v_out = run->v_out, .rest_out = run->rest_out, .length = run->length};
     out.falling = vf_lt(rise, vf_set(0));
     out.level = vf_lt(change, vf_set(KERNEL_TINY));
-    out.turn = vf_select(out.falling, -one, one);
+    out.sign = vf_select(out.falling, -one, one);
     out.per_value = run->length / vf_select(out.level, one, change);
     return out;
 }
@@ -212,7 +212,7 @@ SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *piece_state, const
     piece_state->above = vf_select(fresh, above, piece_state->above);
     piece_state->remaining = vf_select(fresh, remaining, piece_state->remaining);
     const vf left = vf_select(constants->level, constants->length, remaining * constants->per_value);
-    piece_state->left = vf_select(fresh, left, piece_state->left);
+    piece_state->remaining_length = vf_select(fresh, left, piece_state->remaining_length);
     piece_state->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, piece_state->shortest);
     piece_state->edge = vf_select(fresh, vf_select(constants->falling, ends->low, ends->high), piece_state->edge);
     piece_state->rest =
@@ -326,19 +326,19 @@ SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_
             const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
             kernel_piece_state_enter(&piece_state, &constants, fresh, &ends);
         }
-        kernel_integration_step st = kernel_integration_step_begin(t, &at, &piece_state, constants.turn);
-        kernel_integration_step_limit(&st, piece_state.left, piece_state.shortest);
-        const vf size = piece_state.remaining * st.share, move = constants.turn * size;
+        kernel_integration_step st = kernel_integration_step_begin(t, &at, &piece_state, constants.sign);
+        kernel_integration_step_limit(&st, piece_state.remaining_length, piece_state.shortest);
+        const vf size = piece_state.remaining * st.share, move = constants.sign * size;
         kernel_light_step(t, &at, open, piece_state.below, move, &st, light);
         piece_state.below += move;
         piece_state.above -= move;
         piece_state.remaining -= size;
-        piece_state.left -= st.length;
+        piece_state.remaining_length -= st.length;
         const vm through = vf_le(vf_set(1), st.share);
         open = vm_and(vm_andnot(open, vm_and(through, piece_state.is_last)),
                       vf_lt(vf_set(KERNEL_BLACK), light->transmittance));
         fresh = vm_and(open, through);
-        piece = vf_select(fresh, piece + constants.turn, piece);
+        piece = vf_select(fresh, piece + constants.sign, piece);
     }
 }
 

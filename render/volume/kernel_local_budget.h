@@ -63,7 +63,7 @@ typedef struct kernel_local_bounds {
     float cost[SIMD_WIDTH];
     float error_variation[SIMD_WIDTH];
     /* upper bound of the change of the error's weight per depth: cost + R |s'|, as defined at the top of this file */
-    float fade[SIMD_WIDTH];
+    float weight_change[SIMD_WIDTH];
     float extinction[SIMD_WIDTH];
     float low[SIMD_WIDTH], high[SIMD_WIDTH]; /* range of values for which the bounds hold */
 } kernel_local_bounds;
@@ -99,7 +99,7 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
     vf_gather_pair(&t->variations->extinction, entry, &extinction, &steepness);
     vf_store(b->bounds.cost, cost);
     vf_store(b->bounds.error_variation, error_variation);
-    vf_store(b->bounds.fade, cost + steepness);
+    vf_store(b->bounds.weight_change, cost + steepness);
     vf_store(b->bounds.extinction, extinction);
     vf_store(b->bounds.low, low);
     vf_store(b->bounds.high, high);
@@ -117,9 +117,9 @@ typedef struct kernel_local_pairs {
     kernel_point ends[2];
     kernel_local_deviations off_chord;
     vm active;
-    vf begin;     /* depth at which the ray's window begins */
-    vf count;     /* number of segments into which the interval is divided */
-    float unseen; /* factor by which kernel_local_nonlinear.unseen is multiplied; it is 1 for a whole interval */
+    vf begin;        /* depth at which the ray's window begins */
+    vf count;        /* number of segments into which the interval is divided */
+    float unsampled; /* factor by which kernel_local_nonlinear.unsampled is multiplied; it is 1 for a whole interval */
 } kernel_local_pairs;
 
 /* Returns by how much a single chord must be raised so that its mean equals the field's mean. */
@@ -141,13 +141,13 @@ SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_budget *b, const ker
 
 /* Errors, per ray, that arise if one segment replaces the ray's whole interval in its cell. */
 typedef struct kernel_local_errors {
-    vf mean;    /* mean of |v - f|; with n segments it is divided by n^2 */
-    vf quartic; /* upper bound E of the quartic part of the field's deviation from its chord */
-    vf unknown; /* error of the field that the residual of Newton's method causes */
-    vf length;  /* length of the interval in unit distances */
+    vf mean;           /* mean of |v - f|; with n segments it is divided by n^2 */
+    vf quartic;        /* upper bound E of the quartic part of the field's deviation from its chord */
+    vf residual_error; /* error of the field that the residual of Newton's method causes */
+    vf length;         /* length of the interval in unit distances */
     /* variation of the error's weight g (see the top of this file) that is caused by the changes of T and b along the
      * segment */
-    vf fade;
+    vf weight_change;
 } kernel_local_errors;
 
 SIMD_INLINE void kernel_local_errors_of(const kernel_local_budget *b, const kernel_local_pairs *p,
@@ -157,22 +157,22 @@ SIMD_INLINE void kernel_local_errors_of(const kernel_local_budget *b, const kern
     const vf *d = p->off_chord.field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
     const vf bend = kernel_gather_lane(b->nonlinear.bend, lane);
-    const vf unseen = p->unseen * kernel_gather_lane(b->nonlinear.unseen, lane);
+    const vf unseen = p->unsampled * kernel_gather_lane(b->nonlinear.unsampled, lane);
     const vf least = vf_muladd(0.01f * bend, parabola + cubic, unseen);
     const vf depth = vf_min(kernel_gather_lane(b->bounds.extinction, lane) * length, vf_set(1));
     out->quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), least);
     out->mean = 0.26f * parabola + (1.09f * cubic + 4.0f * out->quartic);
-    out->unknown = kernel_gather_lane(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
+    out->residual_error = kernel_gather_lane(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
     out->length = length;
-    out->fade = kernel_gather_lane(b->bounds.fade, lane) * depth;
+    out->weight_change = kernel_gather_lane(b->bounds.weight_change, lane) * depth;
 }
 
 /* Returns the error of light per unit distance if the interval becomes one segment: the part that varies along the
  * segment, plus the part of its mean. */
 SIMD_INLINE vf kernel_local_single_segment_error(const kernel_local_errors *w, vf error_variation, vf cost)
 {
-    const vf half = vf_min(0.5f * (error_variation + w->fade), cost);
-    return vf_muladd(half, w->mean, cost * (w->quartic + w->unknown));
+    const vf half = vf_min(0.5f * (error_variation + w->weight_change), cost);
+    return vf_muladd(half, w->mean, cost * (w->quartic + w->residual_error));
 }
 
 /* Computes the upper bounds of the change of light by a field error, over the range of the ray's own values, which
@@ -205,8 +205,8 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
     /* The error of light that is allowed per unit distance. */
     const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(wrong->length, opacities, one));
     const vm few = vf_le(kernel_local_single_segment_error(wrong, error_variation, cost), allowed);
-    const vf half = vf_min(0.5f * (error_variation + wrong->fade), cost), made = half * wrong->mean;
-    const vf rest = cost * (wrong->quartic + wrong->unknown) + vf_min(3.1f * half, 2.1f * cost) * wrong->quartic;
+    const vf half = vf_min(0.5f * (error_variation + wrong->weight_change), cost), made = half * wrong->mean;
+    const vf rest = cost * (wrong->quartic + wrong->residual_error) + vf_min(3.1f * half, 2.1f * cost) * wrong->quartic;
     const vf wanted = -vf_floor(-vf_sqrt(made / vf_max(allowed - rest, vf_set(1e-30f))));
     p->count = vf_select(few, least, vf_clamp(wanted, vf_set(2), vf_set(KERNEL_LOCAL_PIECES + 1)));
     const vm fails = vm_or(vm_not(vf_lt(rest, 0.9f * allowed)), vf_lt(vf_set(KERNEL_LOCAL_PIECES), p->count));

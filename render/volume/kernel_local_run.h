@@ -20,7 +20,7 @@ static __attribute__((noinline)) void kernel_local_process_queue(kernel_tile_tra
     kernel_local_queue *q = &l->queues[queue];
     unsigned transformed;
     const unsigned all = KERNEL_OF_TYPE(type, kernel_local_fetch_all, l, q);
-    const unsigned showing = stages->place(t, l, type, &transformed) & all;
+    const unsigned showing = stages->transform(t, l, type, &transformed) & all;
     transformed &= all;
     t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~transformed));
     l->rays.count = 0;
@@ -29,9 +29,9 @@ static __attribute__((noinline)) void kernel_local_process_queue(kernel_tile_tra
         unsigned box = q->box[n];
         if (!kernel_local_clip_box(l->ends, n, &box)) continue;
         kernel_pixel_list_add_box(&l->rays, box, n);
-        if (l->rays.count >= KERNEL_LIST_PIXELS) stages->cast(t, l, type);
+        if (l->rays.count >= KERNEL_LIST_PIXELS) stages->process_pixels(t, l, type);
     }
-    stages->cast(t, l, type);
+    stages->process_pixels(t, l, type);
     stages->finish(t, l, type);
     for (unsigned lanes = showing & ~transformed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);

@@ -178,7 +178,7 @@ SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_loca
     kernel_local_pairs *part = &d->parts[number];
     *part = *whole;
     part->active = rays;
-    part->unseen = 2 * (share * share) * (share * share);
+    part->unsampled = 2 * (share * share) * (share * share);
     kernel_local_part_next(&d->chord, share, rays, type, &d->at, &part->off_chord);
     if (number > 0) part->ends[0] = d->parts[number - 1].ends[1];
     if (number + 1 < count) {
@@ -291,7 +291,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     kernel_local_pairs p;
     vi words;
     vf end, near, far;
-    p.unseen = 1;
+    p.unsampled = 1;
     p.active = kernel_local_list_load(list, &t->tile, n, &words, &p.rays);
     const kernel_curved_crossed crossed = {p.active, vm_none(), words >> KERNEL_LOCAL_FACES & 7,
                                            words >> (KERNEL_LOCAL_FACES + 3) & 7};

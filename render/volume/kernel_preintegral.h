@@ -41,8 +41,8 @@
 
 /* The position of a value in the tables of sums. */
 typedef struct kernel_preint_end {
-    /* place: position within the bin, 0 .. 1; it may be outside this range in the first and the last bin */
-    vf value, bin, place;
+    /* position: position within the bin, 0 .. 1; it may be outside this range in the first and the last bin */
+    vf value, bin, position;
     vf own[4], table_error; /* own: the bin's sums of extinction and emission; table_error: error bound of these */
     vi before[4], colour;   /* sums over all bins before it */
 } kernel_preint_end;
@@ -62,7 +62,7 @@ SIMD_INLINE void kernel_preint_find(const kernel_preintegral *t, vf value, kerne
     vf before[4], rest[4];
     e->value = value;
     e->bin = vf_clamp(vf_floor(y), vf_set(0), vf_set((float)(t->bin_count + 1)));
-    e->place = y - e->bin;
+    e->position = y - e->bin;
     const vi index = vi_from_vf(e->bin) * (int)(sizeof *t->entries / sizeof(float));
     int32_t at[SIMD_WIDTH];
     vi_store(at, index);
@@ -112,8 +112,8 @@ SIMD_INLINE void kernel_preint_between(const kernel_preintegral *t, const kernel
 {
     const vf one = vf_set(1), bins = vf_abs(b->bin - a->bin);
     const vm same = vf_eq(a->bin, b->bin), rising = vf_lt(a->bin, b->bin);
-    const vf of_a = vf_select(same, one, vf_select(rising, one - a->place, a->place));
-    const vf of_b = vf_select(same, one, vf_select(rising, b->place, one - b->place));
+    const vf of_a = vf_select(same, one, vf_select(rising, one - a->position, a->position));
+    const vf of_b = vf_select(same, one, vf_select(rising, b->position, one - b->position));
     const vf inverse = one / ((bins - one) + (of_a + of_b)), per_bin = length * inverse;
     vf sum[4], change = vf_set(0), mean;
     for (int i = 0; i < 4; i++) {

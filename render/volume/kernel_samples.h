@@ -35,7 +35,7 @@ typedef struct kernel_samples {
     vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
     /* ends of the interval that contains the sample; set only if the frame needs_contact */
     vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP];
-    vf marked; /* depth of the ray's nearest sample that lies in two cells, in this window and earlier ones */
+    vf overlap_depth; /* depth of the ray's nearest sample that lies in two cells, in this window and earlier ones */
 } kernel_samples;
 
 typedef struct kernel_volume_state {
@@ -91,8 +91,8 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     mask = vm_and(mask, vm_and(vf_lt(t, p->t_far), vf_lt(zero, absorbed)));
     mask = vm_and(mask, vf_le(p->clip_in, t));
     if (!p->frame->job->separate_samples) {
-        mask = vm_and(mask, vf_lt(t, state->samples->marked));
-        state->samples->marked = vf_select(mask, t, state->samples->marked);
+        mask = vm_and(mask, vf_lt(t, state->samples->overlap_depth));
+        state->samples->overlap_depth = vf_select(mask, t, state->samples->overlap_depth);
         /* marks the fragment for render_fold.h */
         const vf sign = p->frame->job->reproducible ? vf_set(FRAGMENT_LATE) : zero;
         const kernel_fragments clear = {t, t, {zero, zero, zero}, vf_set(1), sign};
@@ -156,7 +156,7 @@ typedef struct kernel_blend {
     vf t_first, t_last, contact_in, contact_out;
     vf colour[3], transmittance;
     /* used for segments: -ln(transmittance), and the accumulated rounding errors of the colour sums */
-    vf depth, lost[3];
+    vf depth, rounding_errors[3];
     vf light; /* share of the light that passes all of this rank's samples so far */
     /* Used if all samples and segments of a ray are folded into few fragments (render_fold.h). interval_number: index
      * of the interval, of length 1 / FRAGMENT_INTERVALS, that contains the last sample; within: light that passes all

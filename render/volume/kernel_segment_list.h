@@ -45,7 +45,7 @@ typedef struct kernel_segments {
     kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* segments of each ray, unsorted */
     kernel_segment_double precise[SIMD_WIDTH][KERNEL_WINDOW];
     bool is_double; /* set if the ends of segments are stored in double */
-    int room;       /* capacity of each ray's list; half as large in double, so that a tile's lists stay in the cache */
+    int capacity;   /* capacity of each ray's list; half as large in double, so that a tile's lists stay in the cache */
     kernel_double_rays rays;
     /* Light of the segments that do not fit into a list because too many begin at the same t, as in meshes that overlap
      * many times. Such segments have no order; they are integrated here at once, and blended behind the window. */
@@ -140,7 +140,7 @@ SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, 
 SIMD_INLINE void kernel_segments_set_double(const kernel_packet *p, kernel_segments *list, bool is_double)
 {
     list->is_double = is_double;
-    list->room = is_double ? KERNEL_WINDOW / 2 : KERNEL_WINDOW;
+    list->capacity = is_double ? KERNEL_WINDOW / 2 : KERNEL_WINDOW;
     if (is_double) kernel_double_rays_of(p, &list->rays);
 }
 
@@ -148,7 +148,7 @@ static void kernel_items_sort(kernel_segments *list, int lane)
 {
     kernel_segment *items = list->items[lane];
     kernel_segment_double *precise = list->precise[lane];
-    for (int n = 1; n < list->room; n++) {
+    for (int n = 1; n < list->capacity; n++) {
         const kernel_segment s = items[n];
         const kernel_segment_double its = precise[n];
         int at = n;
@@ -175,8 +175,8 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
 {
     kernel_segment *items = list->items[lane];
     kernel_items_sort(list, lane);
-    int count = list->room * 3 / 4;
-    const float first = items[0].t_in, last = items[list->room - 1].t_in;
+    int count = list->capacity * 3 / 4;
+    const float first = items[0].t_in, last = items[list->capacity - 1].t_in;
     if (first == last) {
         if (s->t_in == first) return false;
         list->t_end[lane] = simd_max(s->t_in, first);
@@ -198,7 +198,7 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
 SIMD_INLINE bool kernel_segments_insert(kernel_segments *list, int lane, const kernel_segment *s,
                                         const kernel_segment_double *precise)
 {
-    if (__builtin_expect(list->count[lane] == list->room, 0)) {
+    if (__builtin_expect(list->count[lane] == list->capacity, 0)) {
         if (!kernel_segments_shorten(list, lane, s)) return false;
         if (!(s->t_in < list->t_end[lane])) return true;
     }

@@ -73,9 +73,10 @@ SIMD_INLINE void kernel_blend_light(kernel_blend *b, vm has, vf t_in, vf t_out, 
     b->transmittance = vf_select(fresh, vf_set(1), b->transmittance);
     for (int a = 0; a < 3; a++) {
         /* Compensated summation: over hundreds of segments rounding would add up to 1e-6. */
-        const vf before = vf_select(fresh, vf_set(0), b->colour[a]), lost = vf_select(fresh, vf_set(0), b->lost[a]);
+        const vf before = vf_select(fresh, vf_set(0), b->colour[a]),
+                 lost = vf_select(fresh, vf_set(0), b->rounding_errors[a]);
         const vf more = b->transmittance * light->colour[a] - lost, sum = before + more;
-        b->lost[a] = vf_select(has, (sum - before) - more, b->lost[a]);
+        b->rounding_errors[a] = vf_select(has, (sum - before) - more, b->rounding_errors[a]);
         b->colour[a] = vf_select(has, sum, b->colour[a]);
     }
     b->depth = vf_select(fresh, light->depth, vf_select(has, b->depth + light->depth, b->depth));

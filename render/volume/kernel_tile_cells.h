@@ -363,7 +363,7 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_trace
 {
     const kernel_frame *f = t->frame;
     kernel_tile_cells *cells = t->thread->tile_cells;
-    cells->tets.count = cells->tets.known = 0;
+    cells->tets.count = cells->tets.indexed_count = 0;
     cells->trace_tets = trace_tets;
     cells->plain_part = -1;
     if (!f->volume_candidates) return true;
@@ -454,7 +454,7 @@ SIMD_INLINE kernel_placement kernel_tile_trees_placement(const kernel_tile_trace
     for (int i = 0; i < job->part_count; i++) {
         if (!job->parts[i].tree->node_count) continue;
         const kernel_placement placement = kernel_box_placement(&t->tree_planes, job->parts[i].tree, 0);
-        all.blocks |= placement.blocks & t->wanted;
+        all.blocks |= placement.blocks & t->traced_blocks;
         all.near = fminf(all.near, placement.near);
         all.far = fmaxf(all.far, placement.far);
     }
@@ -470,7 +470,7 @@ SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, 
         kernel_block_begin(t, block);
         for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
             const int i = block * KERNEL_BLOCK_PACKETS + n;
-            if (t->frame->volume_intervals) kernel_packet_clip_volumes(&t->packets[i], t->turn);
+            if (t->frame->volume_intervals) kernel_packet_clip_volumes(&t->packets[i], t->clip_interval);
             packets[count++] = i;
         }
     }

@@ -34,7 +34,7 @@ typedef struct kernel_tile_depth {
     float expected;
     float before; /* light of the brightest ray before the last window */
     /* number of the last window's rays that have lost light, and number of those that are dark */
-    int met, ended;
+    int lit_count, dark_count;
     /* first: least depth of their samples; last: greatest depth at which one of them became dark */
     float brightest, first, last;
 } kernel_tile_depth;
@@ -48,7 +48,7 @@ SIMD_INLINE void kernel_depth_reset(kernel_tile_depth *d)
 
 SIMD_INLINE void kernel_depth_begin_window(kernel_tile_depth *d)
 {
-    d->met = d->ended = 0;
+    d->lit_count = d->dark_count = 0;
     d->brightest = 0;
     d->first = INFINITY;
     d->last = -INFINITY;
@@ -80,8 +80,8 @@ SIMD_INLINE void kernel_depth_add(kernel_tile_depth *d, vm rays, const kernel_bl
     const vm met = vm_and(rays, vf_lt(b->light, vf_set(1))), lit = vm_and(met, vf_lt(vf_set(KERNEL_DARK), b->light));
     const vm ended = vm_andnot(met, lit);
     if (!vm_any(met)) return;
-    d->met += __builtin_popcount(vm_bits(met));
-    d->ended += __builtin_popcount(vm_bits(ended));
+    d->lit_count += __builtin_popcount(vm_bits(met));
+    d->dark_count += __builtin_popcount(vm_bits(ended));
     d->brightest = simd_max(vf_reduce_max(vf_select(lit, b->light, vf_set(0))), d->brightest);
     d->first = simd_min(vf_reduce_min(vf_select(met, b->t_first, far)), d->first);
     d->last = simd_max(vf_reduce_max(vf_select(ended, b->t_last, -far)), d->last);
@@ -94,10 +94,11 @@ SIMD_INLINE void kernel_depth_end_window(kernel_tile_depth *d, float depth)
     d->expected = fades ? depth * logf(KERNEL_DARK / d->brightest) / logf(d->brightest / d->before) : INFINITY;
     d->before = d->brightest > 0 ? d->brightest : 1;
     d->begin = simd_min(d->first, d->begin);
-    d->has_met = d->has_met || d->met;
+    d->has_met = d->has_met || d->lit_count;
     /* the depth of the last tile is a poor estimate, because this tile has no sample yet */
     if (d->begin == INFINITY) d->dark *= 2;
-    if (d->own_dark == INFINITY && d->ended > 0 && 2 * d->ended >= d->met) d->own_dark = d->last - d->begin;
+    if (d->own_dark == INFINITY && d->dark_count > 0 && 2 * d->dark_count >= d->lit_count)
+        d->own_dark = d->last - d->begin;
     kernel_depth_begin_window(d);
 }
 

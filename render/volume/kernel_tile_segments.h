@@ -228,7 +228,7 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
 SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, const int *packets, int count, float begin,
                                                    float end)
 {
-    const int room = s->packets[packets[0]].list.room;
+    const int room = s->packets[packets[0]].list.capacity;
     int most = room / 16;
     vf least = vf_set(end);
     for (int n = 0; n < count; n++) {

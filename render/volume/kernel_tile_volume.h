@@ -199,7 +199,7 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samp
     kernel_packet_samples(p, &lanes);
     r->active = p->active;
     r->blend = (kernel_blend){.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1), .within = vf_set(1)};
-    r->samples.marked = vf_set(INFINITY);
+    r->samples.overlap_depth = vf_set(INFINITY);
     const vf end = vf_min(p->t_far, vf_set(far));
     const vf from = (near - p->sample_base) * p->sample_inverse, to = (end - p->sample_base) * p->sample_inverse;
     const int lowest = (int)floorf(vf_reduce_min(from)) - 1, highest = (int)floorf(vf_reduce_max(to)) + 1;

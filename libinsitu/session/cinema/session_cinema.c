@@ -194,7 +194,7 @@ insitu_status session_record_picture(session_cinema *cinema, const scene *scene,
     session_table *t = &cinema->tables[output->database];
     insitu_status status = t->has_earlier_lines ? INSITU_OK : begin_table(t, cinema->first_cycle, error);
     if (status) return status;
-    if (!t->has_step_lines && moment->cycle <= t->last_cycle) drop_lines_from_cycle(t, moment->cycle);
+    if (!t->has_lines_of_step && moment->cycle <= t->last_cycle) drop_lines_from_cycle(t, moment->cycle);
     char *file = scene_expand(output->path + output->folder_bytes, moment);
     if (!file || !c_locale_enter(&numbers)) {
         base_free(file);
@@ -209,7 +209,7 @@ insitu_status session_record_picture(session_cinema *cinema, const scene *scene,
         t->size = before;
         return fail_memory(database, "data.csv", "written", error);
     }
-    t->has_step_lines = t->is_changed = true;
+    t->has_lines_of_step = t->is_changed = true;
     t->last_cycle = moment->cycle;
     return INSITU_OK;
 }
@@ -282,7 +282,7 @@ insitu_status session_write_cinema(session_cinema *cinema, base_error *error)
     for (int i = 0; i < cinema->count; i++) {
         session_table *t = &cinema->tables[i];
         base_error own = {.status = INSITU_OK};
-        t->has_step_lines = false;
+        t->has_lines_of_step = false;
         if (!t->is_changed) continue;
         insitu_status status = write_file(t, "data.csv", write_table_file, &own);
         if (!status) status = write_file(t, "data.js", write_script_file, &own);

@@ -22,7 +22,7 @@ typedef struct session_table {
     char *text;                     /* the lines of data.csv that are complete */
     size_t size, capacity;
     bool has_earlier_lines; /* set if `text` includes the lines of the folder's file from before the session */
-    bool has_step_lines;    /* set if `text` contains a line of this step */
+    bool has_lines_of_step; /* set if `text` contains a line of this step */
     bool is_changed;        /* set if the table has changed since the files were written */
     bool has_page;          /* set if this session has written index.html */
     int64_t last_cycle;     /* cycle of the table's last line */

@@ -89,7 +89,7 @@ bool session_lacks_threads(const session_threads *threads, int asked, int cores)
 /* ---- trial --------------------------------------------------------------------------------------------------- */
 
 typedef struct trial {
-    pthread_mutex_t gate; /* locked while threads must not end */
+    pthread_mutex_t exit_mutex; /* locked while threads must not end */
     pthread_t *threads;
     int count;
     /* memory of SPARE_BYTES that is allocated during the trial, and freed after it for other needs */
@@ -140,8 +140,8 @@ static void start_trial_threads(trial *t, int wanted)
     pthread_attr_t attributes;
     sigset_t all, old;
     *t = (trial){.threads = base_calloc((size_t)wanted, sizeof *t->threads), .spare_memory = base_alloc(SPARE_BYTES)};
-    pthread_mutex_init(&t->gate, NULL);
-    pthread_mutex_lock(&t->gate);
+    pthread_mutex_init(&t->exit_mutex, NULL);
+    pthread_mutex_lock(&t->exit_mutex);
     if (!t->threads || !t->spare_memory || pthread_attr_init(&attributes) != 0) return;
     const size_t stack = stack_of_environment();
     /* OpenMP ignores a stack size that is refused here, too */
@@ -149,7 +149,7 @@ static void start_trial_threads(trial *t, int wanted)
     sigfillset(&all);
     /* signals are blocked while threads are started, so that these never receive the caller's signals */
     pthread_sigmask(SIG_SETMASK, &all, &old);
-    while (t->count < wanted && pthread_create(&t->threads[t->count], &attributes, wait_at_gate, &t->gate) == 0)
+    while (t->count < wanted && pthread_create(&t->threads[t->count], &attributes, wait_at_gate, &t->exit_mutex) == 0)
         t->count++;
     pthread_sigmask(SIG_SETMASK, &old, NULL);
     pthread_attr_destroy(&attributes);
@@ -157,9 +157,9 @@ static void start_trial_threads(trial *t, int wanted)
 
 static void join_trial_threads(trial *t)
 {
-    pthread_mutex_unlock(&t->gate);
+    pthread_mutex_unlock(&t->exit_mutex);
     for (int i = 0; i < t->count; i++) pthread_join(t->threads[i], NULL);
-    pthread_mutex_destroy(&t->gate);
+    pthread_mutex_destroy(&t->exit_mutex);
     base_free(t->threads);
     base_free(t->spare_memory);
 }

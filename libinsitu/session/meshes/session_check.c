@@ -575,7 +575,7 @@ static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *err
     insitu_status status = session_make_axes(mesh, error);
     if (!status) status = check_cells_of(mesh, threads, error);
     if (status) session_drop_topology(&mesh->topology);
-    if (!status || !mesh->warp.is_on) return status;
+    if (!status || !mesh->warp.is_applied) return status;
     const base_error fault = *error;
     *error = (base_error){0};
     return base_fail(error, fault.status, "%.900s; the scene's warp moves its vertices", fault.message);

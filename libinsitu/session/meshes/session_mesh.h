@@ -214,7 +214,7 @@ typedef struct session_lattice {
 /* Coordinates that are read in place of the caller's, because the scene draws the mesh with moved vertices
  * (session_warp.h). They are a copy reported to the user. */
 typedef struct session_warp {
-    bool is_on;                  /* set if the moved coordinates are read */
+    bool is_applied;             /* set if the moved coordinates are read */
     bool is_stale;               /* set if the caller's coordinates may have changed since they were moved */
     uint64_t key;                /* hash that identifies the displacements by which they were moved */
     char *places;                /* memory of the moved coordinates (session_places.h) */

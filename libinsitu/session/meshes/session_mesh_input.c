@@ -398,7 +398,7 @@ void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu
     }
     session_take_lattice(mesh);
     mesh->original.lattice = mesh->given.lattice;
-    if (mesh->warp.is_on) session_read_warp(mesh);
+    if (mesh->warp.is_applied) session_read_warp(mesh);
     session_read_topology(mesh);
     mesh->is_given = true;
     mesh->problem = (base_error){0};

@@ -32,10 +32,10 @@ void session_read_warp(session_mesh *mesh)
 /* Makes the description refer to the caller's coordinates. */
 static void read_unmoved(session_mesh *mesh)
 {
-    if (!mesh->warp.is_on) return;
+    if (!mesh->warp.is_applied) return;
     memcpy(mesh->given.coordinates, mesh->warp.unmoved, sizeof mesh->given.coordinates);
     if (mesh->given.lattice) mesh->given.lattice = &mesh->lattice.given;
-    mesh->warp.is_on = false;
+    mesh->warp.is_applied = false;
     session_read_topology(mesh);
 }
 
@@ -47,7 +47,7 @@ static void mark_moved(session_meshes *meshes, session_mesh *mesh)
 
 void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
 {
-    const bool was_on = mesh->warp.is_on;
+    const bool was_on = mesh->warp.is_applied;
     /* the mesh is checked again, because the check has stored this problem as the mesh's error */
     if (mesh->warp.problem.status) {
         mesh->is_check_stale = true;
@@ -164,9 +164,9 @@ insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, cons
                                 base_error *error)
 {
     session_warp *warp = &mesh->warp;
-    const bool was_on = warp->is_on;
+    const bool was_on = warp->is_applied;
     bool differ = !was_on;
-    if (warp->is_on && !warp->is_stale && warp->key == by->key) return INSITU_OK;
+    if (warp->is_applied && !warp->is_stale && warp->key == by->key) return INSITU_OK;
     if (warp->is_stale) session_fill_conformed(mesh, threads);
     read_unmoved(mesh);
     if (compute_coordinates(mesh, by, threads, &differ, error)) {
@@ -178,7 +178,7 @@ insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, cons
     warp->is_stale = false;
     if (differ) mark_moved(meshes, mesh);
     session_read_warp(mesh);
-    warp->is_on = true;
+    warp->is_applied = true;
     session_read_topology(mesh);
     return INSITU_OK;
 }

@@ -56,7 +56,7 @@ static void canvas_free(canvas *c, session_writer *writer)
 
 static bool needs_depth(const session_drawing *d, const scene_image *image)
 {
-    if (d->kept->is_on) return true;
+    if (d->kept->is_enabled) return true;
     for (int i = 0; i < image->output_count; i++)
         if (image->outputs[i].format == SCENE_EXR) return true;
     return false;
@@ -363,7 +363,7 @@ static void compare_bars(const session_drawing *d, const scene_image *image, con
         if (!output->shares_bars) continue;
         session_shared_bars *bars = &d->shared_bars[output->montage];
         if (!bars->path) *bars = (session_shared_bars){output->path, decorations->bars_hash, false};
-        bars->differ = bars->differ || bars->hash != decorations->bars_hash;
+        bars->has_other_bars = bars->has_other_bars || bars->hash != decorations->bars_hash;
     }
 }
 
@@ -373,7 +373,7 @@ static void warn_of_bars(const session_drawing *d)
         const session_shared_bars *bars = &d->shared_bars[i];
         if (!bars->path) continue;
         session_warn_locally(
-            d->report, &(session_warning){WARNING_BARS, bars->path, NULL, 0}, bars->differ,
+            d->report, &(session_warning){WARNING_BARS, bars->path, NULL, 0}, bars->has_other_bars,
             "%s: the pictures in it have different colour bars and cannot share them: each has its own", bars->path);
     }
 }
@@ -412,7 +412,7 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
                                    session_image_ranges *ranges, base_error *error)
 {
     const double start = MPI_Wtime();
-    const bool is_told_later = d->writes_behind && !d->kept->is_on && !ranges;
+    const bool is_told_later = d->writes_behind && !d->kept->is_enabled && !ranges;
     base_error later = {.status = INSITU_OK};
     if (d->team->rank == 0) {
         queue_picture(d, image, c, is_told_later ? &later : error);
@@ -484,7 +484,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     if (!status) status = make_image_decorations(d, image, &view, &layers, &canvas, error);
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
     if (!status) {
-        if (d->kept->is_on && d->team->rank == 0) session_keep_picture(d->kept, image, &canvas.frame, error);
+        if (d->kept->is_enabled && d->team->rank == 0) session_keep_picture(d->kept, image, &canvas.frame, error);
         status = write_outputs(d, image, &canvas, basis.run_ranges, error);
         d->report->public_report.images++;
     }

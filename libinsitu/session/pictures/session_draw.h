@@ -18,9 +18,9 @@
 /* Whether the pictures of a montage that are to share their colour bars have the same bars, as far as they have been
  * drawn in this step. */
 typedef struct session_shared_bars {
-    const char *path; /* path of the output, with placeholders; NULL: no picture has been drawn yet */
-    uint64_t hash;    /* session_decorations.bars_hash of the first picture */
-    bool differ;      /* set if another picture has other bars */
+    const char *path;    /* path of the output, with placeholders; NULL: no picture has been drawn yet */
+    uint64_t hash;       /* session_decorations.bars_hash of the first picture */
+    bool has_other_bars; /* set if another picture has other bars */
 } session_shared_bars;
 
 /* Input for drawing images. */

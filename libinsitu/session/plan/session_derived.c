@@ -25,7 +25,8 @@ static uint64_t add_source_bits(const scene *scene, uint64_t needed)
 {
     for (int i = scene->derived_count - 1; i >= 0; i--)
         for (int k = 0; k < scene->derived[i].input_count && needed >> i & 1; k++)
-            if (scene->derived[i].made_by[k] >= 0) needed |= (uint64_t)1 << scene->derived[i].made_by[k];
+            if (scene->derived[i].derived_indices[k] >= 0)
+                needed |= (uint64_t)1 << scene->derived[i].derived_indices[k];
     return needed;
 }
 

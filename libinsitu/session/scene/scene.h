@@ -67,7 +67,7 @@ typedef struct scene_derived {
     /* fields from which the field is computed: the inputs of an expression; for a gradient a scalar; for other kinds a
      * vector field, or its two or three components */
     scene_field *inputs;
-    int *made_by; /* for each input, the index of the derived field that it is, or -1 */
+    int *derived_indices; /* for each input, the index of the derived field that it is, or -1 */
     /* hash of the set of meshes over which gradients are averaged; set by the session (session_joints.h) */
     uint64_t joint_name;
 } scene_derived;

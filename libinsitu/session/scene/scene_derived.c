@@ -232,9 +232,10 @@ static insitu_status sort_fields(const scene_document *d, scene *s)
     base_free(sorted);
     for (int i = 0; i < s->derived_count && !status; i++) {
         scene_derived *field = &s->derived[i];
-        field->made_by = base_calloc((size_t)field->input_count, sizeof *field->made_by);
-        if (!field->made_by) return scene_fail_for_memory(d);
-        for (int k = 0; k < field->input_count; k++) field->made_by[k] = scene_find_derived(s, field->inputs[k].name);
+        field->derived_indices = base_calloc((size_t)field->input_count, sizeof *field->derived_indices);
+        if (!field->derived_indices) return scene_fail_for_memory(d);
+        for (int k = 0; k < field->input_count; k++)
+            field->derived_indices[k] = scene_find_derived(s, field->inputs[k].name);
     }
     return status;
 }
@@ -264,7 +265,7 @@ void scene_free_derived(scene *s)
         scene_derived *field = &s->derived[i];
         for (int k = 0; k < field->input_count; k++) scene_free_field(&field->inputs[k]);
         base_free(field->inputs);
-        base_free(field->made_by);
+        base_free(field->derived_indices);
         base_free(field->name);
         scene_expression_free(&field->expression);
     }
