@@ -32,7 +32,7 @@ typedef struct comp_group {
     comp_nodes nodes;
     comp_schedule schedule; /* schedule of messages; COMP_AUTOMATIC chooses the fastest one for each picture */
     int longest_dense;      /* rounds with more ranks are sparse (comp_messages.h); 0: the default of comp_route.h */
-    comp_claims *claims;    /* buffer made by comp_claims_create() */
+    comp_claims *claims;    /* buffer in which ranks agree, made by comp_claims_create() */
 } comp_group;
 
 /* Blends one pixel's fragments in place: they are sorted by (t_in, surface before volume, then bits) and blended front

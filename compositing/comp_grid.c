@@ -68,7 +68,8 @@ int32_t comp_claim_priority(uint32_t block, int rank, int64_t fragments)
     const uint32_t drawn = hash_word(hash_word(block + 1) + (uint32_t)rank);
     const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f; /* random number between 0 and 1; may be rounded to 1 */
     const float chance = 4 * logf((float)fragments) - logf(-logf(u < 1 ? u : 0x1.fffffep-1f));
-    const int steps = (int)(16 * (chance + 3)); /* logarithm of the number, in steps of 1/16, between 0 and 1800 */
+    /* the chance, a logarithm, in steps of 1/16 from 0 to about 1800 */
+    const int steps = (int)(16 * (chance + 3));
     return (int32_t)((uint32_t)(1 + (steps > 0 ? steps : 0)) << 20 | ((uint32_t)rank & 0xfffff));
 }
 

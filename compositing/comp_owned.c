@@ -37,7 +37,7 @@ static bool reserve_fragments(fragment_list *list, int64_t count)
 
 /* ---- joined ----------------------------------------------------------------------------------------------------- */
 
-/* Marks a pixel as one whose fragments are listed, and counts its fragment in the sheet first. */
+/* Marks a pixel in the sheet as one that is blended from a list of fragments, and counts its fragment in the sheet. */
 static void mark_mixed(merge_scratch *m, uint32_t at)
 {
     const unsigned bit = 1u << at % COMP_LANES;

@@ -24,7 +24,8 @@ typedef struct comp_merge_output {
     const float *background; /* colour of the background: linear premultiplied RGBA */
     bool is_folded;          /* pixels are merged by comp_merge_folded_pixel() */
     image *out;              /* picture that receives the pixels on rank 0; NULL on other ranks */
-    unsigned char *overlaps; /* pixel_set.h: receives the pixels whose fragments overlap. NULL: not requested */
+    /* set of pixels (pixel_set.h) that receives the pixels whose fragments overlap; NULL: not requested */
+    unsigned char *overlaps;
     comp_deep_list *deep; /* lists that receive the samples, one per thread; NULL if deep samples are not requested */
 } comp_merge_output;
 

@@ -39,7 +39,7 @@ typedef enum mmbvh_layout {
 } mmbvh_layout;
 
 typedef enum mmbvh_builder {
-    MMBVH_SAH,   /* binned surface area heuristic */
+    MMBVH_SAH,   /* the builder by the binned surface area heuristic */
     MMBVH_MORTON /* along a space-filling curve: several times faster to build, slower to traverse */
 } mmbvh_builder;
 
@@ -102,7 +102,7 @@ int64_t mmbvh_bytes(const mmbvh *tree);
 typedef struct mmbvh_ranges {
     const char *low; /* address of node 0's lower end of the range */
     const char *high;
-    int64_t stride; /* bytes between consecutive nodes */
+    int64_t stride; /* number of bytes from one node's range to the next */
 } mmbvh_ranges;
 
 /* A list of cells in ascending order, which owns its memory; free it with mmbvh_selection_free(). */

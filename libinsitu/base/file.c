@@ -1,4 +1,4 @@
-#define _GNU_SOURCE 1 /* for O_PATH */
+#define _GNU_SOURCE 1 /* makes fcntl.h declare O_PATH */
 #include "file.h"
 
 #include <errno.h>

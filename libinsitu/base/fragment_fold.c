@@ -45,7 +45,7 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
 
 /* The range of t within which a rank has all fragments, and the list of folded fragments. */
 typedef struct fold_part {
-    float begin, end; /* range of t */
+    float begin, end; /* range of t in which the rank has all fragments */
     fragment *out;    /* the folded fragments */
     int64_t count;    /* number of folded fragments */
 } fold_part;

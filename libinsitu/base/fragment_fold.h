@@ -33,7 +33,7 @@ enum { FRAGMENT_INTERVALS = 8, FRAGMENT_HALVINGS = 15 };
  * FRAGMENT_HALVINGS bits. All depths beyond a thousand scenes are in one leaf. */
 static inline int32_t fragment_leaf(float t)
 {
-    const float most = 1024, at = t < -most ? -most : t < most ? t : most; /* also replaces NaN */
+    const float most = 1024, at = t < -most ? -most : t < most ? t : most; /* this form of a clamp also replaces NaN */
     return (int32_t)floorf(at * (float)(FRAGMENT_INTERVALS << FRAGMENT_HALVINGS));
 }
 

@@ -47,7 +47,7 @@ static inline int64_t grid_index_along(const grid_numbering *of, int axis, int64
 /* Coordinates along one axis of a uniform or rectilinear lattice. */
 typedef struct grid_axis {
     const double *axis_coordinates; /* coordinates, by index along the axis */
-    int64_t count;                  /* number of coordinates */
+    int64_t count;                  /* number of coordinates along the axis */
     const grid_numbering *vertices;
     int axis;
 } grid_axis;

@@ -75,7 +75,7 @@ static void add_lane_counts(bins *b, int count)
 }
 
 /* Adds `count` items, every stride-th one, in pairs: one from each half of the list. Neighbouring items often belong to
- * the same bin, and would then stall on each other's store. */
+ * the same bin, and would then wait for each other's store. */
 static void bin_run(bins *b, const bin_mapping *mapping, const item *items, int64_t count, int64_t stride)
 {
     const int64_t half = count / 2;

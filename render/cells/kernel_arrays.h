@@ -33,7 +33,7 @@ typedef struct kernel_arrays {
     bool has_lanes;            /* set if indices fit in 32 bits, so that cells can be processed in lanes */
     bool is_narrow;            /* set if the coordinates and the field are all float32 and can be gathered */
     bool has_narrow_positions; /* set if the coordinates are float32 and can be gathered */
-    const grid *cells;         /* the mesh */
+    const grid *cells;         /* the mesh part's cells */
     int type;                  /* type of all cells, or GRID_NO_TYPE if the mesh has several types */
     /* field that is not finite for cells without a value of their own; NULL if all cells have one */
     const grid_field *source_cells;

@@ -97,8 +97,8 @@ SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_tile_p
  * interval then use half of the 1e-6 that it may err by (tests/test_chords.c). */
 #define KERNEL_WEIGHT_ERROR 2.4e-7f
 
-/* The largest error d of an edge's function (see above), and the edge's extent, in which distances across the ray count
- * for a quarter. */
+/* Properties of an edge by which accurate weights are recognized: the largest error d of its edge function, as derived
+ * at kernel_line, and its extent, in which distances across the ray count for a quarter. */
 typedef struct kernel_edge_error {
     float error, extent;
 } kernel_edge_error;
@@ -141,7 +141,8 @@ typedef struct kernel_cell {
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];
     double values[GRID_MAX_CELL_VERTICES];
-    float x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES], z[GRID_MAX_CELL_VERTICES]; /* vertices in tile space */
+    /* coordinates of the vertices in tile space */
+    float x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES], z[GRID_MAX_CELL_VERTICES];
     /* vertex values as the layer needs them: relative to an isovalue, or in the transfer function's domain */
     float f[GRID_MAX_CELL_VERTICES];
     float g[GRID_MAX_CELL_VERTICES];     /* vertex values of the colour field, in its transfer function's domain */

@@ -60,7 +60,7 @@ typedef struct kernel_subtet_interval {
 typedef struct kernel_poly_crossings {
     const kernel_packet *packet;
     const polyhedron *cell;
-    vm rays;         /* the rays to intersect */
+    vm rays;         /* rays for which crossings are computed */
     bool has_colour; /* whether colour values w are computed too */
     vf *x, *y;       /* vertices and centre, projected along the rays */
     vf *edge;        /* edge functions of the edges, then of the lines from each vertex to the centre */

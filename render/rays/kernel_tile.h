@@ -82,7 +82,8 @@ typedef struct kernel_planes {
 
 /* The sides of the planes on which a body lies: one bit per plane's lane. */
 typedef struct kernel_sides {
-    /* Set if part of the body has a distance <= 0 (below), >= 0 (above); a body across a plane sets both. */
+    /* Masks of planes. below: planes for which part of the body has a distance <= 0; above: those for which part has a
+     * distance >= 0. The bit of a plane that cuts the body is set in both. */
     unsigned below, above;
 } kernel_sides;
 

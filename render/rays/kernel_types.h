@@ -45,7 +45,7 @@ enum {
     KERNEL_PIECE_HIGH_REST,
     KERNEL_PIECE_OPACITY,
     KERNEL_PIECE_OPACITY_HIGH, /* opacity at the upper end */
-    KERNEL_PIECE_CLEAR,        /* 1 - opacity */
+    KERNEL_PIECE_CLEAR,        /* 1 - opacity at the lower end */
     KERNEL_PIECE_CLEAR_HIGH,
     KERNEL_PIECE_INVERSE, /* 1 / (high - low), the inverse width of the piece */
     KERNEL_PIECE_SLOPE,   /* slope of the opacity over the value */
@@ -97,7 +97,7 @@ typedef struct kernel_preint_entry {
 
 typedef struct kernel_preintegral {
     int bin_count;                /* number of bins of equal width; one infinite entry before and one behind them */
-    kernel_preint_entry *entries; /* bin_count + 2 */
+    kernel_preint_entry *entries; /* array of bin_count + 2 bins */
     float low, inverse;           /* value at which the first bin begins, and 1 / the width of a bin */
     float depth_unit, light_unit;
     float colour_unit, colour_error;
@@ -125,7 +125,7 @@ typedef struct kernel_pieces {
      * ends' rounding errors (KERNEL_PIECE_LOW_REST). */
     bool has_rests;
     int step_count, steep_count;
-    kernel_step steps[RENDER_MAX_OPACITY_POINTS]; /* sorted by value */
+    kernel_step steps[RENDER_MAX_OPACITY_POINTS]; /* steps of the opacity, sorted by value */
     kernel_steep steep[RENDER_MAX_OPACITY_POINTS];
     /* largest difference between two colours of the function in any channel; black and white count as its colours */
     float contrast;
@@ -155,7 +155,7 @@ typedef struct kernel_scale {
     /* symmetric logarithmic scale: s is linear for magnitudes up to it; logarithmic scale: smaller values are raised to
      * it */
     float threshold;
-    float inverse; /* 1 / threshold */
+    float inverse; /* 1 divided by the threshold */
     float slope, shift;
 } kernel_scale;
 
@@ -259,7 +259,7 @@ typedef struct kernel_candidate_list {
 /* A unit of work in the search for candidates: a subtree of one mesh's tree, searched for one layer. */
 typedef struct kernel_subtree {
     int surface, part; /* index of the surface layer, or -1 for the first volume; index of the mesh part */
-    int64_t node;      /* root of the subtree */
+    int64_t node;      /* index of the subtree's root in the tree */
 } kernel_subtree;
 
 typedef struct kernel_isovalue {
@@ -281,7 +281,8 @@ typedef struct kernel_frame {
     kernel_transfer volumes[RENDER_MAX_VOLUMES];
     double scaled_axes[3][3]; /* right, up, forward, each times the space's scale */
     double depth_shift;       /* depth_origin * scale: t + depth_shift is the scaled depth from the eye's plane */
-    /* the ray in pixel column x has slope slope_x0 + x * slope_dx (orthographic: offset); rows likewise */
+    /* In pixel column x the ray has the slope (or, if the camera is orthographic, the offset) slope_x0 + x * slope_dx.
+     * Rows have slope_y0 + y * slope_dy. */
     double slope_x0, slope_dx;
     double slope_y0, slope_dy;
     double scaled_step;                          /* distance between samples in scaled units: the job's step * scale */

@@ -35,7 +35,7 @@ enum {
 _Static_assert(SIMD_WIDTH *KERNEL_BATCH_PIXELS <= KERNEL_LIST_PIXELS, "a batch's rays have room in a list");
 
 typedef struct kernel_batch {
-    const kernel_surface_cells *queued; /* the cells being traced */
+    const kernel_surface_cells *queued; /* the cells that are being traced */
     kernel_transformed_tets tets;       /* transformed cells; f is the field minus the isovalue, scaled */
     bool is_of_faces;                   /* copy of the layer's is_of_faces */
     bool has_normals;

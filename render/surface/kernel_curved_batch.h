@@ -44,7 +44,7 @@
 enum { KERNEL_CURVED_PIXELS = 64 };
 
 typedef struct kernel_curved_batch {
-    const kernel_surface_cells *queued; /* the cells being traced */
+    const kernel_surface_cells *queued; /* the cells that are being traced */
     kernel_transformed_curved transformed;
     /* colour field by vertex and lane, as in kernel_cell.g; set only if the layer has one */
     float colours[8][SIMD_WIDTH];

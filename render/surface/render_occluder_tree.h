@@ -14,7 +14,7 @@ typedef struct occluder_pieces {
     const void *first;
     size_t stride;
     int64_t count;
-    int rows; /* KERNEL_TRIANGLE_ROWS or KERNEL_SLAB_ROWS */
+    int rows; /* number of floats of a piece: KERNEL_TRIANGLE_ROWS or KERNEL_SLAB_ROWS */
 } occluder_pieces;
 
 /* Builds the tree for kernels with `width` lanes, at most 16. Its sources are the pieces' indices. The caller must free

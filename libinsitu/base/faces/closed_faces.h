@@ -31,7 +31,7 @@ typedef struct closed_faces {
     int face_count, entry_count, vertex_count, triangle_count, piece_count, table_size;
     int *first_entries;  /* first entry of each face; face_count + 1 elements */
     int *entry_vertices; /* vertex number of each entry */
-    int *face_of;        /* face of each entry */
+    int *face_of;        /* for each entry, the face to which it belongs */
     int64_t *vertices;   /* index in the grid of each numbered vertex */
     /* 1 or -1 per face: whether it is reversed; after closed_faces_orient_outward(), 1 if the face's vertices run
      * around the outward normal */

@@ -86,7 +86,7 @@ int session_box_strokes(const double lower[3], const double upper[3], const rend
 /* An edge of the box parallel to an axis, and its projection into the picture. */
 typedef struct ruled_edge {
     double from[3], to[3]; /* the ends in scene coordinates */
-    double pixels[2][2];   /* the ends in pixels */
+    double pixels[2][2];   /* ends of the edge in pixels */
     double outward[2];     /* unit vector in the picture, perpendicular to the edge and pointing out of the box */
     /* is_in_front: the edge lies in front of the eye; is_outer: it is on the box's outline, between a face that is seen
      * from outside and one that is not */

@@ -10,7 +10,7 @@
  * volume_factor. It is exact if opposite edges are parallel, and otherwise a mean. */
 typedef struct cell_corners {
     const signed char (*corners)[4];
-    int count;            /* number of corners */
+    int count;            /* number of corners that are listed */
     double volume_factor; /* value of the sum for a cell of volume 1 */
 } cell_corners;
 

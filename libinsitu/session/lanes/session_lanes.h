@@ -21,7 +21,7 @@ typedef struct lane_cells {
 
 typedef struct lane_sums {
     double lower[3], upper[3]; /* bounds of the vertices */
-    double least;              /* least absolute volume */
+    double least;              /* least absolute volume of a cell */
     double size_sum;           /* sum of the cube roots of the volumes */
     int64_t inverted_count;    /* number of cells with a negative volume */
 } lane_sums;

@@ -44,7 +44,7 @@ typedef struct session_border {
     int64_t *vertices;   /* vertices of the faces that only one cell of this rank has */
     /* number of twins, which are computed again if vertices move (session_hanging.twins_version) */
     int64_t twin_count;
-    session_twin *twins; /* sorted by vertex */
+    session_twin *twins; /* twins of the border's vertices, sorted by vertex */
 } session_border;
 
 /* This rank's hanging vertices in the meshes of a joint, and the values that it sends to other ranks for their hanging
@@ -75,7 +75,7 @@ typedef struct session_vertex_groups {
     int64_t *corner_starts;
     session_key_table keys; /* keys of the groups; empty unless a mesh has patches, whose vertices are found by key */
     /* Groups that lie in other ranks' bounding boxes, sorted by their home rank; none if there is only one rank. */
-    int64_t shared_count;     /* number of these groups */
+    int64_t shared_count;     /* number of groups that lie in other ranks' boxes */
     int64_t *shared_groups;   /* index of each of these groups */
     session_key *shared_keys; /* key by which each of these groups is found on its home rank */
     int64_t *shared_counts;   /* for each rank, the number of these groups whose home it is */
@@ -106,7 +106,7 @@ typedef struct session_catalogue_mesh {
  * layer's field. A mesh with ids is a joint by itself. */
 typedef struct session_joint {
     uint64_t name;                   /* value of scene_field.joint_name or session_catalogue_mesh.single_joint_name */
-    int count;                       /* number of meshes */
+    int count;                       /* number of meshes in the joint */
     session_catalogue_mesh **meshes; /* the meshes of the joint, sorted by name; owned by the catalogue */
     /* set if the joint is a single mesh with global vertex ids; vertices are then equal if their ids are equal */
     bool by_id;

@@ -37,7 +37,7 @@ static bool has_reordered_cells(const session_mesh *mesh)
 /* The entries of the caller's connectivity that belong to cells, and their layout in rows. */
 typedef struct cell_rows {
     const grid_array *connectivity;
-    int64_t count;       /* number of entries */
+    int64_t count;       /* number of entries that belong to cells */
     int64_t row_length;  /* number of entries in each row */
     int64_t used_length; /* number of entries of each row that are read */
 } cell_rows;

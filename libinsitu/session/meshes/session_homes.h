@@ -27,7 +27,7 @@ typedef struct session_box {
 typedef struct session_homes {
     bool is_computed; /* set if the other members are up to date */
     bool by_id;       /* set if homes are found by global vertex ids, and not by positions */
-    int rank;         /* this rank */
+    int rank;         /* number of this rank */
     /* The ranks whose drawn cells' box intersects this rank's box, in ascending order, including this rank. The
      * relation is symmetric. A rank without cells has no such ranks. Boxes are extended by 2e-5 of the scene's half
      * diagonal, so that the boxes of a vertex and of a face on which it lies up to rounding intersect. */

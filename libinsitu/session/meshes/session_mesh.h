@@ -55,7 +55,7 @@ typedef struct session_extremes {
 
 /* A plane that cuts meshes. */
 typedef struct session_plane {
-    double normal[3]; /* unit normal */
+    double normal[3]; /* unit normal of the plane */
     double point[3];  /* a point on the plane */
     /* set if the point is at `offset` along the normal from the centre of the data's bounds, and follows the centre */
     bool is_central;
@@ -131,7 +131,7 @@ typedef struct session_outer {
     bool is_needed;       /* set if an image of this step needs it */
     bool are_faces_known; /* set if `faces` is up to date for the current cells */
     int64_t face_count;
-    session_face *faces; /* sorted by cell */
+    session_face *faces; /* outer faces, sorted by cell */
     /* the mesh built on the faces, which has the name of the whole mesh; NULL: not built yet */
     struct session_mesh *mesh;
     double *coordinates; /* 3 coordinates per vertex of the mesh */
@@ -164,7 +164,7 @@ typedef struct session_topology {
     /* Cells of higher order are read as linear pieces (session_split.h); the pieces of a cell are consecutive. */
     bool is_split;               /* set if cells are split; if not set, the members below are empty */
     bool depends_on_coordinates; /* set if the pieces depend on the coordinates */
-    int64_t cell_count;          /* number of pieces */
+    int64_t cell_count;          /* number of pieces into which the cells are split */
     uint32_t *parents;           /* for each piece, the caller's cell */
     int64_t *first_pieces;       /* for each of the caller's cells its first piece, and at the end cell_count */
     unsigned char *ghosts;       /* one byte per piece, nonzero if its cell is a ghost; NULL: there are no ghosts */
@@ -194,9 +194,9 @@ typedef struct session_finer {
     int64_t counts[SESSION_FINER_COUNTS];
     int parts;         /* number of parts of each edge between two nodes; 0: session_mesh.given is the caller's mesh */
     bool is_lobatto;   /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
-    insitu_mesh nodal; /* the caller's mesh with copies in place of the arrays that cannot be read in place */
+    insitu_mesh nodal; /* the caller's mesh, with copies of those arrays that cannot be read in place */
     insitu_mesh fine;  /* same as session_mesh.given: cells with separate nodes in lexicographic order */
-    double *coordinates; /* 3 per node */
+    double *coordinates; /* coordinates of the nodes, 3 per node */
     int64_t *offsets;    /* NULL if all cells have the same type and order */
     unsigned char *types;
     int64_t bytes;

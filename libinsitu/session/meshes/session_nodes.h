@@ -12,7 +12,7 @@ enum { NODES_MOST_ORDER = 32 };
 typedef struct session_nodes {
     int type;  /* GRID_* type of the linear cell with the same corners */
     int order; /* 1: the cell is linear */
-    int count; /* number of nodes */
+    int count; /* number of nodes of the cell */
     bool is_complete;
     bool is_lagrange; /* set if the caller's type is INSITU_LAGRANGE_* */
 } session_nodes;

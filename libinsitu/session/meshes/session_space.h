@@ -10,7 +10,7 @@
 typedef struct session_extent {
     double lower[3], upper[3]; /* bounds of the drawn cells; both 0 if there are no cells */
     double half_diagonal;      /* half the diagonal of the bounds */
-    int64_t cell_count;        /* number of drawn cells */
+    int64_t cell_count;        /* number of drawn cells on all ranks */
     int64_t solid_count;       /* cells that have a volume */
     double cell_size;          /* mean cube root of the volumes of solid cells; 0 if there are none */
     int rank_count;            /* number of ranks that have drawn cells */

@@ -28,7 +28,7 @@ typedef struct split_work {
      * have one type */
     int64_t *first_pieces, *first_entries;
     bool stores_entries;      /* set if pieces store entries of the caller's connectivity instead of vertices */
-    grid_array piece_entries; /* connectivity of the pieces */
+    grid_array piece_entries; /* connectivity of the pieces, piece by piece */
 } split_work;
 
 /* ---- the caller's cells ---------------------------------------------------------------------------------------- */

@@ -12,8 +12,8 @@ typedef struct session_displacement {
     int component_count;      /* number of components: 2 or 3 */
     grid_array components[3]; /* array of the displacements along each axis, one per tuple */
     grid_array index;         /* index of each vertex's tuple; if it has no data, vertex i has tuple i */
-    int64_t count;            /* number of tuples */
-    double scale;             /* factor of the displacements */
+    int64_t count;            /* number of tuples of the field */
+    double scale;             /* factor by which displacements are multiplied */
 } session_displacement;
 
 /* Moves the vertices, unless they were moved by the same displacements before, and marks the mesh as moved if a

@@ -24,7 +24,7 @@ enum { BOX_WORDS = sizeof(session_level_box) / sizeof(uint64_t) };
 typedef struct box_bins {
     int64_t count;
     int64_t *boxes;            /* for each sorted box, its index in the array that was sorted */
-    double (*centres)[3];      /* centre of each box */
+    double (*centres)[3];      /* centre of each sorted box */
     double largest_half_width; /* half of the largest side length of all boxes */
     session_bins bins;
 } box_bins;

@@ -7,7 +7,7 @@
  * Some library that OpenImageIO uses starts threads when it is loaded. These threads sleep, but could receive the
  * simulation's signals and run its handlers, so they are started with every signal blocked. Other libraries end the
  * process if their constructors cannot allocate memory, so nothing is loaded unless enough memory is available. */
-#define _GNU_SOURCE 1 /* needed for dladdr1() */
+#define _GNU_SOURCE 1 /* makes dlfcn.h declare dladdr1() */
 #include "session_image.h"
 
 #include <dlfcn.h>

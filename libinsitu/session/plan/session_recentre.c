@@ -56,7 +56,7 @@ typedef struct recentring {
     mesh_part *parts; /* for each part in the list, its field and the scalar that gets the means */
     /* begin of each group's values if faces of the boundary have values; otherwise those in joint->groups are used */
     int64_t *starts;
-    value_groups values; /* values of joint->groups */
+    value_groups values; /* the values to be averaged, by group of joint->groups */
 } recentring;
 
 /* ---- values by group ----------------------------------------------------------------------------------------- */

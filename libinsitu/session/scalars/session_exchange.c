@@ -22,7 +22,7 @@ void session_mail_free(session_mail *mail)
 typedef struct message {
     struct message *next;
     int source_rank; /* rank that sent the message */
-    int64_t count;   /* number of words */
+    int64_t count;   /* number of words of the message */
     uint64_t words[];
 } message;
 
@@ -30,7 +30,7 @@ typedef struct delivery {
     MPI_Comm comm;
     int tag, rank, ranks;
     int send_count;     /* number of messages that this rank sends */
-    MPI_Request *sends; /* one request per message */
+    MPI_Request *sends; /* MPI requests, one per sent message */
     message *messages;
 } delivery;
 

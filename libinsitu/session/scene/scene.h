@@ -578,7 +578,7 @@ typedef struct scene_warp {
      * (scene_name_stands_for()) */
     char *mesh;
     char *field;          /* name of the field of displacements */
-    double scale;         /* factor of the displacements */
+    double scale;         /* factor by which displacements are multiplied */
     int line, field_line; /* lines of the mesh's name and of the field in the scene file */
 } scene_warp;
 

@@ -49,7 +49,7 @@ typedef struct scene_file_camera {
 typedef struct scene_file_light {
     double *direction; /* towards the light, x y z */
     double *colour;    /* red, green and blue, sRGB, 0 .. 1 */
-    double *intensity; /* factor of the colour */
+    double *intensity; /* factor by which the light's colour is multiplied */
     scene_frame *in;   /* axes in which the direction is given: those of the camera or of the scene */
     bool *shadows;     /* whether the light casts shadows */
 } scene_file_light;
@@ -87,8 +87,8 @@ typedef struct scene_file_plane {
 } scene_file_plane;
 
 typedef struct scene_file_sphere {
-    double *centre; /* centre, x y z */
-    double radius;  /* radius in scene units */
+    double *centre; /* centre of the sphere, x y z */
+    double radius;  /* radius of the sphere in scene units */
 } scene_file_sphere;
 
 typedef struct scene_file_clip {
@@ -101,7 +101,7 @@ typedef struct scene_file_clip {
 
 typedef struct scene_file_lines {
     char *field, *component;
-    double *values; /* value of each line */
+    double *values; /* value of the field on each contour line */
     int values_count;
     int *count;             /* number of lines, if the scene gives no values */
     double *width, *colour; /* width of the lines in pixels, and their colour: red, green and blue */
@@ -110,7 +110,7 @@ typedef struct scene_file_lines {
 typedef struct scene_file_isosurface {
     char *field, *component;
     int *interpolate; /* whether cell values are averaged to vertices (scene_interpolation) */
-    double *values;   /* the isovalues */
+    double *values;   /* isovalues of the layer */
     int values_count;
     double (*colours)[3]; /* one colour per isovalue: red, green, blue */
     int colours_count;
@@ -231,7 +231,7 @@ typedef struct scene_file_condition {
 } scene_file_condition;
 
 typedef struct scene_file_histogram {
-    int *bins;     /* number of bins */
+    int *bins;     /* number of bins of the histogram */
     double *range; /* lower end of the first bin and upper end of the last one */
 } scene_file_histogram;
 

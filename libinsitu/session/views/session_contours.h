@@ -10,7 +10,7 @@
 
 typedef struct session_contours {
     render_lines lines;                  /* number of lines; 0 if the field has no range */
-    double values[RENDER_MAX_LINES];     /* value of each line */
+    double values[RENDER_MAX_LINES];     /* value of the field on each contour line */
     float colours[3 * RENDER_MAX_LINES]; /* colour of each line, linear RGB */
 } session_contours;
 

@@ -27,7 +27,7 @@ typedef struct session_layers {
      * one for the lines of each surface */
     grid_field *fields;
     int64_t field_count;
-    render_vertex_gradients *gradients; /* part_count entries per isosurface */
+    render_vertex_gradients *gradients; /* gradients at vertices, part_count entries per isosurface */
     /* values gathered at outer faces, in the same order as fields; NULL for other fields */
     double **gathered_values;
     mmbvh_ranges *ranges; /* ranges of the fields, in the same order */
