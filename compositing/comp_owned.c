@@ -116,7 +116,7 @@ static bool join_all(const comp_owned *owned, uint32_t strip, merge_scratch *m)
 /* ---- listed ----------------------------------------------------------------------------------------------------- */
 
 /* Returns the next mixed pixel, starting with index from, or COMP_STRIP_PIXELS if there is none. */
-static uint32_t next_mixed(const merge_scratch *m, uint32_t from)
+static uint32_t next_mixed_pixel(const merge_scratch *m, uint32_t from)
 {
     for (uint32_t r = from / COMP_LANES; r < COMP_ROWS; r++) {
         const unsigned bits = m->mixed[r] & (r == from / COMP_LANES ? 0xffffu << from % COMP_LANES : 0xffffu);
@@ -130,12 +130,12 @@ static uint32_t next_mixed(const merge_scratch *m, uint32_t from)
 static bool list_pixels(merge_scratch *m)
 {
     uint32_t sum = 0;
-    for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1)) {
+    for (uint32_t k = next_mixed_pixel(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed_pixel(m, k + 1)) {
         sum += m->counts[k];
         m->ends[k] = sum;
     }
     if (!reserve_fragments(&m->listed, sum)) return false;
-    for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1))
+    for (uint32_t k = next_mixed_pixel(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed_pixel(m, k + 1))
         m->listed.items[--m->ends[k]] = comp_sheet_get(&m->joined, k, k);
     for (int64_t i = 0; i < m->remaining.count; i++)
         m->listed.items[--m->ends[m->remaining.items[i].pixel]] = m->remaining.items[i];
@@ -159,7 +159,7 @@ static void put_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel)
 
 static void blend_listed(const comp_grid *grid, const comp_merge_output *merged, merge_scratch *m)
 {
-    for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1)) {
+    for (uint32_t k = next_mixed_pixel(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed_pixel(m, k + 1)) {
         const comp_pixel pixel = comp_pixels_blend(merged, m->listed.items + m->ends[k], m->counts[k],
                                                    comp_grid_pixel(grid, m->joined.strip, k));
         put_pixel(&m->pixels, k, &pixel);

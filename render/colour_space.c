@@ -58,7 +58,7 @@ static void linear_from_lab(const double lab[3], float rgb[3])
     }
 }
 
-static void between_lab(const double a[3], const double b[3], double share, float linear[3])
+static void interpolate_lab(const double a[3], const double b[3], double share, float linear[3])
 {
     double from[3], to[3];
     lab_from_srgb(a, from);
@@ -106,7 +106,7 @@ static msh mix_msh(msh a, msh b, double share)
     return (msh){mix(a.m, b.m, share), mix(a.s, b.s, share), mix(a.h, b.h, share)};
 }
 
-static void between_msh(const double a[3], const double b[3], double share, float linear[3])
+static void interpolate_msh(const double a[3], const double b[3], double share, float linear[3])
 {
     msh ends[2] = {msh_from_srgb(a), msh_from_srgb(b)};
     const bool is_grey[2] = {ends[0].s < grey_angle, ends[1].s < grey_angle};
@@ -137,7 +137,7 @@ static void hsv_from_srgb(const double srgb[3], double hsv[3])
     hsv[0] = turn < 0 ? turn + 6 : turn;
 }
 
-static void between_hsv(const double a[3], const double b[3], double share, float linear[3])
+static void interpolate_hsv(const double a[3], const double b[3], double share, float linear[3])
 {
     double from[3], to[3];
     hsv_from_srgb(a, from);
@@ -152,7 +152,7 @@ static void between_hsv(const double a[3], const double b[3], double share, floa
 
 /* ---- colours and tables ---------------------------------------------------------------------------------------- */
 
-static void between_srgb(const double a[3], const double b[3], double share, float linear[3])
+static void interpolate_srgb(const double a[3], const double b[3], double share, float linear[3])
 {
     for (int c = 0; c < 3; c++) linear[c] = (float)colour_linear_of(mix(a[c], b[c], share));
 }
@@ -160,11 +160,11 @@ static void between_srgb(const double a[3], const double b[3], double share, flo
 void colour_between(colour_space space, const double a[3], const double b[3], double share, float linear[3])
 {
     switch (space) {
-    case COLOUR_RGB: between_srgb(a, b, share, linear); break;
-    case COLOUR_HSV: between_hsv(a, b, share, linear); break;
-    case COLOUR_LAB: between_lab(a, b, share, linear); break;
-    case COLOUR_STEP: between_srgb(a, b, share > 0, linear); break;
-    case COLOUR_DIVERGING: between_msh(a, b, share, linear); break;
+    case COLOUR_RGB: interpolate_srgb(a, b, share, linear); break;
+    case COLOUR_HSV: interpolate_hsv(a, b, share, linear); break;
+    case COLOUR_LAB: interpolate_lab(a, b, share, linear); break;
+    case COLOUR_STEP: interpolate_srgb(a, b, share > 0, linear); break;
+    case COLOUR_DIVERGING: interpolate_msh(a, b, share, linear); break;
     }
 }
 

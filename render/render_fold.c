@@ -19,7 +19,7 @@ static int64_t place_in(const render_folding *folding, const pixel_area *area, u
     return (int64_t)y * area->width + x;
 }
 
-static bool make_room(render_folding *folding, int64_t count)
+static bool reserve_folding(render_folding *folding, int64_t count)
 {
     enum { PIXELS = KERNEL_TILE * KERNEL_TILE };
     if (!folding->starts) folding->starts = base_alloc((PIXELS + 1) * sizeof *folding->starts);
@@ -126,7 +126,7 @@ bool render_fold(render_folding *folding, const pixel_area *area, fragment_list 
 {
     const int64_t count = list->count - first, pixels = (int64_t)area->width * area->height;
     if (count == 0) return true;
-    if (!make_room(folding, count)) return false;
+    if (!reserve_folding(folding, count)) return false;
     collect(folding, area, list->items + first, count);
     fragment *out = list->items + first;
     for (int64_t k = 0; k < pixels; k++) {

@@ -57,7 +57,7 @@ static void kernel_tile_process_candidate(kernel_tile_trace *t, const kernel_til
         kernel_blocks_trace(t, blocks, part, candidate->cell, NULL, 0);
         return;
     }
-    kernel_cell_move(c, t->frame, &t->tile, g);
+    kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_prepare_cell(t, part);
     t->curved->bounds = NULL;
@@ -347,7 +347,7 @@ typedef struct kernel_memory {
     kernel_cell_cache packet_cells;
     kernel_cell tile_cell;
     kernel_curved tile_curved;
-    kernel_curved_storage tile_curved_room;
+    kernel_curved_storage tile_curved_storage;
     kernel_tile_trace tile;
     kernel_tile_volume volume;
     kernel_tile_segments segments;
@@ -481,7 +481,7 @@ static void begin(kernel_thread *thread)
     thread->finder = &m->finder;
     m->tile.cell = &m->tile_cell;
     m->tile.curved = &m->tile_curved;
-    m->tile_curved.storage = &m->tile_curved_room;
+    m->tile_curved.storage = &m->tile_curved_storage;
     m->tile.search = &m->search.nodes;
     for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
     m->segments.depth = 0;

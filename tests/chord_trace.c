@@ -49,7 +49,7 @@ static void chord_polyhedron(kernel_packet *p, const chord_state *state, const g
 static void chord_cell(kernel_packet *p, const chord_state *state, const grid_field *field, int part, uint32_t index,
                        vm rays)
 {
-    kernel_cell *c = kernel_cell_find(p, 0, part, field, index);
+    kernel_cell *c = kernel_cell_cache_find(p, 0, part, field, index);
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     int intervals = 1;
     if (c->type == GRID_POLYHEDRON) {

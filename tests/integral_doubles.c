@@ -162,7 +162,7 @@ void integral_on_doubles(const render_transfer *t, double length, double v_in, d
     base_error error = {0};
     prepare_gauss();
     if (render_pieces_build(&pieces, t, 0, &error) != INSITU_OK) abort();
-    kernel_light light = kernel_clear();
+    kernel_light light = kernel_light_none();
     const kernel_unit_segment run = kernel_unit_segment_of(vf_set(length), vf_set(v_in), vf_set(v_out));
     kernel_integrate(&pieces, (vm){-1, -1}, &run, &light);
     for (int c = 0; c < 3; c++) out[c] = light.colour[c][0];

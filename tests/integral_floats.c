@@ -11,7 +11,7 @@ void integral_on_floats(const render_transfer *t, double length, double v_in, do
     kernel_pieces pieces;
     base_error error = {0};
     if (render_pieces_build(&pieces, t, 0, &error) != INSITU_OK) abort();
-    kernel_light light = kernel_clear();
+    kernel_light light = kernel_light_none();
     const kernel_unit_segment run =
         kernel_unit_segment_of(vf_set((float)length), vf_set((float)v_in), vf_set((float)v_out));
     kernel_integrate(&pieces, vm_all_lanes(), &run, &light);

@@ -1347,12 +1347,13 @@ static void scene_texts_have_their_placeholders_replaced(void **state)
                  {"{", 1, "{"},
                  {"", 1, ""}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        char *path = scene_expand(cases[i].pattern, &(scene_moment){"wave", cases[i].cycle, 0.125, 3, 7, -0.5, "p"});
+        char *path =
+            scene_expand(cases[i].pattern, &(scene_placeholder_values){"wave", cases[i].cycle, 0.125, 3, 7, -0.5, "p"});
         assert_string_equal(path, cases[i].path);
         base_free(path);
     }
     base_memory_fail_nth(1);
-    assert_null(scene_expand("a", &(scene_moment){"b", 1, 0, 0, 0, 0, NULL}));
+    assert_null(scene_expand("a", &(scene_placeholder_values){"b", 1, 0, 0, 0, 0, NULL}));
     base_memory_fail_nth(0);
 }
 

@@ -139,7 +139,7 @@ static void sweeps_make_each_combination_once(void **state)
         assert_true(image->isosurfaces[0].colours[value == 0 ? 0 : 1] == 1);
         assert_true(image->isosurfaces == s.images[i - i % 2].isosurfaces); /* views share their layers */
         assert_true(scene_is_first_variant(image) == (i == 0));
-        const scene_moment moment = scene_moment_of(image, 5, 0);
+        const scene_placeholder_values moment = scene_placeholder_values_of(image, 5, 0);
         char expected[64], *path = scene_expand(image->outputs[0].path, &moment);
         snprintf(expected, sizeof expected, "a.cdb/a_000005_%03d_%d_%s.png", i % 2, value + 1, fields[field]);
         assert_string_equal(path, expected);
@@ -170,7 +170,7 @@ static void sweeps_go_through_planes(void **state)
         assert_true(slice->planes[0].offset == (plane < 3 ? offsets[plane] : 0));
         assert_true(slice->planes[0].extent_fraction == (plane < 3 ? 0 : shares[plane - 3]));
         assert_true(scene_is_first_variant(image) == (i == 0));
-        const scene_moment moment = scene_moment_of(image, 5, 0);
+        const scene_placeholder_values moment = scene_placeholder_values_of(image, 5, 0);
         char expected[64], *path = scene_expand(image->outputs[0].path, &moment);
         snprintf(expected, sizeof expected, "a.cdb/a_000005_%d_%02d.png", 3 + i / 5, plane);
         assert_string_equal(path, expected);

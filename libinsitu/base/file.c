@@ -21,7 +21,7 @@ static bool fail_with_errno(file_failure *failure, int code)
     return false;
 }
 
-static bool fail_kind(file_failure *failure, mode_t mode)
+static bool fail_for_file_type(file_failure *failure, mode_t mode)
 {
     const char *kind = "a device";
     if (S_ISDIR(mode)) kind = "a directory";
@@ -46,7 +46,7 @@ static bool find_file_status(const char *path, int flags, struct stat *stamp, fi
 {
     const int look_flags = flags & O_NOFOLLOW ? AT_SYMLINK_NOFOLLOW : 0;
     if (fstatat(AT_FDCWD, path, stamp, look_flags) != 0) return fail_with_errno(failure, errno);
-    return S_ISREG(stamp->st_mode) || fail_kind(failure, stamp->st_mode);
+    return S_ISREG(stamp->st_mode) || fail_for_file_type(failure, stamp->st_mode);
 }
 
 /* Opens a regular file and returns its descriptor, or -1 on a failure. The file type is checked before opening, because
@@ -63,7 +63,7 @@ static int open_regular(const char *path, int flags, struct stat *stamp, file_fa
     const bool is_known = fstat(file, stamp) == 0;
     if (is_known && S_ISREG(stamp->st_mode)) return file;
     if (is_known)
-        fail_kind(failure, stamp->st_mode);
+        fail_for_file_type(failure, stamp->st_mode);
     else
         fail_with_errno(failure, errno);
     close(file);
@@ -180,10 +180,10 @@ typedef struct file_place {
 static bool check_place(const file_place *place, file_failure *failure)
 {
     struct stat found;
-    if (*place->name == '\0') return fail_kind(failure, S_IFDIR);
+    if (*place->name == '\0') return fail_for_file_type(failure, S_IFDIR);
     if (fstatat(place->folder, place->name, &found, AT_SYMLINK_NOFOLLOW) != 0)
         return errno == ENOENT || fail_with_errno(failure, errno);
-    return S_ISREG(found.st_mode) || S_ISLNK(found.st_mode) || fail_kind(failure, found.st_mode);
+    return S_ISREG(found.st_mode) || S_ISLNK(found.st_mode) || fail_for_file_type(failure, found.st_mode);
 }
 
 static bool open_place(const char *path, file_place *place, file_failure *failure)

@@ -56,7 +56,7 @@ static inline kernel_numbers kernel_numbers_of(const grid_array *a, int64_t coun
 }
 
 /* Returns whether the mesh's vertex and cell indices fit in the 32 bits of a lane. */
-SIMD_INLINE bool kernel_arrays_fit(const grid *g)
+SIMD_INLINE bool kernel_arrays_have_small_indices(const grid *g)
 {
     return g->vertex_count < INT32_MAX && g->cell_count < INT32_MAX;
 }
@@ -68,7 +68,7 @@ static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const gr
     memset(p, 0, sizeof *p);
     p->cells = g;
     p->type = g->cell_types ? GRID_NO_TYPE : g->cell_type;
-    p->has_lanes = kernel_arrays_fit(g);
+    p->has_lanes = kernel_arrays_have_small_indices(g);
     p->source_cells = field->source_cells;
     p->is_by_cell = field->is_cell_centred;
     if (field->component >= 0) values.data += field->component * field->component_stride;

@@ -185,7 +185,7 @@ SIMD_INLINE bool kernel_position_before(const double *a, const double *b)
 }
 
 /* Returns a cell's size: the cube root of its bounding box's volume, or the box's longest side if the box is flat. */
-static inline double kernel_size_of(const double (*world)[3], int count)
+static inline double kernel_cell_size(const double (*world)[3], int count)
 {
     double volume = 1, longest = 0;
     for (int a = 0; a < 3; a++) {
@@ -364,8 +364,8 @@ SIMD_INLINE void kernel_transform_in_tile(const kernel_frame *f, const kernel_ti
 }
 
 /* Transforms the cell's vertices into tile space. They are not yet in canonical order, and have no edge functions. */
-static __attribute__((noinline, unused)) void kernel_cell_move(kernel_cell *c, const kernel_frame *f,
-                                                               const kernel_tile *tile, const grid *g)
+static __attribute__((noinline, unused)) void kernel_cell_move_to_tile_space(kernel_cell *c, const kernel_frame *f,
+                                                                             const kernel_tile *tile, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
     for (int i = 0; i < c->count; i++) kernel_transform_in_tile(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
@@ -376,7 +376,7 @@ static __attribute__((noinline, unused)) void kernel_cell_move(kernel_cell *c, c
 SIMD_INLINE void kernel_cell_transform_in_tile(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile,
                                                const grid *g)
 {
-    kernel_cell_move(c, f, tile, g);
+    kernel_cell_move_to_tile_space(c, f, tile, g);
     kernel_cell_order(c);
 }
 

@@ -64,7 +64,7 @@ SIMD_INLINE void kernel_curved_sides_of(const kernel_projected *s, int type, ker
 }
 
 /* Returns, per ray, a mask of the faces that the ray crosses: those whose edge functions all have the same sign. */
-SIMD_INLINE vi kernel_curved_around(const kernel_curved_sides *sides, int type)
+SIMD_INLINE vi kernel_curved_crossed_faces(const kernel_curved_sides *sides, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vi faces = vi_set(0);
@@ -83,7 +83,7 @@ SIMD_INLINE vm kernel_curved_cross_one_triangle(const kernel_projected *s, const
                                                 const kernel_shape *shape, int face, vm rays, vm *alone)
 {
     vm side[4];
-    kernel_quad_around(shape, face, sides, side);
+    kernel_quad_sides_negative(shape, face, sides, side);
     *alone = vm_or(*alone, kernel_curved_may_cross_twice(s->x, s->y, shape->faces[face].vertices, rays, side));
     return kernel_cross_one_triangle(side, vm_sign(sides->side[shape->edge_count + face]));
 }
@@ -100,7 +100,7 @@ SIMD_INLINE void kernel_curved_find(const float (*at)[8][SIMD_WIDTH], const kern
     kernel_curved_project(at, r, type, &seen);
     kernel_curved_sides_of(&seen, type, &sides);
     vm alone = vm_not(vf_lt(vf_set(KERNEL_EDGE_LEAST), sides.least));
-    vi faces = kernel_curved_around(&sides, type);
+    vi faces = kernel_curved_crossed_faces(&sides, type);
     for (int face = 0; nonconvex && face < shape->face_count; face++) {
         if (shape->faces[face].count == 3 || !vm_any(vm_and(rays, vm_sign(*nonconvex << (31 - face))))) continue;
         const vm once = kernel_curved_cross_one_triangle(&seen, &sides, shape, face, rays, &alone);

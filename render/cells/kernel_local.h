@@ -414,7 +414,7 @@ SIMD_INLINE void kernel_local_newton_residual(int type, const kernel_local_point
     }
 }
 
-SIMD_INLINE void kernel_local_derive(int type, kernel_local_points *p)
+SIMD_INLINE void kernel_local_derivatives(int type, kernel_local_points *p)
 {
     /* derivatives of r + n(r) along each component of the reference coordinates r, where n is the map's nonlinear
      * part */
@@ -475,11 +475,11 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
     kernel_local_newton_residual(type, p, left);
     for (int i = 0; i < 3; i++) p->r[i] += left[i];
     kernel_nonlinear_terms_at(type, p->r, &p->bend);
-    kernel_local_derive(type, p);
+    kernel_local_derivatives(type, p);
     const vf first = kernel_local_step(type, p, vm_all_lanes()), second = kernel_local_step(type, p, vm_all_lanes());
     vm open = vm_not(vf_le(first * second, vf_set(5e-7f)));
     for (int step = 0; step < KERNEL_LOCAL_STEPS && __builtin_expect(vm_any(open), 0); step++) {
-        kernel_local_derive(type, p);
+        kernel_local_derivatives(type, p);
         open = vm_andnot(open, vf_le(kernel_local_step(type, p, open), vf_set(7e-4f)));
     }
     return vm_not(open);

@@ -91,7 +91,7 @@ static inline kernel_scalar_quadratic kernel_scalar_a(const kernel_scalar_quad *
                                      kernel_scalar_cross(q, 1, 2), q->e03, q->e12};
 }
 
-static inline bool kernel_scalar_turns(const kernel_scalar_quadratic *c)
+static inline bool kernel_scalar_changes_sign(const kernel_scalar_quadratic *c)
 {
     return c->is_negative0 != c->is_negative2;
 }
@@ -148,7 +148,7 @@ static inline void kernel_scalar_point(const kernel_scalar_quad *q, const kernel
 static inline void kernel_scalar_single_point(const kernel_scalar_quad *q, double place[3])
 {
     const kernel_scalar_quadratic a = kernel_scalar_a(q), b = kernel_scalar_b(q);
-    const bool by_b = kernel_scalar_turns(&b);
+    const bool by_b = kernel_scalar_changes_sign(&b);
     const double root = __builtin_sqrt(kernel_scalar_discriminant(by_b ? &b : &a));
     const bool is_rising = by_b ? b.is_negative0 : a.is_negative0;
     kernel_scalar_point(q, &a, &b, by_b != is_rising ? root : -root, place);
@@ -158,7 +158,7 @@ static inline void kernel_scalar_single_point(const kernel_scalar_quad *q, doubl
  * the other. */
 static inline bool kernel_scalar_may_have_two_roots(const kernel_scalar_quadratic *c)
 {
-    return !kernel_scalar_turns(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
+    return !kernel_scalar_changes_sign(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
 }
 
 /* Computes the two points of a ray that crosses both triangles or none. Returns false if it does not meet the patch. */
@@ -368,7 +368,7 @@ SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
  * are rays for which the quad is so steep that this means an error 8 times as large along the ray, or is nearly folded,
  * and points so near the quad's border that the crossing of a neighbouring face, with an error of 1e-6 of its size,
  * could come in the wrong order. */
-SIMD_INLINE vm kernel_patch_arrived(const kernel_patch *p, vf s, vf r)
+SIMD_INLINE vm kernel_patch_converged(const kernel_patch *p, vf s, vf r)
 {
     const vf one = vf_set(1);
     const kernel_patch_at at = kernel_patch_evaluate(p, s, r);
@@ -416,7 +416,7 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
     for (int step = 0; step < KERNEL_PATCH_STEPS; step++)
         for (int n = 0; n < count; n++) kernel_patch_step(&patch[n], &s[n], &r[n]);
     for (int n = 0; n < count; n++) {
-        const vm left = vm_andnot(once[n], kernel_patch_arrived(&patch[n], s[n], r[n]));
+        const vm left = vm_andnot(once[n], kernel_patch_converged(&patch[n], s[n], r[n]));
         out[n] = (kernel_quad_point){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
         if (__builtin_expect(!vm_any(left), 1)) continue;
         if (are_beside)

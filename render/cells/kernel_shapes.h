@@ -90,7 +90,8 @@ SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const ke
 }
 
 /* Returns masks of the rays on the negative side of a quad's edges, in cyclic order. */
-SIMD_INLINE void kernel_quad_around(const kernel_shape *shape, int face, const kernel_curved_sides *s, vm out[4])
+SIMD_INLINE void kernel_quad_sides_negative(const kernel_shape *shape, int face, const kernel_curved_sides *s,
+                                            vm out[4])
 {
     vi around[4];
     kernel_face_sides(shape, face, s, around);

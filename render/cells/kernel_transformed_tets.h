@@ -1,7 +1,7 @@
 /* Reads, sorts and transforms tets, one per lane, and computes their edge functions. The operations are those of
- * kernel_cell_move(), kernel_cell_order() and kernel_tet_lines(), and so the results have the same bits. Vertices are
- * sorted by coordinates first, so that everything computed from them is in order. Computations in double are done in
- * two halves of the lanes. */
+ * kernel_cell_move_to_tile_space(), kernel_cell_order() and kernel_tet_lines(), and so the results have the same bits.
+ * Vertices are sorted by coordinates first, so that everything computed from them is in order. Computations in double
+ * are done in two halves of the lanes. */
 #ifndef RENDER_KERNEL_TRANSFORMED_TETS_H
 #define RENDER_KERNEL_TRANSFORMED_TETS_H
 

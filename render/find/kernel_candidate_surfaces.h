@@ -245,7 +245,7 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 /* ---- hexes, wedges and pyramids ---- */
 
 /* Adds the queue's cells to the candidates, with the bounds of the isosurface in them. */
-SIMD_INLINE void kernel_crossed_add_candidates(kernel_finder *s, kernel_crossed *h, int vertices)
+SIMD_INLINE void kernel_crossed_queue_process(kernel_finder *s, kernel_crossed_queue *h, int vertices)
 {
     const kernel_level level = kernel_level_of(s->surface->layer->values[h->value]);
     const kernel_cells *c = &h->cells;
@@ -265,14 +265,14 @@ SIMD_INLINE void kernel_crossed_add_candidates(kernel_finder *s, kernel_crossed 
     kernel_add_crossed(s, c, h->value, l.fitting_lanes, (1u << c->count) - 1, &e);
 }
 
-static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kernel_crossed *h)
+static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kernel_crossed_queue *h)
 {
     if (!h->cells.count) return;
     kernel_cells_fill(&h->cells);
     if (h->cells.vertices == 8)
-        kernel_crossed_add_candidates(s, h, 8);
+        kernel_crossed_queue_process(s, h, 8);
     else
-        kernel_crossed_add_candidates(s, h, h->cells.vertices);
+        kernel_crossed_queue_process(s, h, h->cells.vertices);
     h->cells.count = 0;
 }
 
@@ -283,9 +283,10 @@ static void kernel_find_all_crossed(kernel_finder *s)
 
 /* Queues the cells of the given lanes, which the isovalue crosses. A queue holds cells of one isovalue; if the isovalue
  * changes, the queue is processed first. */
-SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
+SIMD_INLINE void kernel_crossed_queue_add(kernel_finder *s, const kernel_cells *from, int vertices, int value,
+                                          unsigned lanes)
 {
-    kernel_crossed *h = &s->crossed[kernel_lane_type_index(from->type)];
+    kernel_crossed_queue *h = &s->crossed[kernel_lane_type_index(from->type)];
     if (lanes && value != h->value) kernel_find_crossed(s, h);
     for (; lanes; lanes &= lanes - 1) {
         if (h->cells.count == SIMD_WIDTH) kernel_find_crossed(s, h);
@@ -311,7 +312,7 @@ SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c,
             any = vm_or(any, below);
             every = vm_and(every, below);
         }
-        kernel_crossed_add(s, c, vertices, value, all & vm_bits(vm_andnot(any, every)));
+        kernel_crossed_queue_add(s, c, vertices, value, all & vm_bits(vm_andnot(any, every)));
     }
 }
 

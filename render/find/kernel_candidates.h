@@ -46,7 +46,7 @@ static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 /* ---- leaves ---- */
 
 /* Tests one cell that cannot be processed in lanes, and adds it to the candidates if it is visible. */
-static __attribute__((noinline)) void kernel_find_one(kernel_finder *s, uint32_t cell)
+static __attribute__((noinline)) void kernel_find_single_cell(kernel_finder *s, uint32_t cell)
 {
     kernel_finder_fetch_cell(s, cell);
     if (kernel_has_own_faces(s->cell.type))
@@ -66,7 +66,7 @@ static void kernel_find_queued(kernel_finder *s)
         const int type = kernel_arrays_type(p, s->queued[n]);
         end = n + 1;
         if (kernel_has_own_faces(type) || !p->has_lanes) {
-            kernel_find_one(s, s->queued[n]);
+            kernel_find_single_cell(s, s->queued[n]);
             continue;
         }
         kernel_cells *c = &s->pending[kernel_lane_type_index(type)];

@@ -17,8 +17,8 @@ typedef struct kernel_cell_cache {
 
 /* Returns the cell from the cache, or fetches it if it is missing. A cached cell may already be transformed. layer is
  * part of the key, because each layer fetches cells with its own field. */
-SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int part, const grid_field *field,
-                                          uint32_t index)
+SIMD_INLINE kernel_cell *kernel_cell_cache_find(const kernel_packet *p, int layer, int part, const grid_field *field,
+                                                uint32_t index)
 {
     const uint32_t key = index + 0x85ebca6bu * (uint32_t)part + 0xc2b2ae35u * (uint32_t)layer;
     kernel_cell *c = &p->thread->cells->cells[(key * 0x9e3779b1u) >> (32 - KERNEL_CACHE_BITS)];

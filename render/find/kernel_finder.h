@@ -60,10 +60,10 @@ SIMD_INLINE int kernel_lane_type_index(int type)
 
 /* A queue of cells that one isovalue crosses, all of one type with quadrilateral faces, one per lane. It is processed
  * when all lanes are full (kernel_candidate_surfaces.h). */
-typedef struct kernel_crossed {
+typedef struct kernel_crossed_queue {
     kernel_cells cells;
     int value; /* index of the isovalue in its layer, the same for all cells */
-} kernel_crossed;
+} kernel_crossed_queue;
 
 /* The state of the search of one subtree, or of a tile's search. */
 typedef struct kernel_finder {
@@ -86,7 +86,7 @@ typedef struct kernel_finder {
     int queued_count;
     /* per type (kernel_lane_type_index()), cells whose vertices are being prefetched */
     kernel_cells pending[KERNEL_LANE_TYPES];
-    kernel_crossed crossed[KERNEL_CURVED_TYPES];
+    kernel_crossed_queue crossed[KERNEL_CURVED_TYPES];
     kernel_arrays arrays;
 } kernel_finder;
 
@@ -265,7 +265,8 @@ static __attribute__((noinline)) void kernel_add_cell_box(kernel_finder *s, kern
 {
     kernel_outline o;
     kernel_candidate candidate = {.cell = c->index, .source = source};
-    if (!c->is_transformed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
+    if (!c->is_transformed)
+        kernel_cell_move_to_tile_space(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
     kernel_vertex_outline(c, &o);
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }

@@ -139,7 +139,7 @@ static bool bin_list_fill(bin_list *bin, const kernel_candidate_list *list, int6
     return true;
 }
 
-static bool ensure_room(kernel_bin *bin, int64_t count)
+static bool ensure_bin_capacity(kernel_bin *bin, int64_t count)
 {
     if (count <= bin->capacity) return true;
     base_free(bin->buffer);
@@ -168,7 +168,7 @@ static bool gather(const struct kernel_bins *bins, int64_t tile, kernel_bin *bin
         }
     if (!last) return true;
     const bool is_shared = count_in_tile(last, tile) < count;
-    if (is_shared && !ensure_room(bin, count)) return false;
+    if (is_shared && !ensure_bin_capacity(bin, count)) return false;
     bin->items = is_shared ? bin->buffer : last->items + last->starts[tile];
     bin->count = (int)count;
     kernel_tile_candidate *to = bin->items;

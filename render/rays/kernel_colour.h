@@ -188,7 +188,7 @@ SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const ker
 
 /* Computes colours from tables with bands of constant colour, or with separate colours for values outside the range and
  * NaN. */
-static __attribute__((noinline)) void kernel_marked_colour(const kernel_transfer *t, vf w, vf out[3])
+static __attribute__((noinline)) void kernel_special_colour(const kernel_transfer *t, vf w, vf out[3])
 {
     const vf place = kernel_colour_position(t, w), one = vf_set(1), zero = vf_set(0);
     if (t->is_banded) {
@@ -210,7 +210,7 @@ static __attribute__((noinline)) void kernel_marked_colour(const kernel_transfer
 SIMD_INLINE void kernel_base_colour(const kernel_surface *s, int value, vf w, vf out[3])
 {
     if (s->layer->colour_map && (s->colour.is_banded || s->colour.outside)) {
-        kernel_marked_colour(&s->colour, w, out);
+        kernel_special_colour(&s->colour, w, out);
         return;
     }
     if (s->layer->colour_map) {

@@ -40,7 +40,7 @@ static inline void kernel_hits_begin(kernel_hits *hits)
 
 /* Adds a crossing at t to each ray in `hit`. Each ray fills its own rows in order, so that the positions where
  * fragments are split depend neither on the traversal nor on the other rays of the packet. */
-SIMD_INLINE void kernel_hits_cut(kernel_hits *hits, vm hit, vf t)
+SIMD_INLINE void kernel_hits_add_crossing(kernel_hits *hits, vm hit, vf t)
 {
     for (int n = 0; vm_any(hit); n++) {
         if (n == KERNEL_MAX_CUTS) {

@@ -265,7 +265,7 @@ SIMD_INLINE void kernel_pixel_list_close(kernel_pixel_list *rays)
     memset(rays->lane + rays->count, 0, SIMD_WIDTH);
 }
 
-SIMD_INLINE vi kernel_bytes(const uint8_t *bytes)
+SIMD_INLINE vi kernel_load_bytes(const uint8_t *bytes)
 {
     typedef uint8_t kernel_byte_lanes __attribute__((vector_size(SIMD_WIDTH)));
     kernel_byte_lanes lanes;
@@ -322,7 +322,7 @@ SIMD_INLINE void kernel_lane_rays_begin(kernel_lane_rays *out, const kernel_tile
     const bool flat = t->frame->job->camera.is_orthographic;
     const int left = rays->count - first;
     out->active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    kernel_lane_rays_of(out, &t->tile, kernel_bytes(rays->pixel + first), kernel_bytes(rays->lane + first));
+    kernel_lane_rays_of(out, &t->tile, kernel_load_bytes(rays->pixel + first), kernel_load_bytes(rays->lane + first));
     out->u = flat ? out->rays.origin_x : out->rays.slope_x;
     out->v = flat ? out->rays.origin_y : out->rays.slope_y;
 }

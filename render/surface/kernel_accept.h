@@ -369,8 +369,8 @@ typedef struct kernel_ray_hit {
 } kernel_ray_hit;
 
 /* Emits one ray's hit that has the same depth as the nearest one. */
-static __attribute__((noinline, cold)) void kernel_ray_tied(kernel_packet *p, const kernel_surface *s, int ray,
-                                                            const kernel_ray_hit *hit)
+static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_packet *p, const kernel_surface *s,
+                                                                        int ray, const kernel_ray_hit *hit)
 {
     const vm tied = vm_from_bits(1u << ray);
     const vf depth = vf_set(hit->depth);
@@ -393,7 +393,7 @@ SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kerne
     const float far = p->t_far[ray];
     if (!(hit->depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
     if (hit->depth == far && far < INFINITY) {
-        kernel_ray_tied(p, s, ray, hit);
+        kernel_ray_emit_equal_depth(p, s, ray, hit);
         return 0;
     }
     p->t_far[ray] = hit->depth;

@@ -244,7 +244,7 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
         kernel_point ends[2];
         vm found;
         const vf zero = vf_set(0), endless = vf_set(INFINITY);
-        const vi faces = kernel_bytes(h->faces + n);
+        const vi faces = kernel_load_bytes(h->faces + n);
         kernel_lane_rays_begin(&p, t, &h->met, n);
         p.far = kernel_batch_far(t, p.at);
         kernel_curved_cross(&h->transformed, &p, type, faces, ends);

@@ -98,7 +98,7 @@ static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uin
     kernel_probe *probe = state;
     const render_field *field = &probe->surface->layer->field;
     for (int n = 0; n < count; n++) {
-        kernel_cell *c = kernel_cell_find(p, probe->layer, part, &field->fields[part], cells[n]);
+        kernel_cell *c = kernel_cell_cache_find(p, probe->layer, part, &field->fields[part], cells[n]);
         if (!c->is_finite || kernel_has_own_faces(c->type)) continue;
         const bool is_fresh = !c->is_transformed;
         if (is_fresh) kernel_cell_transform(c, p, p->frame->job->parts[part].cells);
@@ -194,7 +194,7 @@ SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface
 SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_surface_layer *layer,
                                           const kernel_cell *c)
 {
-    return (float)(0.5 * layer->difference * kernel_size_of(c->world, c->count) * p->frame->job->space.scale);
+    return (float)(0.5 * layer->difference * kernel_cell_size(c->world, c->count) * p->frame->job->space.scale);
 }
 
 /* ---- hits that wait for samples of other ranks ---- */

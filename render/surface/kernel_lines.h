@@ -132,10 +132,9 @@ typedef struct kernel_line_coverage {
 
 /* Computes which line is nearest to each hit, and the share of the pixel that it covers: 0 if the field is constant or
  * NaN. */
-static __attribute__((noinline)) kernel_line_coverage kernel_lines_cover(const kernel_frame *f, const kernel_tile *tile,
-                                                                         const kernel_surface *s,
-                                                                         const kernel_rays *rays, vf t,
-                                                                         const kernel_line_field *at)
+static __attribute__((noinline)) kernel_line_coverage
+kernel_lines_coverage(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s, const kernel_rays *rays,
+                      vf t, const kernel_line_field *at)
 {
     const kernel_lines *l = &s->lines;
     const vf zero = vf_set(0), one = vf_set(1), *g = at->gradient, *n = at->normal;
@@ -168,7 +167,7 @@ SIMD_INLINE vf kernel_draw_lines(const kernel_frame *f, const kernel_tile *tile,
                                  const kernel_rays *rays, vf t, const kernel_line_field *at, vf colour[3])
 {
     const float *colours = s->layer->lines->colours;
-    const kernel_line_coverage cover = kernel_lines_cover(f, tile, s, rays, t, at);
+    const kernel_line_coverage cover = kernel_lines_coverage(f, tile, s, rays, t, at);
     for (int a = 0; a < 3 && colours; a++) {
         const vf own = vf_gather(colours + a, cover.line * 3);
         colour[a] = s->layer->lines->is_alone ? own : (vf)(colour[a] + cover.share * (own - colour[a]));

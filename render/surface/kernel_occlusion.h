@@ -38,7 +38,7 @@ typedef struct kernel_occlusion {
 /* Returns the rays whose root at t is farther from the hit than the layer's `contact` distance. */
 static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet *p, const kernel_occlusion *o, vf t)
 {
-    const double size = kernel_size_of((const double(*)[3])o->world, o->vertex_count);
+    const double size = kernel_cell_size((const double(*)[3])o->world, o->vertex_count);
     const double reach = (double)o->surface->layer->contact * size * p->frame->job->space.scale;
     const vf length = vf_sqrt((p->slope_x * p->slope_x + p->slope_y * p->slope_y) + 1.0f);
     return vf_le(vf_set((float)reach), (t - p->t_near) * length);
@@ -172,7 +172,7 @@ static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const k
 {
     const render_surface_layer *layer = o->surface->layer;
     kernel_cell *c =
-        kernel_cell_find(p, o->layer, occluder->part, &layer->field.fields[occluder->part], occluder->cell);
+        kernel_cell_cache_find(p, o->layer, occluder->part, &layer->field.fields[occluder->part], occluder->cell);
     if (kernel_has_own_faces(c->type)) {
         kernel_occlusion_polyhedra(p, o, occluder);
         return;

@@ -172,7 +172,7 @@ SIMD_INLINE vf kernel_side(vf v)
 }
 
 /* Computes the field just inside a face. If it equals the face's value up to rounding, the face's value is used. */
-SIMD_INLINE void kernel_search_face(const kernel_search *s, vm rays, vf face, kernel_point *at)
+SIMD_INLINE void kernel_search_value_inside(const kernel_search *s, vm rays, vf face, kernel_point *at)
 {
     const vf inside = kernel_solve_lanes(&s->rays, &s->map, s->interval, rays, at->t, at->r, s->failures);
     at->value = vf_select(vf_le(vf_abs(inside - face), vf_set(KERNEL_FACE_BAND)), face, inside);
@@ -256,8 +256,8 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     s->found = vm_or(s->found, vm_and(rays, one));
     s->open = vm_andnot(vm_andnot(rays, none), one);
     if (!vm_any(s->open)) return;
-    kernel_search_face(s, s->open, i->v_in, &s->from);
-    kernel_search_face(s, s->open, i->v_out, &s->end);
+    kernel_search_value_inside(s, s->open, i->v_in, &s->from);
+    kernel_search_value_inside(s, s->open, i->v_out, &s->end);
     /* the field just inside a warped face may have the other sign than the face's value: then there is a root at the
      * face itself */
     const vm jumps = vm_andnot(s->open, vf_eq(kernel_side(s->from.value), s->side));

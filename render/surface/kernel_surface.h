@@ -56,8 +56,8 @@ typedef struct kernel_accepted {
 } kernel_accepted;
 
 /* Emits hits with the same depth as the nearest ones as fragments of their own. */
-static __attribute__((noinline, cold)) void kernel_accept_tied(kernel_packet *p, const kernel_surface *s, vm tied,
-                                                               const kernel_accepted *h)
+static __attribute__((noinline, cold)) void kernel_accept_equal_depth(kernel_packet *p, const kernel_surface *s,
+                                                                      vm tied, const kernel_accepted *h)
 {
     kernel_shading_input own = h->look;
     vm ready = tied;
@@ -73,7 +73,7 @@ SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, kernel_surface_state *st
     kernel_hits *hits = state->hits;
     const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(h->t, p->t_far));
     if (__builtin_expect(vm_any(tied), 0)) {
-        kernel_accept_tied(p, s, tied, h);
+        kernel_accept_equal_depth(p, s, tied, h);
         hit = vm_andnot(hit, tied);
     }
     p->t_far = vf_select(hit, h->t, p->t_far);
@@ -96,7 +96,7 @@ SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_stat
 {
     const kernel_surface *s = state->surface;
     const uint32_t kind = s->first_kind + (uint32_t)h->value;
-    kernel_hits_cut(state->hits, hit, h->t);
+    kernel_hits_add_crossing(state->hits, hit, h->t);
     if (s->layer->normal == RENDER_DIFFERENCES) hit = kernel_differ(p, s, h->value, hit, h->t, h->reach, &h->look);
     if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, hit, h->t, &h->cells, h->look.normal);
     const vf *colour = h->look.colour;

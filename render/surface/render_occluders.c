@@ -75,7 +75,7 @@ static void free_occluder_list(occluder_list *f)
 /* ---- a cell --------------------------------------------------------------------------------------------------- */
 
 /* The cell that is currently searched for occluders, and the isovalue for which it is searched. */
-typedef struct subject {
+typedef struct occluder_search {
     occluder_list *into;
     const kernel_frame *frame;
     int surface, part, value;
@@ -83,19 +83,19 @@ typedef struct subject {
     int count; /* number of vertices; those of a polyhedron occur several times */
     list places, values;
     double reach;
-} subject;
+} occluder_search;
 
-static const double *place_of(const subject *s, int i)
+static const double *place_of(const occluder_search *s, int i)
 {
     return (const double *)s->places.items + (ptrdiff_t)3 * i;
 }
 
-static double value_of(const subject *s, int i)
+static double value_of(const occluder_search *s, int i)
 {
     return ((const double *)s->values.items)[i];
 }
 
-static void bounds_of(const subject *s, double low[3], double high[3])
+static void bounds_of(const occluder_search *s, double low[3], double high[3])
 {
     for (int a = 0; a < 3; a++) low[a] = high[a] = place_of(s, 0)[a];
     for (int i = 1; i < s->count; i++)
@@ -106,12 +106,12 @@ static void bounds_of(const subject *s, double low[3], double high[3])
 }
 
 /* Returns the distance from a hit within which the cell blocks nothing (kernel_occlusion_beyond()), in tree space. */
-static double reach_of(const subject *s, double contact)
+static double contact_distance(const occluder_search *s, double contact)
 {
-    return contact > 0 ? contact * kernel_size_of((const double(*)[3])s->places.items, s->count) : 0;
+    return contact > 0 ? contact * kernel_cell_size((const double(*)[3])s->places.items, s->count) : 0;
 }
 
-static bool add_vertex(subject *s, const double world[3], double value)
+static bool add_vertex(occluder_search *s, const double world[3], double value)
 {
     const render_space *space = &s->frame->job->space;
     double *place = add(s->into, &s->places, 3 * sizeof *place), *kept = add(s->into, &s->values, sizeof *kept);
@@ -122,7 +122,7 @@ static bool add_vertex(subject *s, const double world[3], double value)
     return true;
 }
 
-static bool straddles(const subject *s, double isovalue)
+static bool straddles(const occluder_search *s, double isovalue)
 {
     bool below = false, above = false;
     for (int i = 0; i < s->count; i++) {
@@ -136,14 +136,14 @@ static bool straddles(const subject *s, double isovalue)
 
 /* Computes the point at which the surface crosses the edge between two vertices. They must be given in the order of
  * coordinates, so that all cells of the edge compute the same bits. */
-static void cross_edge(const subject *s, double isovalue, int i, int j, float out[3])
+static void cross_edge(const occluder_search *s, double isovalue, int i, int j, float out[3])
 {
     const double *a = place_of(s, i), *b = place_of(s, j);
     const double va = value_of(s, i) - isovalue, vb = value_of(s, j) - isovalue, w = va / (va - vb);
     for (int k = 0; k < 3; k++) out[k] = (float)(a[k] + w * (b[k] - a[k]));
 }
 
-static void add_triangle(subject *s, float a[3], float b[3], float c[3])
+static void add_triangle(occluder_search *s, float a[3], float b[3], float c[3])
 {
     triangle *t = add(s->into, &s->into->triangles, sizeof *t);
     if (!t) return;
@@ -156,7 +156,7 @@ static void add_triangle(subject *s, float a[3], float b[3], float c[3])
 
 /* Adds the pieces of the isosurface in a tet, one or two triangles. The vertices must be in the order of
  * coordinates. */
-static void add_tet(subject *s, double isovalue)
+static void add_tet(occluder_search *s, double isovalue)
 {
     float at[4][3];
     int below[4], above[4], belows = 0, aboves = 0, n = 0;
@@ -198,7 +198,8 @@ static void solve(double m[3][3], const double b[3], double x[3])
 
 /* Computes the linear function L that fits the values best, by least squares about the mean of the vertices. Values are
  * taken minus the isovalue, times `scale`. *level receives L at the origin. */
-static void fit_linear_function(const subject *s, double isovalue, double scale, double gradient[3], double *level)
+static void fit_linear_function(const occluder_search *s, double isovalue, double scale, double gradient[3],
+                                double *level)
 {
     double mean[3] = {0, 0, 0}, value = 0, m[3][3] = {{0}}, b[3] = {0, 0, 0};
     for (int i = 0; i < s->count; i++) {
@@ -218,14 +219,14 @@ static void fit_linear_function(const subject *s, double isovalue, double scale,
     for (int a = 0; a < 3; a++) *level -= gradient[a] * mean[a];
 }
 
-static double scale_of(const subject *s, double isovalue)
+static double scale_of(const occluder_search *s, double isovalue)
 {
     double largest = 0;
     for (int i = 0; i < s->count; i++) largest = fmax(largest, fabs(value_of(s, i) - isovalue));
     return kernel_mirrored_power(largest);
 }
 
-static void fill_slab(const subject *s, double isovalue, slab *out)
+static void fill_slab(const occluder_search *s, double isovalue, slab *out)
 {
     double low[3], high[3], gradient[3], level, off = 0, steep = 0, size = 0;
     const double scale = scale_of(s, isovalue);
@@ -275,7 +276,7 @@ static bool collapses(const kernel_cell *c)
 }
 
 /* Appends the hex's record and returns its index; -1 if the hex must be traced one ray at a time. */
-static int32_t add_hex(subject *s, const kernel_cell *c, double isovalue)
+static int32_t add_hex(occluder_search *s, const kernel_cell *c, double isovalue)
 {
     const double scale = scale_of(s, isovalue);
     if (s->frame->job->clip_count || collapses(c)) return -1;
@@ -289,7 +290,7 @@ static int32_t add_hex(subject *s, const kernel_cell *c, double isovalue)
     return (int32_t)s->into->hexes.count - 1;
 }
 
-static void add_slab(subject *s, const kernel_cell *c, double isovalue)
+static void add_slab(occluder_search *s, const kernel_cell *c, double isovalue)
 {
     const int32_t record = kernel_is_box(c->type) ? add_hex(s, c, isovalue) : -1;
     slab *out = add(s->into, &s->into->slabs, sizeof *out);
@@ -301,7 +302,7 @@ static void add_slab(subject *s, const kernel_cell *c, double isovalue)
 /* ---- collecting -------------------------------------------------------------------------------------------------- */
 
 /* Lists the vertices of a cell that is not a polyhedron, in the canonical order that kernels use. */
-static bool list_cell_vertices(subject *s, kernel_cell *c, const grid *g)
+static bool list_cell_vertices(occluder_search *s, kernel_cell *c, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
     kernel_cell_order(c);
@@ -310,7 +311,7 @@ static bool list_cell_vertices(subject *s, kernel_cell *c, const grid *g)
     return true;
 }
 
-static bool list_polyhedron_vertices(subject *s, const grid *g, const grid_field *field)
+static bool list_polyhedron_vertices(occluder_search *s, const grid *g, const grid_field *field)
 {
     grid_walk walk = grid_walk_cell(g, s->index);
     int64_t vertex;
@@ -322,7 +323,7 @@ static bool list_polyhedron_vertices(subject *s, const grid *g, const grid_field
     return s->count > 0;
 }
 
-static void find_in_cell(subject *s)
+static void find_in_cell(occluder_search *s)
 {
     const render_surface_layer *layer = s->frame->surfaces[s->surface].layer;
     const grid *g = s->frame->job->parts[s->part].cells;
@@ -334,7 +335,7 @@ static void find_in_cell(subject *s)
     s->count = 0;
     s->places.count = s->values.count = 0;
     if (is_polyhedron ? !list_polyhedron_vertices(s, g, field) : !list_cell_vertices(s, &c, g)) return;
-    s->reach = reach_of(s, (double)layer->contact);
+    s->reach = contact_distance(s, (double)layer->contact);
     for (s->value = 0; s->value < layer->value_count; s->value++) {
         const double isovalue = layer->values[s->value];
         if (!straddles(s, isovalue)) continue;
@@ -345,7 +346,7 @@ static void find_in_cell(subject *s)
     }
 }
 
-static void find_in_subtree(subject *s, const kernel_subtree *subtree)
+static void find_in_subtree(occluder_search *s, const kernel_subtree *subtree)
 {
     const mmbvh *tree = s->frame->job->parts[subtree->part].tree;
     const kernel_surface *surface = &s->frame->surfaces[subtree->surface];
@@ -413,7 +414,7 @@ static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees,
     {
         region_enter();
         occluder_list own = {0};
-        subject s = {.into = &own, .frame = frame};
+        occluder_search s = {.into = &own, .frame = frame};
 #pragma omp for schedule(dynamic, 1) nowait
         for (int64_t i = 0; i < subtrees->count; i++) find_in_subtree(&s, &subtrees->items[i]);
 #pragma omp critical(occluders)

@@ -78,7 +78,7 @@ typedef struct kernel_bisection {
     int count;
 } kernel_bisection;
 
-static inline double kernel_between(double from, double to, double share)
+static inline double kernel_interpolate(double from, double to, double share)
 {
     return from + (to - from) * share;
 }
@@ -87,7 +87,7 @@ static inline double kernel_between(double from, double to, double share)
 static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, double t, const double guess[3])
 {
     const double whole = h->out.t - h->in.t, share = whole > 0 ? (t - h->in.t) / whole : 0;
-    kernel_exact_point out = {.t = t, .v = kernel_between(h->in.v, h->out.v, share)};
+    kernel_exact_point out = {.t = t, .v = kernel_interpolate(h->in.v, h->out.v, share)};
     if (!h->map) return out;
     const double reach = h->slope * t + h->depth_offset, target[3] = {h->u * reach, h->v * reach, t};
     double slopes[3];
@@ -96,7 +96,7 @@ static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, doubl
         out.r[0] = out.r[1] = 0.4;
         out.r[2] = 0.5;
         if (!kernel_exact_newton(h->map, target, out.r) || !kernel_exact_is_near(out.r)) {
-            for (int a = 0; a < 3; a++) out.r[a] = kernel_between(h->in.r[a], h->out.r[a], share);
+            for (int a = 0; a < 3; a++) out.r[a] = kernel_interpolate(h->in.r[a], h->out.r[a], share);
             ++*h->map_failures;
             return out;
         }
@@ -109,8 +109,8 @@ static kernel_exact_point kernel_exact_point_between(const kernel_bisection *h, 
                                                      const kernel_exact_point *b, double share)
 {
     double guess[3];
-    for (int n = 0; n < 3; n++) guess[n] = kernel_between(a->r[n], b->r[n], share);
-    return kernel_exact_point_at(h, kernel_between(a->t, b->t, share), guess);
+    for (int n = 0; n < 3; n++) guess[n] = kernel_interpolate(a->r[n], b->r[n], share);
+    return kernel_exact_point_at(h, kernel_interpolate(a->t, b->t, share), guess);
 }
 
 /* Returns the point between a and b at which the field is x; the values at a and b lie on either side of x. It uses
@@ -318,9 +318,9 @@ static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h,
     float begin = (float)from->t;
     for (int n = 1; n <= (int)subdivisions; n++) {
         const double before = (n - 1) / subdivisions, after = n / subdivisions;
-        const float end = n < (int)subdivisions ? (float)kernel_between(from->t, to->t, after) : (float)to->t;
-        const double in = kernel_between(values[0], values[1], before);
-        const double out = kernel_between(values[0], values[1], after);
+        const float end = n < (int)subdivisions ? (float)kernel_interpolate(from->t, to->t, after) : (float)to->t;
+        const double in = kernel_interpolate(values[0], values[1], before);
+        const double out = kernel_interpolate(values[0], values[1], after);
         const kernel_unit_segment run = {.length = vf_set((float)((to->t - from->t) / subdivisions * h->per_t)),
                                          .v_in = vf_set((float)in),
                                          .v_out = vf_set((float)out),

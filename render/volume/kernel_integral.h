@@ -92,7 +92,7 @@ typedef struct kernel_light {
     vf transmittance;
 } kernel_light;
 
-SIMD_INLINE kernel_light kernel_clear(void)
+SIMD_INLINE kernel_light kernel_light_none(void)
 {
     return (kernel_light){{vf_set(0), vf_set(0), vf_set(0)}, vf_set(0), vf_set(1)};
 }

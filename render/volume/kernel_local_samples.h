@@ -61,7 +61,7 @@ typedef struct kernel_local_batch {
 
 /* Returns whether cells of this type are sampled in lanes. They are not if the frame has surfaces, which need the ends
  * of intervals (kernel_blend_breaks()), nor if samples are separate fragments. */
-SIMD_INLINE bool kernel_local_fits(const kernel_frame *f, int type)
+SIMD_INLINE bool kernel_local_samples_use_lanes(const kernel_frame *f, int type)
 {
     return !f->surface_count && !f->job->separate_samples && kernel_local_queue_of(type) >= 0;
 }
@@ -158,10 +158,10 @@ SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, kernel_l
 {
     const int left = b->lanes.rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    const vi pixel = kernel_bytes(b->lanes.rays.pixel + n);
+    const vi pixel = kernel_load_bytes(b->lanes.rays.pixel + n);
     kernel_lane_rays rays;
     vf base, step, near, far;
-    kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_bytes(b->lanes.rays.lane + n));
+    kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_load_bytes(b->lanes.rays.lane + n));
     const vf depth = kernel_gather_lane(b->lanes.cells.origin[2], rays.lane);
     kernel_local_slab_interval(&b->lanes.cells, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);

@@ -62,9 +62,9 @@ typedef struct kernel_local_segment_batch {
 } kernel_local_segment_batch;
 
 /* Returns whether segments of cells of this type are computed in lanes in this frame. */
-SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
+SIMD_INLINE bool kernel_local_segments_use_lanes(const kernel_frame *f, int type)
 {
-    return kernel_segments_fit(f) && f->pieces[0].variations && kernel_local_queue_of(type) >= 0;
+    return kernel_segments_use_lanes(f) && f->pieces[0].variations && kernel_local_queue_of(type) >= 0;
 }
 
 /* Adds a segment to a ray's list if it begins before the end of the ray's window; it must not begin before the window.
@@ -124,8 +124,8 @@ SIMD_INLINE void kernel_local_emit_one(const kernel_local_segment_batch *b, cons
 
 /* Adds the segments of rays that need several: equal subintervals of the interval, with chords that have the mean of
  * the polynomial through the sampled values. */
-static __attribute__((noinline)) void kernel_local_emit_more(const kernel_local_segment_batch *b,
-                                                             const kernel_local_pairs *p, vm rays)
+static __attribute__((noinline)) void kernel_local_emit_several(const kernel_local_segment_batch *b,
+                                                                const kernel_local_pairs *p, vm rays)
 {
     const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].value,
              v1 = p->ends[1].value;
@@ -155,7 +155,7 @@ SIMD_INLINE void kernel_local_emit(const kernel_local_segment_batch *b, const ke
 {
     const vm single = vm_and(rays, vf_le(p->count, vf_set(1))), more = vm_andnot(rays, single);
     kernel_local_emit_one(b, p, single);
-    if (vm_any(more)) kernel_local_emit_more(b, p, more);
+    if (vm_any(more)) kernel_local_emit_several(b, p, more);
 }
 
 /* ---- parts of an interval ---- */
@@ -191,8 +191,8 @@ SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_loca
 /* Adds the segments of rays for which one polynomial is not accurate enough: their intervals are divided into halves,
  * quarters or eighths, with a polynomial for each part. Returns the rays for which even eighths are not accurate
  * enough. */
-SIMD_INLINE vm kernel_local_by_parts(const kernel_tile_trace *t, const kernel_local_segment_batch *b,
-                                     const kernel_local_pairs *whole, vm rays, int type)
+SIMD_INLINE vm kernel_local_divide_intervals(const kernel_tile_trace *t, const kernel_local_segment_batch *b,
+                                             const kernel_local_pairs *whole, vm rays, int type)
 {
     kernel_local_division d;
     kernel_local_chord_of(&b->lanes.cells, &b->budget.nonlinear, whole->rays.lane, whole->ends, type, &d.chord);
@@ -214,7 +214,7 @@ static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_til
                                                                 const kernel_local_segment_batch *b,
                                                                 const kernel_local_pairs *whole, vm rays, int type)
 {
-    return KERNEL_OF_TYPE(type, kernel_local_by_parts, t, b, whole, rays);
+    return KERNEL_OF_TYPE(type, kernel_local_divide_intervals, t, b, whole, rays);
 }
 
 /* ---- rays ---- */
@@ -315,7 +315,7 @@ SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, kerne
 {
     const int left = b->lanes.rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    const vi pixel = kernel_bytes(b->lanes.rays.pixel + n), lane = kernel_bytes(b->lanes.rays.lane + n);
+    const vi pixel = kernel_load_bytes(b->lanes.rays.pixel + n), lane = kernel_load_bytes(b->lanes.rays.lane + n);
     kernel_lane_rays rays;
     vf near, far, begin, end;
     kernel_lane_rays_of(&rays, &t->tile, pixel, lane);

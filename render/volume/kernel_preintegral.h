@@ -200,7 +200,7 @@ static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *
         left = vm_andnot(rays, good);
     }
     if (!vm_any(left)) return;
-    kernel_light exact = kernel_clear();
+    kernel_light exact = kernel_light_none();
     kernel_integrate_apart(pieces, left, run, &exact);
     const kernel_preint_subinterval sub = {.colour = {exact.colour[0], exact.colour[1], exact.colour[2]},
                                            .depth = exact.depth};
@@ -214,7 +214,7 @@ static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *
 SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_unit_segment *run,
                                               kernel_preint_end *end)
 {
-    kernel_light light = kernel_clear();
+    kernel_light light = kernel_light_none();
     kernel_preint_end next;
     kernel_preint_subinterval sub;
     if (vm_any(vm_andnot(rays, vf_eq(end->value, run->v_in)))) kernel_preint_find(pieces->preintegral, run->v_in, end);

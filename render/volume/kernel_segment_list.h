@@ -58,13 +58,13 @@ typedef struct kernel_segments {
 
 /* Returns whether segments can be integrated one ray-cell pair per lane. They cannot if transparent surfaces cut them,
  * or if each becomes a fragment of its own. */
-SIMD_INLINE bool kernel_segments_fit(const kernel_frame *f)
+SIMD_INLINE bool kernel_segments_use_lanes(const kernel_frame *f)
 {
     return !f->has_transparent && !f->job->separate_samples;
 }
 
 /* Returns the lane of the packet that holds the pixel, or -1 if the pixel is not in the packet. */
-SIMD_INLINE int kernel_lane_of(const kernel_packet *p, uint32_t pixel)
+SIMD_INLINE int kernel_packet_lane_of_pixel(const kernel_packet *p, uint32_t pixel)
 {
     const int width = p->frame->job->camera.width, left = width - p->x0;
     const int columns = left < KERNEL_PACKET_COLUMNS ? left : KERNEL_PACKET_COLUMNS;
@@ -87,7 +87,7 @@ SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_
         const fragment *hit = &p->thread->out->items[i];
         /* skips fragments of volumes, which come from an earlier interval between clips */
         if (hit->kind < FRAGMENT_SURFACE) continue;
-        const int lane = kernel_lane_of(p, hit->pixel);
+        const int lane = kernel_packet_lane_of_pixel(p, hit->pixel);
         if (lane < 0) continue;
         int at = count[lane];
         if (at == KERNEL_LANE_CUTS) {
@@ -114,7 +114,7 @@ static vf kernel_next_cut_by_search(const kernel_packet *p, const kernel_cuts *c
     for (int64_t i = cuts->first; i < cuts->last; i++) {
         const fragment *hit = &p->thread->out->items[i];
         if (hit->kind < FRAGMENT_SURFACE) continue;
-        const int lane = kernel_lane_of(p, hit->pixel);
+        const int lane = kernel_packet_lane_of_pixel(p, hit->pixel);
         if (lane < 0) continue;
         if ((beyond ? hit->t_in > start[lane] : hit->t_in >= start[lane]) && hit->t_in < next[lane])
             next[lane] = hit->t_in;
@@ -255,8 +255,8 @@ SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi i
 
 /* Returns the rays on which the two segments begin at the same t and `item` ends before `earlier`: it has length 0 in
  * float32 and must come first. */
-static __attribute__((noinline, cold)) vm kernel_segments_tied(const kernel_segments *list, vm same, vi item,
-                                                               vi earlier)
+static __attribute__((noinline, cold)) vm kernel_segments_begin_equal(const kernel_segments *list, vm same, vi item,
+                                                                      vi earlier)
 {
     return vm_and(same, vf_lt(kernel_items_gather(list, 1, item), kernel_items_gather(list, 1, earlier)));
 }
@@ -288,7 +288,7 @@ static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out
             if (list->is_double) {
                 const vm same = vm_and(vf_eq(t_in, before), vf_lt(t_in, vf_set(INFINITY)));
                 if (__builtin_expect(vm_any(same), 0))
-                    moves = vm_or(moves, kernel_segments_tied(list, same, item, earlier));
+                    moves = vm_or(moves, kernel_segments_begin_equal(list, same, item, earlier));
             }
             if (!vm_any(moves)) break;
             out->t_in[at] = vf_select(moves, before, t_in);
@@ -579,7 +579,7 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *st
     const vf one = vf_set(1), black = vf_set(KERNEL_BLACK);
     vf from = vf_set(0), to = one, depth = vf_set(0);
     for (vm open = rays; vm_any(open);) {
-        kernel_light light = kernel_clear();
+        kernel_light light = kernel_light_none();
         const kernel_unit_segment run = kernel_unit_segment_part(whole, from, to);
         const vf begin = t_in + (t_out - t_in) * from;
         const vf end = vf_select(vf_eq(to, one), t_out, t_in + (t_out - t_in) * to), middle = 0.5f * (from + to);

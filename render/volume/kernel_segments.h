@@ -104,7 +104,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         vf_gather_rows(&list->items[0][0].t_in, items, segment);
         const vf t_out = segment[1];
         kernel_unit_segment run = kernel_unit_segment_of((t_out - t_in) * list->per_t, segment[2], segment[3]);
-        kernel_light light = kernel_clear();
+        kernel_light light = kernel_light_none();
         if (list->is_double) {
             vf_gather_rows(&list->precise[0][0].length, items, precise);
             run.length = precise[0] * list->per_t;
@@ -134,7 +134,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
 SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 {
     memset(list->count, 0, sizeof list->count);
-    list->unsorted_light = kernel_clear();
+    list->unsorted_light = kernel_light_none();
     list->t_end = t_end;
     list->is_shortened = false;
 }

@@ -64,7 +64,7 @@ SIMD_INLINE unsigned kernel_tile_transform_cell(kernel_tile_trace *t, kernel_til
     kernel_cell *c = &cells->cell;
     kernel_outline outline;
     if (!c->is_finite || !kernel_cell_is_visible(c, transfer)) return 0;
-    kernel_cell_move(c, t->frame, &t->tile, g);
+    kernel_cell_move_to_tile_space(c, t->frame, &t->tile, g);
     kernel_vertex_outline(c, &outline);
     const unsigned meets = kernel_tile_visible_blocks(t, &outline, blocks);
     if (!meets) return 0;

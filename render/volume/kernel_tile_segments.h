@@ -84,7 +84,7 @@ static bool kernel_segments_queue(kernel_tile_trace *t, int part, uint32_t cell,
 {
     const grid *g = t->frame->job->parts[part].cells;
     const int type = grid_cell_type(g, cell);
-    if (!kernel_arrays_fit(g) || !kernel_local_segments_fit(t->frame, type)) return false;
+    if (!kernel_arrays_have_small_indices(g) || !kernel_local_segments_use_lanes(t->frame, type)) return false;
     kernel_local_lanes *l = &t->thread->tile_segments->stretches.lanes;
     kernel_local_enqueue(t, l, part, type, cell, blocks, kernel_tile_box(blocks, box));
     return true;
@@ -109,9 +109,9 @@ static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const u
 /* Returns whether tets may be processed one ray-tet pair per lane. They may not if the ends of segments are computed in
  * double, because that is done per packet. They also may not if they are few enough to be binned by tile, because tets
  * are then so large that packets are as fast. */
-SIMD_INLINE bool kernel_tet_segments_fit(const kernel_frame *f)
+SIMD_INLINE bool kernel_tet_segments_use_lanes(const kernel_frame *f)
 {
-    return kernel_segments_fit(f) && !f->is_double && !f->volume_candidates;
+    return kernel_segments_use_lanes(f) && !f->is_double && !f->volume_candidates;
 }
 
 /* Adds the segments of rays that begin or end inside their tet; `rays` is a mask of lanes. */
@@ -286,7 +286,7 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    if (!kernel_tile_cells_begin(t, kernel_tet_segments_fit(t->frame) ? kernel_tet_segments_small : NULL)) return;
+    if (!kernel_tile_cells_begin(t, kernel_tet_segments_use_lanes(t->frame) ? kernel_tet_segments_small : NULL)) return;
     const kernel_placement reach = kernel_tile_trees_placement(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);

@@ -87,7 +87,7 @@ static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, 
 {
     const grid *g = t->frame->job->parts[part].cells;
     const int type = grid_cell_type(g, cell);
-    if (!kernel_arrays_fit(g) || !kernel_local_fits(t->frame, type)) return false;
+    if (!kernel_arrays_have_small_indices(g) || !kernel_local_samples_use_lanes(t->frame, type)) return false;
     kernel_local_enqueue(t, &t->thread->tile_volume->batch.lanes, part, type, cell, blocks,
                          kernel_tile_box(blocks, box));
     return true;
@@ -100,7 +100,7 @@ enum { KERNEL_TET_SAMPLE_PIXELS = 12 };
 
 /* Returns whether tets may be sampled one ray-tet pair per lane. They may not if surfaces may end rays, or if each
  * sample becomes a fragment of its own. */
-SIMD_INLINE bool kernel_tet_samples_fit(const kernel_frame *f)
+SIMD_INLINE bool kernel_tet_samples_use_lanes(const kernel_frame *f)
 {
     return !f->surface_count && !f->job->separate_samples;
 }
@@ -278,7 +278,7 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
-    if (!kernel_tile_cells_begin(t, kernel_tet_samples_fit(t->frame) ? kernel_tet_samples_small : NULL)) return;
+    if (!kernel_tile_cells_begin(t, kernel_tet_samples_use_lanes(t->frame) ? kernel_tet_samples_small : NULL)) return;
     kernel_placement reach = kernel_tile_trees_placement(t);
     const unsigned blocks = reach.blocks;
     const float cells_near = kernel_tile_cells_near(t);

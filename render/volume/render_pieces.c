@@ -217,7 +217,7 @@ static bool is_narrow(const render_transfer *t, int i)
 
 /* Returns the exact value of the cut in double if a narrow ramp begins or ends there. Otherwise, and if several points
  * coincide there (a step), returns the rounded cut. */
-static double cut_exactly(const render_transfer *t, kernel_real cut)
+static double exact_cut_value(const render_transfer *t, kernel_real cut)
 {
     double out = (double)cut;
     int count = 0;
@@ -233,7 +233,7 @@ static double cut_exactly(const render_transfer *t, kernel_real cut)
 static void set_piece(const render_transfer *t, const kept_entry *entries, kernel_real low, kernel_real high,
                       kernel_piece *piece)
 {
-    const double begin = cut_exactly(t, low), end = cut_exactly(t, high), middle = 0.5 * (begin + end);
+    const double begin = exact_cut_value(t, low), end = exact_cut_value(t, high), middle = 0.5 * (begin + end);
     piece->entry[KERNEL_PIECE_LOW] = low;
     piece->entry[KERNEL_PIECE_HIGH] = high;
     piece->entry[KERNEL_PIECE_LOW_REST] = (kernel_real)(begin - (double)low);

@@ -97,7 +97,8 @@ static void add_header(table_line *line)
     add_bytes(line, end, sizeof end - 1);
 }
 
-static void add_picture(table_line *line, const scene_image *image, const scene_moment *moment, const char *file)
+static void add_picture(table_line *line, const scene_image *image, const scene_placeholder_values *moment,
+                        const char *file)
 {
     const scene_database *database = line->table->database;
     char cycle[32];
@@ -186,7 +187,8 @@ static bool make_tables(session_cinema *cinema, const scene *scene)
 }
 
 insitu_status session_record_picture(session_cinema *cinema, const scene *scene, const scene_image *image,
-                                     const scene_output *output, const scene_moment *moment, base_error *error)
+                                     const scene_output *output, const scene_placeholder_values *moment,
+                                     base_error *error)
 {
     const scene_database *database = &scene->databases[output->database];
     c_locale numbers;

@@ -42,7 +42,8 @@ void session_begin_cinema(session_cinema *cinema, int64_t cycle);
 /* Adds a line for a picture that was written for an output with a database. If the run has gone back to an earlier
  * cycle, the lines from this cycle on are removed. Local. */
 insitu_status session_record_picture(session_cinema *cinema, const scene *scene, const scene_image *image,
-                                     const scene_output *output, const scene_moment *moment, base_error *error);
+                                     const scene_output *output, const scene_placeholder_values *moment,
+                                     base_error *error);
 
 /* Writes all tables that have changed, even if some fail. Returns the first error. The next call tries those that
  * failed again. Local. */

@@ -222,14 +222,16 @@ static void choose_text_colour(const scene_image *image, float colour[3])
 }
 
 /* Adds a text to the decorations. Returns false if memory runs out. */
-static bool add_text(session_decorations *d, const char *text, const scene_moment *moment, insitu_anchor at, float size)
+static bool add_text(session_decorations *d, const char *text, const scene_placeholder_values *moment, insitu_anchor at,
+                     float size)
 {
     char *expanded = scene_expand(text, moment);
     if (expanded) d->words[d->decorations.words_count++] = (insitu_words){expanded, at, size};
     return expanded != NULL;
 }
 
-static bool add_scene_texts(session_decorations *d, const scene_decorations *scene, const scene_moment *moment)
+static bool add_scene_texts(session_decorations *d, const scene_decorations *scene,
+                            const scene_placeholder_values *moment)
 {
     bool well = !scene->title || add_text(d, scene->title, moment, INSITU_TOP, 1.4F);
     for (int i = 0; i < scene->words_count && well; i++)

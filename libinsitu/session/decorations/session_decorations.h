@@ -32,7 +32,7 @@ typedef struct session_decorations {
 
 /* Input for computing decorations. */
 typedef struct session_decoration_basis {
-    const scene_moment *moment;
+    const scene_placeholder_values *moment;
     const session_extent *extent;
     const session_view *view;
     const session_layers *layers;

@@ -30,7 +30,7 @@ void session_read_warp(session_mesh *mesh)
 }
 
 /* Makes the description refer to the caller's coordinates. */
-static void read_unmoved(session_mesh *mesh)
+static void restore_coordinates(session_mesh *mesh)
 {
     if (!mesh->warp.is_applied) return;
     memcpy(mesh->given.coordinates, mesh->warp.unmoved, sizeof mesh->given.coordinates);
@@ -53,7 +53,7 @@ void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
         mesh->is_check_stale = true;
         meshes->are_cells_changed = true;
     }
-    read_unmoved(mesh);
+    restore_coordinates(mesh);
     session_drop_warp(mesh);
     if (was_on) {
         mark_moved(meshes, mesh);
@@ -168,7 +168,7 @@ insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, cons
     bool differ = !was_on;
     if (warp->is_applied && !warp->is_stale && warp->key == by->key) return INSITU_OK;
     if (warp->is_stale) session_fill_conformed(mesh, threads);
-    read_unmoved(mesh);
+    restore_coordinates(mesh);
     if (compute_coordinates(mesh, by, threads, &differ, error)) {
         if (was_on) mark_moved(meshes, mesh);
         session_read_topology(mesh);

@@ -350,9 +350,9 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
 
 /* ---- outputs ------------------------------------------------------------------------------------------------- */
 
-static scene_moment make_moment(const session_drawing *d, const scene_image *image)
+static scene_placeholder_values make_placeholder_values(const session_drawing *d, const scene_image *image)
 {
-    return scene_moment_of(image, d->cycle, d->report->public_report.time);
+    return scene_placeholder_values_of(image, d->cycle, d->report->public_report.time);
 }
 
 /* Compares the picture's colour bars with those of this step's earlier pictures in the same montage. */
@@ -391,7 +391,7 @@ static void queue_picture(const session_drawing *d, const scene_image *image, ca
     files->montages = d->montages;
     files->has_picture = true;
     files->image = *image;
-    files->moment = make_moment(d, image);
+    files->moment = make_placeholder_values(d, image);
     files->frame = c->frame;
     files->memory = c->memory;
     files->channels = c->channels;
@@ -446,7 +446,7 @@ static insitu_status make_image_decorations(const session_drawing *d, const scen
                                             base_error *error)
 {
     session_outline outline;
-    const scene_moment moment = make_moment(d, image);
+    const scene_placeholder_values moment = make_placeholder_values(d, image);
     const insitu_status status =
         session_find_outline(&image->decorations, d->catalogue, d->meshes, &d->space->extent, d->team, &outline, error);
     if (status) return status;

@@ -25,7 +25,7 @@ typedef struct session_files {
     bool has_picture;
     char *news;        /* text of report.json, owned by this struct (session_news.h); NULL: it is not written */
     scene_image image; /* a copy whose camera is that of the step, and whose lists belong to the scene */
-    scene_moment moment;
+    scene_placeholder_values moment;
     image frame;
     session_picture memory; /* block that holds the pixels of `frame`; owned by this struct */
     session_channels channels;

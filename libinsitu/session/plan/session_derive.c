@@ -359,7 +359,7 @@ static void make_expressions(const derive_work *w, base_error *error)
 
 /* ---- gradients --------------------------------------------------------------------------------------------------- */
 
-static int keep_component(int component, const double vector[3], double *out)
+static int select_component(int component, const double vector[3], double *out)
 {
     if (component == SCENE_COMPONENT_MAGNITUDE)
         out[0] = sqrt((vector[0] * vector[0] + vector[1] * vector[1]) + vector[2] * vector[2]);
@@ -381,9 +381,9 @@ static void compute_values(const scene_derived *derived, const double gradient[S
     case SCENE_STRAIN_RATE: out[0] = session_strain_rate(gradient); break;
     case SCENE_VORTICITY:
         session_curl(gradient, curl);
-        keep_component(derived->component, curl, out);
+        select_component(derived->component, curl, out);
         break;
-    default: keep_component(derived->component, gradient[0], out); break;
+    default: select_component(derived->component, gradient[0], out); break;
     }
 }
 

@@ -10,19 +10,19 @@
 #include "session_thresholds.h"
 
 /* A mesh whose outer faces a layer shows, and the layer's threshold. This rank may have no part of the mesh. */
-typedef struct surface_wish {
+typedef struct surface_request {
     const session_catalogue_mesh *mesh;
     const scene_threshold *threshold;
-} surface_wish;
+} surface_request;
 
 /* Returns the part's outer faces for the requested surface; NULL if it has none. */
-static session_outer *find_own_outer(const session_mesh *part, const surface_wish *wish)
+static session_outer *find_own_outer(const session_mesh *part, const surface_request *wish)
 {
     return part->is_given ? session_find_outer(part, wish->threshold) : NULL;
 }
 
 /* Returns whether the outer faces of any of this rank's parts are out of date. */
-static bool are_faces_stale(const session_meshes *meshes, const surface_wish *wish)
+static bool are_faces_stale(const session_meshes *meshes, const surface_request *wish)
 {
     const session_parts parts = session_find_parts(meshes, wish->mesh->name);
     for (int i = 0; i < parts.count; i++) {
@@ -39,7 +39,7 @@ static bool is_same_threshold(const scene_threshold *a, const scene_threshold *b
            a->high == b->high;
 }
 
-static int add_wish(surface_wish *wishes, int count, const surface_wish *wish)
+static int add_surface_request(surface_request *wishes, int count, const surface_request *wish)
 {
     for (int i = 0; i < count; i++)
         if (wishes[i].mesh == wish->mesh && is_same_threshold(wishes[i].threshold, wish->threshold)) return count;
@@ -48,27 +48,28 @@ static int add_wish(surface_wish *wishes, int count, const surface_wish *wish)
 }
 
 /* Lists the outer surfaces that an image's layers show, with their meshes. Returns the new length of the list. */
-static int list_image_wishes(const scene_image *image, const session_catalogue *catalogue, surface_wish *wishes,
+static int list_image_wishes(const scene_image *image, const session_catalogue *catalogue, surface_request *wishes,
                              int count)
 {
     static const scene_threshold none = {.is_given = false};
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         for (int n = 0; n < image->surface_count; n++) {
-            const surface_wish wish = {mesh, &image->surfaces[n].threshold};
-            if (scene_field_is_on(&image->surfaces[n].meshes_field, mesh->name)) count = add_wish(wishes, count, &wish);
+            const surface_request wish = {mesh, &image->surfaces[n].threshold};
+            if (scene_field_is_on(&image->surfaces[n].meshes_field, mesh->name))
+                count = add_surface_request(wishes, count, &wish);
         }
         for (int n = 0; n < image->isosurface_count && mesh->has_shells_alone; n++) {
             const scene_field *field = &image->isosurfaces[n].field;
             const bool is_on = scene_field_is_on(field, mesh->name) && session_catalogue_find(mesh, field->name);
-            if (is_on) count = add_wish(wishes, count, &(surface_wish){mesh, &none});
+            if (is_on) count = add_surface_request(wishes, count, &(surface_request){mesh, &none});
         }
     }
     return count;
 }
 
 /* Lists the outer surfaces of all images, in the same order on all ranks. Returns their number. */
-static int list_wishes(const session_plan *plan, const session_catalogue *catalogue, surface_wish *wishes)
+static int list_wishes(const session_plan *plan, const session_catalogue *catalogue, surface_request *wishes)
 {
     int count = 0;
     for (int i = 0; i < plan->image_count; i++)
@@ -78,8 +79,8 @@ static int list_wishes(const session_plan *plan, const session_catalogue *catalo
 
 /* Determines which outer faces are out of date on some rank. If a rank has failed before, all return its error.
  * Collective. */
-static insitu_status find_stale_wishes(const session_meshes *meshes, const surface_wish *wishes, int count,
-                                       const session_team *team, int *stale, bool *is_any, base_error *error)
+static insitu_status find_stale_surfaces(const session_meshes *meshes, const surface_request *wishes, int count,
+                                         const session_team *team, int *stale, bool *is_any, base_error *error)
 {
     /* first entry: nonzero if this rank has failed; the others: nonzero if its outer faces of a surface are out of
      * date */
@@ -97,7 +98,7 @@ static insitu_status find_stale_wishes(const session_meshes *meshes, const surfa
                              "MPI_Allreduce");
 }
 
-static insitu_status find_faces(const session_meshes *meshes, const surface_wish *wish, const session_team *team,
+static insitu_status find_faces(const session_meshes *meshes, const surface_request *wish, const session_team *team,
                                 base_error *error)
 {
     const session_parts parts = session_find_parts(meshes, wish->mesh->name);
@@ -142,13 +143,13 @@ insitu_status session_update_surfaces(const session_plan *plan, const session_ca
 {
     const size_t most = (size_t)plan->surface_count * (size_t)catalogue->mesh_count;
     int count = 0, *stale = base_calloc(most, sizeof *stale);
-    surface_wish *wishes = base_calloc(most, sizeof *wishes);
+    surface_request *wishes = base_calloc(most, sizeof *wishes);
     bool is_any = false;
     if (!stale || !wishes)
         session_fail_for_memory(error, (int64_t)(most * (sizeof *stale + sizeof *wishes)), "surfaces");
     else
         count = list_wishes(plan, catalogue, wishes);
-    insitu_status status = find_stale_wishes(meshes, wishes, count, team, stale, &is_any, error);
+    insitu_status status = find_stale_surfaces(meshes, wishes, count, team, stale, &is_any, error);
     for (int i = 0; i < count && !status && is_any; i++)
         if (stale[i]) status = find_faces(meshes, &wishes[i], team, error);
     base_free(stale);

@@ -525,7 +525,7 @@ enum { NO_OWNER = 254, SHARED = 255 };
 
 /* Records that this thread adds to the sum of the vertex, if it has one. If no other thread adds to a sum, the
  * additions need not be atomic. */
-static void claim_sum(const target *to, int64_t vertex)
+static void record_adding_thread(const target *to, int64_t vertex)
 {
     const session_gradient_basis *basis = to->basis;
     unsigned char before = NO_OWNER;
@@ -537,15 +537,15 @@ static void claim_sum(const target *to, int64_t vertex)
     if (before != to->owner) __atomic_store_n(owner, SHARED, __ATOMIC_RELAXED);
 }
 
-static void claim_sums(const target *to, int64_t cell)
+static void record_adding_threads(const target *to, int64_t cell)
 {
     const session_polynomials *p = to->basis->polynomials;
     const int64_t size = p ? session_row_size(&p->rows, cell) : 0;
-    for (int n = 0; n < size; n++) claim_sum(to, session_row_node(&p->rows, cell, n));
+    for (int n = 0; n < size; n++) record_adding_thread(to, session_row_node(&p->rows, cell, n));
     if (p) return;
     grid_walk walk = grid_walk_cell(to->basis->cells, cell);
     int64_t vertex;
-    while (grid_walk_next(&walk, &vertex)) claim_sum(to, vertex);
+    while (grid_walk_next(&walk, &vertex)) record_adding_thread(to, vertex);
 }
 
 /* Adds the contributions of all cells. Both loops distribute the cells among the threads in the same way. */
@@ -564,7 +564,7 @@ static bool add_all_cells(const target *like, const session_cell_list *list, ses
         node_list nodes = {0};
         if (to.owners && omp_get_num_threads() < NO_OWNER) {
 #pragma omp for schedule(static)
-            for (int64_t i = 0; i < list->count; i++) claim_sums(&to, list->cells[i]);
+            for (int64_t i = 0; i < list->count; i++) record_adding_threads(&to, list->cells[i]);
         }
 #pragma omp for schedule(static)
         for (int64_t i = 0; i < list->count; i++) add_cell(&to, list->cells[i], &nodes);

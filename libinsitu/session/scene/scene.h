@@ -640,20 +640,20 @@ const scene_warp *scene_find_warp(const scene *s, const char *mesh);
 const scene_mirror *scene_find_mirror(const scene *s, const char *mesh);
 
 /* The values by which placeholders are replaced. */
-typedef struct scene_moment {
+typedef struct scene_placeholder_values {
     const char *name; /* name of the image */
     long long cycle;
     double time;
     int view, plane;
     double isovalue;
     const char *field; /* field that the sweep selects; NULL if there is no sweep */
-} scene_moment;
+} scene_placeholder_values;
 
-scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double time);
+scene_placeholder_values scene_placeholder_values_of(const scene_image *image, int64_t cycle, double time);
 
 /* Returns the pattern with its placeholders replaced: {cycle} or {cycle:0N}, likewise {view} and {plane}; {time} or
  * {time:.Nf} (or e, or g), likewise {isovalue}; {name} and {field}. Numbers have a decimal point in any locale. The
  * result is from base_alloc(); NULL if memory ran out. */
-char *scene_expand(const char *pattern, const scene_moment *moment);
+char *scene_expand(const char *pattern, const scene_placeholder_values *moment);
 
 #endif

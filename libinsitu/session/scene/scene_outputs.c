@@ -85,7 +85,7 @@ static int write_number(const placeholder *p, double value, int fewest, char *ou
 
 /* Writes the placeholder's value to out and returns its length. size: bytes at out; with NULL and 0 only the length is
  * computed. */
-static int write_value(const placeholder *p, const scene_moment *moment, char *out, size_t size)
+static int write_value(const placeholder *p, const scene_placeholder_values *moment, char *out, size_t size)
 {
     switch (p->kind) {
     case PLACEHOLDER_CYCLE: return snprintf(out, size, "%0*lld", p->digits, moment->cycle);
@@ -100,7 +100,7 @@ static int write_value(const placeholder *p, const scene_moment *moment, char *o
 
 /* Writes the expanded text to out and returns its length. size: bytes at out; with NULL and 0 only the length is
  * computed. */
-static size_t expand_pattern(const char *pattern, const scene_moment *moment, char *out, size_t size)
+static size_t expand_pattern(const char *pattern, const scene_placeholder_values *moment, char *out, size_t size)
 {
     size_t length = 0;
     while (*pattern) {
@@ -118,7 +118,7 @@ static size_t expand_pattern(const char *pattern, const scene_moment *moment, ch
     return length;
 }
 
-char *scene_expand(const char *pattern, const scene_moment *moment)
+char *scene_expand(const char *pattern, const scene_placeholder_values *moment)
 {
     c_locale numbers;
     if (!c_locale_enter(&numbers)) return NULL;
@@ -266,10 +266,11 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
 static const long long sample_cycle = 123456789012345678;
 static const double sample_time = 0.5;
 
-scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double time)
+scene_placeholder_values scene_placeholder_values_of(const scene_image *image, int64_t cycle, double time)
 {
     const scene_variant *v = &image->variant;
-    return (scene_moment){image->name, (long long)cycle, time, v->view, v->plane, image->isovalue, image->swept_field};
+    return (scene_placeholder_values){image->name,     (long long)cycle,  time, v->view, v->plane,
+                                      image->isovalue, image->swept_field};
 }
 
 /* The path of an output's file, and the output's index among all outputs of the scene. */
@@ -335,7 +336,7 @@ insitu_status scene_check_outputs(const scene_document *d, const scene *s)
     int count = 0;
     insitu_status status = INSITU_OK;
     for (int i = 0; i < s->image_count && !status; i++) {
-        const scene_moment moment = scene_moment_of(&s->images[i], sample_cycle, sample_time);
+        const scene_placeholder_values moment = scene_placeholder_values_of(&s->images[i], sample_cycle, sample_time);
         for (int o = 0; o < s->images[i].output_count && !status; o++) {
             files[count] = (written_file){scene_expand(s->images[i].outputs[o].path, &moment), i, o, count};
             if (files[count++].path == NULL) status = scene_fail_for_memory(d);

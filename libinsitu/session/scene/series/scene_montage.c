@@ -11,7 +11,7 @@
 /* Returns the output's path, expanded for a sample cycle and time, by which outputs are compared (scene_outputs.c). */
 static char *name_at_sample(const scene_image *image, const scene_output *output, int view)
 {
-    scene_moment moment = scene_moment_of(image, 123456789012345678, 0.5);
+    scene_placeholder_values moment = scene_placeholder_values_of(image, 123456789012345678, 0.5);
     moment.view = view;
     return scene_expand(output->path, &moment);
 }
