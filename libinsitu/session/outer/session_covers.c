@@ -24,7 +24,7 @@ enum { BOX_WORDS = sizeof(session_level_box) / sizeof(uint64_t) };
 typedef struct box_bins {
     int64_t count;
     int64_t *boxes;            /* for each sorted box, its index in the array that was sorted */
-    double (*centres)[3];      /* centre of each sorted box */
+    double (*centres)[3];      /* centre of each box */
     double largest_half_width; /* half of the largest side length of all boxes */
     session_bins bins;
 } box_bins;
@@ -58,7 +58,7 @@ static session_level_box make_level_box(const session_mesh *mesh, int rank)
     session_level_box out = {SESSION_HASH_BEGIN, mesh->block, rank, {0, 0, 0}, {1, 1, 1}, {1, 1, 1}};
     session_hash_text(&out.mesh, mesh->name);
     for (int axis = 0; axis < 3; axis++) {
-        /* along the axis that has no cells, the quads of all blocks are treated as if they had the same position */
+        /* along the axis without cells, the quads of all blocks count as lying in the same place */
         if (!l->cells[axis]) continue;
         out.lower[axis] = l->first[axis] + cells->drawn_first[axis];
         out.upper[axis] = l->first[axis] + cells->drawn_end[axis];
@@ -215,7 +215,7 @@ static bool bin_boxes(const session_level_box *boxes, int64_t count, bool with_c
     return session_bins_create(&out->bins, out->centres[0], (int64_t)sizeof *out->centres, out->count);
 }
 
-/* Returns the quotient a / b rounded down. */
+/* Returns a / b, rounded down. */
 static int64_t floor_quotient(int64_t a, int64_t b)
 {
     const int64_t q = a / b;
@@ -485,8 +485,7 @@ insitu_status session_drop_faces_between_levels(const session_meshes *meshes, co
     if (has_levels && !bin_boxes(meshes->level_boxes, meshes->level_box_count, true, &bins))
         session_fail_for_memory(error, meshes->level_box_count * 32, "faces between levels");
     for (int i = 0; i < count && has_levels && !error->status; i++) {
-        /* a mirror image has its source's cells and faces, with the same numbers */
-        const session_mesh *mesh = session_source(parts[i].mesh);
+        const session_mesh *mesh = session_source(parts[i].mesh); /* an image's cells and faces have the same numbers */
         if (is_level_block(mesh) && !session_is_plane(mesh->given.lattice) && !parts[i].outer->threshold.is_given)
             drop_inner_faces(meshes, &bins, mesh, parts[i].outer);
     }

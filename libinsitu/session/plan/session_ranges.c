@@ -71,13 +71,13 @@ static int pass_shift(int pass)
     return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
 }
 
-/* Returns the mask of the leading bits that are known before a pass. */
+/* Returns the mask of the bits that are known before a pass. */
 static uint64_t known_bits_mask(int pass)
 {
     return pass ? ~UINT64_C(0) << pass_shift(pass - 1) : 0;
 }
 
-/* Values of this rank that the last pass has counted, unsorted. They are stored if there are at most MOST_KEPT. */
+/* This rank's values that the last pass has considered, unsorted; they are stored if there are at most MOST_KEPT. */
 enum { MOST_KEPT = 4096, FIRST_KEPT = 2 };
 
 typedef struct weighted_value {
