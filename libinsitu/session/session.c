@@ -9,15 +9,13 @@
 #include "session_field_input.h"
 #include "session_mesh_input.h"
 
-/* The error that insitu_error(NULL) returns, because after a failed insitu_create() there is no session that could
- * store it. */
+/* The message that insitu_error(NULL) returns: after a failed insitu_create() there is no session. */
 static _Thread_local base_error thread_error;
 
-/* The report that is returned to a fill function while it runs, because the step's own report is incomplete then. */
+/* Returned while a fill function runs, when the step's report is incomplete. */
 static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = ""};
 
-/* Refuses a call made from inside a fill function. The refusal is recorded in the session, the only change made to it,
- * for which const is cast away. */
+/* Refuses a call made from inside a fill function. Casts const away to record the refusal, which is the only change. */
 static bool is_in_fill(const insitu_session *session, const char *call)
 {
     return session_refuse_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);

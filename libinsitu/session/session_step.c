@@ -40,13 +40,13 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Reads the edited scene, and drops everything that was created for images of the old one. If the new scene splits
- * cells of higher order differently, cells count as changed. */
+/* Reads the edited scene, and drops everything that was created for images of the old one. Cells count as changed if
+ * they are split otherwise. */
 static void reload_scene(insitu_session *s, session_changes *changes)
 {
     const int pieces = s->scene_file.scene.finer_pieces;
     session_writer_drain(&s->writer);
-    /* waits until all queued pictures are written, because the writer uses the old scene */
+    /* waits for pictures that are being written, so that the old scene is no longer used */
     session_writer_collect(&s->writer, &s->report);
     if (!session_reload_scene(&s->scene_file, &s->team)) return;
     session_writer_drop_memory(&s->writer);
@@ -161,7 +161,7 @@ static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed
     return status;
 }
 
-/* Replaces cells of higher order by finer ones if the scene requests it. Collective. */
+/* Reads cells of higher order as finer ones, if the scene says so. Collective. */
 static insitu_status refine_cells(insitu_session *s, base_error *error)
 {
     const int pieces = s->scene_file.scene.finer_pieces;
@@ -172,8 +172,8 @@ static insitu_status refine_cells(insitu_session *s, base_error *error)
     return status || !is_any ? status : session_check_meshes(&s->meshes, &s->team, error);
 }
 
-/* Checks the changed contents of meshes, and updates the catalogue. Meshes and fields with faults are excluded from the
- * step; *refused is the first fault. Collective. */
+/* Checks the changed contents of meshes, and updates the catalogue. Meshes and fields with faults are put aside:
+ * *refused is the first fault. Collective. */
 static insitu_status update_meshes(insitu_session *s, const session_changes *changes, base_error *refused,
                                    base_error *error)
 {

@@ -21,12 +21,11 @@ typedef struct session_text {
 } session_text;
 
 typedef struct session_report {
-    /* the report for the caller; its texts are set only at the end of a step */
-    insitu_report public_report;
-    session_text copied_why, left_out, warnings; /* lines of the members of insitu_report with these names */
+    insitu_report public_report;                 /* its texts are set only at the end of a step */
+    session_text copied_why, left_out, warnings; /* texts of the members of insitu_report with these names */
     /* warnings of this rank alone, until session_share_lines() sends those of one rank to all ranks */
     session_text own_warnings;
-    int reported_count; /* number of entries of `reported` */
+    int reported_count; /* number of warnings in `reported` */
     uint64_t *reported; /* hashes of warnings that have been reported and whose condition still holds */
     /* result of session_unusable_key() when warnings of unusable cells were last reported; 0: there were none */
     uint64_t unusable_key;

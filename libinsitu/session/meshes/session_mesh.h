@@ -194,9 +194,9 @@ typedef struct session_finer {
     int64_t counts[SESSION_FINER_COUNTS];
     int parts;         /* number of parts of each edge between two nodes; 0: session_mesh.given is the caller's mesh */
     bool is_lobatto;   /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
-    insitu_mesh nodal; /* the caller's mesh, with copies of those arrays that cannot be read in place */
+    insitu_mesh nodal; /* the caller's mesh with copies in place of the arrays that cannot be read in place */
     insitu_mesh fine;  /* same as session_mesh.given: cells with separate nodes in lexicographic order */
-    double *coordinates; /* coordinates of the nodes, 3 per node */
+    double *coordinates; /* 3 per node */
     int64_t *offsets;    /* NULL if all cells have the same type and order */
     unsigned char *types;
     int64_t bytes;
@@ -520,8 +520,7 @@ static inline int64_t session_cell_count(const session_mesh *mesh)
     return mesh->cells.lattice ? mesh->lattice.cells.cell_count : mesh->given.cell_count;
 }
 
-/* Returns the caller's cell to which a cell of `cells` belongs. They are the same cell unless cells are split into
- * pieces. */
+/* Returns the caller's cell that contains a cell of `cells`: that cell itself, unless cells are split into pieces. */
 static inline int64_t session_given_cell(const session_mesh *mesh, int64_t cell)
 {
     return mesh->topology.is_split ? (int64_t)mesh->topology.parents[cell] : cell;

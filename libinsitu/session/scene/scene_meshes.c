@@ -86,10 +86,10 @@ insitu_status scene_convert_meshes_drawn(const scene_document *d, const scene_fi
 {
     insitu_status status = INSITU_OK;
     if (in->meshes_count == 0) return INSITU_OK;
-    /* displacements and mirrored coordinates exist at nodes, but not at the nodes of the finer lattices between them */
+    /* Displacements and mirrored coordinates are those of nodes, not of the finer lattices between them. */
     if (in->finer_pieces && *in->finer_pieces > 1)
-        return scene_fail_at_key(d, "finer_pieces", "",
-                                 "is %d and meshes are warped or mirrored, expected 1 with these", *in->finer_pieces);
+        return scene_fail_at_key(d, "finer_pieces", "", "is %d and meshes are warped or mirrored, expected 1 with these",
+                                 *in->finer_pieces);
     out->warps = base_calloc((size_t)in->meshes_count, sizeof *out->warps);
     out->mirrors = base_calloc((size_t)in->meshes_count, sizeof *out->mirrors);
     if (!out->warps || !out->mirrors) return scene_fail_for_memory(d);

@@ -285,8 +285,8 @@ typedef struct scene_file {
     int *threads;      /* number of threads per rank */
     int *tree;         /* whether trees are built over all cells or over candidates alone (scene_tree) */
     int *schedule;     /* schedule of compositing (scene_schedule) */
-    int *writing;      /* when pictures are written: during the step, or after it by a thread (scene_writing) */
-    int *finer_pieces; /* number of pieces between two nodes of a cell of higher order */
+    int *writing;      /* when pictures are written: during the step or behind it (scene_writing) */
+    int *finer_pieces; /* pieces between two nodes of a cell of higher order */
     scene_file_image *images;
     int images_count;
     scene_file_statistics *statistics;
