@@ -52,7 +52,7 @@ typedef struct comp_route {
  * round of COMP_RADIX. */
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
-/* These functions convert a rank to its place, and a place to its rank. */
+/* Convert a rank to its place, and a place to its rank. */
 int comp_route_place(const comp_route *route, int rank);
 int comp_route_rank(const comp_route *route, int place);
 

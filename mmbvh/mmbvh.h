@@ -61,7 +61,7 @@ typedef struct mmbvh {
                                ranges */
 } mmbvh;
 
-/* These functions read nodes of either layout; traversals use them instead of the arrays. The box is in elements 0 to 2
+/* Functions that read nodes of either layout; traversals use them instead of the arrays. The box is in elements 0 to 2
  * of lower and upper; element 3 is scratch, so that whole vectors can be stored. */
 static inline void mmbvh_node_box(const mmbvh *tree, int64_t index, float lower[4], float upper[4])
 {

@@ -11,8 +11,8 @@
 
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
-/* How the vertices of a cell are found: all cells are tets, all are hexes, all have the same other type, each has its
- * own type, or the cells form a lattice. */
+/* The way in which the vertices of a cell are found: all cells are tets, all are hexes, all have the same other type,
+ * each has its own type, or the cells form a lattice. */
 typedef enum fetch_shape {
     FETCH_TETS,
     FETCH_HEXES,

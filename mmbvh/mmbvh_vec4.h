@@ -106,9 +106,9 @@ static inline vec4 vec4_from_int(ivec4 a)
 #endif
 }
 
-/* These round a double to the nearest float that is not above, or not below, x. Outside the range of float the result
- * is the largest finite float or infinity, whichever is in the direction of rounding. A zero result is always positive,
- * so that equal bounds have equal bits. */
+/* Round a double to the nearest float that is not above, or not below, x. Outside the range of float the result is the
+ * largest finite float or infinity, whichever is in the direction of rounding. A zero result is always positive, so
+ * that equal bounds have equal bits. */
 static inline float round_down(double x)
 {
     float f = (float)x;

@@ -147,7 +147,7 @@ typedef struct render_pending_hit {
     float t, reach;
 } render_pending_hit;
 
-/* What is needed to light such a hit: the gradient in its own cell, in camera axes, and its unlit colour. */
+/* The data for lighting a pending hit: the gradient in its own cell, in camera axes, and its unlit colour. */
 typedef struct render_pending_shading {
     float normal[3], colour[3];
 } render_pending_shading;
@@ -282,8 +282,8 @@ typedef struct render_clip {
     double centre[3], radius;  /* centre and radius of a sphere, in world coordinates */
 } render_clip;
 
-/* What the fragments of hits contain: lit or unlit colours, or numbers of the pixel's nearest surface as red, green and
- * blue. With numbers, all surfaces must be opaque and there must be no volumes. */
+/* The contents of the fragments of hits: lit or unlit colours, or numbers of the pixel's nearest surface as red, green
+ * and blue. With numbers, all surfaces must be opaque and there must be no volumes. */
 typedef enum render_paint {
     RENDER_LIGHT,
     /* Surfaces that take light get their colours before lighting, and their normal in place of t_out and transmittance.

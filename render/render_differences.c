@@ -196,7 +196,8 @@ insitu_status render_differences_light(const render_job *job, const render_pendi
                                        const render_difference_samples *samples, int64_t first, int64_t count,
                                        fragment *out, base_error *error)
 {
-    /* With a list that begins at hit `first`, hits, samples and fragments have the same indices, from 0 on. */
+    /* offsets by which hits, samples and fragments of a list that begins at hit `first` have the same indices, from 0
+     * on */
     const render_pending_list some = {list->items + first, list->shadings + first, count, count};
     chunk_work work = {.list = &some, .merged = samples, .out = out};
     return count ? process_chunks(job, &work, 0, count, error) : INSITU_OK;

@@ -17,7 +17,7 @@ typedef struct render_folding {
 
 /* Folds a tile's fragments, those of the list from `first` on, each of which is one sample or segment. The volume
  * fragments of a pixel in a halved interval become one fragment if this rank has all of them (fragment_fold.h).
- * FRAGMENT_EARLY marks a fragment before which a surface or another rank's fragment may come; FRAGMENT_LATE marks
+ * FRAGMENT_EARLY marks a fragment in front of which a surface or another rank's fragment may lie; FRAGMENT_LATE marks
  * overlapping cells. Returns false if memory ran out. */
 bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list, int64_t first);
 

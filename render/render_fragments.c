@@ -52,7 +52,7 @@ bool fragment_reserve(fragment_list *list, int64_t more)
     const int64_t grown = list->capacity + list->capacity / 2 + 1024;
     const int64_t capacity = grown > needed ? grown : needed;
     if (w->piece < 0) return grow(list, capacity);
-    /* The fragments move out of the piece, which thereby becomes empty. */
+    /* the fragments are moved out of the piece, which thereby becomes empty */
     fragment_list own = {0};
     if (!grow(&own, capacity)) return false;
     memcpy(own.items, list->items, (size_t)list->count * sizeof *own.items);

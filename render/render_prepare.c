@@ -200,7 +200,7 @@ static void prepare_clips(kernel_frame *f)
         f->volume_intervals = 1 + __builtin_popcount(job->volume_clips & outside);
 }
 
-/* Opaque layers come first; kinds number the isovalues in the job's order. */
+/* opaque layers are stored first; kinds number the isovalues in the job's order */
 static void prepare_surfaces(kernel_frame *f)
 {
     const render_job *job = f->job;

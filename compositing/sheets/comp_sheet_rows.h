@@ -5,8 +5,8 @@
 #include "comp_lanes.h"
 #include "comp_sheet_loops.h"
 
-/* How a word is stored. The first two predict a word by linear extrapolation from the two rows above, or as equal to
- * the row above. The others store one value for all pixels, or nothing because the word equals the preceding one. */
+/* The ways to store a word. The first two predict a word by linear extrapolation from the two rows above, or as equal
+ * to the row above. The others store one value for all pixels, or nothing because the word equals the preceding one. */
 enum word_kind { WORD_LINEAR, WORD_CONSTANT, WORD_UNIFORM, WORD_REPEATED };
 
 /* Returns the nearest lane in `known` to the left of `lane`, or the nearest to the right if there is none. */

@@ -73,8 +73,8 @@ static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int sha
     return is_ok;
 }
 
-/* What a thread packs for one partner in the first round: the fragments for all owners that have the partner's digit,
- * except this place itself. */
+/* The fragments that a thread packs for one partner in the first round: those for all owners that have the partner's
+ * digit, except this place itself. */
 typedef struct batch {
     int digit, radix, place;
     int share, shares;

@@ -142,8 +142,8 @@ static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_
     return status;
 }
 
-/* Warps and mirrors meshes as the scene says. *are_cells_changed is set if that changes cells or coordinates on any
- * rank. Collective. */
+/* Warps and mirrors the meshes for which the scene requests it. *are_cells_changed is set if that changes cells or
+ * coordinates on any rank. Collective. */
 static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed, base_error *error)
 {
     const scene *scene = &s->scene_file.scene;

@@ -544,7 +544,7 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
     return (kernel_beam){.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
 }
 
-/* Computes the bounds of one cell that is traced on its own, with its data in all lanes. */
+/* Computes the bounds of a single cell, and stores the cell's data in all lanes. */
 static __attribute__((noinline, unused)) void kernel_curved_single_bounds(const kernel_cell *c, const kernel_beam *beam,
                                                                           kernel_curved *out)
 {

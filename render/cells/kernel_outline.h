@@ -48,7 +48,7 @@ SIMD_INLINE void kernel_vertex_outline(const kernel_cell *c, kernel_outline *o)
  * corners, and so everywhere, because J is linear in each coordinate). Then no two reference points have the same
  * position, and points between a ray's crossings of the faces are in the cell. */
 
-/* How the Jacobian of a type of cell is computed from the vertices. At the cell's middle its columns are weighted sums
+/* Constants from which the Jacobian of a type of cell is computed. At the cell's middle its columns are weighted sums
  * of the vertices' positions (`middle`). At the corners each column is vertex 1 - vertex 0, plus vertex 3 - vertex 2 if
  * these two differ. */
 typedef struct kernel_differential {

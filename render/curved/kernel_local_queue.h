@@ -62,7 +62,7 @@ struct kernel_local_lanes {
     /* first and last column, first and last row of pixels in which each lane's cell may be visible
      * (kernel_local_pixels()) */
     int32_t ends[4][SIMD_WIDTH];
-    int alone; /* the lane whose cell is the tile's current cell, ready to be traced on its own; -1 if there is none */
+    int alone; /* the lane whose cell is the tile's current cell (kernel_tile_make_current()); -1 if there is none */
     kernel_pixel_list rays;
 };
 

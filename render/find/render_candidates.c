@@ -1,8 +1,8 @@
-/* How candidates are found in parallel: subtrees are distributed among threads. Each thread lists the cells that it
- * finds, counts them by tile, and bins its own cells; threads do not synchronize in between. The thread that traces a
- * tile gathers the tile's cells from the bins of all threads. A bound on the number of cells limits memory and wasted
- * time: if there is more than one cell per pixel, most listed cells are hidden or smaller than a pixel. Cells of a
- * volume are not hidden, so a million of them may be listed in any case. */
+/* Finds candidates in parallel. Subtrees are distributed among threads. Each thread lists the cells that it finds,
+ * counts them by tile, and bins its own cells; threads do not synchronize in between. The thread that traces a tile
+ * gathers the tile's cells from the bins of all threads. A bound on the number of cells limits memory and wasted time:
+ * if there is more than one cell per pixel, most listed cells are hidden or smaller than a pixel. Cells of a volume are
+ * not hidden, so a million of them may be listed in any case. */
 #include "render_candidates.h"
 #include "kernel_bins.h"
 #include "kernel_types.h"

@@ -46,14 +46,15 @@ typedef struct kernel_tile_cells {
     kernel_tile_candidate *items;
     int count, open_count, next;
     int sorted, end_count, ends[KERNEL_SORT_ENDS];
-    kernel_cell cell;     /* the cell that is being traced on its own */
+    kernel_cell cell;     /* the cell that packets are tracing */
     kernel_map map;       /* inverse map of that cell */
     kernel_arrays arrays; /* arrays of the volume's field on the current mesh part */
     int plain_volume, plain_part;
     kernel_transformed_tets transformed;
     kernel_block_rays block_rays;
-    kernel_local_queue tets;            /* tets that are transformed SIMD_WIDTH at a time */
-    kernel_tile_trace_tets *trace_tets; /* NULL if each tet is processed on its own */
+    kernel_local_queue tets; /* tets that are transformed SIMD_WIDTH at a time */
+    /* callback that traces small tets in lanes; NULL if each tet is traced by packets */
+    kernel_tile_trace_tets *trace_tets;
 } kernel_tile_cells;
 
 /* Transforms the cell that has been read, and prepares it for the rays of the blocks. Returns the blocks in which it

@@ -28,7 +28,7 @@ typedef struct session_news {
     base_error error; /* error of the last step that failed or has drawn pictures; empty if it has drawn them */
 } session_news;
 
-/* What report.json says about the scene file. */
+/* The scene file's state, as written into report.json. */
 typedef struct session_news_scene {
     const scene *scene;
     const char *path; /* path of the file as given by the caller */

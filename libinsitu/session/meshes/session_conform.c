@@ -10,7 +10,7 @@
 #include "region.h"
 #include "session_agree.h"
 
-/* What the numbers in an array mean. */
+/* The meaning of the numbers in an array. */
 typedef enum conform_role { OF_PLACES, OF_INDICES, OF_TYPES, OF_FLAGS } conform_role;
 
 /* An array of a mesh that may have to be copied. */

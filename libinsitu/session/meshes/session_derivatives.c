@@ -18,15 +18,15 @@
 
 enum { MOST_NODES_OF_LINE = NODES_MOST_ORDER + 1 };
 
-/* Terms in the making. They are counted while out->nodes is NULL, and then stored. */
+/* The terms of derivatives while they are computed. They are counted while out->nodes is NULL, and then stored. */
 typedef struct term_list {
     session_derivatives *out;
     const session_nodes *of;
     insitu_vertex_order order;
     int count;
-    double lines[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE]; /* derivative at the first node of the second's function */
+    double lines[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE]; /* [i][j]: derivative at node i of the function of node j */
     double values[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE],
-        slopes[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE]; /* of B_n(t) */
+        slopes[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE]; /* derivatives of B_n(t), as defined at the top of this file */
 } term_list;
 
 /* ---- one dimension --------------------------------------------------------------------------------------------- */

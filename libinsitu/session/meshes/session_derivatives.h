@@ -42,7 +42,8 @@ typedef struct session_polynomials {
     session_derivatives *kinds; /* for each kind, the derivatives for equispaced nodes, then those for Gauss-Lobatto */
 } session_polynomials;
 
-/* Returns false if memory runs out; the caller must free *out in any case. Local. */
+/* Finds the polynomials of a mesh's cells. Returns false if memory runs out; the caller must free *out in any case.
+ * Local. */
 bool session_polynomials_create(const session_mesh *mesh, session_polynomials *out);
 void session_polynomials_free(session_polynomials *polynomials);
 

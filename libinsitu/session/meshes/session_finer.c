@@ -18,7 +18,7 @@ _Static_assert(PYRAMIDS + 1 == SESSION_FINER_COUNTS, "each count has a place");
 /* ---- all cells of a mesh ----------------------------------------------------------------------------------------- */
 
 typedef struct finer_work {
-    session_rows rows; /* of the caller's cells */
+    session_rows rows; /* rows of the caller's cells */
     const session_finer *finer;
     session_interpolation kinds[ROWS_MOST_KINDS];
     int64_t node_count; /* number of nodes of all finer lattices */

@@ -29,7 +29,7 @@ typedef struct session_node_values {
     const void *of;
     bool is_by_entry;    /* set if positions are entries of connectivity, counted without the unused ends of rows;
                             otherwise they are vertices */
-    int component_count; /* of a tuple */
+    int component_count; /* number of components of a tuple */
     void (*read)(const void *of, int64_t position, double *tuple);
 } session_node_values;
 

@@ -11,7 +11,7 @@
 
 enum { MOST_SAMPLES = 1024 };
 
-/* What each rank sends to all others. */
+/* The data that each rank sends to all other ranks. */
 typedef struct rank_part {
     session_box box;
     int64_t first_id; /* first id of this rank's share of the ids */

@@ -23,7 +23,7 @@ typedef struct session_box {
     double lower[3], upper[3];
 } session_box;
 
-/* What a rank stores about the parts of one or several meshes on all ranks, to find the home of an item. */
+/* The data by which a rank finds the homes of items of one or several meshes. */
 typedef struct session_homes {
     bool is_computed; /* set if the other members are up to date */
     bool by_id;       /* set if homes are found by global vertex ids, and not by positions */
@@ -34,8 +34,8 @@ typedef struct session_homes {
     int near_count;
     int *near_ranks;
     session_box *boxes; /* box of each of these ranks */
-    /* If by_id: the ids are divided into ranges. Each range has its first id and the rank that is the home of its
-     * ids. */
+    /* Used if by_id is set: the ids are divided into ranges. Each range has its first id and the rank that is the home
+     * of its ids. */
     int share_count;
     int64_t *first_ids;
     int *owners;

@@ -42,7 +42,7 @@ static void weigh_line(int p, int parts, bool is_lobatto, double *out)
         }
 }
 
-/* Computes B_n(t) of session_derivatives.c. */
+/* Computes B_n(t), as defined in session_derivatives.c. */
 static double find_product(int n, double t)
 {
     double value = 1;
@@ -123,7 +123,7 @@ void session_drop_interpolation(session_interpolation *interpolation)
 
 /* ---- one cell -------------------------------------------------------------------------------------------------- */
 
-/* A cell in the making. */
+/* The state of interpolating the values of one cell. */
 typedef struct cell_job {
     const session_interpolation *of;
     const session_shape *shape;
@@ -236,7 +236,7 @@ static void fill_inside(const cell_job *job)
 
 /* A corner and two steps from it along a face of a lattice of order 1; no second step on edges. */
 typedef struct face_axes {
-    int count; /* of the face's corners */
+    int count; /* number of the face's corners */
     const signed char *origin, *along, *across;
 } face_axes;
 

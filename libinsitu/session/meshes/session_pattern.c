@@ -24,8 +24,8 @@
 
 /* ---- listed pieces --------------------------------------------------------------------------------------------- */
 
-/* A list of pieces in the making. The pieces are counted while `piece_positions` and `types` are NULL, and then stored.
- */
+/* A list of pieces while it is made. The pieces are counted while `piece_positions` and `types` are NULL, and then
+ * stored. */
 typedef struct pattern_list {
     session_pattern *out;
     insitu_vertex_order order;

@@ -21,13 +21,14 @@ typedef struct session_pattern {
     int piece_count, piece_size; /* number of listed pieces, and of entries of `piece_positions` */
     unsigned char *types;
     int *piece_positions; /* positions of the pieces' vertices, one piece after the other */
-    int polygon_count;    /* 0 unless it is a serendipity cell */
+    int polygon_count;    /* number of polygons of a serendipity cell; 0 for all other cells */
     pattern_polygon polygons[PATTERN_MOST_POLYGONS];
     int midpoint_count;
     int midpoints[12]; /* positions of the midpoints of edges */
 } session_pattern;
 
-/* Returns false if there is no memory. Of a linear cell (order 1) the only piece is the cell. */
+/* Lists the pieces of a type and order of cell. Returns false if memory runs out. The only piece of a linear cell
+ * (order 1) is the cell itself. */
 bool session_make_pattern(int type, const session_nodes *nodes, insitu_vertex_order order, session_pattern *out);
 void session_drop_pattern(session_pattern *pattern);
 

@@ -12,7 +12,7 @@ static inline const void *session_face_list(const insitu_mesh *mesh, int64_t fac
     return *(const void *const *)(const void *)((const char *)mesh->face_lists.data + face * stride);
 }
 
-/* Where the vertices of one of the caller's faces are stored. */
+/* The place at which the vertices of one of the caller's faces are stored. */
 typedef struct session_face_row {
     grid_array list;
     int64_t first, size; /* index of the row's first entry in the list, and number of the face's vertices */
@@ -21,7 +21,7 @@ typedef struct session_face_row {
 
 session_face_row session_given_face(const insitu_mesh *mesh, int64_t face);
 
-/* For each face, the cell that owns it and the neighbouring cell. */
+/* The caller's arrays that give, for each face, the cell that owns it and the neighbouring cell. */
 typedef struct session_face_sides {
     const insitu_mesh *given;
     grid_array owner, neighbour, boundary_owner;

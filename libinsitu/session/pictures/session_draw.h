@@ -15,8 +15,7 @@
 #include "session_team.h"
 #include "session_writer.h"
 
-/* Whether the pictures of a montage that are to share their colour bars have the same bars, as far as they have been
- * drawn in this step. */
+/* The state of comparing the colour bars of a montage's pictures, which are to share their bars, during a step. */
 typedef struct session_shared_bars {
     const char *path;    /* path of the output, with placeholders; NULL: no picture has been drawn yet */
     uint64_t hash;       /* session_decorations.bars_hash of the first picture */

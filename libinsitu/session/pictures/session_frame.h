@@ -19,7 +19,7 @@ typedef struct session_frame {
     struct render_occluders *occluders;
 } session_frame;
 
-/* Where and with which limits a frame is drawn. */
+/* The ranks that draw a frame, and the settings that they share. */
 typedef struct session_frame_target {
     MPI_Comm comm;
     comp_group compositing;

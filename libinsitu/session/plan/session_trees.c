@@ -43,7 +43,7 @@ static void update_rate(double *rate, double seconds, int64_t cells)
     *rate = *rate > 0 ? 0.5 * (*rate + now) : now;
 }
 
-/* What all updates of trees in a step share, apart from the meshes. */
+/* The data that all updates of trees in a step share, apart from the meshes. */
 typedef struct tree_update {
     session_trees *trees;
     const session_space *space;

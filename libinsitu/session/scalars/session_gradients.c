@@ -47,7 +47,7 @@ typedef struct node {
 typedef double number_pair __attribute__((vector_size(16)));
 typedef int64_t word_pair __attribute__((vector_size(16)));
 
-/* Where the contributions of corners are added: to the sums or, if `sums` is NULL, to the bounds from which the unit of
+/* The destination of the contributions of corners: the sums or, if `sums` is NULL, the bounds from which the unit of
  * the sums is derived. */
 typedef struct target {
     const session_gradient_basis *basis;

@@ -14,7 +14,7 @@ void session_update_warps(const scene *scene, const char *scene_path, session_me
 /* Warns of warps in the scene that name no mesh, and of gradients computed on warped meshes. Local. */
 void session_check_warps(const scene *scene, const session_catalogue *catalogue, session_report *report);
 
-/* How the scene changes a mesh. */
+/* The ways in which the scene changes a mesh. */
 typedef enum session_transform { SESSION_WARP = 0, SESSION_MIRROR } session_transform;
 
 /* Warns if the scene names a mesh that exists on no rank. Local. */

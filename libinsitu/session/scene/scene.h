@@ -72,7 +72,7 @@ typedef struct scene_derived {
     uint64_t joint_name;
 } scene_derived;
 
-/* How a range that is not fixed is computed. Each way uses the values on all ranks at each step that draws. */
+/* The computation of a range that is not fixed. Each uses the values on all ranks at each step that draws. */
 typedef enum scene_range_source {
     SCENE_RANGE_DATA, /* the minimum and the maximum of the values */
     /* the minimum and the maximum over all steps drawn so far, which are kept in a file across restarts
@@ -338,7 +338,7 @@ typedef struct scene_words {
 } scene_words;
 
 /* Titles, colour bars and lines that are drawn in addition to the data. */
-/* What boxes are drawn around: all data, each mesh, or the data of each rank. */
+/* The data that boxes are drawn around: all data, each mesh, or the data of each rank. */
 typedef enum scene_boxes { SCENE_NO_BOX, SCENE_BOX_OF_DATA, SCENE_BOXES_OF_MESHES, SCENE_BOXES_OF_RANKS } scene_boxes;
 
 /* The format of numbers at colour bars: the shortest that distinguishes neighbours, or fixed-point (0.25), or with an
@@ -547,7 +547,7 @@ static inline bool scene_has_words(const scene_image *image)
            (d->title || d->words_count || d->has_bars || d->has_rulers || d->has_axes || d->has_scale_bar);
 }
 
-/* Which cells trees are built over: all cells, those that images can show, or whichever costs less. */
+/* The cells over which trees are built: all cells, those that images can show, or whichever costs less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
 /* The order in which ranks exchange fragments for blending; the constants are those of comp_schedule. */
@@ -559,7 +559,7 @@ typedef enum scene_schedule {
     SCENE_SCHEDULE_BINARY
 } scene_schedule;
 
-/* When pictures are written: by a thread while the simulation continues, or before the step ends. */
+/* The time at which pictures are written: by a thread while the simulation continues, or before the step ends. */
 typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_writing;
 
 /* Maximum number of images of a scene file (session_events.h has one bit for each), and of pictures that they make in a

@@ -273,7 +273,7 @@ static bool explicit_camera(const scene_image *image, render_camera *out)
 
 /* ---- defaults from the data ------------------------------------------------------------------------------------ */
 
-/* Makes the camera look at flat data with the first of its two axes to the right and the second one up. */
+/* Directs the camera at flat data, with the first of the data's two axes to the right and the second one up. */
 static void face_flat_data(int axis, scene_camera *c)
 {
     static const double towards[3][3] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}};
