@@ -181,7 +181,7 @@ SIMD_INLINE void kernel_tile_queue_add(kernel_tile_trace *t, kernel_tile_queue *
 }
 
 /* Traces all cells that are still queued. */
-static void kernel_tile_queue_end(kernel_tile_trace *t, kernel_tile_queue *m)
+static void kernel_tile_queue_finish(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     kernel_tile_queue_trace_singly(t, m);
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) kernel_tile_queue_trace(t, m, &m->pending[i]);
@@ -265,7 +265,7 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
             if (pending.count == SIMD_WIDTH) kernel_tile_queue_prefetched(t, queue, &pending);
         }
     kernel_tile_queue_prefetched(t, queue, &pending);
-    kernel_tile_queue_end(t, queue);
+    kernel_tile_queue_finish(t, queue);
 }
 
 SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
@@ -336,7 +336,7 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
         kernel_tile_surface(t);
         if (t->thread->finder->frame) kernel_find_flush(t->thread->finder);
         kernel_tile_find_flush(&s->list);
-        kernel_tile_queue_end(t, &s->queue);
+        kernel_tile_queue_finish(t, &s->queue);
     }
 }
 

@@ -38,7 +38,7 @@ static void load_cell(const test_mesh *mesh, const grid *g, int64_t index, refer
     reference_polyhedron_setup(cell);
 }
 
-static bool is_star(const reference_polyhedron *p)
+static bool is_star_shaped(const reference_polyhedron *p)
 {
     for (int i = 0; i < p->triangle_count; i++)
         if (p->sign[i] <= 0) return false;
@@ -61,7 +61,7 @@ int64_t test_own_tets(test_mesh *mesh, test_mesh *out)
     memcpy(out->values, mesh->values, (size_t)mesh->vertex_count * sizeof(double));
     for (int64_t i = 0; i < mesh->cell_count; i++) {
         load_cell(mesh, &view.cells, i, &cell, vertices);
-        mesh->ghosts[i] = !is_star(&cell.poly);
+        mesh->ghosts[i] = !is_star_shaped(&cell.poly);
         ghosts += mesh->ghosts[i];
         if (!mesh->ghosts[i]) add_tets(&cell, vertices, out);
     }

@@ -44,7 +44,7 @@ typedef struct subject {
     double values[REFERENCE_MAX_VERTICES], low, high;
     int tet_count;
     tet tets[REFERENCE_MAX_TRIANGLES];
-    bool is_star;
+    bool is_star_shaped;
 } subject;
 
 /* A ray in a tet, from z[0] to z[1] with the values v; is_face: this end is on the cell's surface. */
@@ -123,11 +123,11 @@ static void make_tets(subject *s)
         s->high = fmax(s->high, s->values[i]);
     }
     s->tet_count = 0;
-    s->is_star = true;
+    s->is_star_shaped = true;
     for (int i = 0; i < s->cell.poly.triangle_count; i++) {
         tet *t = &s->tets[s->tet_count];
         if (!make_tet(s, i, mean, t)) continue;
-        s->is_star = s->is_star && t->sign > 0;
+        s->is_star_shaped = s->is_star_shaped && t->sign > 0;
         s->tet_count++;
     }
 }
@@ -356,7 +356,7 @@ static double band_of(const verify *j, const interval *ray_intervals, int count)
 {
     double steepest = 0;
     for (int i = 0; i < count; i++) steepest = fmax(steepest, ray_intervals[i].slope);
-    return 2e-6 * (j->s->high - j->s->low) + j->place * steepest * (j->s->is_star ? 1 : 3);
+    return 2e-6 * (j->s->high - j->s->low) + j->place * steepest * (j->s->is_star_shaped ? 1 : 3);
 }
 
 static void verify_ray(const verify *j, const reference_line *line, ray_hits *hits)
@@ -418,7 +418,7 @@ static void verify_frame(const render_fixture *f, const double iso, tally *t)
                       .is_opaque = f->surfaces[0].opacity >= 1,
                       .t = t};
     t->cells++;
-    t->stars += s.is_star;
+    t->stars += s.is_star_shaped;
     fixture_draw(f, &drawn);
     for (int y = 0; y < HEIGHT; y++)
         for (int x = 0; x < WIDTH; x++) {

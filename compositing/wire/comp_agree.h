@@ -17,8 +17,8 @@ typedef struct comp_claims {
     comp_claim items[]; /* one claim per block; two more carry the status and the maximum */
 } comp_claims;
 
-/* Allocates the claims of any picture for this number of ranks; returns NULL if memory ran out. Local.
- * comp_claims_free() may be called after MPI_Finalize(). */
+/* Allocates a buffer that is large enough for the claims of any picture that this number of ranks share; returns NULL
+ * if memory ran out. Local. comp_claims_free() may be called after MPI_Finalize(). */
 comp_claims *comp_claims_create(int ranks);
 void comp_claims_free(comp_claims *claims);
 

@@ -17,7 +17,7 @@ static bool is_requested(const session_requested_names *asked, const char *name)
     return asked->count > SESSION_MOST_REQUESTED;
 }
 
-static void add_asked(session_requested_names *asked, const char *name)
+static void record_request(session_requested_names *asked, const char *name)
 {
     if (is_requested(asked, name)) return;
     if (asked->count < SESSION_MOST_REQUESTED) asked->names[asked->count] = hash_name(name);
@@ -30,7 +30,7 @@ insitu_status session_read_parameter(const session_scene_file *file, session_req
     char others[512];
     if (!name || !value)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_parameter: %s is NULL", name ? "value" : "name");
-    add_asked(asked, name);
+    record_request(asked, name);
     const scene_parameter *found = scene_find_parameter(&file->scene, name);
     if (found) {
         *value = found->value;

@@ -530,7 +530,7 @@ typedef struct kernel_curved {
     struct kernel_curved_storage *storage; /* memory for the data and bounds of a single cell */
 } kernel_curved;
 
-/* Memory for a single cell, whose data are copied to all lanes. */
+/* Memory for the data of a single cell, which are copied to all lanes. */
 typedef struct kernel_curved_storage {
     float at[4][8][SIMD_WIDTH], colours[8][SIMD_WIDTH];
     kernel_bounds bounds;

@@ -67,7 +67,7 @@ SIMD_INLINE vf kernel_lanes_edge_error(vf size_a, vf size_b)
 }
 
 /* Computes the coefficients c, cu and cv of the edge function from a to b. */
-SIMD_INLINE void kernel_lanes_line(const kernel_frame *f, const vf a[3], const vf b[3], vf line[3])
+SIMD_INLINE void kernel_lanes_edge_function(const kernel_frame *f, const vf a[3], const vf b[3], vf line[3])
 {
     const bool flat = f->job->camera.is_orthographic;
     for (int half = 0; half < 2; half++) {
@@ -83,8 +83,8 @@ SIMD_INLINE void kernel_lanes_line(const kernel_frame *f, const vf a[3], const v
 }
 
 /* Computes the error that the edge function may have, and the edge's extent (kernel_edge_error). */
-SIMD_INLINE void kernel_lanes_line_error(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
-                                         vf *extent)
+SIMD_INLINE void kernel_lanes_edge_extent(const vf line[3], float radius, const vf a[3], const vf b[3], vf *error,
+                                          vf *extent)
 {
     vf apart[3];
     for (int i = 0; i < 3; i++) apart[i] = vf_abs(a[i] - b[i]);

@@ -488,7 +488,7 @@ static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_inte
 {
     kernel_interval *i = &polyhedron_interval->interval;
     kernel_poly_sheets(r);
-    if (r->cell->is_star) return;
+    if (r->cell->is_star_shaped) return;
     kernel_poly_segments(r);
     kernel_poly_inner_value(r, i->mask, &polyhedron_interval->in, false, &polyhedron_interval->u_in, &i->w_in);
     kernel_poly_inner_value(r, i->mask, &polyhedron_interval->out, true, &polyhedron_interval->u_out, &i->w_out);

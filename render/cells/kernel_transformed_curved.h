@@ -275,8 +275,8 @@ typedef struct kernel_lanes_lines {
     vf line[KERNEL_CURVED_EDGES][4], error[KERNEL_CURVED_EDGES], extent[KERNEL_CURVED_EDGES];
 } kernel_lanes_lines;
 
-SIMD_INLINE void kernel_lanes_lines_of(const kernel_transformed_curved *transformed, const kernel_frame *f,
-                                       const kernel_tile *tile, int type, kernel_lanes_lines *out)
+SIMD_INLINE void kernel_lanes_edge_functions(const kernel_transformed_curved *transformed, const kernel_frame *f,
+                                             const kernel_tile *tile, int type, kernel_lanes_lines *out)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     vf at[8][3], size[8];
@@ -286,8 +286,8 @@ SIMD_INLINE void kernel_lanes_lines_of(const kernel_transformed_curved *transfor
     }
     for (int n = 0; n < shape->edge_count; n++) {
         const int i = shape->edges[n][0], j = shape->edges[n][1];
-        kernel_lanes_line(f, at[i], at[j], out->line[n]);
-        kernel_lanes_line_error(out->line[n], tile->radius, at[i], at[j], &out->error[n], &out->extent[n]);
+        kernel_lanes_edge_function(f, at[i], at[j], out->line[n]);
+        kernel_lanes_edge_extent(out->line[n], tile->radius, at[i], at[j], &out->error[n], &out->extent[n]);
         out->line[n][3] = kernel_lanes_edge_error(size[i], size[j]);
     }
 }
@@ -330,7 +330,7 @@ SIMD_INLINE void kernel_transformed_faces(kernel_transformed_curved *out, const 
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     kernel_lanes_lines lines;
-    if (kernel_has_triangles(type)) kernel_lanes_lines_of(out, f, tile, type, &lines);
+    if (kernel_has_triangles(type)) kernel_lanes_edge_functions(out, f, tile, type, &lines);
     for (int face = 0; face < shape->face_count; face++) {
         if (kernel_has_triangles(type) && shape->faces[face].count == 3) {
             kernel_transformed_triangle(out, type, face, rank, &lines);

@@ -85,8 +85,8 @@ SIMD_INLINE void kernel_transformed_lines(kernel_transformed_tets *out, const ke
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         vf line[3];
-        kernel_lanes_line(f, at[i], at[j], line);
-        kernel_lanes_line_error(line, tile->radius, at[i], at[j], &error[n], &extent[n]);
+        kernel_lanes_edge_function(f, at[i], at[j], line);
+        kernel_lanes_edge_extent(line, tile->radius, at[i], at[j], &error[n], &extent[n]);
         out->c[n] = line[0];
         out->cu[n] = line[1];
         out->cv[n] = line[2];

@@ -274,14 +274,14 @@ static void store_facets(work *w, polyhedron *c)
     store_quads(w, c, quad_of);
     closed_edges_empty(&w->faces);
     c->edge_count = 0;
-    c->is_star = true;
+    c->is_star_shaped = true;
     for (int i = 0; i < c->facet_count; i++) {
         const closed_triangle *from = &w->faces.triangles[i];
         polyhedron_facet *to = &c->facets[i];
         to->quad = quad_of[from->face];
         to->other_half = -1;
         to->sign = from->volume > 0 ? 1 : from->volume < 0 ? -1 : 0;
-        c->is_star = c->is_star && to->sign >= 0;
+        c->is_star_shaped = c->is_star_shaped && to->sign >= 0;
         for (int k = 0; k < 3; k++) {
             to->vertex[k] = from->vertex[k];
             const int a = from->vertex[ends[k][0]], b = from->vertex[ends[k][1]];

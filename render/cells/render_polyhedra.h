@@ -26,7 +26,7 @@ typedef struct polyhedron {
     uint32_t index;
     int part, layer;
     bool is_finite, is_transformed, is_constant;
-    bool is_star; /* true if no tet's sign is negative: the cell is star-shaped from its centre */
+    bool is_star_shaped; /* true if no tet's sign is negative: the cell is star-shaped from its centre */
     bool has_slopes;
     int vertex_count, edge_count, facet_count;
     double (*world)[3]; /* the arrays from `world` to `lines` have one entry for each vertex, and one for the centre */

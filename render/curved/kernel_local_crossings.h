@@ -99,8 +99,8 @@ SIMD_INLINE void kernel_local_ray_box(const kernel_tile *tile, int32_t ends[4][S
         vi at;
         memcpy(&at, ends[n], sizeof at);
         at = vi_from_vf(vf_clamp(vf_from_vi(at), first, last));
-        out->slope[a][end] = kernel_batch_of_tile(a ? tile->slope_y : tile->slope_x, at);
-        out->origin[a][end] = kernel_batch_of_tile(a ? tile->origin_y : tile->origin_x, at);
+        out->slope[a][end] = kernel_gather_tile_numbers(a ? tile->slope_y : tile->slope_x, at);
+        out->origin[a][end] = kernel_gather_tile_numbers(a ? tile->origin_y : tile->origin_x, at);
     }
 }
 

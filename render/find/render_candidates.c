@@ -335,17 +335,17 @@ void render_trees_cover(kernel_frame *f)
 
 /* ---- the search ----------------------------------------------------------------------------------------------- */
 
-typedef struct search {
+typedef struct candidate_search {
     kernel_frame *frame;
     render_subtrees subtrees;
     kernel_candidate_list *lists; /* one list of candidates per thread */
     int64_t bound;
     struct kernel_bins *bins;
-} search;
+} candidate_search;
 
 /* Searches all subtrees in parallel. Each thread bins its own cells as soon as no subtree is left, without waiting for
  * the others. */
-static void run(search *s, kernel_thread *thread_of, int threads)
+static void run(candidate_search *s, kernel_thread *thread_of, int threads)
 {
     const kernel_table *kernels = render_kernels();
     const int64_t tiles = tile_count(s->frame), most = 2 * s->bound;
@@ -366,7 +366,7 @@ static void run(search *s, kernel_thread *thread_of, int threads)
 }
 
 /* Creates each thread's list and bins. Returns false if there is no memory. */
-static bool begin_lists(search *s, int threads)
+static bool begin_lists(candidate_search *s, int threads)
 {
     const int64_t tiles = tile_count(s->frame);
     s->lists = base_calloc((size_t)threads, sizeof *s->lists);
@@ -384,7 +384,7 @@ static bool begin_lists(search *s, int threads)
 }
 
 /* Returns whether every thread has binned all of its cells, and the number of all cells is at most `most`. */
-static bool is_complete(const search *s, int threads, int64_t most)
+static bool is_complete(const candidate_search *s, int threads, int64_t most)
 {
     const int64_t tiles = tile_count(s->frame);
     int64_t count = 0;
@@ -401,7 +401,7 @@ static struct kernel_bins *find(kernel_frame *frame, bool is_volume, kernel_thre
     const int64_t pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
     const int64_t cells = is_volume && pixels < VOLUME_ITEMS ? VOLUME_ITEMS : pixels;
     const int64_t bound = cells + ITEMS * (int64_t)threads;
-    search s = {.frame = frame, .bound = bound};
+    candidate_search s = {.frame = frame, .bound = bound};
     const bool is_begun = begin_lists(&s, threads) && cut_trees(frame, is_volume, &s.subtrees);
     if (is_begun) run(&s, thread_of, threads);
     if (!is_begun || !is_complete(&s, threads, 2 * bound)) {

@@ -275,7 +275,7 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
 }
 
 /* An outline is a set of points in tile space whose convex hull contains a cell. It has at most this many points: */
-/* enough for eight vertices and for two points on each of the 28 lines between two of them */
+/* maximum number of points of an outline: eight vertices, and two points on each of the 28 lines between two of them */
 enum { KERNEL_OUTLINE_POINTS = 64 };
 
 typedef struct kernel_outline {

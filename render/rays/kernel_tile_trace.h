@@ -274,13 +274,13 @@ SIMD_INLINE vi kernel_load_bytes(const uint8_t *bytes)
 }
 
 /* Returns entries[index] for each lane. `entries` has one number per column, or per row, of the tile. */
-SIMD_INLINE vf kernel_batch_of_tile(const float entries[KERNEL_TILE], vi index)
+SIMD_INLINE vf kernel_gather_tile_numbers(const float entries[KERNEL_TILE], vi index)
 {
     return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
 }
 
 /* Returns the position of a pixel among the tile's packets, which is packet * SIMD_WIDTH + lane. */
-SIMD_INLINE vi kernel_batch_at(vi column, vi row)
+SIMD_INLINE vi kernel_pixel_position(vi column, vi row)
 {
     const vi block = (row & ~3) + (column >> 2);
     const vi within = SIMD_WIDTH == 4 ? ((row & 2) << 2) + ((column & 2) << 1) + ((row & 1) << 1) + (column & 1)
@@ -288,7 +288,7 @@ SIMD_INLINE vi kernel_batch_at(vi column, vi row)
     return block * (KERNEL_BLOCK * KERNEL_BLOCK) + within;
 }
 
-SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
+SIMD_INLINE vf kernel_pixel_far(const kernel_tile_trace *t, vi at)
 {
     const int stride = (int)(sizeof(kernel_packet) / sizeof(float));
     return vf_gather((const float *)(const void *)&t->packets[0].t_far,
@@ -310,9 +310,10 @@ SIMD_INLINE void kernel_lane_rays_of(kernel_lane_rays *out, const kernel_tile *t
 {
     const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
     out->lane = lane & (SIMD_WIDTH - 1);
-    out->at = kernel_batch_at(column, row);
-    out->rays = (kernel_rays){kernel_batch_of_tile(tile->origin_x, column), kernel_batch_of_tile(tile->origin_y, row),
-                              kernel_batch_of_tile(tile->slope_x, column), kernel_batch_of_tile(tile->slope_y, row)};
+    out->at = kernel_pixel_position(column, row);
+    out->rays = (kernel_rays){
+        kernel_gather_tile_numbers(tile->origin_x, column), kernel_gather_tile_numbers(tile->origin_y, row),
+        kernel_gather_tile_numbers(tile->slope_x, column), kernel_gather_tile_numbers(tile->slope_y, row)};
 }
 
 /* Loads up to SIMD_WIDTH rays of the list, from ray `first` on; missing rays are inactive. */

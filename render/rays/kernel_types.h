@@ -66,7 +66,7 @@ typedef struct kernel_bound {
 
 /* Bounds of a transfer function over a range of values that contains no step of the opacity. A field error d changes
  * the light by at most cost * d per unit distance. For fixed light from the front and from behind, that change varies
- * by at most swing * d. */
+ * by at most variation * d. */
 typedef struct kernel_light_variation {
     float variation, cost;
     float extinction, steepness; /* maximum of the extinction, and of its slope times the contrast */

@@ -139,7 +139,7 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
         kernel_lane_rays r;
         vf depth;
         kernel_lane_rays_begin(&r, t, &b->rays, first);
-        r.far = kernel_batch_far(t, r.at);
+        r.far = kernel_pixel_far(t, r.at);
         r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->queued->near), r.lane), r.far));
         if (!vm_any(r.active)) continue;
         const vm hit = kernel_batch_hit(b, t->t_near, &r, &depth);

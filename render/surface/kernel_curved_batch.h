@@ -178,7 +178,7 @@ SIMD_INLINE void kernel_curved_batch_contract_of(const kernel_tile_trace *t, ker
         kernel_contraction c;
         kernel_contracted at;
         kernel_lane_rays_begin(&p, t, &h->rays, n);
-        p.far = kernel_batch_far(t, p.at);
+        p.far = kernel_pixel_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
         kernel_cell_ray_of(&cells, &p.rays, p.lane, &ray);
         p.active = vm_andnot(p.active, kernel_curved_batch_beside(h, p.lane, &ray));
@@ -209,7 +209,7 @@ SIMD_INLINE unsigned kernel_curved_batch_find_faces_of_type(kernel_tile_trace *t
         kernel_curved_crossed crossed;
         uint8_t faces[SIMD_WIDTH];
         kernel_lane_rays_begin(&p, t, &h->rays, n);
-        p.far = kernel_batch_far(t, p.at);
+        p.far = kernel_pixel_far(t, p.at);
         p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
         if (!vm_any(p.active)) continue;
         kernel_curved_faces(&h->transformed, &p, type, &crossed);
@@ -246,7 +246,7 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
         const vf zero = vf_set(0), endless = vf_set(INFINITY);
         const vi faces = kernel_load_bytes(h->faces + n);
         kernel_lane_rays_begin(&p, t, &h->met, n);
-        p.far = kernel_batch_far(t, p.at);
+        p.far = kernel_pixel_far(t, p.at);
         kernel_curved_cross(&h->transformed, &p, type, faces, ends);
         vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(vf_set(t->t_near), ends[1].t));
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
@@ -394,7 +394,7 @@ SIMD_INLINE unsigned kernel_curved_batch_hit_of(kernel_tile_trace *t, kernel_cur
         kernel_point ends[2], at;
         vm open = vm_none();
         kernel_lane_rays_begin(&p, t, &h->found, n);
-        p.far = kernel_batch_far(t, p.at);
+        p.far = kernel_pixel_far(t, p.at);
         for (int e = 0; e < (is_contracted ? 1 : 2); e++) {
             ends[e].t = vf_load(found->t[e] + n);
             ends[e].value = vf_load(found->v[e] + n);
@@ -438,7 +438,7 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
     kernel_search s;
     vm hits = vm_none();
     kernel_lane_rays_begin(&p, t, &h->others, n);
-    p.far = kernel_batch_far(t, p.at);
+    p.far = kernel_pixel_far(t, p.at);
     i.mask = p.active;
     i.t_in = vf_load(ends->t[0] + n);
     i.t_out = vf_load(ends->t[1] + n);

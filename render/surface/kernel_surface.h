@@ -365,7 +365,7 @@ static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c
                                      vm hit, vf t, vf out[3])
 {
     for (int a = 0; a < 3; a++) out[a] = vf_set(0);
-    if (!c->is_star) hit = vm_andnot(hit, kernel_polyhedron_sum_normals(p, c, r, hit, t, out));
+    if (!c->is_star_shaped) hit = vm_andnot(hit, kernel_polyhedron_sum_normals(p, c, r, hit, t, out));
     vf nearest = vf_set(INFINITY);
     for (int n = 0; n < r->segment_count; n++) {
         const kernel_subtet_interval *s = &r->segments[n];
@@ -494,7 +494,7 @@ SIMD_INLINE vm kernel_polyhedron_may_cross(const kernel_packet *p, polyhedron *c
 {
     const kernel_interval *i = &polyhedron_interval->interval;
     const vm longer = vm_and(i->mask, vf_lt(i->t_in, i->t_out));
-    if (!c->is_star || !p->is_pencil) return longer;
+    if (!c->is_star_shaped || !p->is_pencil) return longer;
     if (!c->has_slopes) kernel_polyhedron_slopes(c, p);
     const vf zero = vf_set(0), fall = kernel_slope_of(c, c->fall), rise = kernel_slope_of(c, c->rise);
     const vf in = polyhedron_interval->in.v, out = polyhedron_interval->out.v;

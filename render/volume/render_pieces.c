@@ -386,8 +386,8 @@ static void unite_variations(value_variation *a, const value_variation *b)
     a->extinction = b->extinction > a->extinction ? b->extinction : a->extinction;
 }
 
-/* Widens the swing by the piece's bounds between two of its values. behind: the minimum and maximum of the light from
- * behind. */
+/* Widens the bounds of the change of light by those of the piece between two of its values. behind: the minimum and
+ * maximum of the light from behind. */
 static void variation_in_piece(value_variation *variation, const kernel_piece *p, double from, double to,
                                const double behind[2])
 {
