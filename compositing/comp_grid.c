@@ -95,7 +95,7 @@ static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *
  * long as another is above the share. No rank loses its last block, so each owner appears among the blocks. */
 typedef struct owner_search {
     const comp_claim *claims;
-    uint32_t blocks, next;   /* number of blocks, and index of the claim whose rank is tried next */
+    uint32_t blocks, next;   /* number of blocks, and index of the claim whose rank is considered next */
     uint64_t allowed_excess; /* allowed excess over the equal share, in eighths of a block's fragments */
     const uint64_t *loads;   /* number of fragments that each rank owns so far */
     uint64_t equal_share;    /* number of fragments per owner if all own the same number, rounded up */

@@ -170,14 +170,14 @@ static bool make_folders(char *path)
 }
 
 /* The folder and the file name of a path. Both strings are in the memory at `path`. */
-typedef struct file_place {
+typedef struct folder_and_name {
     char *path;
     const char *name;
     int folder; /* descriptor of the folder; -1 until it is opened */
-} file_place;
+} folder_and_name;
 
 /* Returns false if the file is of a kind that a rename must not replace, such as a folder, pipe or device. */
-static bool check_place(const file_place *place, file_failure *failure)
+static bool check_place(const folder_and_name *place, file_failure *failure)
 {
     struct stat found;
     if (*place->name == '\0') return fail_for_file_type(failure, S_IFDIR);
@@ -186,7 +186,7 @@ static bool check_place(const file_place *place, file_failure *failure)
     return S_ISREG(found.st_mode) || S_ISLNK(found.st_mode) || fail_for_file_type(failure, found.st_mode);
 }
 
-static bool open_place(const char *path, file_place *place, file_failure *failure)
+static bool open_parent_folder(const char *path, folder_and_name *place, file_failure *failure)
 {
     place->folder = -1;
     place->path = base_strdup(path);
@@ -203,7 +203,7 @@ static bool open_place(const char *path, file_place *place, file_failure *failur
 enum { TEMPORARY_NAME = 40, TRIES = 8 };
 
 /* Writes a new file with the temporary name, and renames it to its final name. */
-static bool try_to_replace(const file_place *place, const char *temporary, const char *bytes, size_t size)
+static bool try_to_replace(const folder_and_name *place, const char *temporary, const char *bytes, size_t size)
 {
     const int file = openat(place->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (file < 0) return false;
@@ -224,7 +224,7 @@ static bool try_to_replace(const file_place *place, const char *temporary, const
 
 /* Replaces the file; tries again if another process has deleted the temporary file because it took it for one that a
  * killed run has left. */
-static bool replace_file(const file_place *place, const char *bytes, size_t size, file_failure *failure)
+static bool replace_file(const folder_and_name *place, const char *bytes, size_t size, file_failure *failure)
 {
     for (int i = 0; i < TRIES; i++) {
         uint64_t random;
@@ -239,8 +239,8 @@ static bool replace_file(const file_place *place, const char *bytes, size_t size
 
 bool file_replace(const char *path, const char *bytes, size_t size, file_failure *failure)
 {
-    file_place place;
-    const bool is_replaced = open_place(path, &place, failure) && replace_file(&place, bytes, size, failure);
+    folder_and_name place;
+    const bool is_replaced = open_parent_folder(path, &place, failure) && replace_file(&place, bytes, size, failure);
     if (place.folder >= 0) close(place.folder);
     base_free(place.path);
     return is_replaced;

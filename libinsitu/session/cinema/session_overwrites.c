@@ -31,7 +31,7 @@ static int count_outputs_before(const scene *scene, int image)
 }
 
 /* Returns the image of the scene that has this output. */
-static const scene_image *find_image_of_output(const scene *scene, int output)
+static const scene_image *find_image_with_output(const scene *scene, int output)
 {
     int image = 0;
     while (output >= scene->images[image].output_count) output -= scene->images[image++].output_count;
@@ -59,7 +59,7 @@ static const char *overwrite_advice(const scene_image *image, const scene_image 
 static void warn_of_overwrite(const session_overwrites *all, const scene *scene, const scene_image *image, int output,
                               int before, const char *path, long long cycle, session_report *report)
 {
-    const scene_image *earlier = find_image_of_output(scene, before);
+    const scene_image *earlier = find_image_with_output(scene, before);
     session_warn(report, &(session_warning){WARNING_REPLACED, image->name, NULL, 0}, true,
                  "image \"%s\": %.400s, written at cycle %lld by image \"%s\", is overwritten at cycle %lld; %s",
                  image->name, path, all->last_files[before].cycle, earlier->name, cycle,

@@ -65,7 +65,7 @@ static const session_field *find_set_field(const session_mesh *part, const char 
 }
 
 /* Returns whether the part is the first one that has the field; the table lists the field with this part. */
-static bool is_first_part_with(const session_parts *parts, int part, const session_field *field)
+static bool is_first_with_field(const session_parts *parts, int part, const session_field *field)
 {
     for (int i = 0; i < part; i++)
         if (find_set_field(parts->items[i], field->given.name)) return false;
@@ -106,7 +106,7 @@ static const session_field *next_set_field(field_visit *visit)
         const session_mesh *part = visit->parts->items[visit->part];
         while (visit->next < part->field_count && !part->source) {
             const session_field *field = &part->fields[visit->next++];
-            if (!field->is_derived && is_first_part_with(visit->parts, visit->part, field)) return field;
+            if (!field->is_derived && is_first_with_field(visit->parts, visit->part, field)) return field;
         }
     }
     return NULL;

@@ -105,7 +105,8 @@ typedef struct session_catalogue_mesh {
 /* A set of meshes across which cell values are averaged at equal vertices: the meshes without vertex ids that have a
  * layer's field. A mesh with ids is a joint by itself. */
 typedef struct session_joint {
-    uint64_t name;                   /* value of scene_field.joint_name or session_catalogue_mesh.single_joint_name */
+    /* name of the joint, as in scene_field.joint_name or session_catalogue_mesh.single_joint_name */
+    uint64_t name;
     int count;                       /* number of meshes in the joint */
     session_catalogue_mesh **meshes; /* the meshes of the joint, sorted by name; owned by the catalogue */
     /* set if the joint is a single mesh with global vertex ids; vertices are then equal if their ids are equal */

@@ -68,7 +68,7 @@ typedef struct session_plane {
  * vertices' signed distances from a plane. */
 typedef struct session_scalar {
     int field;               /* index of the field in the mesh; -1: the scalar is the signed distance from a plane */
-    int component;           /* same as grid_field.component */
+    int component;           /* number of the component, in the format of grid_field.component */
     bool is_recentred;       /* set if cell or corner values are averaged to vertices */
     uint64_t joint_name;     /* value of scene_field.joint_name, if the values are recentred */
     int64_t computed_count;  /* number of times that the values have been computed */
@@ -118,7 +118,7 @@ struct session_mesh;
 typedef struct session_threshold {
     bool is_given; /* if not set, all cells are selected */
     int field;     /* index of the field in the mesh; -1: the mesh does not have it, so that no cell is selected */
-    int component; /* same as grid_field.component */
+    int component; /* number of the component, in the format of grid_field.component */
     double low, high;
 } session_threshold;
 
@@ -137,7 +137,7 @@ typedef struct session_outer {
     double *coordinates; /* 3 coordinates per vertex of the mesh */
     int64_t *connectivity, *offsets;
     unsigned char *types;
-    int64_t *loops; /* same as render_part.loops */
+    int64_t *loops; /* outlines of polygons for edge lines, in the format of render_part.loops */
     /* for each vertex and each cell of the outer mesh: the vertex and the cell of the whole mesh whose values it
      * takes */
     int64_t *vertex_origins, *cell_origins;
@@ -319,11 +319,13 @@ typedef struct session_mesh {
     double size_sum;      /* sum of the cube roots of the volumes of the drawn cells */
     uint64_t *flat_cells; /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
 
-    uint64_t single_joint_name; /* same as session_catalogue_mesh.single_joint_name */
-    bool is_refined;            /* same as session_catalogue_mesh.is_refined */
-    bool is_needed;             /* set if an image of this step draws the mesh */
-    bool has_tree;              /* set if `tree` has been built */
-    mmbvh tree;                 /* tree over the drawn cells, or over some of them (is_partial) */
+    /* name of the joint that contains only this mesh (session_catalogue_mesh.single_joint_name) */
+    uint64_t single_joint_name;
+    /* set if a block of the mesh, on any rank, has a level of refinement (session_catalogue_mesh.is_refined) */
+    bool is_refined;
+    bool is_needed; /* set if an image of this step draws the mesh */
+    bool has_tree;  /* set if `tree` has been built */
+    mmbvh tree;     /* tree over the drawn cells, or over some of them (is_partial) */
     /* set if the tree contains only the candidates of candidates_key, as long as nothing changes */
     bool is_partial;
     /* set if the bounds of the full tree's nodes enclose only the candidates of candidates_key */

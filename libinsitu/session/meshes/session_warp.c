@@ -48,7 +48,7 @@ static void mark_moved(session_meshes *meshes, session_mesh *mesh)
 void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
 {
     const bool was_on = mesh->warp.is_applied;
-    /* the mesh is checked again, because the check has stored this problem as the mesh's error */
+    /* the check of the mesh has stored this problem as the mesh's error, so that it must be repeated */
     if (mesh->warp.problem.status) {
         mesh->is_check_stale = true;
         meshes->are_cells_changed = true;

@@ -135,7 +135,7 @@ typedef struct outer_work {
      * `rim_loops` has the index of the loop of each face of the current cell; 0: the loop is not stored yet. */
     bool has_rims;
     session_rims rims;
-    const uint32_t *parents; /* same as session_topology.parents */
+    const uint32_t *parents; /* for each piece of a split cell, the caller's cell (session_topology.parents) */
     int64_t rim_loops[RIMS_MOST_FACES];
 } outer_work;
 

@@ -316,7 +316,7 @@ insitu_status scene_fail_at_key(const scene_document *d, const char *parent, con
                      path, *path ? ": " : "", what);
 }
 
-/* ---- tree against schema ---- */
+/* ---- check of the tree against the schema ---- */
 
 /* Writes a question that suggests the candidate nearest to the word, or "" if none is near. */
 static void suggest_candidate(const yaml_node_t *word, const char *const *candidates, int count,
