@@ -133,8 +133,8 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
 
 /* ---- forwarding ------------------------------------------------------------------------------------------------- */
 
-/* Forwards the parcels whose owners have this digit in this round. In the digits of earlier rounds these owners equal
- * this rank's place, because all other parcels were sent in those rounds. */
+/* Forwards the parcels for owners whose place has this digit in the round's position. In the digits of earlier rounds
+ * the places of these owners equal this rank's place, because parcels for other places were sent in those rounds. */
 static bool forward_to(const comp_messages *in, const comp_route *route, int round, int place, int digit,
                        comp_writer *writer)
 {

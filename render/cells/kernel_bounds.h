@@ -65,7 +65,7 @@ typedef struct kernel_bounds_lanes {
 /* Lists which derivatives of a map are different at the corners of a reference domain (kernel_domain_of()), for each of
  * the three axes: their number (slope_count), the corner at which each occurs first, and which one each corner has. For
  * a hex a derivative depends on the two other coordinates. For a wedge it depends on the last coordinate alone, or
- * along the last axis on the two others. For a pyramid it depends on the same coordinate alone. */
+ * along the last axis on the two others. For a pyramid it depends only on the coordinate along which it is taken. */
 typedef struct kernel_slope_table {
     int corner_count, slope_count[3];
     signed char first[3][4], at[3][8];

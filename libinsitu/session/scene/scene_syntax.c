@@ -59,7 +59,8 @@ static bool has_content(text_line l)
     return l.indent < l.length && l.start[l.indent] != '#';
 }
 
-/* Writes the message and the line of the error. Returns true, so that a rule can end with this call. */
+/* Stores the message and the line of the error. It always returns true, which a rule that has found an error
+ * returns. */
 __attribute__((format(printf, 3, 4))) static bool set_fault(const fault *f, size_t line, const char *format, ...)
 {
     va_list arguments;
