@@ -193,19 +193,18 @@ static void fill_missing(const cell_job *job, const int at[3])
         out[c] = count == 3 ? middle_of_hex(job, at, c) : middle_of_face(job, at, directions[0], directions[1], c);
 }
 
-/* Puts the tuples into lexicographic order, and adds those that a serendipity cell lacks. */
-static void fill_lattice(const cell_job *job, const double *tuples)
+void session_complete_tuples(const session_interpolation *of, int components, const double *tuples, double *out)
 {
-    const session_interpolation *of = job->of;
-    const size_t bytes = (size_t)job->size * sizeof *tuples;
+    const cell_job job = {.of = of, .size = components, .lattice = out};
+    const size_t bytes = (size_t)components * sizeof *tuples;
     for (int n = 0; n < of->complete.count; n++)
         if (of->positions[n] < of->of.count)
-            memcpy(job->lattice + n * job->size, tuples + of->positions[n] * job->size, bytes);
+            memcpy(out + n * components, tuples + of->positions[n] * components, bytes);
     for (int n = 0; n < 27 && !of->of.is_complete; n++) {
         const int at[3] = {n % 3, n / 3 % 3, n / 9};
         if (session_is_node(&of->of, at[0], at[1], at[2]) &&
             of->positions[find_index(&of->complete, at)] >= of->of.count)
-            fill_missing(job, at);
+            fill_missing(&job, at);
     }
 }
 
@@ -327,7 +326,7 @@ void session_interpolate(const session_interpolation *of, const double (*corners
                     .out = out};
     job.spare[0] = room + of->complete.count * components;
     job.spare[1] = job.spare[0] + of->fine.count * components;
-    fill_lattice(&job, tuples);
+    session_complete_tuples(of, components, tuples, room);
     fill_inside(&job);
     for (int f = 0; f < job.shape->face_count; f++) {
         const face_axes axes = choose_axes(&job, job.shape->faces[f]);

@@ -26,6 +26,10 @@ bool session_make_interpolation(const session_nodes *of, insitu_vertex_order ord
                                 session_interpolation *out);
 void session_drop_interpolation(session_interpolation *interpolation);
 
+/* Puts tuples at the cell's nodes, in the order of its row, into the order of `complete`, and adds those at nodes that
+ * a serendipity cell lacks. */
+void session_complete_tuples(const session_interpolation *of, int components, const double *tuples, double *out);
+
 /* Returns the number of doubles that session_interpolate() needs as working memory. */
 size_t session_interpolation_room(const session_interpolation *of, int components);
 

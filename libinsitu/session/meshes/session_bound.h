@@ -1,0 +1,75 @@
+/* Bounds of the distance between an isosurface of the polynomials of cells of higher order and that of their linear
+ * pieces, and of the distance between positions in both. */
+#ifndef SESSION_BOUND_H
+#define SESSION_BOUND_H
+
+#include "session_interpolation.h"
+#include "session_pattern.h"
+
+/* Cells above this order are drawn between their own nodes, so that no bound is needed. */
+enum { BOUND_MOST_ORDER = NODES_MOST_ORDER / 2 };
+
+/* A second difference of Bernstein coefficients. */
+typedef struct session_second_difference {
+    bool is_diagonal; /* set if it is not along an edge, but along a diagonal of an octahedron between edges of a tet */
+    int count;
+    int nodes[10]; /* numbers of the coefficients */
+    double weights[10];
+} session_second_difference;
+
+/* The polynomials on a line, a triangle or a tet. */
+typedef struct session_bound_factor {
+    int dimensions;             /* 1: line, 2: triangle, 3: tet; 0: not used */
+    int node_count, fine_count; /* number of nodes, and of nodes of the finer lattice */
+    double *bernstein;          /* Bernstein coefficients by values at nodes: node_count x node_count */
+    double *values, *slopes[3]; /* values and derivatives at fine nodes by values at nodes: fine_count x node_count */
+    int difference_count;
+    session_second_difference *differences; /* in all directions of the edges of pieces */
+} session_bound_factor;
+
+/* What is needed for the bounds of one kind of cell. */
+typedef struct session_bound {
+    session_interpolation nodes; /* the cell's nodes, and all nodes of its order */
+    int fine_order;         /* order of the finer lattice, on whose pieces crossings and gradients are determined */
+    session_pattern pieces; /* of the finer lattice */
+    int axis_count;         /* number of axes of the reference cell, 2 or 3 */
+    int fine_count;         /* number of nodes of the finer lattice */
+    session_bound_factor line, simplex;
+} session_bound;
+
+/* Returns false if memory runs out; the caller must drop *out in any case. of: cells other than pyramids, of an order
+ * from 2 to BOUND_MOST_ORDER. order and is_lobatto: as in session_make_interpolation(). */
+bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, session_bound *out);
+void session_drop_bound(session_bound *bound);
+
+/* The isosurfaces of one field. */
+typedef struct session_isovalues {
+    int count;
+    const double *values;
+} session_isovalues;
+
+/* Returns the number of doubles that the functions below need as working memory. */
+size_t session_bound_room(const session_bound *of);
+
+/* Returns whether a cell may have a part of an isosurface; false if a value is not finite. values: the field at its
+ * nodes, in the order of its row. */
+bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *room);
+
+/* The distances, in scene units, if the cell has one piece between two nodes. With n pieces they are divided by the
+ * square of n. */
+typedef struct session_cell_bound {
+    double centre[3], radius; /* of a sphere around the cell */
+    /* set if the cell may have a part of an isosurface, or if no isovalues are given; false if a value or a position is
+     * not finite, and then nothing else holds */
+    bool is_crossed;
+    /* set if the gradient does not vanish near the isosurface; otherwise error holds the size of a piece */
+    bool is_bounded;
+    double error; /* distance of isosurfaces or, without isovalues, of positions */
+} session_cell_bound;
+
+/* Computes the bounds of a cell. tuples: x, y, z and the field's value at its nodes, in the order of its row.
+ * isovalues: NULL if only positions are of interest. */
+session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
+                                      double *room);
+
+#endif

@@ -1,0 +1,506 @@
+/* The bounds of the difference between polynomials and their linear pieces, against brute force: polynomials are sums
+ * of powers, of which values, positions and gradients are computed in closed form, and pieces are those of the pattern
+ * by which cells are split.
+ */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "session_bound.h"
+#include "session_derivatives.h"
+#include "session_shape.h"
+#include "test_effort.h"
+#include "test_mesh_order.h"
+
+enum { MOST_POWER = 8, POWERS = MOST_POWER + 1, MOST_NODES = 729, MOST_PARTS = 3 };
+
+/* A kind of cell with the polynomials that it contains. */
+typedef struct bound_kind {
+    const char *name;
+    session_nodes nodes;
+    insitu_vertex_order order;
+    bool is_lobatto;
+} bound_kind;
+
+static double random_number(void)
+{
+    return 2 * (rand() / (RAND_MAX + 1.0)) - 1;
+}
+
+/* ---- polynomials ------------------------------------------------------------------------------------------------- */
+
+/* Four sums of powers of the reference coordinates: a position and a field. */
+typedef struct cell_functions {
+    int order;
+    double weights[4][POWERS][POWERS][POWERS];
+} cell_functions;
+
+static bool is_in_space(const session_nodes *of, const int q[3])
+{
+    const int p = of->order, plane = q[0] + q[1];
+    switch (of->type) {
+    case GRID_TET: return plane + q[2] <= p;
+    case GRID_TRIANGLE: return plane <= p && q[2] == 0;
+    case GRID_WEDGE:
+        return of->is_complete ? plane <= p && q[2] <= p : (plane <= 2 && q[2] <= 1) || (plane <= 1 && q[2] <= 2);
+    case GRID_QUAD:
+        if (of->is_complete) return q[0] <= p && q[1] <= p && q[2] == 0;
+        return q[0] <= 2 && q[1] <= 2 && q[2] == 0 && plane < 4;
+    default:
+        if (of->is_complete) return q[0] <= p && q[1] <= p && q[2] <= p;
+        return q[0] <= 2 && q[1] <= 2 && q[2] <= 2 && (q[0] == 2) + (q[1] == 2) + (q[2] == 2) <= 1;
+    }
+}
+
+/* Computes a function at a point, or its derivative along an axis if that is not negative. */
+static double evaluate(const cell_functions *of, int function, const double at[3], int axis)
+{
+    double powers[3][POWERS], sum = 0;
+    for (int a = 0; a < 3; a++) {
+        double power = 1;
+        for (int q = 0; q <= of->order; q++, power *= at[a]) powers[a][q] = power;
+        for (int q = of->order; q >= 0 && a == axis; q--) powers[a][q] = q ? q * powers[a][q - 1] : 0;
+    }
+    for (int k = 0; k <= of->order; k++)
+        for (int j = 0; j <= of->order; j++)
+            for (int i = 0; i <= of->order; i++)
+                sum += of->weights[function][k][j][i] * powers[0][i] * powers[1][j] * powers[2][k];
+    return sum;
+}
+
+/* Adds random terms of order 2 and more. fall: by how much terms fall with each power. */
+static void add_terms(const session_nodes *of, int function, double size, double fall, cell_functions *out)
+{
+    for (int i = 0; i < POWERS * POWERS * POWERS; i++) {
+        const int q[3] = {i % POWERS, i / POWERS % POWERS, i / POWERS / POWERS}, sum = q[0] + q[1] + q[2];
+        if (sum > 1 && is_in_space(of, q))
+            out->weights[function][q[2]][q[1]][q[0]] += size * random_number() * pow(fall, sum - 2);
+    }
+}
+
+static void add_linear(int function, const double slopes[3], cell_functions *out)
+{
+    out->weights[function][0][0][1] += slopes[0];
+    out->weights[function][0][1][0] += slopes[1];
+    out->weights[function][1][0][0] += slopes[2];
+}
+
+/* ---- cells ------------------------------------------------------------------------------------------------------- */
+
+static void place_node(const bound_kind *kind, int i, int j, int k, double out[3])
+{
+    double line[NODES_MOST_ORDER + 1];
+    session_place_nodes(kind->nodes.order, kind->is_lobatto, line);
+    out[0] = line[i];
+    out[1] = line[j];
+    out[2] = line[k];
+}
+
+static void make_tuples(const bound_kind *kind, const cell_functions *of, double (*tuples)[4])
+{
+    const int p = kind->nodes.order;
+    for (int i = 0; i < (p + 1) * (p + 1) * (p + 1); i++) {
+        const int n[3] = {i % (p + 1), i / (p + 1) % (p + 1), i / (p + 1) / (p + 1)};
+        if (!session_is_node(&kind->nodes, n[0], n[1], n[2])) continue;
+        const int at = session_node_index(&kind->nodes, kind->order, n[0], n[1], n[2]);
+        double place[3];
+        place_node(kind, n[0], n[1], n[2], place);
+        for (int f = 0; f < 4 && at < kind->nodes.count; f++) tuples[at][f] = evaluate(of, f, place, -1);
+    }
+}
+
+/* The pieces of a cell with so many parts between two nodes. */
+typedef struct cut_cell {
+    int order; /* of the finer lattice */
+    session_pattern pattern;
+    double (*places)[3]; /* reference coordinates of the nodes */
+    double (*tuples)[4];
+} cut_cell;
+
+static void cut(const bound_kind *kind, const cell_functions *of, int parts, cut_cell *out)
+{
+    const int type = kind->nodes.type, r = parts * kind->nodes.order;
+    const session_nodes fine = session_complete_nodes(type, r);
+    out->order = r;
+    out->places = malloc((size_t)fine.count * sizeof *out->places);
+    out->tuples = malloc((size_t)fine.count * sizeof *out->tuples);
+    assert_true(session_make_pattern(session_lagrange_type(type), &fine, INSITU_ORDER_LEXICOGRAPHIC, &out->pattern));
+    for (int i = 0; i < (r + 1) * (r + 1) * (r + 1); i++) {
+        const int n[3] = {i % (r + 1), i / (r + 1) % (r + 1), i / (r + 1) / (r + 1)};
+        if (!session_is_node(&fine, n[0], n[1], n[2])) continue;
+        const int at = session_node_index(&fine, INSITU_ORDER_LEXICOGRAPHIC, n[0], n[1], n[2]);
+        for (int a = 0; a < 3; a++) out->places[at][a] = (double)n[a] / r;
+        for (int f = 0; f < 4; f++) out->tuples[at][f] = evaluate(of, f, out->places[at], -1);
+    }
+}
+
+static void free_cut(cut_cell *of)
+{
+    session_drop_pattern(&of->pattern);
+    free(of->places);
+    free(of->tuples);
+}
+
+/* Finds a random point of a piece, in coordinates along its edges at the first corner. */
+static void place_point(int type, double out[3])
+{
+    const bool is_flat = type == GRID_TRIANGLE || type == GRID_QUAD;
+    double sum;
+    do {
+        for (int a = 0; a < 3; a++) out[a] = is_flat && a == 2 ? 0 : 0.5 + 0.5 * random_number();
+        sum = type == GRID_HEX || type == GRID_QUAD ? 0 : out[0] + out[1] + (type == GRID_TET ? out[2] : 0);
+    } while (sum > 1);
+}
+
+/* Finds the weights of the corners with which a piece interpolates. */
+static void weigh_corners(int type, const double at[3], double weights[8])
+{
+    const session_shape *shape = session_shape_of(type);
+    for (int c = 0; c < 8; c++) {
+        const signed char *corner = shape->corners[c];
+        weights[c] = 1;
+        if (type == GRID_HEX || type == GRID_QUAD)
+            for (int a = 0; a < 3; a++) weights[c] *= corner[a] ? at[a] : 1 - at[a];
+        else {
+            const double last = 1 - at[0] - at[1] - (type == GRID_TET ? at[2] : 0);
+            weights[c] = corner[0] ? at[0] : corner[1] ? at[1] : type == GRID_TET && corner[2] ? at[2] : last;
+            if (type == GRID_WEDGE) weights[c] *= corner[2] ? at[2] : 1 - at[2];
+        }
+        if (c >= shape->corner_count) weights[c] = 0;
+    }
+}
+
+/* A point of a piece: its reference coordinates, and the interpolated tuple. */
+typedef struct piece_point {
+    double at[3], tuple[4];
+} piece_point;
+
+static piece_point interpolate(const cut_cell *of, int type, const int *corners, const double local[3])
+{
+    piece_point out = {{0}, {0}};
+    const int count = grid_type_vertices(type);
+    double weights[8];
+    weigh_corners(type, local, weights);
+    for (int c = 0; c < count; c++) {
+        for (int a = 0; a < 3; a++) out.at[a] += weights[c] * of->places[corners[c]][a];
+        for (int f = 0; f < 4; f++) out.tuple[f] += weights[c] * of->tuples[corners[c]][f];
+    }
+    return out;
+}
+
+/* ---- bounds of positions ----------------------------------------------------------------------------------------- */
+
+static session_cell_bound bound_of(const bound_kind *kind, const cell_functions *of, const session_isovalues *isovalues)
+{
+    static double tuples[MOST_NODES][4];
+    session_bound bound;
+    assert_true(session_make_bound(&kind->nodes, kind->order, kind->is_lobatto, &bound));
+    double *room = malloc(session_bound_room(&bound) * sizeof *room);
+    make_tuples(kind, of, tuples);
+    session_cell_bound out = session_bound_cell(&bound, tuples[0], isovalues, room);
+    double values[MOST_NODES];
+    for (int n = 0; n < kind->nodes.count && isovalues; n++) values[n] = tuples[n][3];
+    out.is_crossed = out.is_crossed && (!isovalues || session_may_cross(&bound, values, isovalues, room));
+    free(room);
+    session_drop_bound(&bound);
+    return out;
+}
+
+/* Returns the largest distance between positions of pieces and of the polynomial at random points. */
+static double largest_shift(const cell_functions *functions, const cut_cell *of, int points)
+{
+    double worst = 0;
+    const int *corners = of->pattern.piece_positions;
+    for (int piece = 0; piece < of->pattern.piece_count; piece++) {
+        const int count = grid_type_vertices(of->pattern.types[piece]);
+        for (int n = 0; n < points; n++) {
+            double local[3], square = 0;
+            place_point(of->pattern.types[piece], local);
+            const piece_point point = interpolate(of, of->pattern.types[piece], corners, local);
+            for (int a = 0; a < 3; a++) square += pow(point.tuple[a] - evaluate(functions, a, point.at, -1), 2);
+            worst = fmax(worst, sqrt(square));
+        }
+        corners += count;
+    }
+    return worst;
+}
+
+static void check_positions(const bound_kind *kind, double fall, double ratios[2])
+{
+    cell_functions *of = calloc(1, sizeof *of);
+    of->order = kind->nodes.order;
+    for (int f = 0; f < 3; f++) add_terms(&kind->nodes, f, 1, fall, of);
+    const session_cell_bound bound = bound_of(kind, of, NULL);
+    for (int parts = 1; parts <= MOST_PARTS && parts * of->order <= 16; parts++) {
+        cut_cell pieces;
+        cut(kind, of, parts, &pieces);
+        const double shift = largest_shift(of, &pieces, 8) * parts * parts;
+        if (!(shift <= bound.error * (1 + 1e-9)))
+            fprintf(stderr, "%s, %d parts: positions are off by %g, and the bound is %g\n", kind->name, parts, shift,
+                    bound.error);
+        assert_true(shift <= bound.error * (1 + 1e-9));
+        if (parts == 1) ratios[0] = fmin(ratios[0], bound.error / shift);
+        if (parts == 1) ratios[1] = fmax(ratios[1], bound.error / shift);
+        free_cut(&pieces);
+    }
+    free(of);
+}
+
+static const struct named_shape {
+    const char *name;
+    int type, most_order;
+} shapes[] = {{"triangle", GRID_TRIANGLE, 6},
+              {"quad", GRID_QUAD, 6},
+              {"tet", GRID_TET, 5},
+              {"wedge", GRID_WEDGE, 4},
+              {"hex", GRID_HEX, 4}};
+
+/* The kinds that are tested: all shapes with all of their nodes, serendipity cells, and Gauss-Lobatto points. */
+static int list_kinds(bound_kind *out)
+{
+    int count = 0;
+    for (size_t s = 0; s < sizeof shapes / sizeof shapes[0]; s++)
+        for (int order = 2; order <= shapes[s].most_order; order++)
+            out[count++] = (bound_kind){shapes[s].name, session_complete_nodes(shapes[s].type, order),
+                                        INSITU_ORDER_LEXICOGRAPHIC, false};
+    out[count++] =
+        (bound_kind){"hex, Gauss-Lobatto", session_complete_nodes(GRID_HEX, 4), INSITU_ORDER_LEXICOGRAPHIC, true};
+    out[count++] =
+        (bound_kind){"hex, Gauss-Lobatto", session_complete_nodes(GRID_HEX, 7), INSITU_ORDER_LEXICOGRAPHIC, true};
+    static const int serendipity[][2] = {
+        {INSITU_QUADRATIC_QUAD, 8}, {INSITU_QUADRATIC_HEX, 20}, {INSITU_QUADRATIC_WEDGE, 15}};
+    for (int i = 0; i < 3; i++, count++) {
+        out[count] = (bound_kind){.name = "serendipity", .order = INSITU_ORDER_VTK};
+        assert_true(session_nodes_of(serendipity[i][0], serendipity[i][1], &out[count].nodes));
+    }
+    return count;
+}
+
+static void positions_are_within_the_bound(void **state)
+{
+    (void)state;
+    bound_kind kinds[40];
+    const int count = list_kinds(kinds), cells = test_effort(2, 60);
+    for (int k = 0; k < count; k++)
+        for (int smooth = 0; smooth < 2; smooth++) {
+            double ratios[2] = {INFINITY, 0};
+            for (int n = 0; n < cells; n++) check_positions(&kinds[k], smooth ? 0.3 : 1, ratios);
+            printf("%s of order %d, %s: bound / largest difference found %.1f to %.1f\n", kinds[k].name,
+                   kinds[k].nodes.order, smooth ? "smooth" : "rough", ratios[0], ratios[1]);
+        }
+}
+
+/* ---- bounds of isosurfaces --------------------------------------------------------------------------------------- */
+
+/* Computes the derivatives of the position along the axes, as columns of a matrix, and the field's gradient. Returns
+ * the determinant. */
+static double find_gradient(const cell_functions *of, const double at[3], double inverse[3][3], double gradient[3])
+{
+    double m[3][3], slopes[3];
+    for (int a = 0; a < 3; a++) {
+        for (int f = 0; f < 3; f++) m[f][a] = evaluate(of, f, at, a);
+        slopes[a] = evaluate(of, 3, at, a);
+    }
+    double determinant = 0;
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) {
+            const int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
+            inverse[c][r] = m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1];
+        }
+    for (int a = 0; a < 3; a++) determinant += m[0][a] * inverse[a][0];
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) inverse[r][c] /= determinant;
+    for (int x = 0; x < 3; x++)
+        gradient[x] = slopes[0] * inverse[0][x] + slopes[1] * inverse[1][x] + slopes[2] * inverse[2][x];
+    return determinant;
+}
+
+/* Goes from a point of the cell along the field's gradient until the polynomial has the value. Returns the distance of
+ * the place from `from`; infinite if the way does not end. */
+static double distance_to_surface(const cell_functions *of, const double start[3], double value, const double from[3])
+{
+    double at[3] = {start[0], start[1], start[2]}, rest = INFINITY, square = 0;
+    for (int step = 0; step < 60 && fabs(rest) > 1e-13; step++) {
+        double inverse[3][3], gradient[3], length = 0;
+        find_gradient(of, at, inverse, gradient);
+        rest = evaluate(of, 3, at, -1) - value;
+        for (int x = 0; x < 3; x++) length += gradient[x] * gradient[x];
+        for (int a = 0; a < 3; a++)
+            for (int x = 0; x < 3; x++) at[a] -= inverse[a][x] * gradient[x] * rest / length;
+    }
+    for (int x = 0; x < 3; x++) square += pow(evaluate(of, x, at, -1) - from[x], 2);
+    return fabs(rest) < 1e-12 ? sqrt(square) : INFINITY;
+}
+
+/* Finds a point of a piece, between two points, at which the interpolated field has the value. Returns false if there
+ * is none. */
+static bool find_crossing(const cut_cell *of, int type, const int *corners, double value, piece_point *out)
+{
+    double ends[2][3], middle[3];
+    place_point(type, ends[0]);
+    place_point(type, ends[1]);
+    const bool is_above = interpolate(of, type, corners, ends[0]).tuple[3] > value;
+    if (is_above == (interpolate(of, type, corners, ends[1]).tuple[3] > value)) return false;
+    for (int turn = 0; turn < 60; turn++) {
+        for (int a = 0; a < 3; a++) middle[a] = 0.5 * (ends[0][a] + ends[1][a]);
+        *out = interpolate(of, type, corners, middle);
+        memcpy(ends[(out->tuple[3] > value) != is_above], middle, sizeof middle);
+    }
+    return true;
+}
+
+/* Returns the largest distance between the surface of pieces and that of the polynomial at random points; -1 if there
+ * are none. */
+static double largest_distance(const cell_functions *functions, const cut_cell *of, double value)
+{
+    double worst = -1;
+    const int *corners = of->pattern.piece_positions;
+    for (int piece = 0; piece < of->pattern.piece_count; piece++) {
+        const int type = of->pattern.types[piece];
+        for (int n = 0; n < 12; n++) {
+            piece_point point;
+            if (find_crossing(of, type, corners, value, &point))
+                worst = fmax(worst, distance_to_surface(functions, point.at, value, point.tuple));
+        }
+        corners += grid_type_vertices(type);
+    }
+    return worst;
+}
+
+/* What was found in the cells of a kind. */
+typedef struct surface_tally {
+    int crossed, unbounded;
+    double least, most; /* bound / largest distance */
+} surface_tally;
+
+static void check_surface(const bound_kind *kind, const cell_functions *of, surface_tally *tally)
+{
+    const double inside[3] = {0.2 + 0.1 * random_number(), 0.3 + 0.2 * random_number(), 0.25 + 0.2 * random_number()};
+    const double value = evaluate(of, 3, inside, -1);
+    const session_cell_bound bound = bound_of(kind, of, &(session_isovalues){1, &value});
+    assert_true(bound.is_crossed);
+    tally->crossed++;
+    tally->unbounded += !bound.is_bounded;
+    for (int parts = 1; parts <= MOST_PARTS && bound.is_bounded && parts * of->order <= 12; parts++) {
+        cut_cell pieces;
+        cut(kind, of, parts, &pieces);
+        const double distance = largest_distance(of, &pieces, value) * parts * parts;
+        if (!(distance <= bound.error))
+            fprintf(stderr, "%s of order %d, %d parts: the surface is off by %g, and the bound is %g\n", kind->name,
+                    of->order, parts, distance, bound.error);
+        assert_true(distance <= bound.error);
+        if (distance > 0) tally->least = fmin(tally->least, bound.error / distance);
+        if (distance > 0 && parts == 1) tally->most = fmax(tally->most, bound.error / distance);
+        free_cut(&pieces);
+    }
+}
+
+/* A field that is mostly linear in a cell that is stretched along an axis and bent. */
+static void make_surface(const bound_kind *kind, double curved, double fall, cell_functions *out)
+{
+    *out = (cell_functions){.order = kind->nodes.order};
+    for (int f = 0; f < 3; f++) {
+        double slopes[3];
+        for (int a = 0; a < 3; a++) slopes[a] = (f == a) + 0.2 * random_number();
+        if (f == 0) slopes[0] *= 10;
+        add_linear(f, slopes, out);
+        add_terms(&kind->nodes, f, 0.05, fall, out);
+    }
+    const double slopes[3] = {random_number(), random_number(), random_number()};
+    add_linear(3, slopes, out);
+    add_terms(&kind->nodes, 3, curved, fall, out);
+}
+
+static void isosurfaces_are_within_the_bound(void **state)
+{
+    (void)state;
+    static const double curves[] = {0.05, 0.2, 0.6};
+    bound_kind kinds[40];
+    const int count = list_kinds(kinds), cells = test_effort(3, 200);
+    cell_functions *of = malloc(sizeof *of);
+    for (int k = 0; k < count; k++) {
+        if (kinds[k].nodes.type == GRID_TRIANGLE || kinds[k].nodes.type == GRID_QUAD) continue;
+        for (int c = 0; c < 3; c++) {
+            surface_tally tally = {0, 0, INFINITY, 0};
+            for (int n = 0; n < cells; n++) {
+                make_surface(&kinds[k], curves[c], 0.3, of);
+                check_surface(&kinds[k], of, &tally);
+            }
+            printf("%s of order %d, terms of %g: bound / distance %.2f to %.1f; %d of %d cells have no bound\n",
+                   kinds[k].name, kinds[k].nodes.order, curves[c], tally.least, tally.most, tally.unbounded,
+                   tally.crossed);
+        }
+    }
+    free(of);
+}
+
+/* ---- other cells ------------------------------------------------------------------------------------------------- */
+
+/* The field is 0 at all nodes but the middle ones, and so at most 0.25 between nodes: it is less than its nodes say
+ * only where they are. */
+static void crossings_between_nodes_are_found(void **state)
+{
+    (void)state;
+    const bound_kind kind = {"hex", session_complete_nodes(GRID_HEX, 2), INSITU_ORDER_LEXICOGRAPHIC, false};
+    cell_functions *of = calloc(1, sizeof *of);
+    of->order = 2;
+    for (int f = 0; f < 3; f++) add_linear(f, (const double[]){f == 0, f == 1, f == 2}, of);
+    of->weights[3][0][0][2] = 1; /* (x - 0.3)^2 */
+    of->weights[3][0][0][1] = -0.6;
+    of->weights[3][0][0][0] = 0.09;
+    const double values[] = {0.01, -0.02, 0.5};
+    assert_true(bound_of(&kind, of, &(session_isovalues){1, &values[0]}).is_crossed);
+    assert_false(bound_of(&kind, of, &(session_isovalues){1, &values[1]}).is_crossed);
+    assert_false(bound_of(&kind, of, &(session_isovalues){1, &values[2]}).is_crossed);
+    assert_false(bound_of(&kind, of, &(session_isovalues){0, NULL}).is_crossed);
+    free(of);
+}
+
+/* Positions that are linear have no error, nor has a linear field. */
+static void linear_cells_have_no_error(void **state)
+{
+    (void)state;
+    bound_kind kinds[40];
+    const int count = list_kinds(kinds);
+    cell_functions *of = malloc(sizeof *of);
+    for (int k = 0; k < count; k++) {
+        *of = (cell_functions){.order = kinds[k].nodes.order};
+        for (int f = 0; f < 4; f++) add_linear(f, (const double[]){f == 0, f == 1 || f == 3, f == 2}, of);
+        const double value = 0.25;
+        const session_cell_bound bound = bound_of(&kinds[k], of, &(session_isovalues){1, &value});
+        assert_true(bound.is_crossed && bound.is_bounded && bound.error < 1e-11);
+    }
+    free(of);
+}
+
+static void values_that_are_not_finite_are_not_measured(void **state)
+{
+    (void)state;
+    const bound_kind kind = {"hex", session_complete_nodes(GRID_HEX, 2), INSITU_ORDER_LEXICOGRAPHIC, false};
+    cell_functions *of = calloc(1, sizeof *of);
+    const double value = 0.25;
+    of->order = 2;
+    for (int f = 0; f < 4; f++) add_linear(f, (const double[]){f == 0 || f == 3, f == 1, f == 2}, of);
+    assert_true(bound_of(&kind, of, &(session_isovalues){1, &value}).is_crossed);
+    of->weights[3][0][0][0] = NAN;
+    assert_false(bound_of(&kind, of, &(session_isovalues){1, &value}).is_crossed);
+    free(of);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(positions_are_within_the_bound),
+        cmocka_unit_test(isosurfaces_are_within_the_bound),
+        cmocka_unit_test(crossings_between_nodes_are_found),
+        cmocka_unit_test(linear_cells_have_no_error),
+        cmocka_unit_test(values_that_are_not_finite_are_not_measured),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
