@@ -185,6 +185,7 @@ static const char every_key[] =
     "  axis/b: {mirror: {x: -1.5, z: 2}}\n"
     "writing: step\n"
     "finer_pieces: 1\n"
+    "finer_memory: 200.5\n"
     "parameters: {inflow: 2.5, _k-2: -1e-3, values: 3, color: 4, axis: 5}\n"
     "schedule: radix\n";
 
@@ -228,7 +229,7 @@ static void scene_image_keys_are_read(void **state)
     assert_int_equal(s.threads, 3);
     assert_int_equal(s.tree, SCENE_TREE_PARTIAL);
     assert_int_equal(s.writing, SCENE_WRITE_IN_STEP);
-    assert_int_equal(s.finer_pieces, 1);
+    assert_true(s.finer_pieces == 1 && s.surface_error == 0 && s.finer_memory == 200.5);
     assert_int_equal(s.schedule, SCENE_SCHEDULE_RADIX);
     assert_int_equal(s.image_count, 3 + 4 * 2 * 3 * 2 + 2);
     const scene_image *image = &s.images[0];
@@ -391,7 +392,7 @@ static void scene_image_defaults_hold(void **state)
     assert_int_equal(s.threads, 0);
     assert_int_equal(s.tree, SCENE_TREE_AUTO);
     assert_int_equal(s.writing, SCENE_WRITE_BEHIND);
-    assert_int_equal(s.finer_pieces, 1);
+    assert_true(s.finer_pieces == 1 && s.surface_error == 0 && s.finer_memory == 4096);
     assert_true(image->width == 1280 && image->height == 720 && image->cycle_interval == 1);
     check_colour(image->background, linear(0.08), linear(0.09), linear(0.11));
     assert_true(image->background[3] == 1);
@@ -787,10 +788,19 @@ static const struct bad_file {
     int reported; /* the line in the message */
     const char *words[3];
 } bad_files[] = {
-    {1, "thread: 1", 1, {"the key \"thread\" is unknown", "threads, tree, schedule, writing, finer_pieces, images"}},
+    {1,
+     "thread: 1",
+     1,
+     {"the key \"thread\" is unknown",
+      "threads, tree, schedule, writing, finer_pieces, surface_error, finer_memory, images"}},
     {1, "finer_pieces: 0", 1, {"finer_pieces: \"0\"", "from 1 to 8"}},
     {1, "finer_pieces: 9", 1, {"finer_pieces: \"9\"", "from 1 to 8"}},
     {1, "finer_pieces: fine", 1, {"finer_pieces: \"fine\"", "a whole number from 1 to 8"}},
+    {1, "surface_error: 0", 1, {"surface_error: \"0\"", "above 0"}},
+    {1, "surface_error: small", 1, {"surface_error: \"small\"", "a number above 0"}},
+    {1, "surface_error: 1001", 1, {"surface_error: \"1001\"", "at most 1000"}},
+    {1, "surface_error: 0.5\nfiner_memory: 0", 2, {"finer_memory: \"0\"", "above 0"}},
+    {1, "surface_error: 0.5\nfiner_memory: 1e13", 2, {"finer_memory: \"1e13\"", "at most 1e+12"}},
     {1, "threads: many", 1, {"threads: \"many\"", "a whole number from 0 to 4096"}},
     {1, "threads: -1", 1, {"threads: \"-1\"", "from 0 to 4096"}},
     {1, "threads: 010", 1, {"threads: \"010\"", "a whole number"}},
@@ -1244,7 +1254,7 @@ static void scene_whole_file_faults_are_reported(void **state)
         {"", "scene.yaml:1: the file is empty"},
         {"# nothing\n", "scene.yaml:1: the file is empty"},
         {"- a\n", "scene.yaml:1: a list is not allowed, expected a mapping with the keys threads, tree, schedule, "
-                  "writing, finer_pieces, images"},
+                  "writing, finer_pieces, surface_error, finer_memory, images"},
         {"hello", "scene.yaml:1: \"hello\" is not allowed"},
         {"threads: 1\n", "scene.yaml:1: images: missing, expected a list of 1 to 64 mappings"},
         {"threads: 1\nimages: \xff\n", "scene.yaml:2: not valid YAML: invalid leading UTF-8"},

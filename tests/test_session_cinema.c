@@ -354,6 +354,7 @@ static void reports_have_warnings_and_edits(void **state)
              "{\"cycle\": 0, \"time\": -0.25, \"error\": null,\n"
              " \"scene\": {\"path\": \"%s\", \"modified\": \"#\", \"error\": null},\n"
              " \"parameters\": {\"a\": 0.5, \"b\": -2.0000000000000001e+300},\n"
+             " \"pieces\": null,\n"
              " \"warnings\": [\n  {\"cycle\": 0, \"text\": \"%s\"}]}\n",
              scene, escaped);
     everywhere(report_matches(news, expected));

@@ -145,7 +145,8 @@ module insitu
         integer(c_int64_t) :: rays = 0, fragments = 0, bytes_sent = 0, map_failures = 0
         integer(c_int64_t) :: bytes_borrowed = 0, bytes_copied = 0, bytes_trees = 0, bytes_pictures = 0, bytes_peak = 0
         ! texts: insitu_text()
-        type(c_ptr) :: schedule = c_null_ptr, copied_why = c_null_ptr, left_out = c_null_ptr, warnings = c_null_ptr
+        type(c_ptr) :: schedule = c_null_ptr, copied_why = c_null_ptr, left_out = c_null_ptr, &
+            warnings = c_null_ptr, pieces = c_null_ptr
     end type insitu_report
 
     type, bind(C) :: c_picture

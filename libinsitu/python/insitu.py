@@ -176,6 +176,7 @@ class _Report(ctypes.Structure):
         ("copied_why", ctypes.c_char_p),
         ("left_out", ctypes.c_char_p),
         ("warnings", ctypes.c_char_p),
+        ("pieces", ctypes.c_char_p),
     ]
 
 

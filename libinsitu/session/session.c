@@ -13,7 +13,7 @@
 static _Thread_local base_error thread_error;
 
 /* Returned while a fill function runs, when the step's report is incomplete. */
-static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = ""};
+static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = "", .pieces = ""};
 
 /* Refuses a call made from inside a fill function. Casts const away to record the refusal, which is the only change. */
 static bool is_in_fill(const insitu_session *session, const char *call)

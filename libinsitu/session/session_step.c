@@ -27,6 +27,7 @@
 #include "session_joints.h"
 #include "session_lines.h"
 #include "session_mirrors.h"
+#include "session_pieces.h"
 #include "session_recentre.h"
 #include "session_smooth.h"
 #include "session_summary.h"
@@ -44,7 +45,7 @@ static double milliseconds_since(double start)
  * they are split otherwise. */
 static void reload_scene(insitu_session *s, session_changes *changes)
 {
-    const int pieces = s->scene_file.scene.finer_pieces;
+    const scene old = s->scene_file.scene;
     session_writer_drain(&s->writer);
     /* waits for pictures that are being written, so that the old scene is no longer used */
     session_writer_collect(&s->writer, &s->report);
@@ -63,7 +64,8 @@ static void reload_scene(insitu_session *s, session_changes *changes)
         session_drop_scalars(s->meshes.items[i]);
         session_drop_derived(s->meshes.items[i]);
     }
-    if (s->scene_file.scene.finer_pieces == pieces) return;
+    const scene *new = &s->scene_file.scene;
+    if (new->finer_pieces == old.finer_pieces &&new->finer_memory == old.finer_memory) return;
     session_end_finer(&s->meshes);
     s->meshes.are_cells_changed = s->meshes.are_names_changed = true;
     changes->are_cells_changed = changes->are_names_changed = true;
@@ -161,21 +163,33 @@ static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed
     return status;
 }
 
-/* Reads cells of higher order as finer ones, if the scene says so. Collective. */
-static insitu_status refine_cells(insitu_session *s, base_error *error)
+/* Reads cells of higher order as finer ones, if the scene says so. A fixed number of pieces is that of the cells, one
+ * by surface_error is that of the images that are due. *are_cells_changed is set if cells are split otherwise on any
+ * rank. Collective. */
+static insitu_status refine_cells(insitu_session *s, const session_moment *moment, bool *are_cells_changed,
+                                  base_error *error)
 {
-    const int pieces = s->scene_file.scene.finer_pieces;
-    bool is_any = false;
-    if (pieces < 2) return INSITU_OK;
-    const insitu_status status =
-        session_make_finer(&s->meshes, &s->catalogue, pieces, &s->team, &s->report, &is_any, error);
-    return status || !is_any ? status : session_check_meshes(&s->meshes, &s->team, error);
+    const scene *scene = &s->scene_file.scene;
+    const session_pieces_basis basis = {scene, moment, &s->catalogue, &s->team, &s->meshes};
+    const bool is_chosen = !scene->finer_pieces && session_count_due(scene, moment) > 0;
+    bool are_changed = false;
+    if (scene->finer_pieces == 1 || !(*are_cells_changed || is_chosen)) return INSITU_OK;
+    session_finer_choice *choices = base_calloc((size_t)s->catalogue.mesh_count + 1, sizeof *choices);
+    if (!choices) session_fail_for_memory(error, s->catalogue.mesh_count * (int64_t)sizeof *choices, "finer pieces");
+    insitu_status status = session_agree(s->team.comm, error);
+    if (!status) status = session_count_finer(&s->meshes, &s->catalogue, s->team.comm, choices, error);
+    if (!status) status = session_choose_pieces(&basis, choices, &s->report, error);
+    if (!status) status = session_make_finer(&s->meshes, &s->catalogue, choices, &s->team, &are_changed, error);
+    base_free(choices);
+    if (status || !are_changed) return status;
+    *are_cells_changed = true;
+    return session_check_meshes(&s->meshes, &s->team, error);
 }
 
 /* Checks the changed contents of meshes, and updates the catalogue. Meshes and fields with faults are put aside:
  * *refused is the first fault. Collective. */
-static insitu_status update_meshes(insitu_session *s, const session_changes *changes, base_error *refused,
-                                   base_error *error)
+static insitu_status update_meshes(insitu_session *s, const session_changes *changes, const session_moment *moment,
+                                   base_error *refused, base_error *error)
 {
     const session_team *team = &s->team;
     const scene *scene = &s->scene_file.scene;
@@ -187,9 +201,9 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     if (!refused->status) *refused = reason;
     const bool of_names = changes->are_names_changed || refused->status || s->catalogue.has_faults;
     if (are_cells_changed) session_forget_homes(&s->catalogue);
-    if (scene->finer_pieces > 1) session_drop_ids(&s->meshes);
+    if (scene->finer_pieces != 1) session_drop_ids(&s->meshes);
     insitu_status status = list_meshes(s, of_names, changes->are_names_shared && !refused->status, error);
-    if (are_cells_changed && !status) status = refine_cells(s, error);
+    if (!status) status = refine_cells(s, moment, &are_cells_changed, error);
     if (are_cells_changed && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
     if ((are_cells_changed || of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
@@ -244,7 +258,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
         .writes_behind = changes->writes_behind,
     };
     session_plan plan = {0};
-    insitu_status status = update_meshes(s, changes, refused, error);
+    insitu_status status = update_meshes(s, changes, moment, refused, error);
     if (!status) status = session_tear_meshes(&s->meshes, &s->catalogue, basis.scene, team, error);
     if (!status) update_events(s, &basis, &of_events);
     if (!status) status = make_plan(s, &basis, refused, &plan, error);
@@ -317,7 +331,8 @@ static insitu_status report_unwritten(insitu_session *s, base_error *error)
 static void queue_news(insitu_session *s)
 {
     const session_scene_file *file = &s->scene_file;
-    const session_news_scene source = {&file->scene, file->path, file->has_stamp ? &file->stamp : NULL, file->warning};
+    const session_news_scene source = {&file->scene, file->path, file->has_stamp ? &file->stamp : NULL,
+                                       s->report.pieces.size ? s->report.pieces.data : NULL, file->warning};
     if (s->team.rank != 0 || file->scene.database_count == 0) return;
     session_record_news(&s->news, &s->report, &s->error);
     if (!s->news.is_new) return;

@@ -81,6 +81,12 @@ static void add_scene(text_output *out, const session_news_scene *source)
     text_print(out, "}");
 }
 
+static void add_pieces(text_output *out, const char *pieces)
+{
+    text_print(out, ",\n \"pieces\": ");
+    add_quoted(out, pieces);
+}
+
 static void add_warnings(text_output *out, const session_news *news)
 {
     const int64_t first = news->count > SESSION_NEWS_LINES ? news->count - SESSION_NEWS_LINES : 0;
@@ -107,6 +113,7 @@ char *session_make_news(session_news *news, const session_news_scene *source, co
     text_print(&out, ", \"error\": ");
     add_quoted(&out, news->error.status ? news->error.message : NULL);
     add_scene(&out, source);
+    add_pieces(&out, source->pieces);
     add_warnings(&out, news);
     c_locale_leave(&numbers);
     if (!out.is_incomplete) {

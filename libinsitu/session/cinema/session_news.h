@@ -34,6 +34,7 @@ typedef struct session_news_scene {
     const char *path; /* path of the file as given by the caller */
     /* state of the file when it was last read, whether it was accepted or not; NULL: there is no file */
     const struct stat *stamp;
+    const char *pieces;  /* text of the report's `pieces`; NULL: there is none */
     const char *refusal; /* the reason why the last edit of the scene was refused; NULL: it was accepted */
 } session_news_scene;
 

@@ -64,7 +64,8 @@ static const char *text_of(const session_text *text)
 
 void session_report_create(session_report *report)
 {
-    *report = (session_report){.public_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = ""}};
+    *report = (session_report){
+        .public_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = "", .pieces = ""}};
 }
 
 void session_report_begin(session_report *report, int64_t cycle, double time)
@@ -73,6 +74,7 @@ void session_report_begin(session_report *report, int64_t cycle, double time)
     clear_text(&report->copied_why);
     clear_text(&report->left_out);
     clear_text(&report->warnings);
+    clear_text(&report->pieces);
     base_memory_reset_peak();
 }
 
@@ -82,6 +84,7 @@ void session_report_end(session_report *report)
     report->public_report.copied_why = text_of(&report->copied_why);
     report->public_report.left_out = text_of(&report->left_out);
     report->public_report.warnings = text_of(&report->warnings);
+    report->public_report.pieces = text_of(&report->pieces);
 }
 
 void session_report_free(session_report *report)
@@ -89,6 +92,7 @@ void session_report_free(session_report *report)
     free_text(&report->copied_why);
     free_text(&report->left_out);
     free_text(&report->warnings);
+    free_text(&report->pieces);
     free_text(&report->own_warnings);
     base_free(report->reported);
 }

@@ -21,8 +21,9 @@ typedef struct session_text {
 } session_text;
 
 typedef struct session_report {
-    insitu_report public_report;                 /* its texts are set only at the end of a step */
-    session_text copied_why, left_out, warnings; /* texts of the members of insitu_report with these names */
+    insitu_report public_report; /* its texts are set only at the end of a step */
+    /* texts of the members of insitu_report with these names */
+    session_text copied_why, left_out, warnings, pieces;
     /* warnings of this rank alone, until session_share_lines() sends those of one rank to all ranks */
     session_text own_warnings;
     int reported_count; /* number of warnings in `reported` */
@@ -47,6 +48,7 @@ void session_report_free(session_report *report);
 
 typedef enum session_warning_kind {
     WARNING_ORDER,       /* the vertices of cells seem not to be in VTK's order, judged by the cells' volumes */
+    WARNING_PIECES,      /* an isosurface is not within surface_error of a polynomial */
     WARNING_FINER,       /* cells of higher order are not split as finely as the scene says */
     WARNING_ISOVALUE,    /* an isovalue lies outside of the range of its field */
     WARNING_TRANSPARENT, /* a volume layer is transparent for all values of its field */

@@ -11,9 +11,18 @@
 #include "session_split.h"
 #include "session_topology.h"
 
-/* What the ranks count of a mesh, in session_finer.counts: the parts whose highest order is each one; and cells. */
-enum { LOBATTO = NODES_MOST_ORDER + 1, EQUISPACED, PYRAMIDS };
-_Static_assert(PYRAMIDS + 1 == SESSION_FINER_COUNTS, "each count has a place");
+/* What the ranks count of a mesh, in session_finer.counts: the blocks whose highest order is each one; cells; and by
+ * the number of parts, bytes, and the blocks that have them. */
+enum {
+    LOBATTO = NODES_MOST_ORDER + 1,
+    EQUISPACED,
+    PYRAMIDS,
+    SERENDIPITY,
+    BYTES,
+    COMPONENT_BYTES = BYTES + FINER_MOST_PARTS + 1,
+    BLOCKS = COMPONENT_BYTES + FINER_MOST_PARTS + 1
+};
+_Static_assert(BLOCKS + FINER_MOST_PARTS + 1 == SESSION_FINER_COUNTS, "each count has a place");
 
 /* ---- all cells of a mesh ----------------------------------------------------------------------------------------- */
 
@@ -199,18 +208,14 @@ void session_end_finer(session_meshes *meshes)
     }
 }
 
-/* What the ranks have agreed on for a mesh. */
-typedef struct finer_choice {
-    int parts; /* 0: cells are not read as finer ones */
-    bool is_lobatto;
-} finer_choice;
-
-static void make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const finer_choice *choice, int threads,
+static void make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const session_finer_choice *choice, int threads,
                             base_error *error)
 {
     session_finer made = mesh->finer;
-    if (made.parts == choice->parts && (!made.parts || made.is_lobatto == choice->is_lobatto)) return;
-    made = (session_finer){.is_counted = true, .parts = choice->parts, .is_lobatto = choice->is_lobatto};
+    const int parts = choice->parts > 1 ? choice->parts : 0;
+    const session_sizes sizes = made.parts ? made.sizes : session_sizes_of(mesh);
+    if (made.parts == parts && (!made.parts || made.is_lobatto == choice->is_lobatto)) return;
+    made = (session_finer){.is_counted = true, .parts = parts, .is_lobatto = choice->is_lobatto, .sizes = sizes};
     memcpy(made.counts, mesh->finer.counts, sizeof made.counts);
     end_finer_mesh(meshes, mesh);
     if (!made.parts || !session_has_higher_order(&mesh->given)) return;
@@ -237,17 +242,32 @@ void session_drop_ids(const session_meshes *meshes)
     }
 }
 
-static void count_spacings(const session_polynomials *of, int64_t counts[SESSION_FINER_COUNTS], double (*places)[3])
+static void count_spacings(const session_polynomials *of, int64_t counts[SESSION_FINER_COUNTS], double (*places)[3],
+                           int64_t cells[ROWS_MOST_KINDS])
 {
     for (int64_t cell = 0; cell < of->cell_count; cell++) {
         const int kind = session_kind_of(&of->rows, cell);
         const session_nodes *nodes = &of->rows.kinds[kind].nodes;
         const int64_t first = session_row_first(&of->rows, cell);
-        counts[PYRAMIDS] += nodes->type == GRID_PYRAMID;
+        cells[kind]++;
         if (!session_has_two_spacings(nodes)) continue;
         for (int n = 0; n < nodes->count; n++)
             grid_vertex(&of->rows.cells, session_row_vertex(&of->rows, first + n), places[n]);
         counts[session_derivatives_of(of, cell, places[0], 3) == &of->kinds[2 * kind] ? EQUISPACED : LOBATTO]++;
+    }
+}
+
+/* Adds what finer lattices take in so many cells: vertices and parents of pieces of 4 bytes, and nodes. */
+static void count_bytes(const session_nodes *nodes, int64_t cells, int64_t counts[SESSION_FINER_COUNTS])
+{
+    const bool is_flat = nodes->type == GRID_TRIANGLE || nodes->type == GRID_QUAD;
+    counts[PYRAMIDS] += nodes->type == GRID_PYRAMID ? cells : 0;
+    counts[SERENDIPITY] += nodes->is_complete ? 0 : cells;
+    for (int parts = 2; parts <= FINER_MOST_PARTS; parts++) {
+        const int64_t m = parts * nodes->order, pieces = is_flat ? m * m : m * m * m;
+        const int64_t fine = session_complete_nodes(nodes->type, (int)m).count;
+        counts[BYTES + parts] += cells * (pieces * 4 * (grid_type_vertices(nodes->type) + 1) + fine * 24);
+        counts[COMPONENT_BYTES + parts] += cells * fine * 8;
     }
 }
 
@@ -264,9 +284,12 @@ static bool count_mesh(session_mesh *mesh)
         order = of->order > order ? of->order : order;
         nodes = of->count > nodes ? of->count : nodes;
     }
+    int64_t cells[ROWS_MOST_KINDS] = {0};
     double(*places)[3] = base_alloc((size_t)nodes * sizeof *places);
     is_made = is_made && places;
-    if (is_made) count_spacings(&polynomials, counts, places);
+    if (is_made) count_spacings(&polynomials, counts, places, cells);
+    for (int i = 0; i < polynomials.rows.kind_count; i++)
+        count_bytes(&polynomials.rows.kinds[i].nodes, cells[i], counts);
     if (is_made) counts[order]++;
     base_free(places);
     session_polynomials_free(&polynomials);
@@ -283,30 +306,33 @@ static bool sum_counts(const session_meshes *meshes, const char *name, int64_t s
         if (!part->is_given || !part->topology.is_split) continue;
         is_made = is_made && (part->finer.is_counted || count_mesh(part));
         for (int n = 0; n < SESSION_FINER_COUNTS; n++) sums[n] += part->finer.counts[n];
+        sums[BLOCKS + part->finer.parts]++;
     }
     return is_made;
 }
 
-static finer_choice choose(const char *mesh, const int64_t sums[SESSION_FINER_COUNTS], int parts,
-                           session_report *report)
+int session_most_parts(const session_finer_choice *choice)
 {
-    int order = NODES_MOST_ORDER;
-    while (order > 1 && !sums[order]) order--;
-    const int most = NODES_MOST_ORDER / order, chosen = parts < most ? parts : most;
-    const bool has_pyramids = sums[PYRAMIDS] > 0;
-    session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 0}, has_pyramids,
-                 "mesh \"%s\": %lld of its cells are pyramids, whose polynomials are not known: finer_pieces has no "
-                 "effect on it, and its cells are split at their own nodes",
-                 mesh, (long long)sums[PYRAMIDS]);
-    session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 1}, !has_pyramids && chosen < parts,
-                 "mesh \"%s\": it has cells of order %d, and so finer_pieces is %d on it instead of %d: at most %d "
-                 "pieces along an edge of a cell are supported",
-                 mesh, order, chosen, parts, NODES_MOST_ORDER);
-    return (finer_choice){has_pyramids || chosen < 2 ? 0 : chosen, sums[LOBATTO] > sums[EQUISPACED]};
+    const int most = choice->order ? NODES_MOST_ORDER / choice->order : FINER_MOST_PARTS;
+    return most < FINER_MOST_PARTS ? most : FINER_MOST_PARTS;
 }
 
-insitu_status session_make_finer(session_meshes *meshes, const session_catalogue *catalogue, int parts,
-                                 const session_team *team, session_report *report, bool *is_any, base_error *error)
+static session_finer_choice make_choice(const int64_t sums[SESSION_FINER_COUNTS])
+{
+    session_finer_choice out = {.order = NODES_MOST_ORDER,
+                                .pyramid_count = sums[PYRAMIDS],
+                                .serendipity_count = sums[SERENDIPITY],
+                                .is_lobatto = sums[LOBATTO] > sums[EQUISPACED],
+                                .parts = 1};
+    while (out.order > 0 && !sums[out.order]) out.order--;
+    memcpy(out.bytes, sums + BYTES, sizeof out.bytes);
+    memcpy(out.bytes_per_component, sums + COMPONENT_BYTES, sizeof out.bytes_per_component);
+    memcpy(out.blocks, sums + BLOCKS, sizeof out.blocks);
+    return out;
+}
+
+insitu_status session_count_finer(session_meshes *meshes, const session_catalogue *catalogue, MPI_Comm comm,
+                                  session_finer_choice *choices, base_error *error)
 {
     const int words = catalogue->mesh_count * SESSION_FINER_COUNTS;
     int64_t *sums = base_calloc((size_t)words + 1, sizeof *sums);
@@ -314,20 +340,35 @@ insitu_status session_make_finer(session_meshes *meshes, const session_catalogue
     for (int m = 0; m < catalogue->mesh_count && is_made; m++)
         is_made = sum_counts(meshes, catalogue->meshes[m].name, sums + m * SESSION_FINER_COUNTS);
     if (!is_made) session_fail_for_memory(error, words * (int64_t)sizeof *sums, "counts of cells of higher order");
-    insitu_status status = session_agree(team->comm, error);
+    insitu_status status = session_agree(comm, error);
     if (!status)
-        status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, words, MPI_INT64_T, MPI_SUM, team->comm),
+        status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, words, MPI_INT64_T, MPI_SUM, comm),
                                    "MPI_Allreduce");
-    for (int m = 0; m < catalogue->mesh_count && !status; m++) {
-        const char *name = catalogue->meshes[m].name;
-        const finer_choice choice = choose(name, sums + m * SESSION_FINER_COUNTS, parts, report);
-        const session_parts of = session_find_parts(meshes, name);
-        for (int order = 0; order <= NODES_MOST_ORDER; order++)
-            *is_any = *is_any || sums[m * SESSION_FINER_COUNTS + order];
+    for (int m = 0; m < catalogue->mesh_count && !status; m++)
+        choices[m] = make_choice(sums + m * SESSION_FINER_COUNTS);
+    base_free(sums);
+    return status;
+}
+
+/* Returns whether some block has another number of parts than the chosen one. */
+static bool is_new_choice(const session_finer_choice *choice)
+{
+    bool is_new = false;
+    for (int parts = 0; parts <= FINER_MOST_PARTS; parts++)
+        is_new = is_new || (choice->blocks[parts] && parts != (choice->parts > 1 ? choice->parts : 0));
+    return is_new;
+}
+
+insitu_status session_make_finer(session_meshes *meshes, const session_catalogue *catalogue,
+                                 const session_finer_choice *choices, const session_team *team, bool *are_changed,
+                                 base_error *error)
+{
+    for (int m = 0; m < catalogue->mesh_count; m++) {
+        const session_parts of = session_find_parts(meshes, catalogue->meshes[m].name);
+        *are_changed = *are_changed || is_new_choice(&choices[m]);
         for (int i = 0; i < of.count && !error->status; i++)
             if (of.items[i]->is_given && of.items[i]->topology.is_split)
-                make_finer_mesh(meshes, of.items[i], &choice, team->threads, error);
+                make_finer_mesh(meshes, of.items[i], &choices[m], team->threads, error);
     }
-    base_free(sums);
-    return status ? status : session_agree(team->comm, error);
+    return session_agree(team->comm, error);
 }

@@ -185,17 +185,25 @@ typedef struct session_torn {
     int64_t bytes;
 } session_torn;
 
-enum { SESSION_FINER_COUNTS = 36 };
+/* Bounds and sizes of the drawn cells of a mesh (members of session_mesh with these names). */
+typedef struct session_sizes {
+    double lower[3], upper[3];
+    int64_t drawn_count, flat_count;
+    double size_sum;
+} session_sizes;
+
+enum { SESSION_FINER_COUNTS = 64 };
 
 /* Nodes of a finer lattice in cells of higher order, at which their polynomials are evaluated (session_finer.h). The
  * coordinates are a copy reported to the user. */
 typedef struct session_finer {
     bool is_counted; /* set if `counts` are those of the current cells */
     int64_t counts[SESSION_FINER_COUNTS];
-    int parts;         /* number of parts of each edge between two nodes; 0: session_mesh.given is the caller's mesh */
-    bool is_lobatto;   /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
-    insitu_mesh nodal; /* the caller's mesh with copies in place of the arrays that cannot be read in place */
-    insitu_mesh fine;  /* same as session_mesh.given: cells with separate nodes in lexicographic order */
+    int parts; /* number of parts of each edge between two nodes; 0: session_mesh.given is the caller's mesh */
+    session_sizes sizes; /* sizes that the mesh has without finer lattices */
+    bool is_lobatto;     /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
+    insitu_mesh nodal;   /* the caller's mesh with copies in place of the arrays that cannot be read in place */
+    insitu_mesh fine;    /* same as session_mesh.given: cells with separate nodes in lexicographic order */
     double *coordinates; /* 3 per node */
     int64_t *offsets;    /* NULL if all cells have the same type and order */
     unsigned char *types;
@@ -520,6 +528,13 @@ static inline const session_mesh *session_source(const session_mesh *mesh)
 static inline int64_t session_cell_count(const session_mesh *mesh)
 {
     return mesh->cells.lattice ? mesh->lattice.cells.cell_count : mesh->given.cell_count;
+}
+
+static inline session_sizes session_sizes_of(const session_mesh *mesh)
+{
+    const double *low = mesh->lower, *high = mesh->upper;
+    return (session_sizes){
+        {low[0], low[1], low[2]}, {high[0], high[1], high[2]}, mesh->drawn_count, mesh->flat_count, mesh->size_sum};
 }
 
 /* Returns the caller's cell that contains a cell of `cells`: that cell itself, unless cells are split into pieces. */

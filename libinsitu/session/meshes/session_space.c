@@ -18,7 +18,16 @@ static double rounded_size(double size)
     return ldexp(floor(ldexp(mantissa, BITS) + 0.61803398874989485), exponent - BITS);
 }
 
-static insitu_status reduce_extent(const session_meshes *meshes, MPI_Comm comm, session_extent *out, base_error *error)
+static double half_diagonal(const double lower[3], const double upper[3])
+{
+    double half[3];
+    for (int axis = 0; axis < 3; axis++) half[axis] = 0.5 * upper[axis] - 0.5 * lower[axis];
+    return hypot(hypot(half[0], half[1]), half[2]);
+}
+
+/* Computes the global bounds. by_nodes: meshes with finer lattices count as if they had none. */
+static insitu_status reduce_extent(const session_meshes *meshes, bool by_nodes, MPI_Comm comm, session_extent *out,
+                                   base_error *error)
 {
     double mine[6], all[6];
     int64_t counts[3] = {0, 0, 0}, totals[3] = {0, 0, 0};
@@ -26,14 +35,15 @@ static insitu_status reduce_extent(const session_meshes *meshes, MPI_Comm comm, 
     for (int i = 0; i < 6; i++) mine[i] = INFINITY;
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
-        if (mesh->drawn_count == 0) continue;
+        const session_sizes of = by_nodes && mesh->finer.parts ? mesh->finer.sizes : session_sizes_of(mesh);
+        if (of.drawn_count == 0) continue;
         for (int axis = 0; axis < 3; axis++) {
-            mine[axis] = fmin(mine[axis], mesh->lower[axis]);
-            mine[3 + axis] = fmin(mine[3 + axis], -mesh->upper[axis]);
+            mine[axis] = fmin(mine[axis], of.lower[axis]);
+            mine[3 + axis] = fmin(mine[3 + axis], -of.upper[axis]);
         }
-        counts[0] += mesh->drawn_count;
-        counts[2] += mesh->drawn_count - mesh->flat_count;
-        sizes += mesh->size_sum;
+        counts[0] += of.drawn_count;
+        counts[2] += of.drawn_count - of.flat_count;
+        sizes += of.size_sum;
     }
     counts[1] = counts[0] > 0;
     insitu_status status =
@@ -52,14 +62,8 @@ static insitu_status reduce_extent(const session_meshes *meshes, MPI_Comm comm, 
         out->lower[axis] = all[axis];
         out->upper[axis] = -all[3 + axis];
     }
+    out->half_diagonal = half_diagonal(out->lower, out->upper);
     return INSITU_OK;
-}
-
-static double half_diagonal(const double lower[3], const double upper[3])
-{
-    double half[3];
-    for (int axis = 0; axis < 3; axis++) half[axis] = 0.5 * upper[axis] - 0.5 * lower[axis];
-    return hypot(hypot(half[0], half[1]), half[2]);
 }
 
 int session_flat_axis(const session_extent *extent)
@@ -104,9 +108,8 @@ static void choose_origin(session_space *space)
 insitu_status session_update_space(session_space *space, session_meshes *meshes, MPI_Comm comm, base_error *error)
 {
     session_extent extent;
-    const insitu_status status = reduce_extent(meshes, comm, &extent, error);
+    const insitu_status status = reduce_extent(meshes, false, comm, &extent, error);
     if (status) return status;
-    extent.half_diagonal = half_diagonal(extent.lower, extent.upper);
     space->extent = extent;
     space->has_extent = true;
     if (!is_space_valid(space)) {
@@ -115,4 +118,10 @@ insitu_status session_update_space(session_space *space, session_meshes *meshes,
     }
     meshes->are_cells_changed = false;
     return INSITU_OK;
+}
+
+insitu_status session_find_nodal_extent(const session_meshes *meshes, MPI_Comm comm, session_extent *out,
+                                        base_error *error)
+{
+    return reduce_extent(meshes, true, comm, out, error);
 }

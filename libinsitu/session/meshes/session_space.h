@@ -33,4 +33,9 @@ typedef struct session_space {
  * Collective. */
 insitu_status session_update_space(session_space *space, session_meshes *meshes, MPI_Comm comm, base_error *error);
 
+/* Computes the global bounds as they would be if no mesh had finer lattices (session_finer.h), so that they do not
+ * depend on these. Collective. */
+insitu_status session_find_nodal_extent(const session_meshes *meshes, MPI_Comm comm, session_extent *out,
+                                        base_error *error);
+
 #endif

@@ -295,7 +295,7 @@ static double count_intervals(double time, double interval)
     return floor(count + 1e-9 * fmax(1, fabs(count)));
 }
 
-static bool is_due(const scene_image *image, const session_moment *m)
+bool session_is_due(const scene_image *image, const session_moment *m)
 {
     if (image->time_interval > 0)
         return m->is_first ||
@@ -335,7 +335,7 @@ session_sound_events session_check_event_fields(const session_plan_basis *basis,
 int session_count_due(const scene *scene, const session_moment *moment)
 {
     int count = 0;
-    for (int i = 0; i < scene->image_count; i++) count += is_due(&scene->images[i], moment);
+    for (int i = 0; i < scene->image_count; i++) count += session_is_due(&scene->images[i], moment);
     return count;
 }
 
@@ -471,7 +471,7 @@ static void select_images(const session_plan_basis *basis, session_report *repor
     bool is_well = false;
     for (int i = 0; i < basis->scene->image_count; i++) {
         const scene_image *image = &basis->scene->images[i];
-        if (!(basis->allowed_images >> image->variant.source & 1) || !is_due(image, basis->moment)) continue;
+        if (!(basis->allowed_images >> image->variant.source & 1) || !session_is_due(image, basis->moment)) continue;
         if (image->variant.view == 0) is_well = can_be_drawn(basis, image, report, &plan->refusal);
         if (!is_well || is_for_nobody(basis, image, report)) continue;
         plan->images[plan->image_count++] = image;

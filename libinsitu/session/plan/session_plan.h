@@ -49,6 +49,8 @@ typedef struct session_plan_basis {
     bool keeps_pictures; /* set if pictures are kept in memory */
 } session_plan_basis;
 
+/* Returns whether an image is due, without regard to its condition. Local. */
+bool session_is_due(const scene_image *image, const session_moment *moment);
 /* Returns the number of images that are due, without regard to conditions. Local. */
 int session_count_due(const scene *scene, const session_moment *moment);
 

@@ -23,6 +23,12 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
     }
 }
 
+void session_want_no_fields(const session_meshes *meshes)
+{
+    for (int m = 0; m < meshes->count; m++)
+        for (int f = 0; f < meshes->items[m]->field_count; f++) meshes->items[m]->fields[f].is_in_statistics = false;
+}
+
 typedef struct indexed_values {
     /* the mesh, if it is torn and values at vertices are read once per corner; else NULL */
     const session_mesh *mesh;
@@ -164,6 +170,22 @@ static insitu_status interpolate_values(const session_mesh *mesh, session_field 
     status = session_interpolate_values(mesh, &values, threads, (double *)(void *)field->copy, error);
     field->is_copy_stale = status != INSITU_OK;
     return status;
+}
+
+insitu_status session_read_nodes(const session_mesh *mesh, int index, session_use_values *use, void *of,
+                                 base_error *error)
+{
+    const session_field *field = &mesh->fields[index];
+    base_error fault = {.status = INSITU_OK};
+    indexed_values v = make_indexed_values(mesh, field);
+    v.mesh = NULL;
+    const session_node_values values = {&v, field->given.centring == INSITU_CORNER, v.values.component_count,
+                                        read_node};
+    const bool has_values = field->values.data || field->component_arrays;
+    if (!has_values || field->problem.status || field->given.centring == INSITU_CELL || field->is_derived ||
+        check_index(mesh, field, &v, &fault))
+        return INSITU_OK;
+    return use(of, &values, error);
 }
 
 /* Updates the copy of a field's values if it is stale. If it is used for recentred scalars, the cells' own values are

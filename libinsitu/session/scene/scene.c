@@ -172,14 +172,28 @@ static insitu_status convert_images(const scene_document *d, const scene_file *i
     return status;
 }
 
+static insitu_status convert_pieces(const scene_document *d, const scene_file *in, scene *out)
+{
+    out->finer_pieces = in->surface_error ? 0 : in->finer_pieces ? *in->finer_pieces : 1;
+    out->surface_error = in->surface_error ? *in->surface_error : 0;
+    out->finer_memory = in->finer_memory ? *in->finer_memory : SCENE_FINER_MEMORY;
+    if (in->finer_pieces && in->surface_error)
+        return scene_fail_at_key(d, "surface_error", "", "given beside finer_pieces, expected one of the two");
+    if (in->finer_memory && !in->finer_pieces && !in->surface_error)
+        return scene_fail_at_key(d, "finer_memory", "",
+                                 "given without finer_pieces or surface_error, expected it "
+                                 "beside one of them");
+    return INSITU_OK;
+}
+
 static insitu_status convert_file(const scene_document *d, const scene_file *in, scene *out)
 {
     out->threads = in->threads ? *in->threads : 0;
-    out->finer_pieces = in->finer_pieces ? *in->finer_pieces : 1;
     out->tree = in->tree ? (scene_tree)*in->tree : SCENE_TREE_AUTO;
     out->schedule = in->schedule ? (scene_schedule)*in->schedule : SCENE_SCHEDULE_AUTO;
     out->writing = in->writing ? (scene_writing)*in->writing : SCENE_WRITE_BEHIND;
-    insitu_status status = scene_convert_derived(d, in, out);
+    insitu_status status = convert_pieces(d, in, out);
+    if (status == INSITU_OK) status = scene_convert_derived(d, in, out);
     if (status == INSITU_OK) status = convert_images(d, in, out);
     if (status == INSITU_OK) status = scene_convert_statistics(d, in, out);
     if (status == INSITU_OK) status = scene_convert_parameters(d, out);

@@ -562,6 +562,9 @@ typedef enum scene_schedule {
 /* The time at which pictures are written: by a thread while the simulation continues, or before the step ends. */
 typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_writing;
 
+/* Default of scene.finer_memory. */
+enum { SCENE_FINER_MEMORY = 4096 };
+
 /* Maximum number of images of a scene file (session_events.h has one bit for each), and of pictures that they make in a
  * step. */
 enum { SCENE_MAX_IMAGES = 64, SCENE_MAX_PICTURES = 1024 };
@@ -595,7 +598,10 @@ typedef struct scene {
     int derived_count;      /* number of derived fields, 0 .. SCENE_MAX_DERIVED */
     scene_derived *derived; /* derived fields; each comes after the fields from which it is derived */
     int threads;            /* number of threads per rank; 0: the cores of the node, shared among its ranks */
-    int finer_pieces;       /* number of pieces along an edge between two nodes of a cell of higher order, 1 .. 8 */
+    /* number of pieces along an edge between two nodes of a cell of higher order, 1 .. 8; 0: surface_error decides */
+    int finer_pieces;
+    double surface_error; /* bound of the error of these pieces in pixels, > 0; used if finer_pieces is 0 */
+    double finer_memory;  /* memory that finer pieces may take on all ranks together, in MiB, > 0 */
     scene_tree tree;
     scene_schedule schedule;
     scene_writing writing;

@@ -490,6 +490,16 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
               "twice as many pieces, their error is divided by 4. Memory and time grow with the number of pieces. "    \
               "See [Cells of higher order](high_order.md#finer-pieces). Linear cells are not affected.",               \
       .default_text = "`1`", .low = 1, .high = 8)                                                                      \
+    X(CYAML_FIELD_FLOAT_PTR("surface_error", OPTIONAL, scene_file, surface_error),                                     \
+      .help = "The number of pieces is chosen instead of given by `finer_pieces`, from 1 to 8 for each mesh and "      \
+              "step: isosurfaces, and positions in other layers, are then at most so many pixels away from those of "  \
+              "the cells' polynomials. 0.25 can hardly be seen. The report tells the numbers and the bounds. See "     \
+              "[Cells of higher order](high_order.md#an-error-in-pixels).",                                            \
+      .default_text = "by `finer_pieces`", .low = 0, .is_low_excluded = true, .high = 1000)                            \
+    X(CYAML_FIELD_FLOAT_PTR("finer_memory", OPTIONAL, scene_file, finer_memory),                                       \
+      .help = "Memory in MiB that finer pieces, their nodes and the values there may take on all ranks together. If "  \
+              "they would take more, there are fewer pieces, and a warning tells the numbers.",                        \
+      .default_text = "`4096`", .low = 0, .is_low_excluded = true, .high = 1e12)                                       \
     X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, SCENE_MAX_IMAGES),             \
       .help = "The images to draw. If three or more frames of a step show the same isosurface, they can share the "    \
               "search for its cells. The isosurface must be opaque, with one colour per value and normals by "         \

@@ -282,11 +282,13 @@ typedef struct scene_file_mesh {
 } scene_file_mesh;
 
 typedef struct scene_file {
-    int *threads;      /* number of threads per rank */
-    int *tree;         /* whether trees are built over all cells or over candidates alone (scene_tree) */
-    int *schedule;     /* schedule of compositing (scene_schedule) */
-    int *writing;      /* when pictures are written: during the step or behind it (scene_writing) */
-    int *finer_pieces; /* pieces between two nodes of a cell of higher order */
+    int *threads;          /* number of threads per rank */
+    int *tree;             /* whether trees are built over all cells or over candidates alone (scene_tree) */
+    int *schedule;         /* schedule of compositing (scene_schedule) */
+    int *writing;          /* when pictures are written: during the step or behind it (scene_writing) */
+    int *finer_pieces;     /* pieces between two nodes of a cell of higher order */
+    double *surface_error; /* bound by which the number of these pieces is chosen */
+    double *finer_memory;  /* limit of their memory */
     scene_file_image *images;
     int images_count;
     scene_file_statistics *statistics;

@@ -1,0 +1,144 @@
+#include "session_deviation.h"
+
+#include <math.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_region.h"
+#include "session_rows.h"
+
+/* The work on the cells of a mesh. */
+typedef struct deviation_work {
+    session_rows rows; /* of the caller's cells */
+    const session_deviation_wish *wish;
+    int field_size;                        /* number of components of the field, or 1 */
+    session_bound bounds[ROWS_MOST_KINDS]; /* nothing for kinds of cells that are not measured */
+} deviation_work;
+
+static const insitu_mesh *find_nodal(const session_mesh *mesh)
+{
+    return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
+}
+
+static bool is_measured(const session_nodes *of)
+{
+    return of->order > 1 && of->order <= BOUND_MOST_ORDER && of->type != GRID_PYRAMID;
+}
+
+static bool begin_work(const session_mesh *mesh, const session_deviation_wish *wish, deviation_work *w)
+{
+    const insitu_mesh *nodal = find_nodal(mesh);
+    bool is_made = true;
+    *w = (deviation_work){.rows = session_given_rows(nodal),
+                          .wish = wish,
+                          .field_size = wish->values ? wish->values->component_count : 1};
+    session_list_kinds(&w->rows);
+    for (int i = 0; i < w->rows.kind_count && is_made; i++)
+        if (is_measured(&w->rows.kinds[i].nodes))
+            is_made = session_make_bound(&w->rows.kinds[i].nodes, nodal->vertex_order, wish->is_lobatto, &w->bounds[i]);
+    return is_made;
+}
+
+static void end_work(deviation_work *w)
+{
+    for (int i = 0; i < w->rows.kind_count; i++) session_drop_bound(&w->bounds[i]);
+}
+
+/* Returns the number of doubles that a cell needs: a tuple of the field, values and tuples at nodes, and working
+ * memory. */
+static size_t find_room(const deviation_work *w)
+{
+    size_t most = 0;
+    for (int i = 0; i < w->rows.kind_count; i++) {
+        if (!w->bounds[i].fine_count) continue;
+        const size_t own = 5 * (size_t)w->bounds[i].nodes.of.count + session_bound_room(&w->bounds[i]);
+        most = own > most ? own : most;
+    }
+    return most + (size_t)w->field_size;
+}
+
+/* Reads the field at the nodes of a cell. */
+static void read_values(const deviation_work *w, int64_t cell, int count, double *field, double *out)
+{
+    const session_node_values *values = w->wish->values;
+    const int64_t first = session_row_first(&w->rows, cell);
+    for (int n = 0; n < count; n++) {
+        values->read(values->of,
+                     values->is_by_entry ? session_row_entry(&w->rows, cell, n)
+                                         : session_row_vertex(&w->rows, first + n),
+                     field);
+        out[n] = field[w->wish->component];
+    }
+}
+
+/* Most cells are not crossed, so that their positions are not read. */
+static session_cell_bound bound_cell(const deviation_work *w, const session_bound *of, int64_t cell, double *room)
+{
+    const session_isovalues *isovalues = w->wish->values ? w->wish->isovalues : NULL;
+    const int64_t first = session_row_first(&w->rows, cell);
+    const int count = of->nodes.of.count;
+    double *values = room + w->field_size, *tuples = values + count, *rest = tuples + 4 * count;
+    if (isovalues) {
+        read_values(w, cell, count, room, values);
+        if (!session_may_cross(of, values, isovalues, rest)) return (session_cell_bound){.is_crossed = false};
+    }
+    for (int n = 0; n < count; n++) {
+        grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + n), tuples + 4 * n);
+        tuples[4 * n + 3] = isovalues ? values[n] : 0;
+    }
+    return session_bound_cell(of, tuples, isovalues, rest);
+}
+
+static void measure_cell(const deviation_work *w, int64_t cell, double *room, session_deviation *out)
+{
+    const session_bound *of = &w->bounds[session_kind_of(&w->rows, cell)];
+    const session_pixels *pixels = &w->wish->pixels;
+    if (!of->fine_count || grid_is_ghost(&w->rows.cells, cell)) return;
+    const session_cell_bound bound = bound_cell(w, of, cell, room);
+    const double size = bound.is_crossed ? pixels->size(pixels->of, bound.centre, bound.radius) : INFINITY;
+    if (size == INFINITY) return;
+    out->cell_count++;
+    out->unbounded_count += !bound.is_bounded;
+    out->error = fmax(out->error, bound.error / size);
+}
+
+static bool measure_cells(const deviation_work *w, int threads, session_deviation *out)
+{
+    const int64_t cells = w->rows.cells.cell_count;
+    const size_t room_size = find_room(w);
+    bool is_lacking = false;
+    double error = out->error;
+    int64_t count = 0, unbounded = 0;
+#pragma omp parallel num_threads(session_region_threads(threads, cells)) reduction(|| : is_lacking)                    \
+    reduction(max : error) reduction(+ : count, unbounded)
+    {
+        region_enter();
+        double *room = base_alloc(room_size * sizeof *room);
+        session_deviation own = {.error = error};
+        is_lacking = !room;
+#pragma omp for schedule(static)
+        for (int64_t cell = 0; cell < cells; cell++)
+            if (room) measure_cell(w, cell, room, &own);
+        error = own.error;
+        count = own.cell_count;
+        unbounded = own.unbounded_count;
+        base_free(room);
+        region_leave();
+    }
+    out->error = error;
+    out->cell_count += count;
+    out->unbounded_count += unbounded;
+    return !is_lacking;
+}
+
+insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_wish *wish, int threads,
+                                        session_deviation *out, base_error *error)
+{
+    deviation_work *w = base_alloc(sizeof *w);
+    const bool is_made = w && begin_work(mesh, wish, w) && measure_cells(w, threads, out);
+    if (w) end_work(w);
+    base_free(w);
+    if (is_made) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for the bound of its cells of higher order",
+                     mesh->label);
+}

@@ -1,0 +1,35 @@
+/* The largest distance, in pixels, between what is drawn of a mesh's cells of higher order and their polynomials. */
+#ifndef SESSION_DEVIATION_H
+#define SESSION_DEVIATION_H
+
+#include "session_bound.h"
+#include "session_finer.h"
+
+/* The sizes of pixels in the views that show a mesh. */
+typedef struct session_pixels {
+    const void *of;
+    /* Returns a lower bound of the size, in scene units, of a pixel on a sphere; INFINITY if no view shows the
+     * sphere. It is called by several threads at once. */
+    double (*size)(const void *of, const double centre[3], double radius);
+} session_pixels;
+
+/* What of a mesh is measured. */
+typedef struct session_deviation_wish {
+    const session_node_values *values;  /* a field; NULL: the positions of all cells are measured */
+    int component;                      /* component of the field */
+    const session_isovalues *isovalues; /* isosurfaces of the field */
+    session_pixels pixels;
+    bool is_lobatto; /* as in session_make_interpolation() */
+} session_deviation_wish;
+
+typedef struct session_deviation {
+    double error; /* largest bound in pixels if cells have one piece between two nodes (session_cell_bound.error) */
+    int64_t cell_count, unbounded_count; /* number of cells that were measured, and of those without a bound */
+} session_deviation;
+
+/* Measures the caller's cells of a mesh with cells of higher order, ghosts excepted, and adds the result to *out.
+ * Parallel. Local. */
+insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_wish *wish, int threads,
+                                        session_deviation *out, base_error *error);
+
+#endif

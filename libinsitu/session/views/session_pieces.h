@@ -1,0 +1,24 @@
+/* Chooses the number of pieces between two nodes of cells of higher order. */
+#ifndef SESSION_PIECES_H
+#define SESSION_PIECES_H
+
+#include "session_finer.h"
+#include "session_plan.h"
+
+/* The input of the choice. Scene, moment and catalogue are the same on every rank. */
+typedef struct session_pieces_basis {
+    const scene *scene;
+    const session_moment *moment;
+    const session_catalogue *catalogue;
+    const session_team *team;
+    session_meshes *meshes;
+} session_pieces_basis;
+
+/* Chooses the numbers: by the scene's finer_pieces, or so that what the due images show is within its surface_error of
+ * the cells' polynomials, but with no more memory than its finer_memory. Calls fill functions of fields that
+ * isosurfaces show. Adds what was chosen to the report. choices: those of session_count_finer(), one per mesh of the
+ * catalogue. Collective; all ranks return the same status. */
+insitu_status session_choose_pieces(const session_pieces_basis *basis, session_finer_choice *choices,
+                                    session_report *report, base_error *error);
+
+#endif
