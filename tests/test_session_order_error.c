@@ -520,17 +520,16 @@ static void memory_is_limited(void **state)
         snprintf(scene, sizeof scene, "%s\nfiner_memory: %.9g\nimages:\n" SMALL(ISO("0.5")),
                  fixed ? "finer_pieces: 5" : "surface_error: 0.3", mebibytes(2) * 1.000001);
         told of = draw(MPI_COMM_WORLD, scene, &mesh);
-        snprintf(
-            words, sizeof words,
-            "there are 2 pieces between two nodes instead of %d: all finer pieces would take %.1f MiB on all ranks",
-            wanted, mebibytes(wanted));
+        snprintf(words, sizeof words,
+                 "2 instead of %d pieces between two nodes: all finer pieces would take %.1f MiB on all ranks", wanted,
+                 mebibytes(wanted));
         everywhere(strstr(of.warnings, words) != NULL && is_drawn_as(&of, 2, SMALL(ISO("0.5")), &mesh));
         everywhere(fixed || (of.count == 2 && of.bound > 0.3));
         free_drawn(&of.pictures);
     }
     snprintf(scene, sizeof scene, "finer_pieces: 2\nfiner_memory: %.9g\nimages:\n" SMALL(ISO("0.5")),
              mebibytes(2) * 0.999999);
-    everywhere(strstr(tell(scene, &mesh).warnings, "there are 1 pieces between two nodes instead of 2") != NULL);
+    everywhere(strstr(tell(scene, &mesh).warnings, "1 instead of 2 pieces between two nodes") != NULL);
     order_mesh_free(&mesh);
 }
 

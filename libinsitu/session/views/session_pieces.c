@@ -95,7 +95,7 @@ typedef struct piece_wish {
     double *values; /* isovalues */
 } piece_wish;
 
-enum { MOST_WISHES = 32 };
+enum { MOST_WISHES = 256 };
 
 /* The first wish is that of the positions. */
 typedef struct piece_wishes {
@@ -218,10 +218,12 @@ static void list_wishes(const session_pieces_basis *basis, const piece_views *vi
 
 /* ---- errors ------------------------------------------------------------------------------------------------------ */
 
-/* The errors of one mesh. */
+/* The errors of one mesh, and what follows from them. */
 typedef struct piece_error {
     bool is_shown;         /* set if some due image shows the mesh; the same on every rank */
     session_deviation all; /* counts are those of isosurfaces */
+    int components;        /* number of components of the fields that images of the scene show */
+    int wanted;            /* number of pieces without a limit of memory */
 } piece_error;
 
 /* A part of a mesh that is being measured. */
@@ -388,43 +390,38 @@ static int count_components(const scene *scene, const session_catalogue_mesh *me
     return count;
 }
 
-static double find_bytes(const session_finer_choice *choice, int components, int parts)
+/* Returns the bytes that the finer pieces of a mesh take. */
+static double find_bytes(const session_finer_choice *choice, const piece_error *of)
 {
-    return (double)choice->bytes[parts] + components * (double)choice->bytes_per_component[parts];
+    return (double)choice->bytes[choice->parts] + of->components * (double)choice->bytes_per_component[choice->parts];
 }
 
-/* Takes pieces from the mesh whose pieces need most memory, until those of all meshes fit. wanted: the numbers before.
- */
-static void limit_memory(const scene *scene, const session_catalogue *catalogue, session_finer_choice *choices,
-                         int *wanted, session_report *report)
+/* Takes pieces from the mesh whose pieces need most memory, until those of all meshes fit. */
+static void limit_memory(const scene *scene, const session_catalogue *catalogue, const piece_error *errors,
+                         session_finer_choice *choices, session_report *report)
 {
     const double limit = scene->finer_memory * bytes_per_mib;
     double all = 0;
-    for (int m = 0; m < catalogue->mesh_count; m++) {
-        wanted[m] = choices[m].parts;
-        all += find_bytes(&choices[m], count_components(scene, &catalogue->meshes[m]), choices[m].parts);
-    }
+    for (int m = 0; m < catalogue->mesh_count; m++) all += find_bytes(&choices[m], &errors[m]);
     for (double sum = all; sum > limit;) {
-        int largest = 0;
-        double most = -1;
+        int largest = -1;
+        double most = 0;
         for (int m = 0; m < catalogue->mesh_count; m++) {
-            const double own =
-                find_bytes(&choices[m], count_components(scene, &catalogue->meshes[m]), choices[m].parts);
-            if (choices[m].parts > 1 && own > most) largest = m;
-            if (choices[m].parts > 1 && own > most) most = own;
+            const double own = find_bytes(&choices[m], &errors[m]);
+            if (own > most) largest = m;
+            most = fmax(most, own);
         }
-        if (most < 0) break;
+        if (largest < 0) break;
         choices[largest].parts--;
-        sum += find_bytes(&choices[largest], count_components(scene, &catalogue->meshes[largest]),
-                          choices[largest].parts) -
-               most;
+        sum += find_bytes(&choices[largest], &errors[largest]) - most;
     }
     for (int m = 0; m < catalogue->mesh_count; m++)
         session_warn(report, &(session_warning){WARNING_FINER, NULL, catalogue->meshes[m].name, 2},
-                     choices[m].parts < wanted[m],
-                     "mesh \"%s\": there are %d pieces between two nodes instead of %d: all finer pieces would take "
-                     "%.1f MiB on all ranks, and finer_memory is %g",
-                     catalogue->meshes[m].name, choices[m].parts, wanted[m], all / bytes_per_mib, scene->finer_memory);
+                     choices[m].parts < errors[m].wanted,
+                     "mesh \"%s\": %d instead of %d pieces between two nodes: all finer pieces would take %.1f MiB on "
+                     "all ranks, and finer_memory is %g",
+                     catalogue->meshes[m].name, choices[m].parts, errors[m].wanted, all / bytes_per_mib,
+                     scene->finer_memory);
 }
 
 /* ---- all meshes -------------------------------------------------------------------------------------------------- */
@@ -433,7 +430,7 @@ static void report_pieces(const char *mesh, const session_finer_choice *choice, 
                           session_report *report)
 {
     char bound[100] = "without a bound", cells[160] = "";
-    if (choice->parts > 1 || !choice->serendipity_count)
+    if ((choice->parts > 1 || !choice->serendipity_count) && choice->order <= BOUND_MOST_ORDER)
         snprintf(bound, sizeof bound, "within %.3g pixels of the polynomials",
                  of->all.error / (choice->parts * choice->parts));
     if (of->all.cell_count)
@@ -443,8 +440,8 @@ static void report_pieces(const char *mesh, const session_finer_choice *choice, 
                      choice->parts > 1 ? "s" : "", bound, cells);
 }
 
-static void choose_all(const session_pieces_basis *basis, const piece_error *errors, session_finer_choice *choices,
-                       int *wanted, session_report *report)
+static void choose_all(const session_pieces_basis *basis, piece_error *errors, session_finer_choice *choices,
+                       session_report *report)
 {
     const scene *scene = basis->scene;
     const session_catalogue *catalogue = basis->catalogue;
@@ -456,8 +453,10 @@ static void choose_all(const session_pieces_basis *basis, const piece_error *err
             choose_fixed(name, scene, &choices[m], report);
         else
             choose_by_error(name, scene, &errors[m], &choices[m], report);
+        errors[m].components = count_components(scene, &catalogue->meshes[m]);
+        errors[m].wanted = choices[m].parts;
     }
-    limit_memory(scene, catalogue, choices, wanted, report);
+    limit_memory(scene, catalogue, errors, choices, report);
     for (int m = 0; m < catalogue->mesh_count && !scene->finer_pieces; m++)
         if (errors[m].is_shown) report_pieces(catalogue->meshes[m].name, &choices[m], &errors[m], report);
 }
@@ -467,12 +466,10 @@ insitu_status session_choose_pieces(const session_pieces_basis *basis, session_f
 {
     const size_t count = (size_t)basis->catalogue->mesh_count + 1;
     piece_error *errors = base_calloc(count, sizeof *errors);
-    int *wanted = base_calloc(count, sizeof *wanted);
-    if (!errors || !wanted) session_fail_for_memory(error, (int64_t)(count * sizeof *errors), "numbers of pieces");
+    if (!errors) session_fail_for_memory(error, (int64_t)(count * sizeof *errors), "numbers of pieces");
     insitu_status status = session_agree(basis->team->comm, error);
     if (!status && !basis->scene->finer_pieces) status = find_errors(basis, choices, errors, report, error);
-    if (!status) choose_all(basis, errors, choices, wanted, report);
+    if (!status) choose_all(basis, errors, choices, report);
     base_free(errors);
-    base_free(wanted);
     return status;
 }
