@@ -40,6 +40,7 @@ program curvilinear
     end do
     call pictures%destroy(status)
     if (status /= INSITU_OK .and. rank == 0) write (error_unit, '(a)') pictures%error()
+    deallocate (x, y, z, velocity, pressure) ! which the library read until here
     call MPI_Finalize()
 
 contains
