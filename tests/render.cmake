@@ -62,7 +62,7 @@ set_tests_properties(render_isa PROPERTIES TIMEOUT 120)
 insitu_render_program(test_partition_mpi)
 insitu_add_mpi_test(partition test_partition_mpi 1 2 3 4 7 WHOLE 2 3 4 7)
 insitu_render_program(test_overlap_mpi)
-insitu_add_mpi_test(overlap test_overlap_mpi 1 2 3 7 WHOLE 1 2 3 4 7 TIMEOUT 300)
+insitu_add_mpi_test(overlap test_overlap_mpi 1 2 3 WHOLE 1 2 3 4 7 TIMEOUT 300)
 insitu_render_program(test_hanging_mpi)
 insitu_add_mpi_test(hanging test_hanging_mpi 1 3 WHOLE 2 7)
 

@@ -1,6 +1,6 @@
 # Sessions: on any ranks, right and wrong input. Pictures are caught by the fixture; test_api writes them. Daily all run on 1
-# and 3 ranks, and session, session_partition and invariance on 2 and 7 too, as compositing's own tests do; the others do so
-# in the long tests.
+# and 3 ranks, session and session_recentre on 2 too, and session_partition and invariance on 2 and 7, as compositing's own
+# tests do; the others do so in the long tests.
 add_library(test_session_fixture OBJECT test_session_fixture.c)
 target_link_libraries(test_session_fixture PUBLIC test_meshes insitu_internal PkgConfig::CMOCKA PRIVATE insitu_quick_flags)
 function(insitu_session_program target)
@@ -218,7 +218,7 @@ insitu_session_program(test_session_left_out)
 insitu_add_mpi_test(session_left_out test_session_left_out 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session)
-insitu_add_mpi_test(session test_session 1 2 3 7 WHOLE 4 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session test_session 1 2 3 WHOLE 4 7 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_regions)
 insitu_add_mpi_test(session_regions test_session_regions 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
