@@ -107,11 +107,11 @@ static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const u
 /* ---- small tets ---- */
 
 /* Returns whether tets may be processed one ray-tet pair per lane. They may not if the ends of segments are computed in
- * double, because that is done per packet. They also may not if they are few enough to be binned by tile, because tets
- * are then so large that packets are as fast. */
+ * double, because that is done per packet. This must not depend on how many cells the rank has, because segments are
+ * not the same to the bit in packets. */
 SIMD_INLINE bool kernel_tet_segments_use_lanes(const kernel_frame *f)
 {
-    return kernel_segments_use_lanes(f) && !f->is_double && !f->volume_candidates;
+    return kernel_segments_use_lanes(f) && !f->is_double;
 }
 
 /* Adds the segments of rays that begin or end inside their tet; `rays` is a mask of lanes. */
