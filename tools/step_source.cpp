@@ -1,7 +1,6 @@
 /* If a step has at least as many parts (the pieces of a .pvtu, the blocks of a .vtm, the files of --pieces) as there
- * are ranks, each rank reads some parts completely. Of one structured grid, each rank reads a part of the extent.
- * Otherwise, and for any partition other than blocks, every rank
- * reads everything and keeps its own cells. */
+ * are ranks, each rank reads some parts completely. If the step is one structured grid, each rank reads a part of its
+ * extent. Otherwise, and for any partition other than blocks, every rank reads everything and keeps its own cells. */
 #include "step_source.h"
 
 #include <algorithm>

@@ -70,8 +70,9 @@ typedef struct kernel_bisection {
     const kernel_segment_state *state;
     const kernel_cell_interval *cell_interval;
     const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
-    double u, v, slope, depth_offset; /* constants of the ray: at depth t its point is (u, v) * (slope * t + shift) */
-    kernel_exact_point in, out;       /* ends of the interval, at the crossings of the faces */
+    /* constants of the ray: at depth t its point is (u, v) * (slope * t + depth_offset) */
+    double u, v, slope, depth_offset;
+    kernel_exact_point in, out; /* ends of the interval, at the crossings of the faces */
     /* unit distances per t; length of the interval; share of the light that reaches the current subinterval */
     double per_t, length, light;
     int64_t *map_failures;
