@@ -1,6 +1,6 @@
 # The adaptors for Conduit's Mesh Blueprint and for Catalyst, on a stand-in of the functions that they call.
-add_library(test_blueprint_fixture OBJECT conduit_stand_in.c test_blueprint_layouts.c)
-target_link_libraries(test_blueprint_fixture PUBLIC test_session_fixture PRIVATE insitu_quick_flags)
+add_library(test_blueprint_fixture OBJECT conduit_stand_in.c test_blueprint_door.c test_blueprint_layouts.c)
+target_link_libraries(test_blueprint_fixture PUBLIC test_session_fixture PRIVATE insitu_blueprint_objects insitu_quick_flags)
 
 foreach(test blueprint blueprint_faults blueprint_levels)
   add_executable(test_${test} test_${test}.c)

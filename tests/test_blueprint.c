@@ -8,6 +8,7 @@
 
 #include "conduit_stand_in.h"
 #include "insitu/conduit.h"
+#include "test_blueprint_door.h"
 #include "test_blueprint_layouts.h"
 
 static const char scene[] =
@@ -33,25 +34,6 @@ static const char scene_of_two[] = "images:\n"
 static const char *write_scene_of(const layout_case *layout)
 {
     return write_scene(layout->field_count == 3 ? scene : scene_of_two);
-}
-
-/* A session with a Blueprint adaptor. */
-typedef struct doorway {
-    insitu_session *session;
-    insitu_blueprint *adaptor;
-} doorway;
-
-static doorway open_door(const char *path)
-{
-    doorway d = {open_session(MPI_COMM_WORLD, path), NULL};
-    everywhere(insitu_blueprint_create(d.session, &insitu_conduit_functions, MPI_COMM_WORLD, &d.adaptor) == INSITU_OK);
-    return d;
-}
-
-static void close_door(doorway *d)
-{
-    insitu_blueprint_destroy(&d->adaptor);
-    everywhere(insitu_destroy(&d->session) == INSITU_OK);
 }
 
 static void step_ok(doorway *d)

@@ -8,6 +8,7 @@
 
 #include "conduit_stand_in.h"
 #include "insitu/conduit.h"
+#include "test_blueprint_door.h"
 #include "test_session_fixture.h"
 
 enum { MOST_BOXES = 16, SIDE = 8, SIZE = 120 };
@@ -282,24 +283,6 @@ static int count_holes(const caught_picture *picture)
         holes += x * x + y * y < 2 * 2 && !(picture->rgba[4 * pixel + 3] > 0);
     }
     return holes;
-}
-
-typedef struct doorway {
-    insitu_session *session;
-    insitu_blueprint *adaptor;
-} doorway;
-
-static doorway open_door(const char *path)
-{
-    doorway d = {open_session(MPI_COMM_WORLD, path), NULL};
-    everywhere(insitu_blueprint_create(d.session, &insitu_conduit_functions, MPI_COMM_WORLD, &d.adaptor) == INSITU_OK);
-    return d;
-}
-
-static void close_door(doorway *d)
-{
-    insitu_blueprint_destroy(&d->adaptor);
-    everywhere(insitu_destroy(&d->session) == INSITU_OK);
 }
 
 /* Draws the domains and compares the picture with that of plain blocks. */

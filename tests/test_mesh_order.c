@@ -272,3 +272,18 @@ void order_mesh_free(order_mesh *mesh)
     free(mesh->connectivity);
     *mesh = (order_mesh){0};
 }
+
+double order_sphere(const double p[3])
+{
+    return p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+}
+
+double order_wavy(const double p[3])
+{
+    return sin(2 * p[0]) * cos(1.5 * p[1]) + 0.5 * p[2];
+}
+
+double order_plane(const double p[3])
+{
+    return p[2] + 0.3 * p[0] + 0.2 * p[1];
+}

@@ -31,6 +31,11 @@ typedef struct order_mesh {
 
 typedef double order_function(const double point[3]);
 
+/* The squared distance from the origin, a wave, and a plane that is not along the axes. */
+double order_sphere(const double point[3]);
+double order_wavy(const double point[3]);
+double order_plane(const double point[3]);
+
 /* side^3 cubes of [-1, 1]^3, of the kind's cells; those of the rank, dealt one by one to so many ranks. bend: how far
  * vertices inside and on the faces of the cube are moved. */
 void order_mesh_create(const order_kind *kind, int side, double bend, order_function *value, int rank, int ranks,

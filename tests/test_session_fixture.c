@@ -103,6 +103,14 @@ insitu_session *open_session(MPI_Comm comm, const char *scene)
     return session;
 }
 
+insitu_session *open_mesh(MPI_Comm comm, const char *text, const insitu_mesh *mesh, const insitu_field *field)
+{
+    insitu_session *session = open_session(comm, write_scene(text));
+    assert_int_equal(insitu_set_mesh(session, "m", mesh), INSITU_OK);
+    assert_int_equal(insitu_set_field(session, "m", field), INSITU_OK);
+    return session;
+}
+
 void describe_part(const test_mesh *part, insitu_mesh *mesh)
 {
     insitu_mesh_defaults(mesh);

@@ -54,6 +54,9 @@ const char *write_scene(const char *text);
 
 insitu_session *open_session(MPI_Comm comm, const char *scene);
 
+/* Opens a session on the text of a scene, and sets mesh "m" with its field. */
+insitu_session *open_mesh(MPI_Comm comm, const char *text, const insitu_mesh *mesh, const insitu_field *field);
+
 /* A rank's part of a mesh, and its description; the arrays are the test_mesh's, which tests may spoil. */
 typedef struct session_input {
     test_mesh part;

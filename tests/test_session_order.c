@@ -52,9 +52,7 @@ static bool step_ok(insitu_session *session, int cycle)
 static drawn draw(MPI_Comm comm, const char *scene, const order_mesh *mesh, const insitu_field *more,
                   insitu_report *report)
 {
-    insitu_session *session = open_session(comm, write_scene(scene));
-    assert_int_equal(insitu_set_mesh(session, "m", &mesh->mesh), INSITU_OK);
-    assert_int_equal(insitu_set_field(session, "m", &mesh->field), INSITU_OK);
+    insitu_session *session = open_mesh(comm, scene, &mesh->mesh, &mesh->field);
     if (more) assert_int_equal(insitu_set_field(session, "m", more), INSITU_OK);
     const bool is_well = step_ok(session, 0);
     if (report) *report = *insitu_last_report(session);
@@ -137,16 +135,11 @@ static void planes_have_no_gap(void **state)
 
 /* ---- the order of the error -------------------------------------------------------------------------------------- */
 
-static double sphere(const double p[3])
-{
-    return p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-}
-
 /* The largest distance along rays within 0.4 of the axis, where the sphere faces the eye. */
 static double sphere_error(const order_kind *kind, int side, double bend)
 {
     order_mesh mesh;
-    order_mesh_create(kind, side, bend, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(kind, side, bend, order_sphere, own_rank, rank_count, &mesh);
     drawn d = draw(MPI_COMM_WORLD, sphere_scene, &mesh, NULL, NULL);
     double worst = 0;
     for (int pixel = 0; own_rank == 0 && pixel < PIXELS; pixel++) {
@@ -185,11 +178,6 @@ static void error_falls_by_four(void **state)
 
 /* ---- hexes are the linear ones between their nodes --------------------------------------------------------------- */
 
-static double wavy(const double p[3])
-{
-    return sin(2 * p[0]) * cos(1.5 * p[1]) + 0.5 * p[2];
-}
-
 /* Vertices of each cell's own, without connectivity. */
 static order_mesh own_nodes(const order_mesh *of, int p)
 {
@@ -217,7 +205,7 @@ static void hexes_are_those_between_their_nodes(void **state)
     for (int p = 1; p <= 4; p++) {
         const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
         order_mesh mesh;
-        order_mesh_create(&kind, 2, 0.1, wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(&kind, 2, 0.1, order_wavy, own_rank, rank_count, &mesh);
         order_mesh cut = order_mesh_linear_hexes(&mesh, p), own = own_nodes(&mesh, p);
         /* The threshold of picture 2 shows whole cells, which linear ones do not know. */
         drawn high = draw(MPI_COMM_WORLD, linear_scene, &mesh, NULL, NULL);
@@ -250,7 +238,7 @@ static void values_in_cells_are_the_callers(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         insitu_report report;
-        order_mesh_create(&order_kinds[k], 2, 0.05, wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
         double *values = malloc((size_t)(mesh.cell_count + 1) * sizeof *values);
         unsigned char *ghosts = malloc((size_t)mesh.cell_count + 1);
         int64_t ghost_count = 0;
@@ -285,7 +273,7 @@ static void thresholds_show_whole_cells(void **state)
     const char *plain = "images:\n" IMAGE("a", "surface: {colour_by: {field: f}}");
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
-        order_mesh_create(&order_kinds[k], 2, 0.05, wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
         unsigned char *ghosts = calloc((size_t)mesh.cell_count + 1, 1);
         for (int64_t i = 0; i < mesh.cell_count * mesh.nodes; i++)
             ghosts[i / mesh.nodes] |= mesh.values[mesh.connectivity[i]] < -0.3;
@@ -310,7 +298,7 @@ static void corner_fields_are_the_cells_own(void **state)
         for (int has_offsets = 0; has_offsets < 2; has_offsets++) {
             const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
             order_mesh mesh;
-            order_mesh_create(&kind, 2, 0.1, wavy, own_rank, rank_count, &mesh);
+            order_mesh_create(&kind, 2, 0.1, order_wavy, own_rank, rank_count, &mesh);
             order_mesh own = own_nodes(&mesh, p);
             int64_t *offsets = malloc((size_t)(mesh.cell_count + 1) * sizeof *offsets);
             for (int64_t cell = 0; cell <= mesh.cell_count; cell++) offsets[cell] = cell * mesh.nodes;
@@ -348,7 +336,7 @@ static void rotate_nodes(order_mesh *mesh)
 static drawn draw_rotated(const order_kind *kind, unsigned changed)
 {
     order_mesh mesh;
-    order_mesh_create(kind, 2, 0, wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(kind, 2, 0, order_wavy, own_rank, rank_count, &mesh);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_scene));
     assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);
     assert_int_equal(insitu_set_field(session, "m", &mesh.field), INSITU_OK);

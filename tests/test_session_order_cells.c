@@ -21,16 +21,6 @@ enum { SIDE = 240, PIXELS = SIDE * SIDE };
     IMAGE("surface: {colour: [1, 1, 1], edges: {width: " width                                                         \
           ", colour: [0, 0, 0]}, material: {ambient: 1, diffuse: 0, specular: 0}}")
 
-static double wavy(const double p[3])
-{
-    return sin(2 * p[0]) * cos(1.5 * p[1]) + 0.5 * p[2];
-}
-
-static double plane(const double p[3])
-{
-    return p[2] + 0.3 * p[0] + 0.2 * p[1];
-}
-
 /* more: a second field, or NULL. The caller owns the session. */
 static insitu_session *draw(const char *scene, const order_mesh *mesh, const insitu_field *more)
 {
@@ -133,7 +123,7 @@ static void check_edges(const order_kind *kind, double bend, const char *scene, 
 {
     order_mesh mesh;
     edge_list edges;
-    order_mesh_create(kind, 2, bend, wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(kind, 2, bend, order_wavy, own_rank, rank_count, &mesh);
     list_edges(kind, bend, &edges);
     caught_picture picture = draw_picture(scene, &mesh, NULL);
     const int wrong = own_rank ? 0 : count_wrong(&picture, &edges, width, fade);
@@ -170,7 +160,7 @@ static void cells_of_several_orders_share_a_mesh(void **state)
     edge_list edges;
     unsigned char types[8];
     int64_t offsets[9] = {0}, wrong = 0;
-    order_mesh_create(&kind, 2, 0, plane, own_rank, rank_count, &mesh);
+    order_mesh_create(&kind, 2, 0, order_plane, own_rank, rank_count, &mesh);
     for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
         const int at = (int)(cell * rank_count + own_rank) % 3;
         types[cell] = kinds[at].type;
@@ -252,7 +242,7 @@ static void cells_that_cannot_be_shown_count_once(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         int64_t expected = 0;
-        order_mesh_create(&order_kinds[k], 2, 0, wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0, order_wavy, own_rank, rank_count, &mesh);
         for (int64_t v = 0; v < mesh.vertex_count; v++) {
             const double *at = mesh.coordinates + 3 * v;
             if (fabs(at[0] - 1. / order_kinds[k].order) + fabs(at[1]) + fabs(at[2]) > 1e-9) continue;
@@ -279,7 +269,7 @@ static void cells_that_show_nothing_count_once(void **state)
     int reported = 0;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
-        order_mesh_create(&order_kinds[k], 2, 0, plane, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0, order_plane, own_rank, rank_count, &mesh);
         long long left = 0, of = 0, expected = mesh.cell_count;
         for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
             double low = INFINITY, high = -INFINITY;
@@ -308,7 +298,7 @@ static void statistics_count_cells_once(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         char text[4096];
-        order_mesh_create(&order_kinds[k], 2, 0, wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0, order_wavy, own_rank, rank_count, &mesh);
         int64_t cells = mesh.cell_count;
         MPI_Allreduce(MPI_IN_PLACE, &cells, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
         if (!own_rank) remove("cells.csv");
@@ -372,8 +362,8 @@ static void cell_values_count_once(void **state)
     (void)state;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
-        order_mesh_create(&order_kinds[k], 2, 0.05, wavy, own_rank, rank_count, &part);
-        order_mesh_create(&order_kinds[k], 2, 0.05, wavy, 0, 1, &whole);
+        order_mesh_create(&order_kinds[k], 2, 0.05, order_wavy, own_rank, rank_count, &part);
+        order_mesh_create(&order_kinds[k], 2, 0.05, order_wavy, 0, 1, &whole);
         const int64_t corners = part.cell_count * part.nodes;
         double *means = mean_values(&whole), *at_vertices = own_means(&part, &whole, means);
         double *of_cells = malloc((size_t)(part.cell_count + 1) * sizeof *of_cells);
@@ -410,8 +400,8 @@ static void normals_of_means_are_those_of_pieces(void **state)
     for (int p = 2; p <= 3; p++) {
         const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, p};
         order_mesh part, whole;
-        order_mesh_create(&kind, 2, 0.05, wavy, own_rank, rank_count, &part);
-        order_mesh_create(&kind, 2, 0.05, wavy, 0, 1, &whole);
+        order_mesh_create(&kind, 2, 0.05, order_wavy, own_rank, rank_count, &part);
+        order_mesh_create(&kind, 2, 0.05, order_wavy, 0, 1, &whole);
         order_mesh cut = order_mesh_linear_hexes(&part, p);
         double *means = mean_values(&whole), *at_vertices = own_means(&part, &whole, means);
         double *of_cells = malloc((size_t)(part.cell_count + 1) * sizeof *of_cells);

@@ -29,16 +29,6 @@ enum { WIDTH = 384, HEIGHT = 288, PIXELS = WIDTH * HEIGHT };
 #define WITHIN(error) "surface_error: " error "\nimages:\n"
 #define FINER(pieces) "finer_pieces: " pieces "\nimages:\n"
 
-static double sphere(const double p[3])
-{
-    return p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-}
-
-static double wavy(const double p[3])
-{
-    return sin(2 * p[0]) * cos(1.5 * p[1]) + 0.5 * p[2];
-}
-
 static bool is_measured(const order_kind *kind)
 {
     return !strstr(kind->name, "pyramid") && kind->order > 1;
@@ -75,17 +65,9 @@ static told step_told(insitu_session *session, int cycle)
     return out;
 }
 
-static insitu_session *open_with(MPI_Comm comm, const char *scene, const order_mesh *mesh)
-{
-    insitu_session *session = open_session(comm, write_scene(scene));
-    assert_int_equal(insitu_set_mesh(session, "m", &mesh->mesh), INSITU_OK);
-    assert_int_equal(insitu_set_field(session, "m", &mesh->field), INSITU_OK);
-    return session;
-}
-
 static told draw(MPI_Comm comm, const char *scene, const order_mesh *mesh)
 {
-    insitu_session *session = open_with(comm, scene, mesh);
+    insitu_session *session = open_mesh(comm, scene, &mesh->mesh, &mesh->field);
     told out = step_told(session, 0);
     insitu_destroy(&session);
     return out;
@@ -125,7 +107,7 @@ static sphere_hits find_hits(const caught_picture *picture, double bound)
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         const double x = (pixel % WIDTH + 0.5 - WIDTH / 2.0) * PIXEL, y = (HEIGHT / 2.0 - pixel / WIDTH - 0.5) * PIXEL;
         const double depth = (double)picture->depth[pixel], place[3] = {x, y, EYE - depth}, off = hypot(x, y);
-        if (isfinite(depth)) out.farthest = fmax(out.farthest, fabs(sqrt(sphere(place)) - radius) / PIXEL);
+        if (isfinite(depth)) out.farthest = fmax(out.farthest, fabs(sqrt(order_sphere(place)) - radius) / PIXEL);
         out.missed += !isfinite(depth) && off < radius - bound * PIXEL;
         out.beyond += isfinite(depth) && off > radius + bound * PIXEL;
     }
@@ -153,7 +135,8 @@ static void spheres_are_within_the_stated_error(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         if (!is_measured(&order_kinds[k]) || (!test_is_whole() && is_of_other_layout(&order_kinds[k]))) continue;
-        order_mesh_create(&order_kinds[k], order_kinds[k].order > 2 ? 2 : 4, 0, sphere, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], order_kinds[k].order > 2 ? 2 : 4, 0, order_sphere, own_rank, rank_count,
+                          &mesh);
         check_sphere(order_kinds[k].name, &mesh, 0.5);
         order_mesh_free(&mesh);
     }
@@ -164,12 +147,12 @@ static void lobatto_points_are_recognised(void **state)
     (void)state;
     const double of4[5] = {0, 0.5 - 0.5 * sqrt(3. / 7), 0.5, 0.5 + 0.5 * sqrt(3. / 7), 1};
     order_mesh mesh;
-    order_mesh_create(&hex_4, 2, 0, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_4, 2, 0, order_sphere, own_rank, rank_count, &mesh);
     for (int64_t i = 0; i < 3 * mesh.vertex_count; i++) {
         const int at = (int)lround((mesh.coordinates[i] + 1) * 4);
         mesh.coordinates[i] = at / 4 - 1 + of4[at % 4];
     }
-    for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = sphere(mesh.coordinates + 3 * v);
+    for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = order_sphere(mesh.coordinates + 3 * v);
     check_sphere("hex 4, Gauss-Lobatto", &mesh, 0.5);
     order_mesh_free(&mesh);
 }
@@ -255,7 +238,7 @@ static double distance_from(const order_mesh *mesh, double isovalue, const doubl
             for (int a = 0; a < 3; a++) at[a] += way[a];
         }
         const double d[3] = {of.value[0] - place[0], of.value[1] - place[1], of.value[2] - place[2]};
-        if (fabs(of.value[3] - isovalue) < 1e-9) nearest = fmin(nearest, sqrt(sphere(d)) / PIXEL);
+        if (fabs(of.value[3] - isovalue) < 1e-9) nearest = fmin(nearest, sqrt(order_sphere(d)) / PIXEL);
     }
     return nearest;
 }
@@ -266,8 +249,8 @@ static void bent_cells_are_within_the_stated_error(void **state)
     (void)state;
     const order_kind kind = {"hex 2", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 2};
     order_mesh part, whole;
-    order_mesh_create(&kind, 3, 0.1, wavy, own_rank, rank_count, &part);
-    order_mesh_create(&kind, 3, 0.1, wavy, 0, 1, &whole);
+    order_mesh_create(&kind, 3, 0.1, order_wavy, own_rank, rank_count, &part);
+    order_mesh_create(&kind, 3, 0.1, order_wavy, 0, 1, &whole);
     told of = draw(MPI_COMM_WORLD, WITHIN("0.5") IMAGE("a", "[384, 288]", FRONT, ISO("0.2")), &part);
     double farthest = 0;
     int hits = 0;
@@ -295,7 +278,7 @@ static void pieces_follow_the_error_and_the_camera(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_27, 2, 0, order_sphere, own_rank, rank_count, &mesh);
     const char *near = "{position: [0, 0, 2.5], focal: [0, 0, 0], up: [0, 1, 0]}";
     const char *far = "{position: [0, 0, 10], focal: [0, 0, 0], up: [0, 1, 0]}";
     char scene[2][1024];
@@ -322,7 +305,7 @@ static void pieces_are_drawn_as_a_fixed_number(void **state)
     static const order_kind *const kinds[] = {&hex_27, &hex_20};
     for (int k = 0; k < 2; k++) {
         order_mesh mesh;
-        order_mesh_create(kinds[k], 2, 0.05, wavy, own_rank, rank_count, &mesh);
+        order_mesh_create(kinds[k], 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
         told of = draw(MPI_COMM_WORLD, WITHIN("0.7") ALL, &mesh);
         everywhere(of.count > 1 && is_drawn_as(&of, of.count, ALL, &mesh));
         free_drawn(&of.pictures);
@@ -338,8 +321,8 @@ static void pieces_are_the_same_on_any_ranks(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
         if (!is_measured(&order_kinds[k]) || (!test_is_whole() && is_of_other_layout(&order_kinds[k]))) continue;
-        order_mesh_create(&order_kinds[k], 2, 0.07, wavy, own_rank, rank_count, &part);
-        order_mesh_create(&order_kinds[k], 2, 0.07, wavy, 0, 1, &whole);
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, own_rank, rank_count, &part);
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, 0, 1, &whole);
         told all = draw(MPI_COMM_WORLD, WITHIN("1.5") ALL, &part);
         told alone = draw(MPI_COMM_SELF, WITHIN("1.5") ALL, &whole);
         const bool is_same = (own_rank != 0 || same_drawn(&all.pictures, &alone.pictures)) &&
@@ -387,7 +370,7 @@ static void other_descriptions_have_the_same_pieces(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0.05, wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
     const int64_t entries = mesh.cell_count * mesh.nodes;
     int64_t *index = malloc(((size_t)mesh.vertex_count + 1) * sizeof *index);
     double *corners = malloc(((size_t)entries + 1) * sizeof *corners);
@@ -420,7 +403,7 @@ static void fields_without_a_bound_are_told(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0.05, wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_27, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
     const told of =
         tell("surface_error: 0.5\nfields: {g: 2 * f}\nimages:\n" SMALL("isosurface: {field: g, values: [0.1]}"), &mesh);
     everywhere(strstr(of.warnings, "surface_error does not hold for the isosurface of \"g\" on mesh \"m\"") != NULL);
@@ -449,7 +432,7 @@ static void the_number_is_in_the_database(void **state)
     static const char news[] = "pieces.cdb/report.json";
     static char text[8192];
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_27, 2, 0, order_sphere, own_rank, rank_count, &mesh);
     told of = draw(MPI_COMM_WORLD,
                    WITHIN("1") "  - name: a\n    size: [96, 72]\n    camera: " FRONT
                                "\n    layers: [" ISO("0.5") "]\n    outputs: [{cinema: pieces.cdb}]\n",
@@ -473,8 +456,8 @@ static void check_change(int change)
     static const char *const scenes[CHANGES] = {WITHIN("1") ALL, WITHIN("1") ALL, WITHIN("0.3") ALL, FINER("2") ALL,
                                                 "images:\n" ALL};
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0.05, wavy, own_rank, rank_count, &mesh);
-    insitu_session *session = open_with(MPI_COMM_WORLD, WITHIN("1") ALL, &mesh);
+    order_mesh_create(&hex_27, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
+    insitu_session *session = open_mesh(MPI_COMM_WORLD, WITHIN("1") ALL, &mesh.mesh, &mesh.field);
     told first = step_told(session, 0);
     for (int64_t v = 0; v < mesh.vertex_count && change == VALUES; v++) mesh.values[v] = sin(5 * mesh.values[v]);
     for (int64_t i = 0; i < 3 * mesh.vertex_count && change == NODES; i++) mesh.coordinates[i] *= 0.3;
@@ -512,7 +495,7 @@ static void memory_is_limited(void **state)
     (void)state;
     order_mesh mesh;
     char scene[1024], words[200];
-    order_mesh_create(&hex_27, 2, 0, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_27, 2, 0, order_sphere, own_rank, rank_count, &mesh);
     const told free_told = tell(WITHIN("0.3") SMALL(ISO("0.5")), &mesh);
     everywhere(free_told.count > 2 && !strstr(free_told.warnings, "finer_memory"));
     for (int fixed = 0; fixed < 2; fixed++) {
@@ -538,11 +521,11 @@ static void an_error_that_is_not_met_is_told(void **state)
     (void)state;
     const order_kind pyramid = {"pyramid 2", INSITU_LAGRANGE_PYRAMID, INSITU_ORDER_LEXICOGRAPHIC, 2};
     order_mesh mesh;
-    order_mesh_create(&hex_27, 2, 0, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_27, 2, 0, order_sphere, own_rank, rank_count, &mesh);
     const told of = tell(WITHIN("0.01") SMALL(ISO("0.5")), &mesh);
     everywhere(of.count == 8 && of.bound > 0.01 && strstr(of.warnings, "8 pieces between two nodes are the most"));
     order_mesh_free(&mesh);
-    order_mesh_create(&pyramid, 2, 0, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&pyramid, 2, 0, order_sphere, own_rank, rank_count, &mesh);
     const told pyramids = tell(WITHIN("0.01") SMALL(ISO("0.5")), &mesh);
     everywhere(strstr(pyramids.warnings, "surface_error has no effect on it") != NULL);
     order_mesh_free(&mesh);

@@ -27,21 +27,6 @@ enum { WIDTH = 96, HEIGHT = 72, PIXELS = WIDTH * HEIGHT };
     IMAGE("d", "volume: {field: f}")                                                                                   \
     IMAGE("e", "volume: {field: f}") "    sampling: {reproducible: true}\n"
 
-static double sphere(const double p[3])
-{
-    return p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-}
-
-static double wavy(const double p[3])
-{
-    return sin(2 * p[0]) * cos(1.5 * p[1]) + 0.5 * p[2];
-}
-
-static double plane(const double p[3])
-{
-    return p[2] + 0.3 * p[0] + 0.2 * p[1];
-}
-
 static bool is_finer(const order_kind *kind)
 {
     return !strstr(kind->name, "pyramid");
@@ -51,17 +36,9 @@ static bool is_finer(const order_kind *kind)
 
 enum { VOLUME = 3 };
 
-static insitu_session *open_with(MPI_Comm comm, const char *scene, const order_mesh *mesh)
-{
-    insitu_session *session = open_session(comm, write_scene(scene));
-    assert_int_equal(insitu_set_mesh(session, "m", &mesh->mesh), INSITU_OK);
-    assert_int_equal(insitu_set_field(session, "m", &mesh->field), INSITU_OK);
-    return session;
-}
-
 static drawn draw(MPI_Comm comm, const char *scene, const order_mesh *mesh)
 {
-    insitu_session *session = open_with(comm, scene, mesh);
+    insitu_session *session = open_mesh(comm, scene, &mesh->mesh, &mesh->field);
     drawn out = step_drawn(session, 0);
     insitu_destroy(&session);
     return out;
@@ -102,7 +79,7 @@ static double normal_error(const caught_picture *picture)
         if (at[0] * at[0] + at[1] * at[1] > 0.25) continue;
         at[2] = EYE - (double)picture->depth[pixel];
         for (int a = 0; a < 3; a++)
-            square += pow((double)picture->data[a * PIXELS + pixel] - at[a] / sqrt(sphere(at)), 2);
+            square += pow((double)picture->data[a * PIXELS + pixel] - at[a] / sqrt(order_sphere(at)), 2);
         worst = fmax(worst, sqrt(square));
     }
     return worst;
@@ -140,7 +117,7 @@ static void error_falls_with_the_square(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         if (!is_finer(&order_kinds[k]) || order_kinds[k].order == 1) continue;
-        order_mesh_create(&order_kinds[k], 2, 0, sphere, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0, order_sphere, own_rank, rank_count, &mesh);
         check_sphere(order_kinds[k].name, &mesh);
         order_mesh_free(&mesh);
     }
@@ -155,12 +132,12 @@ static void lobatto_points_are_recognised(void **state)
     (void)state;
     const double of4[5] = {0, 0.5 - 0.5 * sqrt(3. / 7), 0.5, 0.5 + 0.5 * sqrt(3. / 7), 1};
     order_mesh mesh;
-    order_mesh_create(&hex_4, 2, 0, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_4, 2, 0, order_sphere, own_rank, rank_count, &mesh);
     for (int64_t i = 0; i < 3 * mesh.vertex_count; i++) {
         const int at = (int)lround((mesh.coordinates[i] + 1) * 4);
         mesh.coordinates[i] = at / 4 - 1 + of4[at % 4];
     }
-    for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = sphere(mesh.coordinates + 3 * v);
+    for (int64_t v = 0; v < mesh.vertex_count; v++) mesh.values[v] = order_sphere(mesh.coordinates + 3 * v);
     check_sphere("hex 4, Gauss-Lobatto", &mesh);
     order_mesh_free(&mesh);
 }
@@ -200,7 +177,7 @@ static void every_ray_meets_a_plane(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh mesh;
         if (!is_finer(&order_kinds[k])) continue;
-        order_mesh_create(&order_kinds[k], 2, 0.07, plane, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_plane, own_rank, rank_count, &mesh);
         drawn pictures = draw(MPI_COMM_WORLD, FINER("3") IMAGE("a", "isosurface: {field: f, values: [0.1]}"), &mesh);
         int wrong = 0;
         for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) {
@@ -224,8 +201,8 @@ static void pictures_are_the_same_on_any_ranks(void **state)
     bool are_all_same = true;
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
-        order_mesh_create(&order_kinds[k], 2, 0.07, wavy, own_rank, rank_count, &part);
-        order_mesh_create(&order_kinds[k], 2, 0.07, wavy, 0, 1, &whole);
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, own_rank, rank_count, &part);
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, 0, 1, &whole);
         drawn all = draw(MPI_COMM_WORLD, FINER("3") ALL, &part), alone = draw(MPI_COMM_SELF, FINER("3") ALL, &whole);
         for (int i = 0; i < all.count && own_rank == 0; i++) {
             const caught_picture *one = &all.pictures[i], *other = &alone.pictures[i];
@@ -261,7 +238,7 @@ static void other_descriptions_draw_the_same(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0.07, wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0.07, order_wavy, own_rank, rank_count, &mesh);
     const int64_t entries = mesh.cell_count * mesh.nodes;
     int64_t *ids = malloc(((size_t)mesh.vertex_count + 1) * sizeof *ids);
     double *corners = malloc(((size_t)entries + 1) * sizeof *corners);
@@ -290,12 +267,12 @@ static void an_index_out_of_range_is_told(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0, wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(&hex_20, 2, 0, order_wavy, own_rank, rank_count, &mesh);
     int64_t *index = malloc((size_t)mesh.vertex_count * sizeof *index);
     for (int64_t v = 0; v < mesh.vertex_count; v++) index[v] = v;
     index[3] = mesh.vertex_count;
     mesh.field.index = (insitu_array){index, INSITU_INT64, 0};
-    insitu_session *session = open_with(MPI_COMM_WORLD, FINER("2") SPHERE, &mesh);
+    insitu_session *session = open_mesh(MPI_COMM_WORLD, FINER("2") SPHERE, &mesh.mesh, &mesh.field);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "field \"f\"",
                         "the index of vertex 3");
     insitu_destroy(&session);
@@ -308,8 +285,8 @@ static void cells_are_counted_as_the_caller_gave_them(void **state)
 {
     (void)state;
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0.05, wavy, own_rank, rank_count, &mesh);
-    insitu_session *session = open_with(MPI_COMM_WORLD, FINER("3") SPHERE, &mesh);
+    order_mesh_create(&hex_20, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
+    insitu_session *session = open_mesh(MPI_COMM_WORLD, FINER("3") SPHERE, &mesh.mesh, &mesh.field);
     drawn pictures = step_drawn(session, 0);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->cells == mesh.cell_count && report->cells_inverted == 0 && report->cells_flat == 0);
@@ -325,7 +302,7 @@ static void mixed_cells_draw_the_same(void **state)
     (void)state;
     const order_kind kind = {"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2};
     order_mesh mesh;
-    order_mesh_create(&kind, 2, 0.07, wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(&kind, 2, 0.07, order_wavy, own_rank, rank_count, &mesh);
     drawn plain = draw(MPI_COMM_WORLD, FINER("3") ALL, &mesh);
     int64_t offsets[65];
     unsigned char types[64];
@@ -349,8 +326,8 @@ enum { VALUES, NODES, SCENE, NO_SCENE, CHANGES };
 static void check_change(int change)
 {
     order_mesh mesh;
-    order_mesh_create(&hex_20, 2, 0.05, wavy, own_rank, rank_count, &mesh);
-    insitu_session *session = open_with(MPI_COMM_WORLD, FINER("2") ALL, &mesh);
+    order_mesh_create(&hex_20, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
+    insitu_session *session = open_mesh(MPI_COMM_WORLD, FINER("2") ALL, &mesh.mesh, &mesh.field);
     drawn first = step_drawn(session, 0);
     const char *scene = change == SCENE ? FINER("3") ALL : change == NO_SCENE ? "images:\n" ALL : FINER("2") ALL;
     for (int64_t v = 0; v < mesh.vertex_count && change == VALUES; v++) mesh.values[v] *= 0.9;
@@ -380,8 +357,8 @@ static void changes_are_drawn(void **state)
 static void check_warning(const order_kind *kind, const char *scene, const char *as, const char *words)
 {
     order_mesh mesh;
-    order_mesh_create(kind, 2, 0, sphere, own_rank, rank_count, &mesh);
-    insitu_session *session = open_with(MPI_COMM_WORLD, scene, &mesh);
+    order_mesh_create(kind, 2, 0, order_sphere, own_rank, rank_count, &mesh);
+    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, &mesh.mesh, &mesh.field);
     drawn pictures = step_drawn(session, 0);
     everywhere(strstr(insitu_last_report(session)->warnings, words) != NULL);
     insitu_destroy(&session);

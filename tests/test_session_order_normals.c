@@ -20,21 +20,9 @@ enum { WIDTH = 96, HEIGHT = 72, PIXELS = WIDTH * HEIGHT };
 
 static const char sphere_scene[] = SCENE("isosurface: {field: f, values: [0.5]}");
 
-static double sphere(const double p[3])
-{
-    return p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-}
-
-static double wavy(const double p[3])
-{
-    return sin(2 * p[0]) * cos(1.5 * p[1]) + 0.5 * p[2];
-}
-
 static caught_picture draw(MPI_Comm comm, const char *scene, const order_mesh *mesh)
 {
-    insitu_session *session = open_session(comm, write_scene(scene));
-    assert_int_equal(insitu_set_mesh(session, "m", &mesh->mesh), INSITU_OK);
-    assert_int_equal(insitu_set_field(session, "m", &mesh->field), INSITU_OK);
+    insitu_session *session = open_mesh(comm, scene, &mesh->mesh, &mesh->field);
     discard_pictures();
     const insitu_status status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
@@ -61,7 +49,7 @@ static double worst_normal(const caught_picture *picture)
         if (!isfinite(depth)) return INFINITY;
         double square = 0;
         for (int a = 0; a < 3; a++)
-            square += pow((double)picture->data[a * PIXELS + pixel] - at[a] / sqrt(sphere(at)), 2);
+            square += pow((double)picture->data[a * PIXELS + pixel] - at[a] / sqrt(order_sphere(at)), 2);
         worst = fmax(worst, sqrt(square));
     }
     return worst;
@@ -70,7 +58,7 @@ static double worst_normal(const caught_picture *picture)
 static double sphere_normal_error(const order_kind *kind, int side, double bend, const char *scene)
 {
     order_mesh mesh;
-    order_mesh_create(kind, side, bend, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(kind, side, bend, order_sphere, own_rank, rank_count, &mesh);
     caught_picture picture = draw(MPI_COMM_WORLD, scene, &mesh);
     double worst = own_rank ? 0 : worst_normal(&picture);
     MPI_Bcast(&worst, 1, MPI_DOUBLE, 0, MPI_COMM_WORLD);
@@ -121,7 +109,7 @@ static void derived_gradients_are_exact(void **state)
     for (int k = 0; k < order_kind_count; k++) {
         if (!is_of_order_two(&order_kinds[k])) continue;
         order_mesh mesh;
-        order_mesh_create(&order_kinds[k], 2, 0, sphere, own_rank, rank_count, &mesh);
+        order_mesh_create(&order_kinds[k], 2, 0, order_sphere, own_rank, rank_count, &mesh);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &mesh);
         int wrong = 0;
         for (int pixel = 0; own_rank == 0 && pixel < PIXELS; pixel++) {
@@ -145,7 +133,7 @@ static void place_lobatto(order_mesh *mesh)
         const int at = (int)lround((mesh->coordinates[i] + 1) * 4);
         mesh->coordinates[i] = at / 4 - 1 + of4[at % 4];
     }
-    for (int64_t v = 0; v < mesh->vertex_count; v++) mesh->values[v] = sphere(mesh->coordinates + 3 * v);
+    for (int64_t v = 0; v < mesh->vertex_count; v++) mesh->values[v] = order_sphere(mesh->coordinates + 3 * v);
 }
 
 static void normals_between_lobatto_points_are_exact(void **state)
@@ -153,7 +141,7 @@ static void normals_between_lobatto_points_are_exact(void **state)
     (void)state;
     const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4};
     order_mesh mesh;
-    order_mesh_create(&kind, 2, 0, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&kind, 2, 0, order_sphere, own_rank, rank_count, &mesh);
     place_lobatto(&mesh);
     caught_picture picture = draw(MPI_COMM_WORLD, sphere_scene, &mesh);
     everywhere(own_rank || worst_normal(&picture) < 2e-5);
@@ -169,8 +157,8 @@ static void normals_are_the_same_on_any_ranks(void **state)
     const char *scene = SCENE("isosurface: {field: f, values: [0.1, 0.4], opacity: 0.6}");
     for (int k = 0; k < order_kind_count; k++) {
         order_mesh part, whole;
-        order_mesh_create(&order_kinds[k], 2, 0.07, wavy, own_rank, rank_count, &part);
-        order_mesh_create(&order_kinds[k], 2, 0.07, wavy, 0, 1, &whole);
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, own_rank, rank_count, &part);
+        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, 0, 1, &whole);
         caught_picture all = draw(MPI_COMM_WORLD, scene, &part);
         caught_picture alone = draw(MPI_COMM_SELF, scene, &whole);
         everywhere(own_rank || same_pictures(&all, &alone));
@@ -187,7 +175,7 @@ static void vertex_normals_are_the_default(void **state)
     (void)state;
     const order_kind kind = {"hex", INSITU_QUADRATIC_HEX, INSITU_ORDER_VTK, 2};
     order_mesh mesh;
-    order_mesh_create(&kind, 2, 0.07, wavy, own_rank, rank_count, &mesh);
+    order_mesh_create(&kind, 2, 0.07, order_wavy, own_rank, rank_count, &mesh);
     caught_picture plain = draw(MPI_COMM_WORLD, SCENE("isosurface: {field: f, values: [0.1]}"), &mesh);
     caught_picture asked = draw(MPI_COMM_WORLD, SCENE("isosurface: {field: f, values: [0.1], normals: vertex}"), &mesh);
     everywhere(own_rank || same_pictures(&plain, &asked));
@@ -206,7 +194,7 @@ static void pieces_beside_lost_values_have_normals(void **state)
     (void)state;
     const order_kind kind = {"hex", INSITU_LAGRANGE_HEX, INSITU_ORDER_LEXICOGRAPHIC, 4};
     order_mesh mesh;
-    order_mesh_create(&kind, 1, 0, sphere, own_rank, rank_count, &mesh);
+    order_mesh_create(&kind, 1, 0, order_sphere, own_rank, rank_count, &mesh);
     for (int64_t v = 0; v < mesh.vertex_count; v++)
         if (mesh.coordinates[3 * v] > 0.9 && mesh.coordinates[3 * v + 1] > 0.9) mesh.values[v] = NAN;
     caught_picture picture = draw(MPI_COMM_WORLD, sphere_scene, &mesh);

@@ -1,0 +1,17 @@
+/* A session with a Blueprint adaptor. */
+#ifndef TEST_BLUEPRINT_DOOR_H
+#define TEST_BLUEPRINT_DOOR_H
+
+#include "insitu/blueprint.h"
+#include "insitu/insitu.h"
+
+typedef struct doorway {
+    insitu_session *session;
+    insitu_blueprint *adaptor;
+} doorway;
+
+/* path: of the scene. Collective. */
+doorway open_door(const char *path);
+void close_door(doorway *d);
+
+#endif
