@@ -10,10 +10,13 @@ The flags are those of BUILD/compile_commands.json. Ends with 77 if the compiler
 import json
 import os
 import pathlib
+import re
 import shlex
 import shutil
 import subprocess
 import sys
+import tempfile
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 
 CROSS = "aarch64-linux-gnu-gcc"
@@ -27,6 +30,30 @@ def clang_command(source, flags):
         return ["clang", *flags, *CLANG, str(source)]
     standard = [] if any(f.startswith("-std=") for f in flags) else ["-std=gnu++17"]
     return ["clang++", *flags, *standard, *CLANG, str(source)]
+
+
+def system_headers(source):
+    return re.findall(r"^#include (<[^>]+>)", source.read_text(), re.MULTILINE)
+
+
+def share_headers(pool, place, jobs):
+    """Gives the C++ jobs of the same flags one precompiled header: VTK's headers take three quarters of clang's time."""
+    groups = {}
+    for folder, command in jobs:
+        if command[0] == "clang++":
+            groups.setdefault((folder, *command[:-1]), []).append(command)
+    makers = []
+    for (folder, *maker), commands in groups.items():
+        counts = Counter(h for command in commands for h in system_headers(pathlib.Path(command[-1])))
+        common = sorted(h for h, count in counts.items() if count >= 3)
+        if common:
+            header = place / f"common{len(makers)}.hpp"
+            header.write_text("".join(f"#include {h}\n" for h in common))
+            maker.remove("-fsyntax-only")
+            makers.append((folder, [*maker, "-x", "c++-header", str(header), "-o", f"{header}.pch"]))
+            for command in commands:
+                command[-1:] = ["-include-pch", f"{header}.pch", command[-1]]
+    return list(pool.map(read, makers))
 
 
 def cross_command(source, flags):
@@ -73,8 +100,9 @@ def main():
 
     jobs = [(folder, command(source, flags)) for folder, source, flags in entries(build, is_wanted)]
     jobs = [job for job in jobs if job[1]]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        answers = list(pool.map(read, jobs))
+    with ThreadPoolExecutor(os.cpu_count()) as pool, tempfile.TemporaryDirectory() as place:
+        answers = share_headers(pool, pathlib.Path(place), jobs)
+        answers += pool.map(read, jobs)
     faults = [text for is_right, text in answers if not is_right]
     print("".join(faults), end="")
     print(f"{who} has read {len(jobs)} sources and found fault with {len(faults)}")

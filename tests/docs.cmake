@@ -27,7 +27,7 @@ else()
     -DSCRIPT=${docs_scripts}/run_tutorial.py -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}/tutorial
     -P ${CMAKE_CURRENT_SOURCE_DIR}/docs_tutorial.cmake)
 endif()
-set_tests_properties(docs_tutorial PROPERTIES SKIP_REGULAR_EXPRESSION "^skipped" TIMEOUT 180 PROCESSORS 2
+set_tests_properties(docs_tutorial PROPERTIES SKIP_REGULAR_EXPRESSION "^skipped" TIMEOUT 180
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};PYTHONDONTWRITEBYTECODE=1")
 
 # cmake/site.cmake has looked for mkdocs.

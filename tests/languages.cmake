@@ -7,7 +7,7 @@ function(insitu_add_same_pictures_test name)
     COMMAND ${CMAKE_COMMAND} "-DPROGRAM=${ARGN}" "-DTRUTH=${truth}"
       -DSCENE=${scene} -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}/${name}
       "-DMPIRUN=${MPIEXEC_EXECUTABLE};${MPIEXEC_NUMPROC_FLAG}" -P ${CMAKE_CURRENT_SOURCE_DIR}/languages_run.cmake)
-  set_tests_properties(${name} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120 PROCESSORS 2
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120
     FIXTURES_REQUIRED readme)
 endfunction()
 
@@ -25,7 +25,7 @@ function(insitu_add_block_example name scene)
       -DSCENE=${PROJECT_SOURCE_DIR}/examples/${scene}.yaml -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}/${name}_example
       "-DMPIRUN=${MPIEXEC_EXECUTABLE};${MPIEXEC_NUMPROC_FLAG}" -P ${CMAKE_CURRENT_SOURCE_DIR}/languages_run.cmake)
   set_tests_properties(${name}_example_draws_the_same_on_2_ranks PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}"
-    TIMEOUT 120 PROCESSORS 2)
+    TIMEOUT 120)
 endfunction()
 add_executable(blocks ${PROJECT_SOURCE_DIR}/examples/blocks.c)
 target_link_libraries(blocks PRIVATE insitu insitu_flags m)
@@ -110,8 +110,7 @@ else()
   endif()
   foreach(test python_example_draws_on_2_ranks discontinuous_example_draws_on_2_ranks
       moving_mesh_example_draws_on_2_ranks uniform_block_example_draws_the_same_on_2_ranks python_np1 python_np2)
-    set_tests_properties(${test} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};${python_path}" TIMEOUT 120
-      PROCESSORS 2)
+    set_tests_properties(${test} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};${python_path}" TIMEOUT 120)
   endforeach()
 endif()
 

@@ -28,7 +28,7 @@ endfunction()
 
 # insitu_add_mpi_test(NAME TARGET RANKS [RANKS ...] [WHOLE RANKS ...] [ARGS arg ...] [ENVIRONMENT variable ...]): one ctest
 # case a count, named NAME_np<RANKS>. WHOLE: with INSITU_TEST_WHOLE=1 (test_effort.h), NAME_np<RANKS>_whole, among the
-# long ones.
+# long ones. A slow test usually runs on one count: on 2 or 3 ranks, which meet what one rank does as well.
 function(insitu_add_mpi_test name target)
   cmake_parse_arguments(PARSE_ARGV 2 arg "" "TIMEOUT" "ARGS;WHOLE;ENVIRONMENT")
   set(environment ${INSITU_TEST_ENVIRONMENT} ${arg_ENVIRONMENT})
@@ -54,7 +54,7 @@ function(insitu_add_mpi_test name target)
     set_property(GLOBAL PROPERTY insitu_mpi_test_${name} 1)
   endif()
   foreach(ranks IN LISTS counts)
-    # Starting is half of the time of most tests of few ranks, and ranks that wait yield: two tests at once fill two cores.
+    # Ranks wait for each other half of the time, and give the cores away meanwhile: other tests fill two cores.
     set(cores 1)
     if(ranks GREATER 3)
       set(cores 2)

@@ -31,7 +31,7 @@ insitu_session_program(test_session_blocks)
 insitu_add_mpi_test(session_blocks test_session_blocks 1 3 WHOLE 2 5 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_levels)
-insitu_add_mpi_test(session_levels test_session_levels 1 3 WHOLE 1 2 3 5 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_levels test_session_levels 3 WHOLE 1 2 3 5 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_slices)
 insitu_add_mpi_test(session_slices test_session_slices 1 3 WHOLE 2 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -43,7 +43,7 @@ insitu_session_program(test_session_channels)
 insitu_add_mpi_test(session_channels test_session_channels 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_deep)
-insitu_add_mpi_test(session_deep test_session_deep 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_deep test_session_deep 3 WHOLE 1 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 add_executable(test_deep_file test_deep_file.cpp)
 add_dependencies(test_deep_file insitu_image)
@@ -79,13 +79,13 @@ insitu_session_program(test_session_turns)
 insitu_add_mpi_test(session_turns test_session_turns 1 3 WHOLE 8 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_smooth)
-insitu_add_mpi_test(session_smooth test_session_smooth 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_smooth test_session_smooth 2 WHOLE 1 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_derived)
 insitu_add_mpi_test(session_derived test_session_derived 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_light)
-insitu_add_mpi_test(session_light test_session_light 1 3 WHOLE 2 7 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_light test_session_light 3 WHOLE 1 2 7 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_outline)
 insitu_add_mpi_test(session_outline test_session_outline 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -105,14 +105,14 @@ insitu_session_program(test_session_plane)
 insitu_add_mpi_test(session_plane test_session_plane 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_clips)
-insitu_add_mpi_test(session_clips test_session_clips 1 3 WHOLE 2 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_clips test_session_clips 2 WHOLE 1 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_index_base)
 insitu_add_mpi_test(session_index_base test_session_index_base 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 foreach(name indexed cell_order vertex_order corners filled writer)
   insitu_session_program(test_session_${name})
-  insitu_add_mpi_test(session_${name} test_session_${name} 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+  insitu_add_mpi_test(session_${name} test_session_${name} 2 WHOLE 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()
 
 # Cells of higher order.
@@ -134,7 +134,7 @@ insitu_add_split_test(order_bound $<TARGET_FILE:test_order_bound>)
 foreach(name order order_cells order_normals order_faults order_finer order_error)
   insitu_session_program(test_session_${name})
   target_sources(test_session_${name} PRIVATE test_mesh_order.c)
-  insitu_add_mpi_test(session_${name} test_session_${name} 1 3 WHOLE 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+  insitu_add_mpi_test(session_${name} test_session_${name} 2 WHOLE 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()
 
 # Faces by owner and neighbour.
@@ -172,7 +172,7 @@ if(INSITU_SYSTEM_PYTHON)
   add_test(NAME session_cinema_page COMMAND ${INSITU_SYSTEM_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/test_cinema_page.py
     $<TARGET_FILE:six_calls> ${CMAKE_CURRENT_BINARY_DIR}/cinema_page)
   set_tests_properties(session_cinema_page PROPERTIES
-    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 240 PROCESSORS 2 SKIP_RETURN_CODE 77)
+    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 240 SKIP_RETURN_CODE 77)
   # insitu-view: its server without a browser, and its page beside a running mini-app.
   set(insitu_view ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/insitu-view)
   add_test(NAME view_server COMMAND ${INSITU_SYSTEM_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/test_view_server.py
@@ -181,7 +181,7 @@ if(INSITU_SYSTEM_PYTHON)
   add_test(NAME view_page COMMAND ${INSITU_SYSTEM_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/test_view_page.py
     ${insitu_view} $<TARGET_FILE:insitu-wave> ${CMAKE_CURRENT_BINARY_DIR}/view_page)
   set_tests_properties(view_page PROPERTIES
-    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 240 PROCESSORS 2 SKIP_RETURN_CODE 77)
+    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 240 SKIP_RETURN_CODE 77)
 else()
   foreach(test session_cinema_page view_server view_page)
     add_test(NAME ${test} COMMAND ${CMAKE_COMMAND} -E echo "skipped: no /usr/bin/python3")
@@ -218,7 +218,7 @@ insitu_session_program(test_session_left_out)
 insitu_add_mpi_test(session_left_out test_session_left_out 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session)
-insitu_add_mpi_test(session test_session 1 2 3 WHOLE 4 7 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session test_session 1 2 WHOLE 3 4 7 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_regions)
 insitu_add_mpi_test(session_regions test_session_regions 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
@@ -239,7 +239,7 @@ insitu_session_program(test_session_messages)
 insitu_add_mpi_test(session_messages test_session_messages 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_candidates)
-insitu_add_mpi_test(session_candidates test_session_candidates 1 3 WHOLE 1 3 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+insitu_add_mpi_test(session_candidates test_session_candidates 2 WHOLE 1 3 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 
 insitu_session_program(test_session_changes)
