@@ -384,6 +384,27 @@ static void suggest_for_empty_value(const scene_document *d, const yaml_node_t *
         snprintf(question, question_size, " (its keys stand on the next lines, further in, or in { })");
 }
 
+static bool mapping_has_key(const cyaml_schema_value_t *mapping, const char *key)
+{
+    const cyaml_schema_field_t *f = mapping->mapping.fields;
+    while (f->key && strcmp(f->key, key) != 0) f++;
+    return f->key != NULL;
+}
+
+/* Writes a question for a mapping where a list of mappings is expected: the entries stand under their names, or a "- "
+ * is missing. */
+static void suggest_list_of_mappings(const scene_document *d, const yaml_node_t *node,
+                                     const cyaml_schema_value_t *entry, char question[question_size])
+{
+    const bool is_empty = node->data.mapping.pairs.top == node->data.mapping.pairs.start;
+    const yaml_node_t *first = is_empty ? NULL : find_node_by_index(d, node->data.mapping.pairs.start->key);
+    const char *name = first && first->type == YAML_SCALAR_NODE ? node_text(first) : NULL;
+    if (name && mapping_has_key(entry, "name") && !mapping_has_key(entry, name))
+        snprintf(question, question_size, " (did you mean \"- name: %.32s\"?)", name);
+    else
+        snprintf(question, question_size, " (is a \"- \" missing before its first key?)");
+}
+
 /* Writes "did you mean ...?" if the value would be valid in quotes, as a list, or as an entry of a list. */
 static void suggest_form(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                          const scene_key *key, char question[question_size])
@@ -404,8 +425,10 @@ static void suggest_form(const scene_document *d, const yaml_node_t *node, const
         else if (entry == CYAML_SEQUENCE_FIXED && value->sequence.entry->sequence.max == 2 &&
                  read_number(text, &number))
             snprintf(question, question_size, " (did you mean [[0, %.24s], [1, %.24s]]?)", text, text);
+        else if (entry == CYAML_MAPPING && mapping_has_key(value->sequence.entry, "field"))
+            snprintf(question, question_size, " (did you mean [{field: %.48s}]?)", text);
     } else if (node->type == YAML_MAPPING_NODE && entry == CYAML_MAPPING) {
-        snprintf(question, question_size, " (is a \"- \" missing before its first key?)");
+        suggest_list_of_mappings(d, node, value->sequence.entry, question);
     } else if (node->type == YAML_MAPPING_NODE && node->data.mapping.pairs.top - node->data.mapping.pairs.start == 1) {
         const yaml_node_t *name = find_node_by_index(d, node->data.mapping.pairs.start->key);
         const yaml_node_t *rest = find_node_by_index(d, node->data.mapping.pairs.start->value);
