@@ -459,8 +459,8 @@ static bool is_for_nobody(const session_plan_basis *basis, const scene_image *im
     session_warn(
         report, &(session_warning){WARNING_OUTPUTS, image->name, NULL, 0}, is_for_none,
         "image \"%s\": it has no outputs, and pictures are not kept in memory (insitu_keep_pictures): it is not "
-        "drawn",
-        image->name);
+        "drawn; outputs: \"%s_{cycle:06}.png\" would write them",
+        image->name, image->name);
     return is_for_none;
 }
 

@@ -4,6 +4,7 @@
  * message; the same traversal stores correct values in the schema's structs. */
 #include "scene_document.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
@@ -391,6 +392,19 @@ static bool mapping_has_key(const cyaml_schema_value_t *mapping, const char *key
     return f->key != NULL;
 }
 
+/* Writes a question for a word where a mapping is expected: the word may be one of its keys, or the name of a field. */
+static void suggest_mapping(const char *word, const cyaml_schema_value_t *mapping, const char *begin, const char *end,
+                            char question[question_size])
+{
+    double number;
+    for (const char *at = word; *at; at++)
+        if (!isalnum((unsigned char)*at) && *at != '_') return;
+    if (mapping_has_key(mapping, word))
+        snprintf(question, question_size, " (did you mean %s%.32s: {}%s?)", begin, word, end);
+    else if (mapping_has_key(mapping, "field") && !read_number(word, &number))
+        snprintf(question, question_size, " (did you mean %sfield: %.32s%s?)", begin, word, end);
+}
+
 /* Writes a question for a mapping where a list of mappings is expected: the entries stand under their names, or a "- "
  * is missing. */
 static void suggest_list_of_mappings(const scene_document *d, const yaml_node_t *node,
@@ -425,8 +439,10 @@ static void suggest_form(const scene_document *d, const yaml_node_t *node, const
         else if (entry == CYAML_SEQUENCE_FIXED && value->sequence.entry->sequence.max == 2 &&
                  read_number(text, &number))
             snprintf(question, question_size, " (did you mean [[0, %.24s], [1, %.24s]]?)", text, text);
-        else if (entry == CYAML_MAPPING && mapping_has_key(value->sequence.entry, "field"))
-            snprintf(question, question_size, " (did you mean [{field: %.48s}]?)", text);
+        else if (entry == CYAML_MAPPING)
+            suggest_mapping(text, value->sequence.entry, "[{", "}]", question);
+    } else if (node->type == YAML_SCALAR_NODE && value->type == CYAML_MAPPING) {
+        suggest_mapping(node_text(node), value, "{", "}", question);
     } else if (node->type == YAML_MAPPING_NODE && entry == CYAML_MAPPING) {
         suggest_list_of_mappings(d, node, value->sequence.entry, question);
     } else if (node->type == YAML_MAPPING_NODE && node->data.mapping.pairs.top - node->data.mapping.pairs.start == 1) {
