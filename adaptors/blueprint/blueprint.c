@@ -392,8 +392,11 @@ static insitu_status agree_on_lattices(insitu_blueprint *adaptor, named_lattices
 
 static bool is_same_place(const insitu_lattice *a, const insitu_lattice *b)
 {
-    return memcmp(a->origin, b->origin, sizeof a->origin) == 0 && memcmp(a->first, b->first, sizeof a->first) == 0 &&
-           memcmp(a->refinement, b->refinement, sizeof a->refinement) == 0;
+    bool is_same = true;
+    for (int i = 0; i < 3; i++)
+        is_same = is_same && a->origin[i] == b->origin[i] && a->first[i] == b->first[i] &&
+                  a->refinement[i] == b->refinement[i];
+    return is_same;
 }
 
 /* Sets those uniform blocks again that are on another lattice than in the last step. */
