@@ -373,11 +373,21 @@ void a_field_that_begins_later_leaves_out_the_first_steps(void **)
     expect(r, 0, "3 steps, 2 pictures");
     expect(r, 0, "late_0.vtu: not drawn: scene.yaml:6: no mesh has the field \"x\"");
     expect(run_tool("scene.yaml late_0.vtu late_0.vtu"), 1, "insitu-render: scene.yaml:6: no mesh has the field");
-    write_vtu("lost_0.vtu", row_of_tets(3));
-    write_vtu("lost_1.vtu", row_without_x(3));
-    const run_result lost = run_tool("lost_0.vtu lost_1.vtu");
-    expect(lost, 0, "lost_1.vtu: not drawn: no mesh has the field \"x\"; there are");
-    expect(lost, 0, "; the first step has it, and --field takes another");
+}
+
+/* Without a scene the field is one that the first and the last step have, or else the last step's. */
+void default_field_is_one_that_the_last_step_has(void **)
+{
+    auto with_y = row_without_x(3);
+    with_y->GetCellData()->GetArray("number")->SetName("y");
+    write_vtu("with_x.vtu", row_of_tets(3));
+    write_vtu("without.vtu", row_without_x(3));
+    write_vtu("with_y.vtu", with_y);
+    expect(run_tool("with_x.vtu without.vtu"), 0, "2 steps, 2 pictures");
+    const run_result later = run_tool("with_y.vtu with_x.vtu with_x.vtu");
+    expect(later, 0, "3 steps, 2 pictures");
+    expect(later, 0, "with_y.vtu: not drawn: no mesh has the field \"x\"; there are");
+    expect(run_tool("with_x.vtu without.vtu with_x.vtu"), 0, "; other steps have it, and --field takes another");
 }
 
 /* Without a scene a small step is drawn otherwise where a step of more and larger values follows, by the scale and the
@@ -474,6 +484,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(several_files_are_steps_in_the_order_of_their_numbers),
         cmocka_unit_test(chosen_steps_keep_their_cycles),
         cmocka_unit_test(a_field_that_begins_later_leaves_out_the_first_steps),
+        cmocka_unit_test(default_field_is_one_that_the_last_step_has),
         cmocka_unit_test(a_series_has_one_scale_and_one_camera),
         cmocka_unit_test(pieces_that_differ_are_drawn_the_same_on_any_ranks),
         cmocka_unit_test(every_way_of_reading_gives_all_cells),

@@ -67,21 +67,29 @@ bool is_field(vtkDataArray *array)
            name != "ObjectId" && name != "PedigreeNodeId" && name != "PedigreeElementId";
 }
 
-std::string first_field(vtkFieldData *fields)
+void add_names(vtkFieldData *fields, std::vector<std::string> &names)
 {
     for (int i = 0; fields && i < fields->GetNumberOfArrays(); i++)
-        if (is_field(fields->GetArray(i))) return fields->GetArray(i)->GetName();
-    return "";
+        if (is_field(fields->GetArray(i))) names.emplace_back(fields->GetArray(i)->GetName());
 }
 
-std::string first_field_of(const grid_list &grids)
+/* Returns the names of all fields: those of points first. */
+std::vector<std::string> names_of_fields(const grid_list &grids)
 {
-    std::string at_points, in_cells;
-    for (vtkUnstructuredGrid *grid : grids) {
-        if (at_points.empty()) at_points = first_field(grid->GetPointData());
-        if (in_cells.empty()) in_cells = first_field(grid->GetCellData());
-    }
-    return at_points.empty() ? in_cells : at_points;
+    std::vector<std::string> names;
+    for (vtkUnstructuredGrid *grid : grids) add_names(grid->GetPointData(), names);
+    for (vtkUnstructuredGrid *grid : grids) add_names(grid->GetCellData(), names);
+    return names;
+}
+
+/* Returns the first field that both steps have, otherwise the first of the last step: at its first step a run often
+ * lacks fields that it computes later. "" if there are no fields. */
+std::string choose_field(const std::vector<std::string> &first, const std::vector<std::string> &last)
+{
+    for (const std::string &name : first)
+        if (std::find(last.begin(), last.end(), name) != last.end()) return name;
+    if (!last.empty()) return last.front();
+    return first.empty() ? "" : first.front();
 }
 
 /* Returns a tuple's value, or its magnitude if there are several components. */
@@ -205,6 +213,12 @@ std::array<int, 3> best_cut(const vtkBoundingBox &bounds, const vector &to_viewe
     return cut;
 }
 
+vtkSmartPointer<vtkDataObject> read_whole(const step_source &source, size_t step)
+{
+    const std::string &path = source.path(step);
+    return grids_of(open_data_file(path)->read(source.index_in_file(step), 0, 1), path);
+}
+
 } // namespace
 
 std::array<double, 3> eye_direction(const options &o)
@@ -224,15 +238,17 @@ std::array<double, 3> up_direction(const options &o)
     return {0, 1, 0};
 }
 
-default_look choose_look(const options &o)
+default_look choose_look(const options &o, const step_source &source)
 {
-    const auto file = open_data_file(o.files.front());
-    const size_t steps = file->times().size();
-    const size_t step = steps ? std::min(static_cast<size_t>(o.first_step), steps - 1) : 0;
-    const auto data = grids_of(file->read(step, 0, 1), o.files.front());
+    const auto data = read_whole(source, 0);
     const grid_list grids = list_grids(data);
     default_look look;
-    look.field = o.field.empty() ? first_field_of(grids) : o.field;
+    look.field = o.field;
+    if (o.field.empty()) {
+        const std::vector<std::string> names = names_of_fields(grids);
+        const size_t last = source.count() - 1;
+        look.field = choose_field(names, last ? names_of_fields(list_grids(read_whole(source, last))) : names);
+    }
     vtkBoundingBox bounds;
     int dimension = 0;
     for (vtkUnstructuredGrid *grid : grids) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "render_options.h"
+#include "step_source.h"
 
 namespace render_tool
 {
@@ -17,10 +18,10 @@ struct default_look {
     bool is_cut() const { return cut[0] || cut[1] || cut[2]; }
 };
 
-/* Chooses the look from the first step of the first file. The field is the one named in the options, otherwise the
- * first point field, otherwise the first cell field. A solid is cut open if its outer surface, seen from the viewer,
- * shows only a small part of the field's range. Throws std::runtime_error. */
-default_look choose_look(const options &o);
+/* Chooses the look from the first step. The field is the one named in the options, otherwise the first point field or
+ * cell field that the last step has too, otherwise the first field of the last step. A solid is cut open if its outer
+ * surface, seen from the viewer, shows only a small part of the field's range. Throws std::runtime_error. */
+default_look choose_look(const options &o, const step_source &source);
 
 /* Return the direction from the data to the viewer, which is that of the options or a default, and the up direction. */
 std::array<double, 3> eye_direction(const options &o);

@@ -225,7 +225,7 @@ std::string name_missing_option(const options &o, const std::string &missing)
 {
     const size_t reason = missing.find("no mesh has the field");
     if (!o.scene.empty() || reason == std::string::npos) return missing;
-    if (o.field.empty()) return missing.substr(reason) + "; the first step has it, and --field takes another";
+    if (o.field.empty()) return missing.substr(reason) + "; other steps have it, and --field takes another";
     return "--field " + o.field + ": " + missing.substr(reason);
 }
 
@@ -282,7 +282,7 @@ std::string text_of_default(const rank_info &w, const options &o, step_source &s
 {
     default_look look;
     run_on_all_ranks(w, [&] {
-        if (w.is_root()) look = choose_look(o);
+        if (w.is_root()) look = choose_look(o, source);
     });
     int length = static_cast<int>(look.field.size());
     MPI_Bcast(&length, 1, MPI_INT, 0, w.comm);

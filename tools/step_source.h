@@ -22,6 +22,8 @@ class step_source
 
     size_t count() const { return steps_.size(); }
     int64_t cycle(size_t step) const { return steps_[step].cycle; }
+    const std::string &path(size_t step) const { return options_.files[steps_[step].file]; }
+    size_t index_in_file(size_t step) const { return steps_[step].inside; }
     const std::string &name(size_t step) const
     {
         return steps_[step].name;
