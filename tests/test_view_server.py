@@ -8,6 +8,7 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 import socket
 import stat
 import subprocess
@@ -237,7 +238,7 @@ def terminals_get_each_new_picture():
         table.write("6,0.6,new.png\n7,0.7,deep.exr\n8,0.8,to")
     wait_for(lambda: all(decoded(p, (folder / p).read_bytes()) == [PNG, large] for p, _ in environments))
     for process in running:
-        process.send_signal(2)
+        process.send_signal(signal.SIGINT)
         assert process.wait(10) == 0
 
 
@@ -262,6 +263,8 @@ def wrong_options_are_reported():
 
 
 def main():
+    # A test that a shell runs in the background inherits that SIGINT is ignored, and its children would too.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     make_files()
     (folder / "link.yaml").symlink_to("scene.yaml")
     with View(program, "run.cdb", "--scene", "scene.yaml", folder=folder) as view:
