@@ -31,10 +31,10 @@ static void set_box(insitu_session *session, int b, double time)
     mesh.vertex_count = (n[0] + 1) * (n[1] + 1) * (n[2] + 1);
     mesh.cell_count = field.count = n[0] * n[1] * n[2];
     mesh.changed = INSITU_CHANGED_NOTHING; /* but for what the description shows */
-    for (int i = 0; i < field.count; i++)
-        values[b][i] =
-            (float)pulse((first[0] + i % n[0] + 0.5) * h, (first[1] + i / n[0] % n[1] + 0.5) * h,
-                         (first[2] + i / n[0] / n[1] + 0.5) * h, time);
+    for (int i = 0; i < field.count; i++) {
+        const int x = first[0] + i % n[0], y = first[1] + i / n[0] % n[1], z = first[2] + i / n[0] / n[1];
+        values[b][i] = (float)pulse((x + 0.5) * h, (y + 0.5) * h, (z + 0.5) * h, time);
+    }
     field.name = "height";
     field.centring = INSITU_CELL;
     field.values = (insitu_array){.data = values[b], .type = INSITU_FLOAT32};

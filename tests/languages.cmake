@@ -75,7 +75,7 @@ endif()
 
 # Python. The address sanitizer would have to be loaded before the interpreter.
 if(NOT INSITU_TEST_PYTHON)
-  add_test(NAME python COMMAND ${CMAKE_COMMAND} -E echo "skipped: no python3 with numpy and mpi4py, or sanitizers are on")
+  add_test(NAME python COMMAND ${CMAKE_COMMAND} -E echo "skipped: no python3 with numpy and this MPI's mpi4py, or sanitizers are on")
   set_tests_properties(python PROPERTIES SKIP_REGULAR_EXPRESSION "^skipped")
 else()
   set(python_path PYTHONPATH=${CMAKE_LIBRARY_OUTPUT_DIRECTORY} PYTHONDONTWRITEBYTECODE=1)

@@ -19,11 +19,13 @@ static inline bool session_store_place(const insitu_array *array, int64_t vertex
 {
     char *to = (char *)(uintptr_t)array->data + vertex * array->stride_bytes;
     if (array->type == INSITU_FLOAT64) {
+        /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): -0 and 0, and two NaNs, are compared by their bits */
         const bool differs = memcmp(to, &number, sizeof number) != 0;
         memcpy(to, &number, sizeof number);
         return differs;
     }
     const float narrow = (float)number;
+    /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits, as above */
     const bool differs = memcmp(to, &narrow, sizeof narrow) != 0;
     memcpy(to, &narrow, sizeof narrow);
     return differs;
