@@ -115,7 +115,8 @@ static void corrupt_stride(const input_array *a, dice *d)
 {
     static const int64_t wild[] = {
         (int64_t)1 << 60, (int64_t)1 << 62, INT64_MIN, INT64_MAX, -((int64_t)1 << 50), 1, 3, 0};
-    a->array->stride_bytes = PICK(d, wild);
+    const int64_t stride = PICK(d, wild), size = size_of(a->truth.type);
+    a->array->stride_bytes = stride == 3 && size < stride ? size : stride; /* no array gets longer than its memory */
 }
 
 /* Types of no more bytes, right ones and wrong ones, and numbers that are no type. */

@@ -113,7 +113,8 @@ static bool read_strides(const blueprint_mesh *mesh, blueprint_field *field)
     if (!mesh->mesh.lattice) return true;
     node_integers(&field->field_node, "offsets", offsets, &count);
     if (node_integers(&field->field_node, "strides", field->strides, &count))
-        for (int axis = count; axis < 3; axis++) field->strides[axis] = field->strides[axis - 1] * counts[axis - 1];
+        for (int axis = 1; axis < 3; axis++)
+            if (axis >= count) field->strides[axis] = field->strides[axis - 1] * counts[axis - 1];
     for (int axis = 0; axis < 3; axis++) {
         if (field->strides[axis] < 1 || offsets[axis] < 0)
             return node_set_error(&field->field_node, field->strides[axis] < 1 ? "strides" : "offsets",

@@ -160,7 +160,8 @@ static bool read_dims(const node *topology, int64_t counts[3], int64_t offsets[3
     set_packed(counts, strides);
     node_integers(topology, "elements/dims/offsets", offsets, &offset_count);
     if (node_integers(topology, "elements/dims/strides", strides, &stride_count))
-        for (int axis = stride_count; axis < 3; axis++) strides[axis] = strides[axis - 1] * counts[axis - 1];
+        for (int axis = 1; axis < 3; axis++)
+            if (axis >= stride_count) strides[axis] = strides[axis - 1] * counts[axis - 1];
     for (int axis = 0; axis < 3 && !topology->log->status; axis++)
         if (offsets[axis] < 0 || strides[axis] < 1)
             return node_set_error(topology, offsets[axis] < 0 ? "elements/dims/offsets" : "elements/dims/strides",

@@ -190,7 +190,7 @@ new_numbers numbers_for_vtk(const std::string &path)
             const std::string place = std::string(name.data()) + "/" + zone.name();
             if (!zone.is_misread_by_vtk()) continue;
             try {
-                zone.renumber(path + ": cannot be read: zone " + place, "/" + place, all);
+                zone.renumber(std::string(path).append(": cannot be read: zone ").append(place), "/" + place, all);
             } catch (const std::runtime_error &e) {
                 wrong = e.what();
             }
@@ -273,7 +273,7 @@ class link_writer
         std::stable_sort(children.begin(), children.end(),
                          [&](double a, double b) { return number_of(a) < number_of(b); });
         for (const double child : children) {
-            const std::string name = from_.name(child), child_path = path + "/" + name;
+            const std::string name = from_.name(child), child_path = std::string(path).append("/").append(name);
             const auto below = numbers_.lower_bound(child_path + "/");
             const bool is_ancestor = numbers_.count(child_path) > 0 ||
                                      (below != numbers_.end() && below->first.rfind(child_path + "/", 0) == 0);
