@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "memory.h"
@@ -390,31 +391,52 @@ static int count_components(const scene *scene, const session_catalogue_mesh *me
     return count;
 }
 
-/* Returns the bytes that the finer pieces of a mesh take. */
-static double find_bytes(const session_finer_choice *choice, const piece_error *of)
+/* Returns the bytes that so many finer pieces of a mesh take. They grow with the number of pieces. */
+static double find_bytes(const session_finer_choice *choice, const piece_error *of, int parts)
 {
-    return (double)choice->bytes[choice->parts] + of->components * (double)choice->bytes_per_component[choice->parts];
+    return (double)choice->bytes[parts] + of->components * (double)choice->bytes_per_component[parts];
 }
 
-/* Takes pieces from the mesh whose pieces need most memory, until those of all meshes fit. */
-static void limit_memory(const scene *scene, const session_catalogue *catalogue, const piece_error *errors,
-                         session_finer_choice *choices, session_report *report)
+/* A number of pieces that a mesh may lose one of, and the bytes that they take. */
+typedef struct piece_step {
+    double bytes;
+    int mesh, parts;
+} piece_step;
+
+/* Orders steps by decreasing bytes, and those of the same bytes by their meshes. */
+static int compare_steps(const void *a, const void *b)
 {
-    const double limit = scene->finer_memory * bytes_per_mib;
+    const piece_step *x = a, *y = b;
+    if (x->bytes != y->bytes) return x->bytes > y->bytes ? -1 : 1;
+    return x->mesh - y->mesh;
+}
+
+/* Takes pieces from the mesh whose pieces need most memory, until those of all meshes fit. steps: space for
+ * FINER_MOST_PARTS steps of each mesh. Returns the bytes before. */
+static double take_pieces(int mesh_count, double limit, const piece_error *errors, piece_step *steps,
+                          session_finer_choice *choices)
+{
     double all = 0;
-    for (int m = 0; m < catalogue->mesh_count; m++) all += find_bytes(&choices[m], &errors[m]);
-    for (double sum = all; sum > limit;) {
-        int largest = -1;
-        double most = 0;
-        for (int m = 0; m < catalogue->mesh_count; m++) {
-            const double own = find_bytes(&choices[m], &errors[m]);
-            if (own > most) largest = m;
-            most = fmax(most, own);
-        }
-        if (largest < 0) break;
-        choices[largest].parts--;
-        sum += find_bytes(&choices[largest], &errors[largest]) - most;
+    int count = 0;
+    for (int m = 0; m < mesh_count; m++) {
+        all += find_bytes(&choices[m], &errors[m], choices[m].parts);
+        for (int parts = choices[m].parts; parts > 1; parts--)
+            steps[count++] = (piece_step){find_bytes(&choices[m], &errors[m], parts), m, parts};
     }
+    if (!(all > limit)) return all;
+    qsort(steps, (size_t)count, sizeof *steps, compare_steps);
+    double sum = all;
+    for (const piece_step *step = steps; step < steps + count && sum > limit; step++) {
+        choices[step->mesh].parts = step->parts - 1;
+        sum += find_bytes(&choices[step->mesh], &errors[step->mesh], step->parts - 1) - step->bytes;
+    }
+    return all;
+}
+
+static void limit_memory(const scene *scene, const session_catalogue *catalogue, const piece_error *errors,
+                         piece_step *steps, session_finer_choice *choices, session_report *report)
+{
+    const double all = take_pieces(catalogue->mesh_count, scene->finer_memory * bytes_per_mib, errors, steps, choices);
     for (int m = 0; m < catalogue->mesh_count; m++)
         session_warn(report, &(session_warning){WARNING_FINER, NULL, catalogue->meshes[m].name, 2},
                      choices[m].parts < errors[m].wanted,
@@ -440,8 +462,8 @@ static void report_pieces(const char *mesh, const session_finer_choice *choice, 
                      choice->parts > 1 ? "s" : "", bound, cells);
 }
 
-static void choose_all(const session_pieces_basis *basis, piece_error *errors, session_finer_choice *choices,
-                       session_report *report)
+static void choose_all(const session_pieces_basis *basis, piece_error *errors, piece_step *steps,
+                       session_finer_choice *choices, session_report *report)
 {
     const scene *scene = basis->scene;
     const session_catalogue *catalogue = basis->catalogue;
@@ -456,7 +478,7 @@ static void choose_all(const session_pieces_basis *basis, piece_error *errors, s
         errors[m].components = count_components(scene, &catalogue->meshes[m]);
         errors[m].wanted = choices[m].parts;
     }
-    limit_memory(scene, catalogue, errors, choices, report);
+    limit_memory(scene, catalogue, errors, steps, choices, report);
     for (int m = 0; m < catalogue->mesh_count && !scene->finer_pieces; m++)
         if (errors[m].is_shown) report_pieces(catalogue->meshes[m].name, &choices[m], &errors[m], report);
 }
@@ -466,10 +488,14 @@ insitu_status session_choose_pieces(const session_pieces_basis *basis, session_f
 {
     const size_t count = (size_t)basis->catalogue->mesh_count + 1;
     piece_error *errors = base_calloc(count, sizeof *errors);
-    if (!errors) session_fail_for_memory(error, (int64_t)(count * sizeof *errors), "numbers of pieces");
+    piece_step *steps = base_calloc(count * FINER_MOST_PARTS, sizeof *steps);
+    if (!errors || !steps)
+        session_fail_for_memory(error, (int64_t)(count * (sizeof *errors + FINER_MOST_PARTS * sizeof *steps)),
+                                "numbers of pieces");
     insitu_status status = session_agree(basis->team->comm, error);
     if (!status && !basis->scene->finer_pieces) status = find_errors(basis, choices, errors, report, error);
-    if (!status) choose_all(basis, errors, choices, report);
+    if (!status) choose_all(basis, errors, steps, choices, report);
     base_free(errors);
+    base_free(steps);
     return status;
 }
