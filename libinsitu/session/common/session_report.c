@@ -109,21 +109,45 @@ static uint64_t warning_key(const session_warning *w)
     return key;
 }
 
-/* Returns the index of a warning that has been reported; reported_count if it has not been reported. */
+/* Returns the index of the first key that is not less than `key`; reported_count if there is none. */
 static int find_reported(const session_report *report, uint64_t key)
 {
-    int at = 0;
-    while (at < report->reported_count && report->reported[at] != key) at++;
-    return at;
+    int begin = 0, end = report->reported_count;
+    while (begin < end) {
+        const int middle = begin + (end - begin) / 2;
+        if (report->reported[middle] < key)
+            begin = middle + 1;
+        else
+            end = middle;
+    }
+    return begin;
 }
 
-/* Stores that a warning has been reported. If memory runs out, the warning will be reported again. */
-static void add_reported(session_report *report, uint64_t key)
+static bool is_reported_at(const session_report *report, int at, uint64_t key)
 {
-    uint64_t *told = base_realloc(report->reported, (size_t)(report->reported_count + 1) * sizeof *told);
-    if (!told) return;
-    report->reported = told;
-    told[report->reported_count++] = key;
+    return at < report->reported_count && report->reported[at] == key;
+}
+
+/* Stores at index `at` that a warning has been reported. If memory runs out, the warning will be reported again. */
+static void add_reported(session_report *report, int at, uint64_t key)
+{
+    const int count = report->reported_count;
+    if (count == report->reported_capacity) {
+        const int capacity = 2 * count + 8;
+        uint64_t *reported = base_realloc(report->reported, (size_t)capacity * sizeof *reported);
+        if (!reported) return;
+        report->reported = reported;
+        report->reported_capacity = capacity;
+    }
+    memmove(report->reported + at + 1, report->reported + at, (size_t)(count - at) * sizeof *report->reported);
+    report->reported[at] = key;
+    report->reported_count++;
+}
+
+static void remove_reported(session_report *report, int at)
+{
+    const int behind = --report->reported_count - at;
+    memmove(report->reported + at, report->reported + at + 1, (size_t)behind * sizeof *report->reported);
 }
 
 static void add_warning(session_report *report, session_text *text, const session_warning *warning, bool holds,
@@ -131,16 +155,17 @@ static void add_warning(session_report *report, session_text *text, const sessio
 {
     const uint64_t key = warning_key(warning);
     const int at = find_reported(report, key);
-    if (holds && at == report->reported_count) {
+    const bool is_reported = is_reported_at(report, at, key);
+    if (holds && !is_reported) {
         char line[1024];
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wformat-nonliteral"
         vsnprintf(line, sizeof line, format, arguments);
 #pragma GCC diagnostic pop
         session_text_add(text, "%s", line);
-        add_reported(report, key);
-    } else if (!holds && at < report->reported_count) {
-        report->reported[at] = report->reported[--report->reported_count];
+        add_reported(report, at, key);
+    } else if (!holds && is_reported) {
+        remove_reported(report, at);
     }
 }
 
@@ -162,7 +187,8 @@ void session_warn_locally(session_report *report, const session_warning *warning
 
 bool session_is_warned(const session_report *report, const session_warning *warning)
 {
-    return find_reported(report, warning_key(warning)) < report->reported_count;
+    const uint64_t key = warning_key(warning);
+    return is_reported_at(report, find_reported(report, key), key);
 }
 
 void session_forget_warnings(session_report *report)

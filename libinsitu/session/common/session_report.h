@@ -26,8 +26,9 @@ typedef struct session_report {
     session_text copied_why, left_out, warnings, pieces;
     /* warnings of this rank alone, until session_share_lines() sends those of one rank to all ranks */
     session_text own_warnings;
-    int reported_count; /* number of warnings in `reported` */
-    uint64_t *reported; /* hashes of warnings that have been reported and whose condition still holds */
+    /* number of warnings in `reported`, and number for which it has space */
+    int reported_count, reported_capacity;
+    uint64_t *reported; /* hashes of warnings that were reported and whose condition still holds, in ascending order */
     /* result of session_unusable_key() when warnings of unusable cells were last reported; 0: there were none */
     uint64_t unusable_key;
 } session_report;
