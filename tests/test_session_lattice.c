@@ -24,6 +24,8 @@ static const char *const images[] = {
     "[{volume: {field: c, opacity: [[0, 0.2], [1, 0.9]]}}]",
     "[{isosurface: {field: c, values: [0.4], normals: vertex}}]",
     "[{surface: {colour_by: {field: c}, threshold: {field: f, from: 0.2}}}]",
+    "[{isosurface: {field: f, values: [0.9]}}, {slice: {planes: [{normal: [1, 2, 3]}], field: f}}], "
+    "lights: [{direction: [2, 1, 1]}], shadows: true, ambient_occlusion: {samples: 4, radius: 0.2}",
 };
 enum { IMAGES = sizeof images / sizeof images[0] };
 
@@ -292,6 +294,15 @@ static int covered(const caught_picture *p)
     return count;
 }
 
+/* Returns the bytes that a lattice takes: a number for each index along each axis, unless vertices have coordinates. */
+static int64_t bytes_of_axes(const block *b)
+{
+    int64_t bytes = 0;
+    for (int axis = 0; axis < 3 && b->form < CURVILINEAR; axis++)
+        bytes += (b->cells[axis] + 1) * (int64_t)sizeof(double);
+    return bytes;
+}
+
 /* Hexes are drawn first, then the lattice. */
 static void compare(place_form form, array_order order, bool layers, bool blanking, int count)
 {
@@ -323,6 +334,8 @@ static void compare(place_form form, array_order order, bool layers, bool blanki
     everywhere(strcmp(statistics[0], statistics[1]) == 0);
     everywhere(strcmp(left_out[0], left_out[1]) == 0); /* it has the number of cells that trees are without */
     everywhere(count > 1 || strstr(left_out[1], "cells show nothing"));
+    /* the first image shows values as they are given, so that no cell and no vertex has a byte of its own */
+    everywhere(count > 1 || reports[1].bytes_copied == bytes_of_axes(&b));
     const int64_t own =
         (b.own_end[0] - b.own_first[0]) * (b.own_end[1] - b.own_first[1]) * (b.own_end[2] - b.own_first[2]);
     everywhere(reports[1].cells == b.cells[0] * b.cells[1] * b.cells[2]);
