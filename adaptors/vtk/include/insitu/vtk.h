@@ -20,6 +20,11 @@
  * "name/blocks of a, b", or of "name/flat blocks of a, b" if they have two dimensions. All other leaves become the
  * meshes "name/0", "name/1", ....
  *
+ * The names contain the fields because all blocks of a mesh must have the same fields, also those on other ranks, of
+ * which this rank knows nothing. Scenes hardly need them: `mesh: name` stands for all leaves, and a layer without mesh
+ * is drawn on the leaves that have its field. A layer cannot be drawn on one block of a mesh. To draw a structured leaf
+ * alone, set it by a call of its own, under a name of its own.
+ *
  * Points are borrowed if they are float or double, interleaved (AOS) or with separate components (SOA); others are
  * copied to double.
  *
