@@ -304,14 +304,15 @@ static inline bool fetch_is_plain(const grid *g)
            c[0].stride == c[2].stride;
 }
 
-/* Extends the box by a cell of a uniform or rectilinear lattice. */
+/* Extends the box by a cell of a uniform or rectilinear lattice, whose coordinates are finite. Comparisons take half as
+ * long as fmin() and fmax(), which are calls. */
 static inline void fetch_box_axes(fetch_box *box, const grid_lattice *l, int64_t cell)
 {
     for (int axis = 0; axis < 3; axis++) {
         const double *at = l->axes[axis].axis_coordinates + grid_index_along(&l->cell_numbering, axis, cell);
-        const double a = at[0], b = l->cells[axis] ? at[1] : a;
-        box->lower[axis] = fmin(fmin(a, b), box->lower[axis]);
-        box->upper[axis] = fmax(fmax(a, b), box->upper[axis]);
+        const double a = at[0], b = at[l->cells[axis] > 0], low = a < b ? a : b, high = a < b ? b : a;
+        box->lower[axis] = low < box->lower[axis] ? low : box->lower[axis];
+        box->upper[axis] = high > box->upper[axis] ? high : box->upper[axis];
     }
 }
 
