@@ -105,9 +105,9 @@ bool rows_extent(const grid *g, const grid_field *field, float *low, float *high
                                  : float_extent(data, g->vertex_count, low, high);
 }
 
-/* Finds the first drawn cell with a number from `from` on, and how many cells follow it in its row. Returns false if
- * there is none before `end`. */
-static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t end, rows_ranges *out)
+/* Finds the first drawn cell with a number from `from` on, the number of its first vertex, and how many cells follow it
+ * in its row. Returns false if there is none before `end`. */
+static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t end, rows_ranges *out, int64_t *vertex)
 {
     while (from < end) {
         int64_t index[3], row = from;
@@ -123,6 +123,9 @@ static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t e
             out->first = from > first ? from : first;
             out->count = (last < end ? last : end) - out->first;
             if (out->count > ROWS_CELLS) out->count = ROWS_CELLS;
+            index[along] = out->first - row;
+            *vertex = 0;
+            for (int axis = 0; axis < 3; axis++) *vertex += index[axis] * l->vertex_numbering.stride[axis];
             if (out->count > 0) return true;
         }
         /* Continues with the next row, because the rest of this row contains no drawn cell. */
@@ -137,10 +140,11 @@ bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end
 {
     const grid_lattice *l = g->lattice;
     const int along = grid_lattice_row_axis(l);
-    if (!next_cells(l, along, from, end, out)) return false;
+    int64_t vertex;
+    if (!next_cells(l, along, from, end, out, &vertex)) return false;
     const char *rows[4];
     const char *data = field->values.data + field->component * field->component_stride;
-    const int64_t vertex = grid_lattice_first(l, out->first), stride = field->values.stride;
+    const int64_t stride = field->values.stride;
     /* Along an axis without cells the vertices' stride is 0, so the same row is read twice. */
     const int64_t across[2] = {l->vertex_numbering.stride[(along + 1) % 3],
                                l->vertex_numbering.stride[(along + 2) % 3]};
