@@ -137,34 +137,57 @@ static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, i
     return false;
 }
 
-/* Reports that a field has the values of the last picture. Fields of blocks are only counted, in *blocks. */
-static void report_unchanged(const session_mesh *mesh, const session_scalar *scalar, int64_t *blocks,
-                             session_report *report)
+/* Compares the checksums of a part's fields. Returns the number of a block's fields that have the values of the last
+ * picture; those of a mesh without blocks are reported instead. */
+static int64_t compare_part(const session_mesh *mesh, int threads, session_report *report)
 {
-    if (mesh->source) return;
-    if (mesh->block != SESSION_WHOLE)
-        (*blocks)++;
-    else
-        session_text_add(&report->left_out, "mesh \"%s\": field \"%s\" has the values of the last picture: no ranges",
-                         mesh->name, session_scalar_name(mesh, scalar));
+    int64_t unchanged = 0;
+    for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++) {
+        session_scalar *scalar = &mesh->scalars[k];
+        if (!scalar->is_used || !scalar->may_have_changed || !compare_checksum(mesh, scalar, threads)) continue;
+        if (mesh->source) continue;
+        if (mesh->block != SESSION_WHOLE)
+            unchanged++;
+        else
+            session_text_add(&report->left_out,
+                             "mesh \"%s\": field \"%s\" has the values of the last picture: no ranges", mesh->name,
+                             session_scalar_name(mesh, scalar));
+    }
+    return unchanged;
+}
+
+/* Compares the checksums of blocks, each by one thread. Returns the number of fields that have not changed. */
+static int64_t compare_blocks(const session_parts *parts, int threads)
+{
+    int64_t unchanged = 0;
+#pragma omp parallel num_threads(threads)
+    {
+        region_enter();
+#pragma omp for schedule(dynamic, 4) reduction(+ : unchanged) nowait
+        for (int i = 0; i < parts->count; i++) unchanged += compare_part(parts->items[i], 1, NULL);
+        region_leave();
+    }
+    return unchanged;
 }
 
 static void compare_parts(const session_parts *parts, int threads, session_report *report)
 {
-    int64_t blocks = 0;
+    enum { PARTS_A_THREAD = 4 };
+    const bool are_blocks = parts->items[0]->block != SESSION_WHOLE && parts->count >= PARTS_A_THREAD * threads;
+    int64_t unchanged = 0;
     for (int i = 0; i < parts->count; i++) {
-        session_mesh *mesh = parts->items[i];
-        for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++) {
-            session_scalar *scalar = &mesh->scalars[k];
-            if (scalar->is_used) warn_of_change(mesh, scalar, report);
-            if (scalar->is_used && scalar->may_have_changed && compare_checksum(mesh, scalar, threads))
-                report_unchanged(mesh, scalar, &blocks, report);
-        }
+        const session_mesh *mesh = parts->items[i];
+        for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++)
+            if (mesh->scalars[k].is_used) warn_of_change(mesh, &mesh->scalars[k], report);
     }
-    if (blocks)
+    if (threads > 1 && are_blocks)
+        unchanged = compare_blocks(parts, threads);
+    else
+        for (int i = 0; i < parts->count; i++) unchanged += compare_part(parts->items[i], threads, report);
+    if (unchanged)
         session_text_add(&report->left_out,
                          "mesh \"%s\": %lld fields of blocks have the values of the last picture: no ranges",
-                         parts->items[0]->name, (long long)blocks);
+                         parts->items[0]->name, (long long)unchanged);
 }
 
 void session_compare_checksums(const session_meshes *meshes, int threads, session_report *report)
