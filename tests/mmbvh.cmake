@@ -13,6 +13,11 @@ target_link_libraries(test_mmbvh_layout PRIVATE insitu_internal insitu_flags Pkg
 add_test(NAME mmbvh_layout COMMAND test_mmbvh_layout)
 set_tests_properties(mmbvh_layout PROPERTIES TIMEOUT 120 PROCESSORS 2)
 
+add_executable(test_mmbvh_bricks test_mmbvh_bricks.c)
+target_link_libraries(test_mmbvh_bricks PRIVATE insitu_internal insitu_flags PkgConfig::CMOCKA)
+add_test(NAME mmbvh_bricks COMMAND test_mmbvh_bricks)
+set_tests_properties(mmbvh_bricks PROPERTIES TIMEOUT 60)
+
 add_executable(test_mmbvh_sort test_mmbvh_sort.c)
 target_include_directories(test_mmbvh_sort PRIVATE ${PROJECT_SOURCE_DIR}/mmbvh/build)
 target_link_libraries(test_mmbvh_sort PRIVATE insitu_internal insitu_flags PkgConfig::CMOCKA)

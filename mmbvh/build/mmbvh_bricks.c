@@ -1,5 +1,8 @@
 /* The cells of a lattice are already in spatial order: a box of indices is compact wherever the lattice is not folded.
- * Each node is halved along the axis on which its box is longest, estimated by the mean edge length of the cells. */
+ * Each node is halved along the axis on which its box is longest, estimated by the mean edge length of the cells.
+ * Halves alone would end in leaves of 2 x 2 x 1 cells if sides are powers of two, with 4 of MMBVH_MAX_LEAF cells. So
+ * small boxes are split where their leaves cost least, mostly into 3 x 2 x 1 cells: a third fewer nodes, of a tenth
+ * less area. */
 #include "mmbvh_bricks.h"
 
 #include <math.h>
@@ -12,11 +15,17 @@ typedef struct brick {
     int64_t first[3], count[3];
 } brick;
 
+/* Limits of small boxes, and the cost of a leaf in addition to that of its cells. A cell costs the sum of the sides of
+ * its leaf, to which the probability that a surface meets the leaf is proportional. With a leaf's cost between 12 and
+ * 126, leaves of 3 x 2 x 1 cells are cheaper for each cell than those of 2 x 2 x 1 and 7 x 1 x 1. */
+enum { SMALL_SIDE = 8, SMALL_CELLS = 64, LEAF_COST = 24 };
+
 typedef struct bricks {
     topology_build *build;
     const grid_lattice *lattice;
     double edge[3]; /* mean lengths of the cells' edges along each axis, times the number of samples */
     uint32_t *cells;
+    int costs[SMALL_SIDE + 1][SMALL_SIDE + 1][SMALL_SIDE + 1]; /* least costs of small boxes, by their sides */
 } bricks;
 
 static int64_t brick_cell_count(const brick *b)
@@ -67,7 +76,59 @@ static void measure_edges(const grid *g, double out[3])
     }
 }
 
-/* Halves a box of at least two cells along its longest axis. */
+/* A plane that splits a box: the axis that it is perpendicular to, and the number of cells before it. */
+typedef struct brick_split {
+    int along;
+    int64_t before;
+} brick_split;
+
+static bool is_small(const int64_t count[3])
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (count[axis] > SMALL_SIDE) return false;
+    return count[0] * count[1] * count[2] <= SMALL_CELLS;
+}
+
+static int cost_of_split(const bricks *s, const int64_t count[3], brick_split split)
+{
+    int64_t sides[2][3];
+    for (int axis = 0; axis < 3; axis++) sides[0][axis] = sides[1][axis] = count[axis];
+    sides[0][split.along] = split.before;
+    sides[1][split.along] -= split.before;
+    return s->costs[sides[0][0]][sides[0][1]][sides[0][2]] + s->costs[sides[1][0]][sides[1][1]][sides[1][2]];
+}
+
+/* Returns the cheapest split of a small box; `first` if no other one is cheaper. *cost is set to its cost. */
+static brick_split cheapest_split(const bricks *s, const int64_t count[3], brick_split first, int *cost)
+{
+    brick_split best = first;
+    *cost = cost_of_split(s, count, first);
+    for (int along = 0; along < 3; along++)
+        for (int64_t before = 1; before < count[along]; before++) {
+            const brick_split split = {along, before};
+            const int own = cost_of_split(s, count, split);
+            if (own < *cost) best = split;
+            if (own < *cost) *cost = own;
+        }
+    return best;
+}
+
+/* Computes the costs of small boxes, smaller ones first. */
+static void compute_costs(bricks *s)
+{
+    for (int64_t k = 1; k <= SMALL_SIDE; k++)
+        for (int64_t j = 1; j <= SMALL_SIDE; j++)
+            for (int64_t i = 1; i <= SMALL_SIDE; i++) {
+                const int64_t count[3] = {i, j, k}, cells = i * j * k;
+                const int along = i > 1 ? 0 : j > 1 ? 1 : 2;
+                if (cells <= MMBVH_MAX_LEAF)
+                    s->costs[i][j][k] = LEAF_COST + (int)(cells * (i + j + k));
+                else if (is_small(count))
+                    cheapest_split(s, count, (brick_split){along, 1}, &s->costs[i][j][k]);
+            }
+}
+
+/* Splits a box of at least two cells. */
 static void split_brick(const bricks *s, const brick *b, brick halves[2])
 {
     double extent[3];
@@ -75,10 +136,13 @@ static void split_brick(const bricks *s, const brick *b, brick halves[2])
         extent[axis] = b->count[axis] > 1 ? (double)b->count[axis] * s->edge[axis] : -1;
     int along = extent[1] > extent[0];
     along = extent[2] > extent[along] ? 2 : along;
+    int cost;
+    brick_split split = {along, b->count[along] / 2};
+    if (is_small(b->count)) split = cheapest_split(s, b->count, split, &cost);
     halves[0] = halves[1] = *b;
-    halves[0].count[along] = b->count[along] / 2;
-    halves[1].first[along] += halves[0].count[along];
-    halves[1].count[along] -= halves[0].count[along];
+    halves[0].count[split.along] = split.before;
+    halves[1].first[split.along] += split.before;
+    halves[1].count[split.along] -= split.before;
 }
 
 static void list_cells(const grid_lattice *l, const brick *b, uint32_t *out)
@@ -139,6 +203,7 @@ topology *bricks_build(topology_build *build, const grid *g, uint32_t *cells)
     topology *root = topology_new(build, 0, brick_cell_count(&all));
     if (!root) return NULL;
     measure_edges(g, s.edge);
+    compute_costs(&s);
 #pragma omp parallel num_threads(build->threads)
     {
         region_enter();
