@@ -173,7 +173,7 @@ static int64_t compare_blocks(const session_parts *parts, int threads)
 static void compare_parts(const session_parts *parts, int threads, session_report *report)
 {
     enum { PARTS_A_THREAD = 4 };
-    const bool are_blocks = parts->items[0]->block != SESSION_WHOLE && parts->count >= PARTS_A_THREAD * threads;
+    const bool are_blocks = parts->count >= PARTS_A_THREAD * threads && parts->items[0]->block != SESSION_WHOLE;
     int64_t unchanged = 0;
     for (int i = 0; i < parts->count; i++) {
         const session_mesh *mesh = parts->items[i];
