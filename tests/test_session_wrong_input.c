@@ -197,7 +197,7 @@ static void corrupt_choice(formed_mesh *m, dice *d)
     case 4: a->changed = (unsigned)roll(d, 9); return;
     case 5: a->connectivity_row = PICK(d, rows); return;
     case 6: field->corner_row = PICK(d, rows); return;
-    case 7: field->centring = (insitu_centring)(roll(d, field->index.data ? 3 : 5) - 1); return;
+    case 7: field->centring = (insitu_centring)(roll(d, field->index.data ? 2 : 5) - 1); return;
     case 8: field->component_count = (int)roll(d, 3) - 1; return;
     case 9: field->component_stride_bytes = PICK(d, rows); return;
     default: m->patch.first_face = PICK(d, rows);
