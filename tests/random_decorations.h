@@ -1,4 +1,5 @@
-/* Decorations of a picture at random: all anchors, any number of bars, words from none to long ones, big and small. */
+/* Decorations of a picture at random: all anchors, any number of bars, words from none to long ones, big and small,
+ * and corners that other pictures cover. */
 #ifndef TEST_RANDOM_DECORATIONS_H
 #define TEST_RANDOM_DECORATIONS_H
 
@@ -34,6 +35,7 @@ class random_decorations
         make_bars();
         make_labels(width, height);
         if (whole(0, 2) == 0) make_scale_bar(width);
+        if (whole(0, 2) == 0) make_covered(width, height);
         what_.has_axes = whole(0, 1);
         for (auto &axis : what_.axes) axis[whole(0, 2)] = whole(0, 1) ? 1 : -1;
         return what_;
@@ -103,6 +105,18 @@ class random_decorations
         std::snprintf(what_.scale_bar.text, sizeof what_.scale_bar.text, "%s", text(8));
     }
 
+    /* Each corner may be covered, up to its edges, as in a panel among others. */
+    void make_covered(int width, int height)
+    {
+        for (int corner = 0; corner < 4; corner++) {
+            if (whole(0, 1)) continue;
+            const int wide = whole(1, 2 * width / 5), high = whole(1, 2 * height / 5), edge = whole(0, height / 40);
+            covered_[static_cast<std::size_t>(what_.covered_count++)] = {
+                corner & 1 ? edge : width - edge - wide, corner & 2 ? edge : height - edge - high, wide, high};
+        }
+        what_.covered = covered_.data();
+    }
+
     std::mt19937 random_;
     insitu_decorations what_{};
     std::vector<std::string> texts_;
@@ -110,6 +124,7 @@ class random_decorations
     std::array<insitu_colour_bar, 20> bars_{};
     std::array<std::array<insitu_tick, 12>, 20> ticks_{};
     std::array<insitu_label, 39> labels_{};
+    std::array<insitu_rectangle, 4> covered_{};
 };
 
 #endif

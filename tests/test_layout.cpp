@@ -61,16 +61,31 @@ void check_bar(const block &b)
     assert_true(g.y1 - g.y0 >= 3.9 * b.size);
 }
 
+bool is_decoration(const block &b)
+{
+    return b.kind != block_kind::covered;
+}
+
 /* All is placed once or named; labels may be missing. */
 void check_all_are_reported(const layout &places, const insitu_decorations &what)
 {
     int wanted = what.bar_count + (what.scale_bar.length > 0) + what.has_axes;
     for (int i = 0; i < what.words_count; i++) wanted += *what.words[i].text != 0;
-    const auto is_label = [](const block &b) { return b.kind == block_kind::label; };
-    const auto labels = std::count_if(places.blocks.begin(), places.blocks.end(), is_label);
-    assert_int_equal(static_cast<std::ptrdiff_t>(places.blocks.size()) - labels +
+    const auto is_counted = [](const block &b) { return is_decoration(b) && b.kind != block_kind::label; };
+    assert_int_equal(std::count_if(places.blocks.begin(), places.blocks.end(), is_counted) +
                          static_cast<std::ptrdiff_t>(places.left_out.size()),
                      wanted);
+}
+
+/* Nothing is below the pictures that cover parts of this one. */
+void check_covered(const block &b, const insitu_decorations &what)
+{
+    for (int i = 0; i < what.covered_count; i++) {
+        const insitu_rectangle &r = what.covered[i];
+        const area covered = {static_cast<double>(r.x), static_cast<double>(r.y), static_cast<double>(r.x + r.width),
+                              static_cast<double>(r.y + r.height)};
+        assert_true(are_apart(b.bounds, covered));
+    }
 }
 
 void check_layout(const layout &places, const insitu_image &image)
@@ -80,6 +95,7 @@ void check_layout(const layout &places, const insitu_image &image)
         assert_true(b.bounds.x0 >= 0 && b.bounds.y0 >= 0 && b.bounds.x1 <= image.width && b.bounds.y1 <= image.height);
         for (std::size_t k = 0; k < i; k++) assert_true(are_apart(b.bounds, places.blocks[k].bounds));
         check_lines(b);
+        if (is_decoration(b)) check_covered(b, *image.decorations);
         if (b.kind == block_kind::bar) check_bar(b);
     }
     check_all_are_reported(places, *image.decorations);
@@ -158,6 +174,40 @@ void words_at_right_stand_beside_the_bar(void **)
     assert_int_equal(places.blocks.size(), 2);
 }
 
+/* A picture over a corner, whose height is a third, four fifths or all of that of the picture below: the bar stands
+ * below or above it, with at least 0.4 of the height, where there is room, and else beside it. */
+void bars_keep_clear_of_covered_corners(void **)
+{
+    const std::vector<insitu_colour_bar> bars = {bar_named("Temperature [K]")};
+    const insitu_words words[] = {{"A title at the top, as wide as half of the picture", INSITU_TOP, 1.4F},
+                                  {"t = 0.5", INSITU_BOTTOM_RIGHT, 1}};
+    for (const int corner : {0, 1, 2, 3})
+        for (const int height : {160, 384, 480}) {
+            insitu_decorations what = bars_of(bars);
+            const insitu_rectangle covered = {corner & 1 ? 408 : 12,
+                                              height == 480 ? 0
+                                              : corner & 2  ? 468 - height
+                                                            : 12,
+                                              220, height};
+            what.words = words;
+            what.words_count = 2;
+            what.has_axes = true;
+            what.covered = &covered;
+            what.covered_count = 1;
+            const insitu_image image = image_of(640, 480, what);
+            const layout places = make_layout(image, measure);
+            check_layout(places, image);
+            assert_true(places.left_out.empty());
+            const auto bar = std::find_if(places.blocks.begin(), places.blocks.end(),
+                                          [](const block &b) { return b.kind == block_kind::bar; });
+            assert_true(bar != places.blocks.end());
+            assert_int_equal(bar->size, text_size(image));
+            const bool is_beside = height > 160 && (corner & 1);
+            assert_true(bar->bounds.y1 - bar->bounds.y0 >= 0.4 * 480);
+            assert_true(is_beside ? bar->bounds.x1 < 408 : bar->bounds.x1 > 620);
+        }
+}
+
 /* 20 bars with letters of a fifth of the height. */
 void what_has_no_room_is_named(void **)
 {
@@ -175,9 +225,11 @@ void what_has_no_room_is_named(void **)
 
 int main()
 {
-    const CMUnitTest tests[] = {
-        cmocka_unit_test(random_blocks_neither_overlap_nor_leave_the_picture),
-        cmocka_unit_test(four_bars_have_room_for_numbers), cmocka_unit_test(a_label_of_many_letters_is_wrapped),
-        cmocka_unit_test(words_at_right_stand_beside_the_bar), cmocka_unit_test(what_has_no_room_is_named)};
+    const CMUnitTest tests[] = {cmocka_unit_test(random_blocks_neither_overlap_nor_leave_the_picture),
+                                cmocka_unit_test(four_bars_have_room_for_numbers),
+                                cmocka_unit_test(a_label_of_many_letters_is_wrapped),
+                                cmocka_unit_test(words_at_right_stand_beside_the_bar),
+                                cmocka_unit_test(bars_keep_clear_of_covered_corners),
+                                cmocka_unit_test(what_has_no_room_is_named)};
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }

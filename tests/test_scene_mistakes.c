@@ -1181,10 +1181,11 @@ static const mistake mistakes[] = {
      {"images[1].outputs[0].bits", "differs from that of", "expected the same"}},
     {13,
      1,
-     "      - {path: a.png, grid: [1, 1], shared_bars: true}\n  - name: zoom\n    size: [64, 48]\n    layers: "
-     "[{surface: {}}]\n    outputs: [{path: a.png, inset: top_left}]",
-     17,
-     {"images[1].outputs[0].inset", "given for a file with shared_bars: true", "expected shared_bars: false"}},
+     "      - {path: a.png, grid: [1, 1]}\n  - name: zoom\n    size: [308, 48]\n    layers: [{surface: {}}]\n    "
+     "outputs: [{path: a.png, inset: top_left}]\n  - name: more\n    size: [308, 48]\n    layers: [{surface: {}}]\n   "
+     " outputs: [{path: a.png, inset: top_right}]",
+     21,
+     {"images[2].outputs[0].inset", "308 x 48 pixels and overlaps another inset", "expected smaller pictures"}},
     {13,
      1,
      "      - {path: a.png, grid: [1, 1]}\n  - name: zoom\n    size: [64, 48]\n    layers: [{surface: {}}]\n    "

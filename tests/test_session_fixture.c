@@ -433,6 +433,12 @@ static void catch_bars(const insitu_decorations *decorations, char *out, size_t 
     }
 }
 
+static void catch_covered(const insitu_decorations *decorations, placed_picture *out)
+{
+    for (int i = 0; i < decorations->covered_count && i < 4; i++)
+        out->covered[out->covered_count++] = decorations->covered[i];
+}
+
 insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error)
 {
     (void)error;
@@ -443,6 +449,7 @@ insitu_status session_place_image(const insitu_image *image, const insitu_place 
         if (image->decorations) p->size = image->decorations->size * image->height;
         if (image->decorations) memcpy(p->colour, image->decorations->colour, sizeof p->colour);
         if (image->decorations) catch_bars(image->decorations, p->bars, sizeof p->bars);
+        if (image->decorations) catch_covered(image->decorations, p);
     }
     for (int y = 0; y < image->height; y++)
         memcpy(place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x),

@@ -168,9 +168,12 @@ double colour_difference(const caught_picture *a, const caught_picture *b);
 /* Paths with this in them cannot be written. NULL: all can. */
 extern const char *unwritable;
 
-/* What was put into places of larger pictures since the last forget_pictures(), with its colour bars. */
+/* What was put into places of larger pictures since the last forget_pictures(), with its colour bars, and the parts
+ * that others will cover. */
 typedef struct placed_picture {
     int x, y, width, height, of_width;
+    int covered_count;
+    insitu_rectangle covered[4];
     double size;     /* of words, in pixels; 0 without decorations */
     float colour[3]; /* of words */
     char bars[200];

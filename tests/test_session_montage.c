@@ -158,6 +158,7 @@ static const char inset_scene[] = "images:\n"
                                   "    layers: [{isosurface: {field: f, values: [0.1]}}]\n"
                                   "    outputs: [{path: whole.png, grid: [2, 1]}, {path: a.png}]\n"
                                   "  - name: b\n    size: [32, 24]\n    layers: [{slice: {field: f}}]\n"
+                                  "    decorations: {colour_bar: true}\n"
                                   "    outputs: [{path: whole.png, grid: [2, 1]}, {path: b.png}]\n"
                                   "  - name: c\n    size: [10, 8]\n    camera: {automatic: {zoom: 3}}\n"
                                   "    layers: [{slice: {field: f}}]\n"
@@ -202,6 +203,20 @@ static bool has_insets(bool with_d)
     return is_well;
 }
 
+static bool is_covered(const placed_picture *panel, int x, int y, int width, int height)
+{
+    const insitu_rectangle *r = &panel->covered[0];
+    return panel->covered_count == 1 && r->x == x && r->y == y && r->width == width && r->height == height;
+}
+
+/* On rank 0: the decorations of the second panel keep clear of the inset over it and its frame, and those of the first,
+ * which has none, are not asked to. */
+static bool keeps_clear(void)
+{
+    return placed_count >= 2 && placed[0].covered_count == 0 &&
+           is_covered(&placed[1], WIDTH - 10 - MARGIN - FRAME, MARGIN - FRAME, 10 + 2 * FRAME, 8 + 2 * FRAME);
+}
+
 static void insets_cover_corners(void **state)
 {
     (void)state;
@@ -213,18 +228,70 @@ static void insets_cover_corners(void **state)
         assert_int_equal(submit(session, &in), INSITU_OK);
         assert_int_equal(insitu_step(session, cycle, 0), INSITU_OK);
         everywhere(!strstr(insitu_last_report(session)->warnings, "overwr") || cycle > 0);
-        everywhere(own_rank != 0 || has_insets(cycle % 2 == 0));
+        everywhere(own_rank != 0 || (has_insets(cycle % 2 == 0) && keeps_clear()));
     }
     insitu_destroy(&session);
     input_free(&in);
     discard_pictures();
 }
 
+/* Two panels that share a bar up to 1, and two insets with bars up to 1 and to 2. */
+static void write_insets_beside_bars(char text[2048], const char *side)
+{
+    static const char panel[] = "  - name: %s\n    size: [32, 24]\n    layers: [{slice: {field: f, range: [-1, 1]}}]\n"
+                                "    decorations: {size: 0.1, colour_bar: {at: %s, labels: heat}}\n"
+                                "    outputs: [{path: all.png, grid: [2, 1], shared_bars: true}]\n";
+    static const char inset[] = "  - name: %s\n    size: [9, 8]\n    layers: [{slice: {field: f, range: [-1, %s]}}]\n"
+                                "    decorations: {size: 0.1, colour_bar: {at: %s, labels: heat}}\n"
+                                "    outputs: [{path: all.png, inset: %s}]\n";
+    int used = snprintf(text, 2048, "writing: step\nimages:\n");
+    used += snprintf(text + used, 2048 - (size_t)used, panel, "a", side);
+    used += snprintf(text + used, 2048 - (size_t)used, panel, "b", side);
+    used += snprintf(text + used, 2048 - (size_t)used, inset, "c", "1", side, "top_right");
+    snprintf(text + used, 2048 - (size_t)used, inset, "d", "2", side, "bottom_left");
+}
+
+/* On rank 0: insets lie over the panels, not over the strip, and after them. That with the bar of the strip has none of
+ * its own. */
+static bool are_beside_bars(const char *side)
+{
+    const int left = strcmp(side, "left") == 0 ? STRIP : 0;
+    const placed_picture *const strip = &placed[2], *const same = &placed[3], *const other = &placed[4];
+    return caught_count == 1 && placed_count == 5 && strip->width == STRIP && strncmp(strip->bars, "heat:", 5) == 0 &&
+           !*placed[0].bars && !*placed[1].bars &&
+           is_covered(&placed[0], MARGIN - FRAME, HEIGHT - 8 - MARGIN - FRAME, 9 + 2 * FRAME, 8 + 2 * FRAME) &&
+           is_covered(&placed[1], WIDTH - 9 - MARGIN - FRAME, MARGIN - FRAME, 9 + 2 * FRAME, 8 + 2 * FRAME) &&
+           same->x == left + 2 * WIDTH - 9 - MARGIN && same->y == MARGIN && !*same->bars && other->x == left + MARGIN &&
+           other->y == HEIGHT - 8 - MARGIN && strstr(other->bars, " 2");
+}
+
+static void insets_lie_beside_shared_bars(void **state)
+{
+    (void)state;
+    static const char *const sides[] = {"right", "left"};
+    session_input in;
+    char text[2048];
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    for (int i = 0; i < 2; i++) {
+        insitu_session *session = NULL;
+        write_insets_beside_bars(text, sides[i]);
+        assert_int_equal(insitu_create_from_text(MPI_COMM_WORLD, text, &session), INSITU_OK);
+        discard_pictures();
+        assert_int_equal(submit(session, &in), INSITU_OK);
+        assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
+        everywhere(own_rank != 0 || are_beside_bars(sides[i]));
+        everywhere(!strstr(insitu_last_report(session)->warnings, "different"));
+        insitu_destroy(&session);
+    }
+    input_free(&in);
+    discard_pictures();
+}
+
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(cells_have_the_pictures_of_a_step),
-                                       cmocka_unit_test(files_that_cannot_be_written_are_reported),
-                                       cmocka_unit_test(insets_cover_corners),
-                                       cmocka_unit_test(alike_colour_bars_are_drawn_once)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(cells_have_the_pictures_of_a_step),
+        cmocka_unit_test(files_that_cannot_be_written_are_reported), cmocka_unit_test(insets_cover_corners),
+        cmocka_unit_test(insets_lie_beside_shared_bars), cmocka_unit_test(alike_colour_bars_are_drawn_once)};
     return run_session_tests(argc, argv, tests, NULL, NULL);
 }

@@ -252,6 +252,7 @@ void draw_block(drawing &s, const block &b)
     case block_kind::bar: draw_bar(s, b); break;
     case block_kind::scale_bar: draw_scale_bar(s, b); break;
     case block_kind::axes: draw_axes(s, b); break;
+    case block_kind::covered:
     case block_kind::words:
     case block_kind::label: break;
     }

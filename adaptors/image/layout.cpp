@@ -1,6 +1,7 @@
-/* Text at the top and the bottom is placed first, because it depends most on the borders. Colour bars share the
- * remaining height of their side. Every other block takes the free position nearest to its own. Candidate positions
- * align with edges of the blocks already placed, so that their number is small and bounded. */
+/* The parts that other pictures cover come first, because they cannot move. Then text at the top and the bottom is
+ * placed, because it depends most on the borders. Colour bars share the remaining height of their side. Every other
+ * block takes the free position nearest to its own. Candidate positions align with edges of the blocks already placed,
+ * so that their number is small and bounded. */
 #include "layout.h"
 
 #include <algorithm>
@@ -287,12 +288,24 @@ void free_height(const layout_state &s, double x0, double x1, double &top, doubl
     }
 }
 
+/* Returns the positions of the outer edge of the outermost column to try: the border of the picture, and the sides of
+ * covered parts, for a part that takes too much of the height at the border. */
+std::vector<double> column_edges(const layout_state &s, const bar_group &g)
+{
+    const bool is_at_left = g.anchor == INSITU_LEFT;
+    const double gap = pixels(column_gap, g.size);
+    std::vector<double> out{is_at_left ? s.x0 : s.x1};
+    for (const block &b : s.out.blocks)
+        if (b.kind == block_kind::covered) out.push_back(is_at_left ? b.bounds.x1 + gap : b.bounds.x0 - gap);
+    return out;
+}
+
 /* Stacks `count` bars of the group, from `first` on, in the column. Returns false if they would be too short. */
-bool fill_column(const layout_state &s, const bar_group &g, std::size_t first, std::size_t count, int column,
-                 std::vector<block> &out)
+bool fill_column(const layout_state &s, const bar_group &g, std::size_t first, std::size_t count, double edge,
+                 int column, std::vector<block> &out)
 {
     const double pitch = g.width + pixels(column_gap, g.size);
-    const double x0 = g.anchor == INSITU_LEFT ? s.x0 + column * pitch : s.x1 - column * pitch - g.width;
+    const double x0 = g.anchor == INSITU_LEFT ? edge + column * pitch : edge - column * pitch - g.width;
     double top = 0, bottom = 0;
     free_height(s, x0, x0 + g.width, top, bottom);
     const double share = count == 1 ? 0.62 : count == 2 ? 0.8 : 1;
@@ -309,9 +322,9 @@ bool fill_column(const layout_state &s, const bar_group &g, std::size_t first, s
     return true;
 }
 
-/* Places all bars of the group in the smallest number of columns in which they fit. Several columns may cover at most
- * half of the picture's width, a single one all of it. */
-bool place_group(layout_state &s, const bar_group &g)
+/* Places all bars of the group in the smallest number of columns in which they fit beside the edge. Several columns may
+ * cover at most half of the picture's width, a single one all of it. */
+bool place_group(layout_state &s, const bar_group &g, double edge)
 {
     const std::size_t count = g.bars.size();
     for (std::size_t columns = 1; columns <= count; columns++) {
@@ -323,7 +336,7 @@ bool place_group(layout_state &s, const bar_group &g)
         for (std::size_t i = 0; i < used && is_transformed; i++) { /* the first column is the leftmost one */
             const std::size_t column = g.anchor == INSITU_LEFT ? i : used - 1 - i;
             is_transformed =
-                fill_column(s, g, i * rows, std::min(rows, count - i * rows), static_cast<int>(column), bars);
+                fill_column(s, g, i * rows, std::min(rows, count - i * rows), edge, static_cast<int>(column), bars);
         }
         if (!is_transformed) continue;
         s.out.blocks.insert(s.out.blocks.end(), bars.begin(), bars.end());
@@ -337,7 +350,9 @@ bool place_at_largest_size(layout_state &s, const std::vector<int> &bars, insitu
     const std::vector<int> sizes = sizes_from(s.size);
     for (const int size : sizes) {
         const bar_group g = make_group(s, bars, at, size);
-        if ((g.is_readable || size == sizes.back()) && place_group(s, g)) return true;
+        if (!g.is_readable && size != sizes.back()) continue;
+        for (const double edge : column_edges(s, g))
+            if (place_group(s, g, edge)) return true;
     }
     return false;
 }
@@ -368,7 +383,21 @@ void place_bars(layout_state &s, insitu_anchor at)
     }
 }
 
-/* ---- other decorations ------------------------------------------------------------------------------------------ */
+/* ---- covered parts and other decorations
+ * ------------------------------------------------------------------------------------------ */
+
+/* Adds blocks for the covered parts, with a gap around each, so that nothing touches the frame of the other picture. */
+void place_covered(layout_state &s)
+{
+    const double gap = pixels(padding, s.size);
+    for (int i = 0; i < s.decorations.covered_count; i++) {
+        const insitu_rectangle &r = s.decorations.covered[i];
+        const area bounds = {std::max(0.0, r.x - gap), std::max(0.0, r.y - gap),
+                             std::min<double>(s.image.width, r.x + r.width + gap),
+                             std::min<double>(s.image.height, r.y + r.height + gap)};
+        s.out.blocks.push_back({block_kind::covered, i, s.size, bounds, {}, {}, {}});
+    }
+}
 
 bool place_scale_bar(layout_state &s)
 {
@@ -440,6 +469,7 @@ layout make_layout(const insitu_image &image, const text_measure &measure)
     const int size = text_size(image);
     const double edge = pixels(border, size);
     layout_state s{image, *image.decorations, measure, size, edge, edge, image.width - edge, image.height - edge, {}};
+    place_covered(s);
     place_all_words(s, false);
     place_bars(s, INSITU_RIGHT);
     place_bars(s, INSITU_LEFT);

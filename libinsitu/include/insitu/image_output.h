@@ -82,6 +82,11 @@ typedef struct insitu_scale_bar {
     char text[300];
 } insitu_scale_bar;
 
+/* A rectangle of a picture in pixels: (x, y) is its upper left corner. */
+typedef struct insitu_rectangle {
+    int x, y, width, height;
+} insitu_rectangle;
+
 /* Decorations that are drawn over a picture, and the background that is put behind it first. All pointers are
  * borrowed. */
 typedef struct insitu_decorations {
@@ -99,6 +104,10 @@ typedef struct insitu_decorations {
     insitu_scale_bar scale_bar;
     bool has_axes;
     double axes[3][3]; /* the scene's axes in camera coordinates: right, up, towards the eye; unit lengths */
+    /* parts of the picture that other pictures will cover; texts, colour bars, the scale bar and the axes keep clear of
+     * them */
+    int covered_count;
+    const insitu_rectangle *covered;
 } insitu_decorations;
 
 /* An additional channel of an image, for EXR. */

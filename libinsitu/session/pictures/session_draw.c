@@ -425,14 +425,30 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
+/* Finds the parts that insets will cover in the first file in which they cover any. Returns their number. */
+static int find_covered(const scene *scene, const scene_image *image, insitu_rectangle covered[SCENE_ANCHORS])
+{
+    int count = 0;
+    for (int i = 0; i < image->output_count && !count; i++) {
+        const scene_output *output = &image->outputs[i];
+        if (output->montage < 0 || output->is_inset) continue;
+        count =
+            session_find_covered(&scene->montages[output->montage], output->first_panel + image->variant.view, covered);
+    }
+    return count;
+}
+
 /* Warns on rank 0 of texts that cannot be drawn as written. The writing thread lays the texts out again later; they are
  * also laid out here, so that the warnings belong to the step that draws them. */
 static void warn_of_words(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
 {
     insitu_word_faults faults;
-    session_check_words(
-        &(insitu_image){.width = image->width, .height = image->height, .decorations = &decorations->decorations},
-        &faults);
+    insitu_rectangle covered[SCENE_ANCHORS];
+    insitu_decorations in_file = decorations->decorations;
+    in_file.covered = covered;
+    in_file.covered_count = find_covered(d->scene, image, covered);
+    session_check_words(&(insitu_image){.width = image->width, .height = image->height, .decorations = &in_file},
+                        &faults);
     const char *const texts[] = {faults.font, faults.letters, faults.room};
     for (int i = 0; i < 3; i++)
         session_warn_locally(d->report, &(session_warning){WARNING_WORDS, image->name, NULL, i}, *texts[i] != '\0',

@@ -26,23 +26,35 @@ static int64_t count_pixels(const scene_montage *montage)
     return (int64_t)width_of(montage) * height_of(montage);
 }
 
-/* Returns the place of a panel. */
-static insitu_place find_place(const scene_montage *of, const session_montage *m, int panel)
+/* Returns the place of a panel. rgba: the whole picture. */
+static insitu_place find_place(const scene_montage *of, float *rgba, int panel)
 {
     const int left = of->are_bars_left ? of->bar_width : 0;
-    return (insitu_place){m->rgba, width_of(of), left + panel % of->columns * of->width,
-                          panel / of->columns * of->height};
+    return (insitu_place){rgba, width_of(of), left + panel % of->columns * of->width, panel / of->columns * of->height};
 }
 
-/* Returns the place of an inset of the picture's size. */
-static insitu_place find_inset_place(const scene_montage *of, const session_montage *m, scene_anchor corner,
-                                     const insitu_image *picture)
+/* Clips the interval [first, first + length) to [0, end). The length may become negative. */
+static void clip(int end, int *first, int *length)
 {
-    const bool is_right = corner == SCENE_TOP_RIGHT || corner == SCENE_BOTTOM_RIGHT;
-    const bool is_low = corner == SCENE_BOTTOM_LEFT || corner == SCENE_BOTTOM_RIGHT;
-    const int x = of->inset_margin, y = of->inset_margin;
-    return (insitu_place){m->rgba, width_of(of), is_right ? width_of(of) - x - picture->width : x,
-                          is_low ? height_of(of) - y - picture->height : y};
+    const int last = *first + *length < end ? *first + *length : end;
+    *first = *first > 0 ? *first : 0;
+    *length = last - *first;
+}
+
+int session_find_covered(const scene_montage *montage, int panel, insitu_rectangle covered[SCENE_ANCHORS])
+{
+    const insitu_place place = find_place(montage, NULL, panel);
+    const int frame = montage->frame_width;
+    int count = 0;
+    for (int i = 0; i < SCENE_ANCHORS; i++) {
+        const scene_rectangle *inset = &montage->insets[i];
+        insitu_rectangle r = {inset->x - frame - place.x, inset->y - frame - place.y, inset->width + 2 * frame,
+                              inset->height + 2 * frame};
+        clip(montage->width, &r.x, &r.width);
+        clip(montage->height, &r.y, &r.height);
+        if (inset->width && r.width > 0 && r.height > 0) covered[count++] = r;
+    }
+    return count;
 }
 
 /* Allocates the whole picture, which is transparent at first. */
@@ -66,6 +78,10 @@ static insitu_status begin_montage(session_montages *montages, const scene *scen
 static void end(session_montage *m)
 {
     for (int i = 0; i < m->panel_count; i++) session_free_decorations(m->panels[i]);
+    for (int i = 0; i < SCENE_ANCHORS; i++) {
+        session_free_decorations(m->insets[i].decorations);
+        base_free(m->insets[i].rgba);
+    }
     base_free(m->panels);
     base_free(m->rgba);
     base_free(m->path);
@@ -87,7 +103,7 @@ static size_t row_size(int width)
 static insitu_status keep_panel(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
                                 const session_decorations *decorations, base_error *error)
 {
-    const insitu_place place = find_place(of, m, panel);
+    const insitu_place place = find_place(of, m->rgba, panel);
     m->panels[panel] = session_copy_decorations(decorations);
     if (!m->panels[panel]) return fail_for_memory(of, error);
     for (int y = 0; y < picture->height; y++)
@@ -95,35 +111,42 @@ static insitu_status keep_panel(const scene_montage *of, session_montage *m, int
     return INSITU_OK;
 }
 
-/* Draws the frame around an inset, in a grey that differs from dark and light backgrounds. */
-static void draw_frame(const scene_montage *of, const insitu_place *place, const insitu_image *picture)
+/* Keeps a picture without its decorations, and a copy of them, until it is laid over the panels. */
+static insitu_status keep_inset(const scene_montage *of, session_inset *inset, const scene_output *output,
+                                const insitu_image *picture, const session_decorations *decorations, base_error *error)
 {
-    static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1}; /* half of sRGB's range */
-    const int frame = of->frame_width;
-    for (int y = -frame; y < picture->height + frame; y++)
-        for (int x = -frame; x < picture->width + frame; x++) {
-            const bool is_inside = x >= 0 && x < picture->width && y >= 0 && y < picture->height;
-            if (!is_inside) memcpy(row_of(place, y) + 4 * x, grey, sizeof grey);
-        }
+    const size_t size = row_size(picture->width) * (size_t)picture->height;
+    inset->has_decorations = output->has_decorations;
+    inset->decorations = decorations ? session_copy_decorations(decorations) : NULL;
+    if (!decorations || inset->decorations) inset->rgba = base_alloc(size);
+    if (!inset->rgba) return fail_for_memory(of, error);
+    memcpy(inset->rgba, picture->rgba, size);
+    return INSITU_OK;
 }
 
-/* Lays a picture over a corner of the panels. */
-static insitu_status add_inset(const scene_montage *of, session_montage *m, scene_anchor corner,
-                               const insitu_image *picture, base_error *error)
+/* Draws a picture into its panel, with decorations that keep clear of the insets. */
+static insitu_status draw_panel(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
+                                base_error *error)
 {
-    const insitu_place place = find_inset_place(of, m, corner, picture);
-    const insitu_status status = session_place_image(picture, &place, error);
-    if (!status) draw_frame(of, &place, picture);
-    return status;
+    insitu_rectangle covered[SCENE_ANCHORS];
+    insitu_decorations decorations = {0};
+    insitu_image drawn = *picture;
+    const insitu_place place = find_place(of, m->rgba, panel);
+    if (picture->decorations) {
+        decorations = *picture->decorations;
+        decorations.covered = covered;
+        decorations.covered_count = session_find_covered(of, panel, covered);
+        drawn.decorations = &decorations;
+    }
+    return session_place_image(&drawn, &place, error);
 }
 
-static insitu_status add_picture(const scene_montage *of, session_montage *m, const scene_output *output, int panel,
+static insitu_status add_picture(const scene_montage *of, session_montage *m, int panel, const scene_output *output,
                                  const insitu_image *picture, const session_decorations *decorations, base_error *error)
 {
-    if (output->is_inset) return add_inset(of, m, output->corner, picture, error);
+    if (output->is_inset) return keep_inset(of, &m->insets[output->corner], output, picture, decorations, error);
     if (of->shares_bars) return keep_panel(of, m, panel, picture, decorations, error);
-    const insitu_place place = find_place(of, m, panel);
-    return session_place_image(picture, &place, error);
+    return draw_panel(of, m, panel, picture, error);
 }
 
 insitu_status session_add_panel(session_montages *montages, const scene *scene, const scene_image *image,
@@ -139,7 +162,7 @@ insitu_status session_add_panel(session_montages *montages, const scene *scene, 
     session_montage *m = &montages->items[output->montage];
     base_free(m->path);
     m->path = path;
-    status = add_picture(&scene->montages[output->montage], m, output, panel, picture, decorations, error);
+    status = add_picture(&scene->montages[output->montage], m, panel, output, picture, decorations, error);
     m->has_picture = m->has_picture || !status;
     return status;
 }
@@ -165,11 +188,11 @@ static insitu_status decorate_panel(const scene_montage *of, session_montage *m,
     insitu_decorations decorations = m->panels[panel]->decorations;
     const insitu_image picture = {
         .width = of->width, .height = of->height, .rgba = buffer, .decorations = &decorations};
-    const insitu_place place = find_place(of, m, panel);
+    const insitu_place place = find_place(of, m->rgba, panel);
     for (int y = 0; y < of->height; y++)
         memcpy(buffer + 4 * (ptrdiff_t)of->width * y, row_of(&place, y), row_size(of->width));
     if (!has_bars) decorations.bar_count = 0;
-    return session_place_image(&picture, &place, error);
+    return draw_panel(of, m, panel, &picture, error);
 }
 
 /* Draws the bars into the strip beside the panels, with words as large as in the panels. */
@@ -192,16 +215,58 @@ static insitu_status draw_strip(const scene_montage *of, session_montage *m, con
     return status;
 }
 
-/* Draws the decorations of all panels, and the bars that they share. */
-static insitu_status finish_panels(const scene_montage *of, session_montage *m, base_error *error)
+/* Draws the decorations of all panels, and the bars that they share. shared: decorations with these bars, or NULL. */
+static insitu_status finish_panels(const scene_montage *of, session_montage *m, const session_decorations *shared,
+                                   base_error *error)
 {
-    const session_decorations *shared = find_shared(of, m);
     float *buffer = base_alloc(4 * (size_t)of->width * (size_t)of->height * sizeof *buffer);
     insitu_status status = buffer ? INSITU_OK : fail_for_memory(of, error);
     for (int i = 0; i < of->panel_count && !status; i++)
         if (m->panels[i]) status = decorate_panel(of, m, i, !shared, buffer, error);
     base_free(buffer);
     return status || !shared ? status : draw_strip(of, m, shared, error);
+}
+
+/* ---- insets ------------------------------------------------------------------------------------------------------ */
+
+/* Draws the frame around an inset, in a grey that differs from dark and light backgrounds. */
+static void draw_frame(const scene_montage *of, const insitu_place *place, const scene_rectangle *inset)
+{
+    static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1}; /* half of sRGB's range */
+    const int frame = of->frame_width;
+    for (int y = -frame; y < inset->height + frame; y++)
+        for (int x = -frame; x < inset->width + frame; x++) {
+            const bool is_inside = x >= 0 && x < inset->width && y >= 0 && y < inset->height;
+            if (!is_inside) memcpy(row_of(place, y) + 4 * x, grey, sizeof grey);
+        }
+}
+
+/* Lays a picture over a corner of the panels. shared: decorations with the bars in the strip, or NULL. */
+static insitu_status lay_inset(const scene_montage *of, session_montage *m, scene_anchor corner,
+                               const session_decorations *shared, base_error *error)
+{
+    const scene_rectangle *at = &of->insets[corner];
+    const session_inset *inset = &m->insets[corner];
+    const session_decorations *own = inset->decorations;
+    const insitu_place place = {m->rgba, width_of(of), at->x, at->y};
+    insitu_decorations decorations = {0};
+    if (own) decorations = inset->has_decorations ? own->decorations : own->background;
+    if (own && shared && own->bars_hash == shared->bars_hash) decorations.bar_count = 0;
+    const insitu_image picture = {
+        .width = at->width, .height = at->height, .rgba = inset->rgba, .decorations = own ? &decorations : NULL};
+    const insitu_status status = session_place_image(&picture, &place, error);
+    if (!status) draw_frame(of, &place, at);
+    return status;
+}
+
+/* Draws all that was kept for after the last picture of the step. */
+static insitu_status finish_montage(const scene_montage *of, session_montage *m, base_error *error)
+{
+    const session_decorations *shared = of->shares_bars ? find_shared(of, m) : NULL;
+    insitu_status status = of->shares_bars ? finish_panels(of, m, shared, error) : INSITU_OK;
+    for (int i = 0; i < SCENE_ANCHORS && !status; i++)
+        if (m->insets[i].rgba) status = lay_inset(of, m, (scene_anchor)i, shared, error);
+    return status;
 }
 
 /* ---- files ------------------------------------------------------------------------------------------------------- */
@@ -215,8 +280,7 @@ insitu_status session_write_montages(session_montages *montages, const scene *sc
         const insitu_image whole = {.width = width_of(of), .height = height_of(of), .rgba = m->rgba};
         base_error reason = {0};
         const insitu_image_format format = of->format == SCENE_PNG16 ? INSITU_PNG16 : INSITU_PNG8;
-        if (of->shares_bars) finish_panels(of, m, &reason);
-        if (reason.status || session_write_image(&whole, format, m->path, &reason) != INSITU_OK)
+        if (finish_montage(of, m, &reason) || session_write_image(&whole, format, m->path, &reason) != INSITU_OK)
             base_fail(error, reason.status, "%.900s", reason.message);
         end(m);
     }

@@ -329,7 +329,8 @@ typedef enum scene_anchor {
     SCENE_RIGHT,
     SCENE_BOTTOM_LEFT,
     SCENE_BOTTOM,
-    SCENE_BOTTOM_RIGHT
+    SCENE_BOTTOM_RIGHT,
+    SCENE_ANCHORS
 } scene_anchor;
 
 typedef struct scene_words {
@@ -399,7 +400,12 @@ typedef struct scene_output {
     int first_panel;     /* number of the panel that shows the first view; for an inset behind that of the last panel */
 } scene_output;
 
-/* A file that contains several pictures side by side, and pictures over its corners. */
+/* A rectangle of a file in pixels: (x, y) is its upper left corner. */
+typedef struct scene_rectangle {
+    int x, y, width, height;
+} scene_rectangle;
+
+/* A file that contains several pictures side by side, and pictures over their corners. */
 typedef struct scene_montage {
     char *name; /* identifies the pictures that belong together: their path, expanded for one cycle and time */
     int columns, rows;
@@ -410,8 +416,9 @@ typedef struct scene_montage {
     int bar_width;      /* width in pixels of the strip for these bars; 0 without shares_bars */
     bool are_bars_left; /* set if the strip is left of the pictures, otherwise it is right of them */
     int frame_width;    /* width in pixels of the frames of insets */
-    int inset_margin;   /* distance in pixels of insets from the edges of the file, including their frames */
-    unsigned insets;    /* a bit for each corner (scene_anchor) that has an inset */
+    int inset_margin;   /* distance in pixels of insets from the edges of the panels, including their frames */
+    /* the inset at each corner (scene_anchor) without its frame; width 0: there is none. No two overlap. */
+    scene_rectangle insets[SCENE_ANCHORS];
 } scene_montage;
 
 /* A Cinema database by Spec D: a folder of pictures, and a table that describes them. */

@@ -213,9 +213,12 @@ DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
     X(CHOICE("inset", scene_file_output, inset, corner_words),                                                         \
       .help = "Lays the picture, with a grey frame, over a corner of the PNG that earlier outputs with the same file " \
               "and a `grid` make: for example a second image with a closer view. For a single picture below it, use "  \
-              "`grid: [1, 1]`. The picture covers what is below it. It must leave space on all sides for its frame "   \
-              "and a margin of a fiftieth of the file's height. Each corner may have one inset. All outputs of the "   \
-              "file with a `grid` come before the insets. Not allowed if the file has `shared_bars`.",                 \
+              "`grid: [1, 1]`. The picture covers what is below it, except that colour bars, texts, the scale bar "    \
+              "and the axes of the pictures below keep clear of it. It must leave space on all sides for its frame "   \
+              "and a margin of a fiftieth of the file's height. Each corner may have one inset, and insets must not "  \
+              "overlap. All outputs of the file with a `grid` come before the insets. If the file has "                \
+              "`shared_bars`, the inset lies beside the strip, and is drawn without its own colour bars if they are "  \
+              "the shared ones.",                                                                                      \
       .default_text = "none")                                                                                          \
     X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
       .help = "Bits per channel of a PNG: 8 or 16. EXR always has 32-bit floats: R, G, B (linear, times A), A, and "   \

@@ -33,7 +33,7 @@ static insitu_status check_views(const scene_document *d, const char *path, cons
  * possible without being wrapped, and its borders (adaptors/image/layout.cpp). */
 static const double bar_strip = 9;
 
-/* Width of the frames of insets, and their distance from the edges of the file, as shares of its height. */
+/* Width of the frames of insets, and their distance from the edges of the panels, as shares of the file's height. */
 static const double inset_frame = 1 / 400.0, inset_distance = 1 / 50.0;
 
 /* Returns the index of the montage of this name; -1: there is none. */
@@ -73,6 +73,13 @@ static int find_or_add_montage(scene *s, const scene_image *image, const scene_o
     return s->montage_count++;
 }
 
+static bool has_insets(const scene_montage *m)
+{
+    bool has = false;
+    for (int i = 0; i < SCENE_ANCHORS; i++) has = has || m->insets[i].width;
+    return has;
+}
+
 static insitu_status check_panels(const scene_document *d, const char *path, const scene_image *image,
                                   const scene_output *output, const scene_montage *m)
 {
@@ -91,7 +98,7 @@ static insitu_status check_panels(const scene_document *d, const char *path, con
         return scene_fail_at_key(d, path, "shared_bars",
                                  "is %s, and %s for the file's first picture, expected the same",
                                  output->shares_bars ? "true" : "false", m->shares_bars ? "true" : "false");
-    if (m->insets)
+    if (has_insets(m))
         return scene_fail_at_key(d, path, "grid",
                                  "follows an inset of the same file, expected before all insets of the file");
     if (m->panel_count > m->columns * m->rows)
@@ -100,23 +107,51 @@ static insitu_status check_panels(const scene_document *d, const char *path, con
     return INSITU_OK;
 }
 
+/* Returns the rectangle of an inset of the image's size. Insets lie over the panels, not over the strip for shared
+ * colour bars. */
+static scene_rectangle find_inset(const scene_montage *m, scene_anchor corner, const scene_image *image)
+{
+    const bool is_right = corner == SCENE_TOP_RIGHT || corner == SCENE_BOTTOM_RIGHT;
+    const bool is_low = corner == SCENE_BOTTOM_LEFT || corner == SCENE_BOTTOM_RIGHT;
+    const int left = m->are_bars_left ? m->bar_width : 0;
+    return (scene_rectangle){
+        left + (is_right ? m->width * m->columns - m->inset_margin - image->width : m->inset_margin),
+        is_low ? m->height * m->rows - m->inset_margin - image->height : m->inset_margin, image->width, image->height};
+}
+
+/* Returns whether an inset and its frame overlap another inset of the file or its frame. */
+static bool overlaps_another(const scene_montage *m, const scene_rectangle *a)
+{
+    const int frames = 2 * m->frame_width;
+    bool overlaps = false;
+    for (int i = 0; i < SCENE_ANCHORS; i++) {
+        const scene_rectangle *b = &m->insets[i];
+        overlaps = overlaps || (b->width && a->x < b->x + b->width + frames && b->x < a->x + a->width + frames &&
+                                a->y < b->y + b->height + frames && b->y < a->y + a->height + frames);
+    }
+    return overlaps;
+}
+
 static insitu_status check_inset(const scene_document *d, const char *path, const scene_image *image,
                                  const scene_output *output, const scene_montage *m)
 {
+    const scene_rectangle own = find_inset(m, output->corner, image);
     const int most_width = m->width * m->columns - 2 * m->inset_margin;
     const int most_height = m->height * m->rows - 2 * m->inset_margin;
     if (image->camera.orbit.view_count)
         return scene_fail_at_key(d, path, "inset", "given for an image with an orbit, expected for a single view");
-    if (m->shares_bars)
-        return scene_fail_at_key(d, path, "inset",
-                                 "given for a file with shared_bars: true, expected shared_bars: false there");
     if (output->format != m->format)
         return scene_fail_at_key(d, path, "bits", "differs from that of the file's first picture, expected the same");
-    if (m->insets >> output->corner & 1)
+    if (m->insets[output->corner].width)
         return scene_fail_at_key(d, path, "inset", "is the corner of another inset of the file, expected its own");
     if (image->width > most_width || image->height > most_height)
         return scene_fail_at_key(d, path, "inset", "this picture has %d x %d pixels, expected at most %d x %d",
                                  image->width, image->height, most_width, most_height);
+    if (overlaps_another(m, &own))
+        return scene_fail_at_key(d, path, "inset",
+                                 "this picture has %d x %d pixels and overlaps another inset of the file, expected "
+                                 "smaller pictures",
+                                 image->width, image->height);
     return INSITU_OK;
 }
 
@@ -135,7 +170,7 @@ static insitu_status put_inset(const scene_document *d, const char *path, scene 
     if (status) return status;
     output->montage = index;
     output->first_panel = m->columns * m->rows;
-    m->insets |= 1U << output->corner;
+    m->insets[output->corner] = find_inset(m, output->corner, image);
     return INSITU_OK;
 }
 
