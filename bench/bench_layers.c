@@ -1,7 +1,9 @@
-/* Measures what slices, outer surfaces, clips, edges and antialiasing cost: whole steps with new values, and VTK's way
- * to the same picture from the same values, in turns in one process. Prints CSV. */
+/* Measures what slices, outer surfaces, clips, edges and antialiasing cost, or derived fields, contour lines, warps,
+ * mirrors, planes and montages: whole steps with new values, and VTK's way to the same picture from the same values, in
+ * turns in one process. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <mpi.h>
 
@@ -9,9 +11,49 @@
 #include "bench_layers_vtk.h"
 #include "bench_session.h"
 
-static const bench_picture pictures[] = {BENCH_SLICE,       BENCH_SURFACE,    BENCH_CLIPPED, BENCH_EDGES,
-                                         BENCH_ANTIALIASED, BENCH_ISOSURFACE, BENCH_SMOOTH,  BENCH_DIFFERENCES};
-enum { PICTURES = sizeof pictures / sizeof *pictures };
+/* A picture, and VTK's; BENCH_LAYER_NONE: it has no peer. */
+typedef struct bench_pair {
+    bench_picture picture;
+    bench_layer layer;
+} bench_pair;
+
+enum { MOST_PICTURES = 12 };
+
+typedef struct bench_group {
+    const char *program;
+    bool is_by_part; /* set if the parts of a step are printed too, from the report, which has times of a clock */
+    int count;
+    bench_pair pairs[MOST_PICTURES];
+} bench_group;
+
+static const bench_group layers = {"bench_layers",
+                                   true,
+                                   8,
+                                   {{BENCH_SLICE, BENCH_LAYER_SLICE},
+                                    {BENCH_SURFACE, BENCH_LAYER_SURFACE},
+                                    {BENCH_CLIPPED, BENCH_LAYER_CLIPPED},
+                                    {BENCH_EDGES, BENCH_LAYER_NONE},
+                                    {BENCH_ANTIALIASED, BENCH_LAYER_NONE},
+                                    {BENCH_ISOSURFACE, BENCH_LAYER_NONE},
+                                    {BENCH_SMOOTH, BENCH_LAYER_NONE},
+                                    {BENCH_DIFFERENCES, BENCH_LAYER_NONE}}};
+
+/* The slice, the surface and the isosurface are measured again beside those with contour lines. */
+static const bench_group flow = {"bench_layers flow",
+                                 false,
+                                 12,
+                                 {{BENCH_SLICE, BENCH_LAYER_SLICE},
+                                  {BENCH_LINED_SLICE, BENCH_LAYER_LINED_SLICE},
+                                  {BENCH_SURFACE, BENCH_LAYER_SURFACE},
+                                  {BENCH_LINED_SURFACE, BENCH_LAYER_LINED_SURFACE},
+                                  {BENCH_ISOSURFACE, BENCH_LAYER_NONE},
+                                  {BENCH_LINED_ISOSURFACE, BENCH_LAYER_NONE},
+                                  {BENCH_Q_CRITERION, BENCH_LAYER_Q_CRITERION},
+                                  {BENCH_VORTICES, BENCH_LAYER_VORTICES},
+                                  {BENCH_WARPED, BENCH_LAYER_WARPED},
+                                  {BENCH_MIRRORED, BENCH_LAYER_MIRRORED},
+                                  {BENCH_PLANES, BENCH_LAYER_PLANES},
+                                  {BENCH_MONTAGE, BENCH_LAYER_MONTAGE}}};
 
 static const float *floats(const grid_array *a)
 {
@@ -36,57 +78,91 @@ static bench_layers_vtk *create_vtk(const bench_scene *scene, float *xyz)
         view.focal[axis] = bench_focal[axis];
         view.up[axis] = bench_up[axis];
     }
-    return bench_layers_vtk_create(&mesh, &view, bench_plane, scene->subject.threads);
+    bench_layers_parameters parameters = {.isovalue = bench_isovalues[0],
+                                          .vortex = bench_vortex,
+                                          .warp = bench_warp,
+                                          .mirror = bench_mirror,
+                                          .line_count = BENCH_LINE_COUNT,
+                                          .plane_count = BENCH_PLANE_COUNT};
+    memcpy(parameters.plane, bench_plane, sizeof parameters.plane);
+    memcpy(parameters.range, bench_range, sizeof parameters.range);
+    return bench_layers_vtk_create(&mesh, &view, &parameters, scene->subject.threads);
 }
 
-/* Only the first three pictures have a peer. */
-static void measure_pictures(const bench_scene *scene, bench_layers_vtk *vtk, int runs)
+static void print_pair(bench_session *session, bool is_by_part, bench_series *peer)
 {
-    bench_session sessions[PICTURES];
-    bench_series peers[BENCH_LAYER_COUNT] = {0};
-    for (int i = 0; i < PICTURES; i++) bench_session_create(&sessions[i], scene, pictures[i], BENCH_NEW_VALUES);
+    const bench_subject *subject = &session->scene->subject;
+    const char *name = bench_picture_name(session->picture);
+    char measure[96];
+    snprintf(measure, sizeof measure, "%s new values", name);
+    if (is_by_part)
+        bench_session_print(session);
+    else
+        bench_print_series(subject, measure, &session->whole);
+    snprintf(measure, sizeof measure, "%s vtk", name);
+    if (peer->count) bench_print_series(subject, measure, peer);
+}
+
+static void measure_pictures(const bench_scene *scene, const bench_group *group, bench_layers_vtk *vtk, int runs)
+{
+    bench_session sessions[MOST_PICTURES];
+    bench_series peers[MOST_PICTURES] = {0};
+    const bench_pair *pairs = group->pairs;
+    for (int i = 0; i < group->count; i++)
+        bench_session_create(&sessions[i], scene, pairs[i].picture, BENCH_NEW_VALUES);
     for (int number = 0; number <= runs; number++)
-        for (int i = 0; i < PICTURES; i++) {
+        for (int i = 0; i < group->count; i++) {
             bench_session_step(&sessions[i], number);
-            if (!vtk || i >= BENCH_LAYER_COUNT) continue;
-            bench_layers_vtk_set(vtk, bench_session_values(&sessions[i]));
+            if (!vtk || pairs[i].layer == BENCH_LAYER_NONE) continue;
+            bench_layers_vtk_set(vtk, bench_session_values(&sessions[i]), bench_session_velocities(&sessions[i]));
             const double began = bench_begin();
-            bench_layers_vtk_draw(vtk, (bench_layer)i);
+            bench_layers_vtk_draw(vtk, pairs[i].layer);
             bench_end(began, number, &peers[i]);
         }
-    for (int i = 0; i < PICTURES; i++) {
-        char measure[96];
-        snprintf(measure, sizeof measure, "%s vtk", bench_picture_name(pictures[i]));
-        bench_session_print(&sessions[i]);
-        if (vtk && i < BENCH_LAYER_COUNT) bench_print_series(&scene->subject, measure, &peers[i]);
+    for (int i = 0; i < group->count; i++) {
+        print_pair(&sessions[i], group->is_by_part, &peers[i]);
         bench_session_free(&sessions[i]);
     }
 }
 
-static void measure(const bench_command *command, test_mesh_kind kind, int n)
+static void measure_group(const bench_command *command, const bench_group *group, test_mesh_kind kind, int n)
 {
     bench_scene scene;
-    bench_scene_create(&scene, "bench_layers", kind, n);
+    bench_scene_create(&scene, group->program, kind, n);
     bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
     float *xyz = malloc(3 * (size_t)scene.view.cells.vertex_count * sizeof *xyz);
     if (!xyz) abort();
     bench_layers_vtk *vtk = bench_layers_vtk_is_available() ? create_vtk(&scene, xyz) : NULL;
     if (!vtk) fprintf(stderr, "bench_layers: no VTK, or no X server: ours alone\n");
-    measure_pictures(&scene, vtk, command->runs);
+    measure_pictures(&scene, group, vtk, command->runs);
     bench_layers_vtk_destroy(vtk);
     free(xyz);
     bench_scene_free(&scene);
 }
 
+static void measure_layers(const bench_command *command, test_mesh_kind kind, int n)
+{
+    measure_group(command, &layers, kind, n);
+}
+
+static void measure_flow(const bench_command *command, test_mesh_kind kind, int n)
+{
+    measure_group(command, &flow, kind, n);
+}
+
 int main(int argc, char **argv)
 {
     MPI_Init(&argc, &argv);
+    const bool is_flow = argc > 1 && strcmp(argv[1], "flow") == 0;
+    if (is_flow) bench_use_processor_time();
     const int status = bench_measure_meshes(
-        argc, argv,
+        argc - is_flow, argv + is_flow,
         "Measures steps of new values for each MESH (tets or hexes) of N^3 cubes: a slice, the outer\n"
         "surface, the same clipped, with edges and with 4 samples a pixel, the first three beside VTK's\n"
-        "filters and Mesa; and an isosurface by each kind of normals.",
-        TEST_HEXES, measure);
+        "filters and Mesa; and an isosurface by each kind of normals. With the word \"flow\" before the\n"
+        "options: pictures with and without contour lines, the Q criterion alone and its isosurface, a\n"
+        "warp, a mirror, 16 planes and a montage, beside VTK's filters and Mesa, in time of the processor.",
+        TEST_HEXES, is_flow ? measure_flow : measure_layers);
     MPI_Finalize();
     return status;
 }

@@ -8,9 +8,9 @@ bool bench_layers_vtk_is_available(void)
 }
 
 bench_layers_vtk *bench_layers_vtk_create(const bench_contour_mesh *mesh, const bench_contour_view *view,
-                                          const double normal[3], int threads)
+                                          const bench_layers_parameters *parameters, int threads)
 {
-    (void)mesh, (void)view, (void)normal, (void)threads;
+    (void)mesh, (void)view, (void)parameters, (void)threads;
     return NULL;
 }
 
@@ -19,9 +19,9 @@ void bench_layers_vtk_destroy(bench_layers_vtk *layers)
     (void)layers;
 }
 
-void bench_layers_vtk_set(bench_layers_vtk *layers, const float *values)
+void bench_layers_vtk_set(bench_layers_vtk *layers, const float *values, const float *velocities)
 {
-    (void)layers, (void)values;
+    (void)layers, (void)values, (void)velocities;
 }
 
 void bench_layers_vtk_draw(bench_layers_vtk *layers, bench_layer layer)

@@ -14,6 +14,7 @@ enum { WARM_UP = 8, MOST_WARM_UP = 60 };
 static const char *const part_names[BENCH_PARTS] = {"prepare", "build", "refit", "trace", "composite"};
 
 const double bench_plane[3] = {0.4, 0.6, 0.7};
+const double bench_range[2] = {-1.5, 1.5}, bench_vortex = 30, bench_warp = 0.02, bench_mirror = 1;
 
 /* The depths of the last picture, if it had any. */
 static float *caught_depths;
@@ -33,7 +34,10 @@ void session_check_words(const insitu_image *image, insitu_word_faults *out)
 
 insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error)
 {
-    (void)image, (void)place, (void)error;
+    (void)error;
+    for (int y = 0; y < image->height; y++)
+        memcpy(place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x),
+               image->rgba + 4 * (ptrdiff_t)y * image->width, 4 * (size_t)image->width * sizeof(float));
     return INSITU_OK;
 }
 
@@ -58,9 +62,25 @@ const char *bench_change_name(bench_change change)
 
 const char *bench_picture_name(bench_picture picture)
 {
-    static const char *const names[BENCH_PICTURE_COUNT] = {
-        "isosurface", "isosurfaces", "volume",          "smooth isosurface",  "isosurface by differences",
-        "slice",      "surface",     "clipped surface", "surface with edges", "antialiased surface"};
+    static const char *const names[BENCH_PICTURE_COUNT] = {"isosurface",
+                                                           "isosurfaces",
+                                                           "volume",
+                                                           "smooth isosurface",
+                                                           "isosurface by differences",
+                                                           "slice",
+                                                           "surface",
+                                                           "clipped surface",
+                                                           "surface with edges",
+                                                           "antialiased surface",
+                                                           "q criterion",
+                                                           "vortices",
+                                                           "lined slice",
+                                                           "lined surface",
+                                                           "lined isosurface",
+                                                           "warped surface",
+                                                           "mirrored surface",
+                                                           "planes",
+                                                           "montage"};
     return names[picture];
 }
 
@@ -77,6 +97,31 @@ static float *copy(const float *from, int64_t count)
     if (!to) abort();
     memcpy(to, from, (size_t)count * sizeof *to);
     return to;
+}
+
+static bool shows_q(bench_picture picture)
+{
+    return picture == BENCH_Q_CRITERION || picture == BENCH_VORTICES;
+}
+
+static bool has_velocities(bench_picture picture)
+{
+    return shows_q(picture) || picture == BENCH_LINED_ISOSURFACE || picture == BENCH_WARPED;
+}
+
+/* An ABC flow whose phase is shifted. */
+static float *make_velocities(const grid *g, double shift)
+{
+    float *out = malloc(3 * (size_t)g->vertex_count * sizeof *out);
+    if (!out) abort();
+#pragma omp parallel for schedule(static)
+    for (int64_t v = 0; v < g->vertex_count; v++) {
+        double p[3];
+        grid_vertex(g, v, p);
+        for (int i = 0; i < 3; i++)
+            out[3 * v + i] = (float)(sin(6 * (p[(i + 2) % 3] + shift)) + cos(6 * (p[(i + 1) % 3] + shift)));
+    }
+    return out;
 }
 
 /* Makes the second state: the field has moved a little, and the vertices by less than a cell, so that no cell turns
@@ -100,6 +145,7 @@ static void make_states(bench_session *s)
             s->coordinates[1][axis][v] = (float)(p[axis] + sway * sin(3 * p[(axis + 1) % 3]));
         s->values[1][v] = (float)test_wave((const double[]){p[0] + 0.01, p[1] + 0.02, p[2] + 0.03});
     }
+    for (int i = 0; i < 2 && has_velocities(s->picture); i++) s->velocities[i] = make_velocities(g, 0.01 * i);
 }
 
 static void describe(bench_session *s)
@@ -129,54 +175,119 @@ static void set_field(bench_session *s, insitu_session *to)
     s->field.values = (insitu_array){.data = s->values[s->phase], .type = INSITU_FLOAT32};
     s->field.changed = INSITU_CHANGED_VALUES;
     must(s, insitu_set_field(to, "cube", &s->field));
+    if (!s->velocities[0]) return;
+    insitu_field velocity = s->field;
+    velocity.name = "v";
+    velocity.component_count = 3;
+    velocity.values.data = s->velocities[s->phase];
+    must(s, insitu_set_field(to, "cube", &velocity));
 }
 
-/* Writes the scene of slices and outer surfaces, coloured as VTK's are; false where the picture is neither. */
-static bool write_plane_or_faces(const bench_session *s, FILE *file)
+static bool is_slice(bench_picture picture)
 {
-    const char *colours = "field: f, map: cool_to_warm, range: [-1.5, 1.5]";
-    const char *no_light = "material: {ambient: 1, diffuse: 0, specular: 0}";
-    if (s->picture < BENCH_SLICE) return false;
-    if (s->picture == BENCH_SLICE)
-        fprintf(file, "      - slice: {%s, planes: [{normal: [%g, %g, %g], point: [0, 0, 0]}]}\n", colours,
-                bench_plane[0], bench_plane[1], bench_plane[2]);
+    return picture == BENCH_SLICE || picture == BENCH_Q_CRITERION || picture == BENCH_LINED_SLICE ||
+           picture == BENCH_PLANES;
+}
+
+static bool is_isosurface(bench_picture picture)
+{
+    return picture < BENCH_SLICE || picture == BENCH_VORTICES || picture == BENCH_LINED_ISOSURFACE;
+}
+
+static void write_lines(bench_picture picture, FILE *file)
+{
+    if (picture == BENCH_LINED_SLICE || picture == BENCH_LINED_SURFACE)
+        fprintf(file, ", lines: {count: %d}", BENCH_LINE_COUNT);
+    if (picture == BENCH_LINED_ISOSURFACE)
+        fprintf(file, ", lines: {field: v, component: x, count: %d}", BENCH_LINE_COUNT);
+}
+
+/* Writes slices and outer surfaces, coloured as VTK's are. */
+static void write_plane_or_faces(bench_picture picture, FILE *file)
+{
+    char colours[96], plane[96];
+    snprintf(colours, sizeof colours, "field: %s, map: cool_to_warm, range: [%g, %g]", shows_q(picture) ? "q" : "f",
+             bench_range[0], bench_range[1]);
+    snprintf(plane, sizeof plane, "planes: [{normal: [%g, %g, %g], ", bench_plane[0], bench_plane[1], bench_plane[2]);
+    if (picture == BENCH_PLANES)
+        fprintf(file, "      - slice: {%s, %scount: %d}]", colours, plane, BENCH_PLANE_COUNT);
+    else if (is_slice(picture))
+        fprintf(file, "      - slice: {%s, %spoint: [0, 0, 0]}]", colours, plane);
     else
-        fprintf(file, "      - surface: {colour_by: {%s}, %s%s}\n", colours, no_light,
-                s->picture == BENCH_EDGES ? ", edges: {}" : "");
-    if (s->picture == BENCH_CLIPPED)
-        fprintf(file, "    clip: {planes: [{normal: [%g, %g, %g], point: [0, 0, 0]}]}\n", bench_plane[0],
-                bench_plane[1], bench_plane[2]);
-    if (s->picture == BENCH_ANTIALIASED) fprintf(file, "    antialias: 4\n");
-    return true;
+        fprintf(file, "      - surface: {colour_by: {%s}, material: {ambient: 1, diffuse: 0, specular: 0}%s", colours,
+                picture == BENCH_EDGES ? ", edges: {}" : "");
+    write_lines(picture, file);
+    fprintf(file, "}\n");
+    if (picture == BENCH_CLIPPED) fprintf(file, "    clip: {%spoint: [0, 0, 0]}]}\n", plane);
+    if (picture == BENCH_ANTIALIASED) fprintf(file, "    antialias: 4\n");
 }
 
-static void write_layer(const bench_session *s, FILE *file)
+static void write_volume(const bench_session *s, FILE *file)
 {
-    if (write_plane_or_faces(s, file)) return;
-    if (s->picture == BENCH_VOLUME) {
-        fprintf(file, "      - volume: {field: f, map: viridis, range: [%g, %g], unit_distance: %g, opacity: [",
-                bench_knots[0], bench_knots[BENCH_KNOTS - 1], bench_unit_distance);
-        for (int i = 0; i < BENCH_KNOTS; i++)
-            fprintf(file, "%s[%g, %g]", i ? ", " : "",
-                    (bench_knots[i] - bench_knots[0]) / (bench_knots[BENCH_KNOTS - 1] - bench_knots[0]),
-                    (double)bench_opacities[i]);
-        fprintf(file, "]}\n    sampling: {step: %.9g}\n", s->scene->job.step);
+    fprintf(file, "      - volume: {field: f, map: viridis, range: [%g, %g], unit_distance: %g, opacity: [",
+            bench_knots[0], bench_knots[BENCH_KNOTS - 1], bench_unit_distance);
+    for (int i = 0; i < BENCH_KNOTS; i++)
+        fprintf(file, "%s[%g, %g]", i ? ", " : "",
+                (bench_knots[i] - bench_knots[0]) / (bench_knots[BENCH_KNOTS - 1] - bench_knots[0]),
+                (double)bench_opacities[i]);
+    fprintf(file, "]}\n    sampling: {step: %.9g}\n", s->scene->job.step);
+}
+
+static void write_isosurface(bench_picture picture, FILE *file)
+{
+    if (picture == BENCH_VORTICES) {
+        fprintf(file, "      - isosurface: {field: q, values: [%g]}\n", bench_vortex);
         return;
     }
     fprintf(file, "      - isosurface: {field: f, values: [");
-    for (int i = 0; i < (s->picture == BENCH_ISOSURFACES ? BENCH_ISOVALUES : 1); i++)
+    for (int i = 0; i < (picture == BENCH_ISOSURFACES ? BENCH_ISOVALUES : 1); i++)
         fprintf(file, "%s%g", i ? ", " : "", bench_isovalues[i]);
-    fprintf(file, "]%s}\n",
-            s->picture == BENCH_SMOOTH        ? ", normals: vertex"
-            : s->picture == BENCH_DIFFERENCES ? ", normals: differences"
-                                              : "");
+    fprintf(file, "]%s",
+            picture == BENCH_SMOOTH        ? ", normals: vertex"
+            : picture == BENCH_DIFFERENCES ? ", normals: differences"
+                                           : "");
+    write_lines(picture, file);
+    fprintf(file, "}\n");
+}
+
+/* Writes an image with a layer of this picture. part: number of the image in a montage, whose pictures are a quarter as
+ * large; -1: it is alone. */
+static void write_image(const bench_session *s, bench_picture picture, int part, const char *ending, FILE *file)
+{
+    const render_camera *camera = &s->scene->job.camera;
+    const int side = part < 0 ? 1 : 2, least = 8;
+    const bool is_small = picture == BENCH_Q_CRITERION;
+    fprintf(file, "  - name: picture%d\n    size: [%d, %d]\n", part + 1, is_small ? least : camera->width / side,
+            is_small ? least : camera->height / side);
+    fprintf(file, "    camera: {position: [%g, %g, %g], focal: [%g, %g, %g], up: [%g, %g, %g], angle: %g}\n",
+            bench_eye[0], bench_eye[1], bench_eye[2], bench_focal[0], bench_focal[1], bench_focal[2], bench_up[0],
+            bench_up[1], bench_up[2], bench_degrees);
+    fprintf(file, "    layers:\n");
+    if (picture == BENCH_VOLUME)
+        write_volume(s, file);
+    else if (is_isosurface(picture))
+        write_isosurface(picture, file);
+    else
+        write_plane_or_faces(picture, file);
+    fprintf(file, "    outputs: [{path: picture%s%s}]\n", ending, part < 0 ? "" : ", grid: [2, 2]");
+}
+
+static void write_scene(const bench_session *s, const char *ending, FILE *file)
+{
+    static const bench_picture parts[BENCH_VIEWS] = {BENCH_SLICE, BENCH_SURFACE, BENCH_CLIPPED, BENCH_ISOSURFACE};
+    fprintf(file, "threads: %d\n", s->scene->subject.threads);
+    if (shows_q(s->picture)) fprintf(file, "fields: {q: {q_criterion: v}}\n");
+    if (s->picture == BENCH_WARPED) fprintf(file, "meshes: {cube: {warp: {field: v, scale: %g}}}\n", bench_warp);
+    if (s->picture == BENCH_MIRRORED) fprintf(file, "meshes: {cube: {mirror: {x: %g}}}\n", bench_mirror);
+    fprintf(file, "images:\n");
+    if (s->picture != BENCH_MONTAGE) write_image(s, s->picture, -1, ending, file);
+    for (int i = 0; i < BENCH_VIEWS && s->picture == BENCH_MONTAGE; i++) write_image(s, parts[i], i, ending, file);
 }
 
 /* Opens a session whose picture has this ending; .exr has depth. */
 static insitu_session *open_session(const bench_session *s, const char *ending)
 {
     char path[] = "/tmp/bench_session_XXXXXX";
-    const render_camera *camera = &s->scene->job.camera;
     insitu_session *session = NULL;
     const int descriptor = mkstemp(path);
     FILE *file = descriptor >= 0 ? fdopen(descriptor, "w") : NULL;
@@ -184,14 +295,7 @@ static insitu_session *open_session(const bench_session *s, const char *ending)
         perror(path);
         exit(1);
     }
-    fprintf(file, "threads: %d\nimages:\n  - name: picture\n    size: [%d, %d]\n", s->scene->subject.threads,
-            camera->width, camera->height);
-    fprintf(file, "    camera: {position: [%g, %g, %g], focal: [%g, %g, %g], up: [%g, %g, %g], angle: %g}\n",
-            bench_eye[0], bench_eye[1], bench_eye[2], bench_focal[0], bench_focal[1], bench_focal[2], bench_up[0],
-            bench_up[1], bench_up[2], bench_degrees);
-    fprintf(file, "    layers:\n");
-    write_layer(s, file);
-    fprintf(file, "    outputs: [{path: picture%s}]\n", ending);
+    write_scene(s, ending, file);
     fclose(file);
     const insitu_status status = insitu_create(MPI_COMM_WORLD, path, &session);
     unlink(path);
@@ -224,6 +328,7 @@ void bench_session_free(bench_session *s)
     insitu_destroy(&s->session);
     for (int axis = 0; axis < 3; axis++) free(s->coordinates[1][axis]);
     free(s->values[1]);
+    for (int i = 0; i < 2; i++) free(s->velocities[i]);
 }
 
 static void change_state(bench_session *s)
@@ -261,6 +366,11 @@ const float *const *bench_session_coordinates(const bench_session *s)
 const float *bench_session_values(const bench_session *s)
 {
     return s->values[s->phase];
+}
+
+const float *bench_session_velocities(const bench_session *s)
+{
+    return s->velocities[s->phase];
 }
 
 void bench_session_print(bench_session *s)

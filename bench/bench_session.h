@@ -28,10 +28,24 @@ typedef enum bench_picture {
     BENCH_CLIPPED,     /* the same, cut by the plane */
     BENCH_EDGES,       /* the outer surface with the cells' edges */
     BENCH_ANTIALIASED, /* the outer surface by 4 samples a pixel */
+    BENCH_Q_CRITERION, /* a slice of the Q criterion of a velocity, of 8 × 8 pixels: the criterion takes the time */
+    BENCH_VORTICES,    /* an isosurface of the Q criterion */
+    BENCH_LINED_SLICE, /* the slice, outer surface and isosurface with contour lines of the field */
+    BENCH_LINED_SURFACE,
+    BENCH_LINED_ISOSURFACE,
+    BENCH_WARPED,   /* the outer surface of the mesh moved by the velocity, which is new at each step */
+    BENCH_MIRRORED, /* of the mesh and its image in a side of the cube */
+    BENCH_PLANES,   /* BENCH_PLANE_COUNT slices */
+    BENCH_MONTAGE,  /* a slice, an outer surface, a clipped one and an isosurface side by side, a quarter as large */
     BENCH_PICTURE_COUNT
 } bench_picture;
 
+enum { BENCH_LINE_COUNT = 10, BENCH_PLANE_COUNT = 16, BENCH_VIEWS = 4 };
+
 extern const double bench_plane[3];
+
+/* The range of the colours, the value of the Q criterion, the scale of the displacements, and where the mirror is. */
+extern const double bench_range[2], bench_vortex, bench_warp, bench_mirror;
 
 const char *bench_picture_name(bench_picture picture);
 
@@ -46,6 +60,7 @@ typedef struct bench_session {
     insitu_mesh mesh;
     insitu_field field;
     float *coordinates[2][3], *values[2]; /* [0] the scene's own */
+    float *velocities[2];                 /* vertices × 3; NULL: the picture needs none */
     int place, phase;                     /* which of them are set */
     int64_t cycle;
     bench_series whole, parts[BENCH_PARTS];
@@ -63,6 +78,7 @@ void bench_session_step(bench_session *session, int number);
 /* The arrays that are set now. */
 const float *const *bench_session_coordinates(const bench_session *session);
 const float *bench_session_values(const bench_session *session);
+const float *bench_session_velocities(const bench_session *session);
 
 /* Prints the times, as "isosurface new values", and those of the parts. */
 void bench_session_print(bench_session *session);

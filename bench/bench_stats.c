@@ -19,10 +19,17 @@ bench_stats bench_stats_of(double *values, int count)
     return (bench_stats){count, median, values[0], values[count - 1]};
 }
 
+static clockid_t used_clock = CLOCK_MONOTONIC;
+
+void bench_use_processor_time(void)
+{
+    used_clock = CLOCK_PROCESS_CPUTIME_ID;
+}
+
 double bench_seconds(void)
 {
     struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
+    clock_gettime(used_clock, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
@@ -65,5 +72,6 @@ void bench_add_sample(double seconds, int number, bench_series *series)
 void bench_print_series(const bench_subject *subject, const char *measure, bench_series *series)
 {
     for (int i = 0; i < series->count; i++) series->seconds[i] *= 1e3;
-    bench_print(subject, measure, "ms", bench_stats_of(series->seconds, series->count));
+    bench_print(subject, measure, used_clock == CLOCK_MONOTONIC ? "ms" : "cpu ms",
+                bench_stats_of(series->seconds, series->count));
 }

@@ -15,6 +15,10 @@ bench_stats bench_stats_of(double *values, int count);
 /* Seconds on a clock that only rises. */
 double bench_seconds(void);
 
+/* Makes times those of the processor in this process, on all threads, from now on; series are printed as "cpu ms". They
+ * change less than times of a clock if the machine has other work. */
+void bench_use_processor_time(void);
+
 /* The first columns of a line. */
 typedef struct bench_subject {
     const char *program, *isa, *mesh;
@@ -46,7 +50,7 @@ void bench_add_sample(double seconds, int number, bench_series *series);
 /* Keeps the time since began, and returns it. */
 double bench_end(double began, int number, bench_series *series);
 
-/* Prints milliseconds. Sorts the series. */
+/* Prints milliseconds, as "ms" or "cpu ms". Sorts the series. */
 void bench_print_series(const bench_subject *subject, const char *measure, bench_series *series);
 
 #endif

@@ -9,8 +9,8 @@ import sys
 from typing import NamedTuple
 
 import page
-from performance_bars import Standing, all_claims, span, span_of_speeds
-from performance_results import Mesh, Results
+from performance_bars import Standing, all_claims, figures, span, span_of_speeds, write_ratio
+from performance_results import NONE, Mesh, Results
 
 PAGES = ("performance", "measurements")
 WIDTHS = {"avx512": "16, AVX-512", "avx2": "8, AVX2", "sse4.2": "4, SSE4.2", "plain": "4, plain C"}
@@ -66,6 +66,32 @@ def all_agreements(meshes):
     return agreements
 
 
+class FlowRow(NamedTuple):
+    """A picture of the section "flow", and how VTK makes it."""
+    picture: str
+    name: str
+    peer: str
+
+    def text(self, mesh):
+        """Return the ratio of our time to VTK's, and both."""
+        ours, theirs = mesh.median(f"{self.name} new values"), mesh.median(f"{self.name} vtk")
+        return f"{write_ratio(ours / theirs)} ({figures(ours, theirs)})" if ours and theirs else NONE
+
+
+FLOW = (
+    FlowRow("Slice", "slice", "vtk3DLinearGridPlaneCutter"),
+    FlowRow("Slice with 10 contour lines", "lined slice", "the same, vtkContourFilter"),
+    FlowRow("16 slices", "planes", "vtk3DLinearGridPlaneCutter for each"),
+    FlowRow("Outer surface", "surface", "vtkGeometryFilter"),
+    FlowRow("Outer surface with 10 contour lines", "lined surface", "the same, vtkContourFilter"),
+    FlowRow("Outer surface of the warped mesh, new displacements", "warped surface", "vtkWarpVector, vtkGeometryFilter"),
+    FlowRow("Outer surface of the mesh and its mirror image", "mirrored surface",
+            "vtkReflectionFilter, vtkGeometryFilter"),
+    FlowRow("Q criterion at all vertices, without a picture", "q criterion", "vtkGradientFilter"),
+    FlowRow("Isosurface of the Q criterion, new velocities", "vortices", "vtkGradientFilter, vtkContour3DLinearGrid"),
+    FlowRow("Montage: a slice, two outer surfaces, an isosurface", "montage", "a window with a renderer for each"))
+
+
 class Scaling(NamedTuple):
     lanes: str
     threads: int
@@ -96,7 +122,7 @@ def draw(arguments):
     return page.fill_template(
         f"{name}.md.j2", results=results, bars=Standing(all_claims(results)), hexes=Hexes(results),
         scalings=all_scalings(results), agreements=all_agreements(results["peers"].meshes),
-        disagreement=count_disagreements([results["render"], results["tables sizes"]]), span_of_speeds=span_of_speeds)
+        flow=FLOW, disagreement=count_disagreements([results["render"], results["tables sizes"]]), span_of_speeds=span_of_speeds)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import page
 
 SECTIONS = {"render": "render", "peers": "peers", "light": "light", "steps": "steps", "volumes": "volumes",
-            "layers": "layers", "cells types": "cells", "cells layouts": "cells", "cells thousand": "cells",
+            "layers": "layers", "layers flow": "flow", "cells types": "cells", "cells layouts": "cells", "cells thousand": "cells",
             "tables sizes": "tables",
             "tables groups": "tables", "tables steps": "tables", "scaling": "scaling"}
 NONE = "–"
