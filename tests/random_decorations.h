@@ -3,6 +3,7 @@
 #ifndef TEST_RANDOM_DECORATIONS_H
 #define TEST_RANDOM_DECORATIONS_H
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -110,7 +111,8 @@ class random_decorations
     {
         for (int corner = 0; corner < 4; corner++) {
             if (whole(0, 1)) continue;
-            const int wide = whole(1, 2 * width / 5), high = whole(1, 2 * height / 5), edge = whole(0, height / 40);
+            const int wide = whole(1, std::max(1, 2 * width / 5)), high = whole(1, std::max(1, 2 * height / 5)),
+                      edge = whole(0, height / 40);
             covered_[static_cast<std::size_t>(what_.covered_count++)] = {
                 corner & 1 ? edge : width - edge - wide, corner & 2 ? edge : height - edge - high, wide, high};
         }
