@@ -2,18 +2,16 @@
  * In each simplex, polynomials are written in Bernstein's form, whose coefficients bound them: a second derivative
  * along an edge e is p (p - 1) times a second difference of coefficients, and at most the largest of these, M.
  *
- * Let u be the difference between a polynomial and its linear interpolation in a simplex with edges of 1 / m, with
- * second derivatives of at most M / m^2 along each edge. With q = M / (2 m^2) times the sum of products l_i l_j of all
- * pairs of barycentric coordinates, q - u has second derivatives of at most 0 along edges, and is 0 at the corners. So
- * it is not negative on edges, then on faces, which lines parallel to an edge cross from edge to edge, and then inside.
- * The sum of products is largest at the centre, and so
+ * Let u be the difference between a polynomial and its linear interpolation in a simplex with edges of 1 / m. Let B_ij
+ * be at least -m^2 times its second derivative along the edge from corner i to j. Half the sum of B_ij l_i l_j / m^2
+ * over all pairs of barycentric coordinates is q. Then q - u has second derivatives of at most 0 along edges, and is 0
+ * at the corners. So it is not negative on edges, then on faces, which lines parallel to an edge cross from edge to
+ * edge, and then inside. So u is at most the largest value of q, and -u that with the opposite signs. If all B_ij are
+ * M, these are K M / m^2, K = 1/8 on a line, 1/6 in a triangle and 3/16 in a tet. For polynomials of order 2 they are
+ * exact.
  *
- *     |u| <= K M / m^2,   K = 1/8 on a line, 1/6 in a triangle, 3/16 in a tet.
- *
- * A tet is cut into smaller ones and octahedra, which are split along a diagonal. If the second derivative along this
- * is at most D = r M, the sum has D in place of M for one pair. It is largest where both corners of the diagonal have
- * the same coordinate, and so have the other two, and then K is (1 + 1 / (3 - r)) / 8 for r from 1 to 2, and r / 8
- * above.
+ * A tet is cut into smaller ones and octahedra, which are split into tets along a diagonal. So the pieces of a tet have
+ * five shapes, whose edges have seven directions.
  *
  * In a product, interpolation in one factor does not increase what is interpolated in the others, so that the bounds of
  * all factors add up.
@@ -31,12 +29,15 @@
 
 #include "memory.h"
 #include "session_derivatives.h"
+#include "session_shape.h"
 #include "vector3.h"
 
 enum {
-    SIZE = 4,   /* numbers of a tuple: a position and a value */
-    COARSE = 4, /* the finer lattice has at least this order */
-    MOST_DIRECTIONS = 9
+    SIZE = 4,            /* numbers of a tuple: a position and a value */
+    COARSE = 4,          /* the first lattice has at least this order */
+    FINE = 16,           /* no other lattice is above this order */
+    MOST_DIRECTIONS = 7, /* along edges of pieces in one simplex */
+    TET_SHAPES = 5
 };
 
 /* ---- one simplex ----------------------------------------------------------------------------------------------- */
@@ -54,7 +55,8 @@ static int list_nodes(int dimensions, int order, int (*out)[4])
 
 /* The nodes of a simplex, as list_nodes() lists them. */
 typedef struct node_lists {
-    int dimensions, order, fine_order, count, fine_count;
+    int dimensions, order, count;
+    int fine_order, fine_count;               /* of a finer lattice */
     bool is_lobatto;                          /* set if the nodes of a line are Gauss-Lobatto points */
     int (*nodes)[4], (*fine)[4], (*lower)[4]; /* of the cell, of the finer lattice, and of the order lower by 2 */
 } node_lists;
@@ -151,10 +153,11 @@ static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *
 }
 
 /* Adds the second difference of the coefficients at a node of the list `lower` along a direction. */
-static void add_difference(const node_lists *lists, int lower, const int direction[4], session_bound_factor *out)
+static void add_difference(const node_lists *lists, int lower, int number, const int direction[4],
+                           session_bound_factor *out)
 {
     session_second_difference *difference = &out->differences[out->difference_count++];
-    *difference = (session_second_difference){.count = 0};
+    *difference = (session_second_difference){.direction = number};
     for (int a = 0; a < 4; a++)
         for (int b = a; b < 4; b++) {
             int node[4];
@@ -165,19 +168,18 @@ static void add_difference(const node_lists *lists, int lower, const int directi
             difference->nodes[difference->count] = find_node(lists->dimensions, lists->order, node);
             difference->weights[difference->count++] = (a == b ? 1 : 2) * direction[a] * direction[b];
         }
-    difference->is_diagonal = difference->count == 10;
 }
 
-/* Lists the second differences along all edges of pieces. A tet of order m consists of tets and octahedra that have the
- * directions of its edges, and the octahedra are split along a diagonal. */
+/* Lists the second differences along all edges of pieces. In a tet the last direction is that of the octahedra's
+ * diagonals (session_pattern.c). */
 static void list_differences(const node_lists *lists, session_bound_factor *out)
 {
-    static const int directions[][4] = {{-1, 1, 0, 0}, {-1, 0, 1, 0},  {0, -1, 1, 0},  {-1, 0, 0, 1}, {0, -1, 0, 1},
-                                        {0, 0, -1, 1}, {-1, -1, 1, 1}, {-1, 1, -1, 1}, {-1, 1, 1, -1}};
+    static const int directions[MOST_DIRECTIONS][4] = {{-1, 1, 0, 0}, {-1, 0, 1, 0}, {0, -1, 1, 0}, {-1, 0, 0, 1},
+                                                       {0, -1, 0, 1}, {0, 0, -1, 1}, {-1, -1, 1, 1}};
     static const int counts[] = {0, 1, 3, MOST_DIRECTIONS};
     const int count = list_nodes(lists->dimensions, lists->order - 2, lists->lower);
     for (int n = 0; n < count; n++)
-        for (int d = 0; d < counts[lists->dimensions]; d++) add_difference(lists, n, directions[d], out);
+        for (int d = 0; d < counts[lists->dimensions]; d++) add_difference(lists, n, d, directions[d], out);
 }
 
 static double *make_matrix(int rows, int columns)
@@ -186,9 +188,9 @@ static double *make_matrix(int rows, int columns)
 }
 
 /* Replaces the columns for Bernstein coefficients by those for values at nodes. spare: as many doubles. */
-static void convert_columns(const session_bound_factor *of, double *matrix, double *spare)
+static void convert_columns(const session_bound_factor *of, int level, double *matrix, double *spare)
 {
-    const int rows = of->fine_count, columns = of->node_count;
+    const int rows = of->fine_counts[level], columns = of->node_count;
     for (int r = 0; r < rows; r++)
         for (int c = 0; c < columns; c++) {
             double sum = 0;
@@ -198,56 +200,65 @@ static void convert_columns(const session_bound_factor *of, double *matrix, doub
     memcpy(matrix, spare, (size_t)rows * (size_t)columns * sizeof *matrix);
 }
 
-static bool fill_factor(const node_lists *lists, session_bound_factor *out)
+/* Computes the matrices of one level. */
+static bool fill_level(node_lists *lists, int level, int order, session_bound_factor *out)
 {
-    const int count = lists->count, fine = lists->fine_count;
-    double *spare = make_matrix(fine, count);
-    out->bernstein = make_matrix(count, count);
-    out->values = make_matrix(fine, count);
-    bool is_made = spare && out->bernstein && out->values;
-    for (int a = 0; a < lists->dimensions; a++) {
-        out->slopes[a] = make_matrix(fine, count);
-        is_made = is_made && out->slopes[a];
+    const int dimensions = lists->dimensions, count = lists->count;
+    lists->fine_order = order;
+    lists->fine_count = out->fine_counts[level] = list_nodes(dimensions, order, NULL);
+    lists->fine = base_alloc((size_t)lists->fine_count * sizeof *lists->fine);
+    double *spare = make_matrix(lists->fine_count, count);
+    bool is_made = lists->fine && spare;
+    if (is_made) list_nodes(dimensions, order, lists->fine);
+    for (int a = -1; a < dimensions && is_made; a++) {
+        double *matrix = make_matrix(lists->fine_count, count);
+        if (a < 0)
+            out->values[level] = matrix;
+        else
+            out->slopes[level][a] = matrix;
+        is_made = matrix;
+        if (is_made) fill_basis(lists, a, true, matrix);
+        if (is_made) convert_columns(out, level, matrix, spare);
     }
+    base_free(spare);
+    base_free(lists->fine);
+    return is_made;
+}
+
+static bool fill_bernstein(const node_lists *lists, session_bound_factor *out)
+{
+    const int count = lists->count;
+    double *spare = make_matrix(count, count);
+    out->bernstein = make_matrix(count, count);
     out->differences = base_alloc((size_t)count * MOST_DIRECTIONS * sizeof *out->differences);
-    is_made = is_made && out->differences;
+    const bool is_made = spare && out->bernstein && out->differences;
     if (is_made) {
         fill_basis(lists, -1, false, spare);
         for (int n = 0; n < count; n++) out->bernstein[n * count + n] = 1;
         invert(count, spare, out->bernstein);
-        for (int a = -1; a < lists->dimensions; a++) {
-            double *matrix = a < 0 ? out->values : out->slopes[a];
-            fill_basis(lists, a, true, matrix);
-            convert_columns(out, matrix, spare);
-        }
         list_differences(lists, out);
     }
     base_free(spare);
     return is_made;
 }
 
-static bool make_factor(int dimensions, int order, int fine_order, bool is_lobatto, session_bound_factor *out)
+static bool make_factor(const session_bound *of, int dimensions, bool is_lobatto, session_bound_factor *out)
 {
+    const int order = of->nodes.of.order;
     node_lists lists = {.dimensions = dimensions,
                         .order = order,
-                        .fine_order = fine_order,
                         .is_lobatto = is_lobatto,
-                        .count = list_nodes(dimensions, order, NULL),
-                        .fine_count = list_nodes(dimensions, fine_order, NULL)};
+                        .count = list_nodes(dimensions, order, NULL)};
     out->dimensions = dimensions;
     out->node_count = lists.count;
-    out->fine_count = lists.fine_count;
     lists.nodes = base_alloc((size_t)lists.count * sizeof *lists.nodes);
-    lists.fine = base_alloc((size_t)lists.fine_count * sizeof *lists.fine);
     lists.lower = base_alloc((size_t)lists.count * sizeof *lists.lower);
-    bool is_made = lists.nodes && lists.fine && lists.lower;
-    if (is_made) {
-        list_nodes(dimensions, order, lists.nodes);
-        list_nodes(dimensions, fine_order, lists.fine);
-        is_made = fill_factor(&lists, out);
-    }
+    bool is_made = lists.nodes && lists.lower;
+    if (is_made) list_nodes(dimensions, order, lists.nodes);
+    is_made = is_made && fill_bernstein(&lists, out);
+    for (int level = 0; level < of->level_count && is_made; level++)
+        is_made = fill_level(&lists, level, of->levels[level].order, out);
     base_free(lists.nodes);
-    base_free(lists.fine);
     base_free(lists.lower);
     return is_made;
 }
@@ -255,9 +266,11 @@ static bool make_factor(int dimensions, int order, int fine_order, bool is_lobat
 static void drop_factor(session_bound_factor *factor)
 {
     base_free(factor->bernstein);
-    base_free(factor->values);
-    for (int a = 0; a < 3; a++) base_free(factor->slopes[a]);
     base_free(factor->differences);
+    for (int level = 0; level < BOUND_MOST_LEVELS; level++) {
+        base_free(factor->values[level]);
+        for (int a = 0; a < 3; a++) base_free(factor->slopes[level][a]);
+    }
     *factor = (session_bound_factor){0};
 }
 
@@ -273,26 +286,35 @@ static const session_bound_factor *factor_of(const session_bound *of, int factor
     return factor == 0 && of->simplex.dimensions ? &of->simplex : &of->line;
 }
 
+static bool make_levels(session_bound *out)
+{
+    const int type = out->nodes.of.type, p = out->nodes.of.order;
+    bool is_made = true;
+    for (int order = p < COARSE ? (COARSE + p - 1) / p * p : p; is_made; order *= 2) {
+        if (out->level_count == BOUND_MOST_LEVELS || (out->level_count > 0 && order > FINE)) break;
+        const session_nodes fine = session_complete_nodes(type, order);
+        session_bound_level *level = &out->levels[out->level_count++];
+        level->order = order;
+        level->count = fine.count;
+        is_made = session_make_pattern(session_lagrange_type(type), &fine, INSITU_ORDER_LEXICOGRAPHIC, &level->pieces);
+    }
+    return is_made;
+}
+
 bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, session_bound *out)
 {
     const int type = of->type, is_box = type == GRID_HEX || type == GRID_QUAD;
-    *out = (session_bound){.axis_count = type == GRID_QUAD || type == GRID_TRIANGLE ? 2 : 3, .fine_order = of->order};
-    while (out->fine_order < COARSE) out->fine_order += of->order;
-    const session_nodes fine = session_complete_nodes(type, out->fine_order);
-    out->fine_count = fine.count;
-    bool is_made = session_make_interpolation(of, order, 1, is_lobatto, &out->nodes) &&
-                   session_make_pattern(session_lagrange_type(type), &fine, INSITU_ORDER_LEXICOGRAPHIC, &out->pieces);
-    if (is_box || type == GRID_WEDGE)
-        is_made = is_made && make_factor(1, of->order, out->fine_order, is_lobatto && is_box, &out->line);
-    if (!is_box)
-        is_made = is_made && make_factor(type == GRID_TET ? 3 : 2, of->order, out->fine_order, false, &out->simplex);
+    *out = (session_bound){.axis_count = type == GRID_QUAD || type == GRID_TRIANGLE ? 2 : 3};
+    bool is_made = session_make_interpolation(of, order, 1, is_lobatto, &out->nodes) && make_levels(out);
+    if (is_box || type == GRID_WEDGE) is_made = is_made && make_factor(out, 1, is_lobatto && is_box, &out->line);
+    if (!is_box) is_made = is_made && make_factor(out, type == GRID_TET ? 3 : 2, false, &out->simplex);
     return is_made;
 }
 
 void session_drop_bound(session_bound *bound)
 {
     session_drop_interpolation(&bound->nodes);
-    session_drop_pattern(&bound->pieces);
+    for (int level = 0; level < bound->level_count; level++) session_drop_pattern(&bound->levels[level].pieces);
     drop_factor(&bound->line);
     drop_factor(&bound->simplex);
 }
@@ -303,6 +325,7 @@ void session_drop_bound(session_bound *bound)
 typedef struct bound_job {
     const session_bound *of;
     const session_isovalues *isovalues;
+    int level;
     double *nodes, *coefficients;       /* tuples: at the equispaced nodes, and in Bernstein's form */
     double *fine, *slopes[3];           /* tuples at the fine nodes, and their derivatives along the axes */
     double (*gradients)[3];             /* of the field at the fine nodes; not finite where the cell is flat */
@@ -312,20 +335,21 @@ typedef struct bound_job {
 
 size_t session_bound_room(const session_bound *of)
 {
-    const size_t nodes = (size_t)of->nodes.complete.count, fine = (size_t)of->fine_count;
+    const size_t nodes = (size_t)of->nodes.complete.count, fine = (size_t)of->levels[of->level_count - 1].count;
     return SIZE * (2 * nodes + 6 * fine) + 3 * fine;
 }
 
 static void place_arrays(bound_job *job, double *room)
 {
-    const size_t nodes = SIZE * (size_t)job->of->nodes.complete.count, fine = SIZE * (size_t)job->of->fine_count;
+    const size_t nodes = SIZE * (size_t)job->of->nodes.complete.count,
+                 fine = SIZE * (size_t)job->of->levels[job->level].count;
     job->nodes = room;
     job->coefficients = room += nodes;
     job->fine = room += nodes;
     for (int a = 0; a < 3; a++) job->slopes[a] = room += fine;
     room += fine;
     job->gradients = (double(*)[3])room;
-    job->room = room + 3 * job->of->fine_count;
+    job->room = room + 3 * job->of->levels[job->level].count;
 }
 
 /* Multiplies each factor of a product with its matrix. size: number of numbers of a tuple. */
@@ -337,8 +361,8 @@ static void apply(const bound_job *job, int size, const double *const matrices[3
     for (int f = 0; f < count; f++) outer *= factor_of(job->of, f)->node_count;
     for (int f = 0; f < count; f++) {
         const session_bound_factor *factor = factor_of(job->of, f);
-        const int rows = is_fine ? factor->fine_count : factor->node_count;
-        double *to = f == count - 1 ? out : job->room + f % 2 * SIZE * job->of->fine_count;
+        const int rows = is_fine ? factor->fine_counts[job->level] : factor->node_count;
+        double *to = f == count - 1 ? out : job->room + f % 2 * SIZE * job->of->levels[job->level].count;
         outer /= factor->node_count;
         multiply(matrices[f], rows, factor->node_count, outer, inner, in, to);
         inner *= rows;
@@ -346,35 +370,86 @@ static void apply(const bound_job *job, int size, const double *const matrices[3
     }
 }
 
-/* Returns the bound of the difference from interpolation in a factor, by those of the second derivatives along edges
- * and along diagonals of octahedra. */
-static double bound_factor(int dimensions, double along_edges, double along_diagonals)
+/* Returns the largest value of q in a triangle, or 0 if it is not inside (top of the file). */
+static double largest_in_triangle(double a, double b, double c)
 {
-    if (dimensions == 1) return along_edges / 8;
-    if (dimensions == 2) return along_edges / 6;
-    if (along_diagonals >= 2 * along_edges) return along_diagonals / 8;
-    const double ratio = along_diagonals > along_edges ? along_diagonals / along_edges : 1;
-    return along_edges / 8 * (1 + 1 / (3 - ratio));
+    const double x = a * (b + c - a), y = b * (c + a - b), z = c * (a + b - c);
+    return a > 0 && b > 0 && c > 0 && x >= 0 && y >= 0 && z >= 0 ? 0.5 * a * b * c / (x + y + z) : 0;
 }
+
+/* As above, in a tet. The numbers are those of the pairs of corners 01, 02, 03, 12, 13 and 23. */
+static double largest_in_tet(const double b[6])
+{
+    double matrix[16] = {0, b[0], b[1], b[2], b[0], 0, b[3], b[4], b[1], b[3], 0, b[5], b[2], b[4], b[5], 0};
+    double inverse[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, sum = 0;
+    bool is_inside = true;
+    invert(4, matrix, inverse);
+    for (int c = 0; c < 4; c++) {
+        const double at = inverse[4 * c] + inverse[4 * c + 1] + inverse[4 * c + 2] + inverse[4 * c + 3];
+        is_inside = is_inside && at >= 0;
+        sum += at;
+    }
+    return is_inside && sum > 0 ? 0.25 / sum : 0;
+}
+
+static double largest_in_shape(const double b[6])
+{
+    static const int faces[4][3] = {{0, 1, 3}, {0, 2, 4}, {1, 2, 5}, {3, 4, 5}};
+    double most = 0, least = INFINITY, out = 0;
+    for (int i = 0; i < 6; i++) {
+        most = fmax(most, b[i]);
+        least = fmin(least, b[i]);
+    }
+    out = most / 8;
+    for (int f = 0; f < 4; f++) out = fmax(out, largest_in_triangle(b[faces[f][0]], b[faces[f][1]], b[faces[f][2]]));
+    return least > 0 ? fmax(out, largest_in_tet(b)) : out;
+}
+
+/* Returns the bound of u in the pieces of a factor by B, which is given by direction. */
+static double bound_factor(int dimensions, const double b[MOST_DIRECTIONS])
+{
+    static const signed char tets[TET_SHAPES][6] = {
+        {0, 1, 3, 2, 4, 5}, {1, 2, 6, 0, 4, 3}, {3, 1, 6, 5, 2, 4}, {4, 3, 6, 0, 1, 2}, {2, 4, 6, 5, 3, 1}};
+    double out = 0;
+    if (dimensions == 1) return fmax(0, b[0] / 8);
+    if (dimensions == 2) return fmax(fmax(fmax(0, b[0]), fmax(b[1], b[2])) / 8, largest_in_triangle(b[0], b[1], b[2]));
+    for (int shape = 0; shape < TET_SHAPES; shape++) {
+        double of[6];
+        for (int i = 0; i < 6; i++) of[i] = b[(int)tets[shape][i]];
+        out = fmax(out, largest_in_shape(of));
+    }
+    return out;
+}
+
+/* The largest values of u and of -u, for each number of a tuple. */
+typedef struct bound_sums {
+    double above[SIZE], below[SIZE];
+} bound_sums;
 
 /* Adds the bounds of the differences from interpolation in one factor. inner: number of doubles from one coefficient of
  * the factor to the next. */
-static void add_factor(const bound_job *job, const session_bound_factor *factor, int inner, double sums[SIZE])
+static void add_factor(const bound_job *job, const session_bound_factor *factor, int inner, bound_sums *sums)
 {
     const int p = job->of->nodes.of.order, all = SIZE * job->of->nodes.complete.count;
-    double most[2][SIZE] = {{0}, {0}};
+    double above[SIZE][MOST_DIRECTIONS], below[SIZE][MOST_DIRECTIONS];
+    for (int c = 0; c < SIZE; c++)
+        for (int d = 0; d < MOST_DIRECTIONS; d++) above[c][d] = below[c][d] = -INFINITY;
     for (int outer = 0; outer < all; outer += inner * factor->node_count)
         for (int d = 0; d < factor->difference_count; d++) {
             const session_second_difference *difference = &factor->differences[d];
-            double *largest = most[difference->is_diagonal];
+            const int direction = difference->direction;
             for (int s = 0; s < inner; s++) {
                 double sum = 0;
                 for (int t = 0; t < difference->count; t++)
                     sum += difference->weights[t] * job->coefficients[outer + difference->nodes[t] * inner + s];
-                largest[s % SIZE] = fmax(largest[s % SIZE], fabs(sum));
+                above[s % SIZE][direction] = fmax(above[s % SIZE][direction], -sum);
+                below[s % SIZE][direction] = fmax(below[s % SIZE][direction], sum);
             }
         }
-    for (int c = 0; c < SIZE; c++) sums[c] += p * (p - 1) * bound_factor(factor->dimensions, most[0][c], most[1][c]);
+    for (int c = 0; c < SIZE; c++) {
+        sums->above[c] += p * (p - 1) * bound_factor(factor->dimensions, above[c]);
+        sums->below[c] += p * (p - 1) * bound_factor(factor->dimensions, below[c]);
+    }
 }
 
 /* Completes the tuples of `size` numbers at the cell's nodes, and computes their Bernstein coefficients. */
@@ -389,14 +464,16 @@ static void find_coefficients(const bound_job *job, int size, const double *tupl
 /* Computes the bounds of the differences from interpolation. */
 static void bound_differences(bound_job *job)
 {
-    double sums[SIZE] = {0};
+    bound_sums sums = {{0}, {0}};
+    double largest[SIZE];
     int inner = SIZE;
     for (int f = 0; f < count_factors(job->of->nodes.of.type); f++) {
-        add_factor(job, factor_of(job->of, f), inner, sums);
+        add_factor(job, factor_of(job->of, f), inner, &sums);
         inner *= factor_of(job->of, f)->node_count;
     }
-    job->position_bound = vector3_length(sums);
-    job->value_bound = sums[3];
+    for (int c = 0; c < SIZE; c++) largest[c] = fmax(sums.above[c], sums.below[c]);
+    job->position_bound = vector3_length(largest);
+    job->value_bound = largest[3];
 }
 
 /* Finds a sphere around the cell, whose positions are means of their coefficients. The radius is NaN if a coefficient
@@ -445,15 +522,15 @@ static void find_gradients(bound_job *job)
     const int count = count_factors(of->nodes.of.type);
     const double *values[3], *matrices[3];
     int axis = 0;
-    for (int f = 0; f < count; f++) values[f] = factor_of(of, f)->values;
+    for (int f = 0; f < count; f++) values[f] = factor_of(of, f)->values[job->level];
     apply(job, SIZE, values, true, job->nodes, job->fine);
     for (int f = 0; f < count; f++)
         for (int a = 0; a < factor_of(of, f)->dimensions; a++, axis++) {
             memcpy(matrices, values, sizeof matrices);
-            matrices[f] = factor_of(of, f)->slopes[a];
+            matrices[f] = factor_of(of, f)->slopes[job->level][a];
             apply(job, SIZE, matrices, true, job->nodes, job->slopes[axis]);
         }
-    for (int n = 0; n < of->fine_count; n++) find_gradient(job, n, job->gradients[n]);
+    for (int n = 0; n < of->levels[job->level].count; n++) find_gradient(job, n, job->gradients[n]);
 }
 
 /* Returns a lower bound of the lengths of means of the gradients at a piece's corners; 0 if there is none. */
@@ -469,13 +546,13 @@ static double least_gradient(const bound_job *job, const int *corners, int count
 
 static void bound_isosurface(bound_job *job, session_cell_bound *out)
 {
-    const session_bound *of = job->of;
-    const int p = of->nodes.of.order, *corners = of->pieces.piece_positions;
-    const double between = job->value_bound / (of->fine_order * of->fine_order);
+    const session_bound_level *level = &job->of->levels[job->level];
+    const int p = job->of->nodes.of.order, *corners = level->pieces.piece_positions;
+    const double between = job->value_bound / (level->order * level->order);
     double least = INFINITY;
     find_gradients(job);
-    for (int piece = 0; piece < of->pieces.piece_count; piece++) {
-        const int count = grid_type_vertices(of->pieces.types[piece]);
+    for (int piece = 0; piece < level->pieces.piece_count; piece++) {
+        const int count = grid_type_vertices(level->pieces.types[piece]);
         double low = INFINITY, high = -INFINITY;
         for (int c = 0; c < count; c++) {
             low = fmin(low, job->fine[SIZE * corners[c] + 3]);
@@ -485,10 +562,23 @@ static void bound_isosurface(bound_job *job, session_cell_bound *out)
             least = fmin(least, least_gradient(job, corners, count));
         corners += count;
     }
-    const double size = 2 * out->radius / p, distance = job->value_bound / (p * p) / least;
     out->is_crossed = least < INFINITY;
-    out->is_bounded = distance < size || job->value_bound == 0;
-    out->error = (job->value_bound == 0 ? 0 : fmin(distance, size)) + job->position_bound / (p * p);
+    out->surface_error = out->position_error;
+    if (job->value_bound > 0) out->surface_error += job->value_bound / (p * p) / least;
+}
+
+/* Returns the root mean square of the lengths of the edges between the cell's corners, divided by the order. */
+static double find_node_distance(const session_bound *of, const double *tuples)
+{
+    const session_shape *shape = session_shape_of(of->nodes.of.type);
+    double sum = 0;
+    for (int e = 0; e < shape->edge_count; e++)
+        for (int x = 0; x < 3; x++) {
+            const double *a = tuples + SIZE * of->nodes.corners[(int)shape->edges[e][0]];
+            const double *b = tuples + SIZE * of->nodes.corners[(int)shape->edges[e][1]];
+            sum += (b[x] - a[x]) * (b[x] - a[x]);
+        }
+    return sqrt(sum / shape->edge_count) / of->nodes.of.order;
 }
 
 bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *room)
@@ -506,10 +596,10 @@ bool session_may_cross(const session_bound *of, const double *values, const sess
 }
 
 session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
-                                      double *room)
+                                      int level, double *room)
 {
-    bound_job job = {.of = of, .isovalues = isovalues};
-    session_cell_bound out = {.is_bounded = true};
+    bound_job job = {.of = of, .isovalues = isovalues, .level = level};
+    session_cell_bound out = {.node_distance = find_node_distance(of, tuples)};
     const int p = of->nodes.of.order;
     place_arrays(&job, room);
     find_coefficients(&job, SIZE, tuples);
@@ -517,7 +607,7 @@ session_cell_bound session_bound_cell(const session_bound *of, const double *tup
     out.is_crossed = isfinite(out.radius);
     if (!out.is_crossed) return out;
     bound_differences(&job);
-    out.error = job.position_bound / (p * p);
+    out.position_error = job.position_bound / (p * p);
     if (isovalues) bound_isosurface(&job, &out);
     return out;
 }

@@ -11,29 +11,39 @@ enum { BOUND_MOST_ORDER = NODES_MOST_ORDER / 2 };
 
 /* A second difference of Bernstein coefficients. */
 typedef struct session_second_difference {
-    bool is_diagonal; /* set if it is not along an edge, but along a diagonal of an octahedron between edges of a tet */
+    int direction; /* the direction along which it is taken, in the order of list_differences() */
     int count;
     int nodes[10]; /* numbers of the coefficients */
     double weights[10];
 } session_second_difference;
 
+enum { BOUND_MOST_LEVELS = 3 };
+
 /* The polynomials on a line, a triangle or a tet. */
 typedef struct session_bound_factor {
-    int dimensions;             /* 1: line, 2: triangle, 3: tet; 0: not used */
-    int node_count, fine_count; /* number of nodes, and of nodes of the finer lattice */
-    double *bernstein;          /* Bernstein coefficients by values at nodes: node_count x node_count */
-    double *values, *slopes[3]; /* values and derivatives at fine nodes by values at nodes: fine_count x node_count */
+    int dimensions;    /* 1: line, 2: triangle, 3: tet; 0: not used */
+    int node_count;    /* number of nodes */
+    double *bernstein; /* Bernstein coefficients by values at nodes: node_count x node_count */
     int difference_count;
     session_second_difference *differences; /* in all directions of the edges of pieces */
+    /* by level: number of nodes of the finer lattice, and values and derivatives there by values at nodes, each
+     * fine_counts[level] x node_count */
+    int fine_counts[BOUND_MOST_LEVELS];
+    double *values[BOUND_MOST_LEVELS], *slopes[BOUND_MOST_LEVELS][3];
 } session_bound_factor;
+
+/* A finer lattice, on whose pieces crossings and gradients are determined. */
+typedef struct session_bound_level {
+    int order, count; /* order, and number of nodes */
+    session_pattern pieces;
+} session_bound_level;
 
 /* What is needed for the bounds of one kind of cell. */
 typedef struct session_bound {
     session_interpolation nodes; /* the cell's nodes, and all nodes of its order */
-    int fine_order;         /* order of the finer lattice, on whose pieces crossings and gradients are determined */
-    session_pattern pieces; /* of the finer lattice */
-    int axis_count;         /* number of axes of the reference cell, 2 or 3 */
-    int fine_count;         /* number of nodes of the finer lattice */
+    int axis_count;              /* number of axes of the reference cell, 2 or 3 */
+    int level_count;
+    session_bound_level levels[BOUND_MOST_LEVELS]; /* each of twice the order of the one before */
     session_bound_factor line, simplex;
 } session_bound;
 
@@ -62,14 +72,15 @@ typedef struct session_cell_bound {
     /* set if the cell may have a part of an isosurface, or if no isovalues are given; false if a value or a position is
      * not finite, and then nothing else holds */
     bool is_crossed;
-    /* set if the gradient does not vanish near the isosurface; otherwise error holds the size of a piece */
-    bool is_bounded;
-    double error; /* distance of isosurfaces or, without isovalues, of positions */
+    double node_distance;  /* distance of two neighbouring nodes: the root mean square of that on the cell's edges */
+    double position_error; /* distance of positions */
+    double surface_error;  /* distance of isosurfaces; INFINITY if the gradient may vanish near one */
 } session_cell_bound;
 
 /* Computes the bounds of a cell. tuples: x, y, z and the field's value at its nodes, in the order of its row.
- * isovalues: NULL if only positions are of interest. */
+ * isovalues: NULL if only positions are of interest. level: that of the lattice, 0 .. level_count - 1; a finer
+ * one mostly gives a smaller bound, but takes longer. */
 session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
-                                      double *room);
+                                      int level, double *room);
 
 #endif

@@ -50,7 +50,7 @@ static size_t find_room(const deviation_work *w)
 {
     size_t most = 0;
     for (int i = 0; i < w->rows.kind_count; i++) {
-        if (!w->bounds[i].fine_count) continue;
+        if (!w->bounds[i].level_count) continue;
         const size_t own = 5 * (size_t)w->bounds[i].nodes.of.count + session_bound_room(&w->bounds[i]);
         most = own > most ? own : most;
     }
@@ -72,7 +72,8 @@ static void read_values(const deviation_work *w, int64_t cell, int count, double
 }
 
 /* Most cells are not crossed, so that their positions are not read. */
-static session_cell_bound bound_cell(const deviation_work *w, const session_bound *of, int64_t cell, double *room)
+static session_cell_bound bound_cell(const deviation_work *w, const session_bound *of, int64_t cell, int level,
+                                     double *room)
 {
     const session_isovalues *isovalues = w->wish->values ? w->wish->isovalues : NULL;
     const int64_t first = session_row_first(&w->rows, cell);
@@ -86,20 +87,46 @@ static session_cell_bound bound_cell(const deviation_work *w, const session_boun
         grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + n), tuples + 4 * n);
         tuples[4 * n + 3] = isovalues ? values[n] : 0;
     }
-    return session_bound_cell(of, tuples, isovalues, rest);
+    return session_bound_cell(of, tuples, isovalues, level, rest);
 }
 
+/* Returns the largest error that counts. With linear pieces between two nodes, a surface whose radius of curvature is
+ * half their distance is off by a quarter of it. Where it bends more, nodes do not resolve it. */
+static double limit_error(const session_cell_bound *bound)
+{
+    return 0.25 * bound->node_distance + bound->position_error;
+}
+
+/* Finds the bound of the isosurfaces in a cell, by the lattices as fine as needed: it need not be below `enough` if it
+ * is below the limit. */
+static double find_surface_error(const deviation_work *w, const session_bound *of, int64_t cell, double enough,
+                                 const session_cell_bound *first, double *room)
+{
+    double least = first->surface_error;
+    for (int level = 1; level < of->level_count; level++)
+        if (!(least <= enough && least <= limit_error(first)))
+            least = fmin(least, bound_cell(w, of, cell, level, room).surface_error);
+    return least;
+}
+
+/* A cell that does not increase the largest error needs no better bound, so that the result does not depend on the
+ * order of cells. */
 static void measure_cell(const deviation_work *w, int64_t cell, double *room, session_deviation *out)
 {
     const session_bound *of = &w->bounds[session_kind_of(&w->rows, cell)];
     const session_pixels *pixels = &w->wish->pixels;
-    if (!of->fine_count || grid_is_ghost(&w->rows.cells, cell)) return;
-    const session_cell_bound bound = bound_cell(w, of, cell, room);
+    if (!of->level_count || grid_is_ghost(&w->rows.cells, cell)) return;
+    const session_cell_bound bound = bound_cell(w, of, cell, 0, room);
     const double size = bound.is_crossed ? pixels->size(pixels->of, bound.centre, bound.radius) : INFINITY;
     if (size == INFINITY) return;
-    out->cell_count++;
-    out->unbounded_count += !bound.is_bounded;
-    out->error = fmax(out->error, bound.error / size);
+    double error = bound.position_error;
+    if (w->wish->values) {
+        error = find_surface_error(w, of, cell, out->error * size, &bound, room);
+        out->cell_count++;
+        out->unbounded_count += error > limit_error(&bound);
+        error = fmin(error, limit_error(&bound));
+    }
+    out->error = fmax(out->error, error / size);
 }
 
 static bool measure_cells(const deviation_work *w, int threads, session_deviation *out)

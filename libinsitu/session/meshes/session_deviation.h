@@ -23,8 +23,10 @@ typedef struct session_deviation_wish {
 } session_deviation_wish;
 
 typedef struct session_deviation {
-    double error; /* largest bound in pixels if cells have one piece between two nodes (session_cell_bound.error) */
-    int64_t cell_count, unbounded_count; /* number of cells that were measured, and of those without a bound */
+    double error; /* largest bound in pixels if cells have one piece between two nodes */
+    /* number of cells that an isosurface may cross, and of those that count with less than their bound, because the
+     * distance of their nodes does not resolve the isosurface */
+    int64_t cell_count, unbounded_count;
 } session_deviation;
 
 /* Measures the caller's cells of a mesh with cells of higher order, ghosts excepted, and adds the result to *out.

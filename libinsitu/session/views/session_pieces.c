@@ -254,13 +254,8 @@ static void measure_part(const session_pieces_basis *basis, const session_mesh *
                       .threads = basis->team->threads,
                       .out = out};
     if (!wish->is_shown || !mesh->is_given || !mesh->topology.is_split) return;
-    if (!wish->field) {
-        session_deviation positions = {.error = out->error};
-        session_measure_deviation(mesh, &work.wish, work.threads, &positions, error);
-        out->error = positions.error;
-        return;
-    }
-    const int field = session_find_field(mesh, wish->field);
+    const int field = wish->field ? session_find_field(mesh, wish->field) : -1;
+    if (!wish->field) session_measure_deviation(mesh, &work.wish, work.threads, out, error);
     if (field >= 0) session_read_nodes(mesh, field, measure_values, &work, error);
 }
 
