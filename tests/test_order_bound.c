@@ -387,7 +387,7 @@ static void check_surface(const bound_kind *kind, const cell_functions *of, surf
 {
     const double inside[3] = {0.2 + 0.1 * random_number(), 0.3 + 0.2 * random_number(), 0.25 + 0.2 * random_number()};
     const double value = evaluate(of, 3, inside, -1);
-    const session_cell_bound bound = bound_of(kind, of, &(session_isovalues){1, &value});
+    const session_cell_bound bound = bound_of(kind, of, &(session_isovalues){1, &value, 0});
     assert_true(bound.is_crossed);
     tally->crossed++;
     const bool is_bounded = bound.surface_error < 2 * bound.radius / of->order;
@@ -460,10 +460,10 @@ static void crossings_between_nodes_are_found(void **state)
     of->weights[3][0][0][1] = -0.6;
     of->weights[3][0][0][0] = 0.09;
     const double values[] = {0.01, -0.02, 0.5};
-    assert_true(bound_of(&kind, of, &(session_isovalues){1, &values[0]}).is_crossed);
-    assert_false(bound_of(&kind, of, &(session_isovalues){1, &values[1]}).is_crossed);
-    assert_false(bound_of(&kind, of, &(session_isovalues){1, &values[2]}).is_crossed);
-    assert_false(bound_of(&kind, of, &(session_isovalues){0, NULL}).is_crossed);
+    assert_true(bound_of(&kind, of, &(session_isovalues){1, &values[0], 0}).is_crossed);
+    assert_false(bound_of(&kind, of, &(session_isovalues){1, &values[1], 0}).is_crossed);
+    assert_false(bound_of(&kind, of, &(session_isovalues){1, &values[2], 0}).is_crossed);
+    assert_false(bound_of(&kind, of, &(session_isovalues){0, NULL, 0}).is_crossed);
     free(of);
 }
 
@@ -478,7 +478,7 @@ static void linear_cells_have_no_error(void **state)
         *of = (cell_functions){.order = kinds[k].nodes.order};
         for (int f = 0; f < 4; f++) add_linear(f, (const double[]){f == 0, f == 1 || f == 3, f == 2}, of);
         const double value = 0.25;
-        const session_cell_bound bound = bound_of(&kinds[k], of, &(session_isovalues){1, &value});
+        const session_cell_bound bound = bound_of(&kinds[k], of, &(session_isovalues){1, &value, 0});
         assert_true(bound.is_crossed && bound.surface_error < 1e-11);
     }
     free(of);
@@ -492,9 +492,9 @@ static void values_that_are_not_finite_are_not_measured(void **state)
     const double value = 0.25;
     of->order = 2;
     for (int f = 0; f < 4; f++) add_linear(f, (const double[]){f == 0 || f == 3, f == 1, f == 2}, of);
-    assert_true(bound_of(&kind, of, &(session_isovalues){1, &value}).is_crossed);
+    assert_true(bound_of(&kind, of, &(session_isovalues){1, &value, 0}).is_crossed);
     of->weights[3][0][0][0] = NAN;
-    assert_false(bound_of(&kind, of, &(session_isovalues){1, &value}).is_crossed);
+    assert_false(bound_of(&kind, of, &(session_isovalues){1, &value, 0}).is_crossed);
     free(of);
 }
 

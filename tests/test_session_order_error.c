@@ -459,7 +459,8 @@ static void check_change(int change)
     order_mesh_create(&hex_27, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
     insitu_session *session = open_mesh(MPI_COMM_WORLD, WITHIN("1") ALL, &mesh.mesh, &mesh.field);
     told first = step_told(session, 0);
-    for (int64_t v = 0; v < mesh.vertex_count && change == VALUES; v++) mesh.values[v] = sin(5 * mesh.values[v]);
+    for (int64_t v = 0; v < mesh.vertex_count && change == VALUES; v++)
+        mesh.values[v] = order_plane(mesh.coordinates + 3 * v);
     for (int64_t i = 0; i < 3 * mesh.vertex_count && change == NODES; i++) mesh.coordinates[i] *= 0.3;
     if (change == NODES) mesh.mesh.changed = INSITU_CHANGED_GEOMETRY;
     if (change == NODES) assert_int_equal(insitu_set_mesh(session, "m", &mesh.mesh), INSITU_OK);

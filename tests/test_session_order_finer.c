@@ -318,6 +318,56 @@ static void mixed_cells_draw_the_same(void **state)
     order_mesh_free(&mesh);
 }
 
+/* ---- cells that are not shown ------------------------------------------------------------------------------------ */
+
+/* A small sphere in the middle, and a plane through a corner. */
+#define FEW                                                                                                            \
+    IMAGE("a", "isosurface: {field: f, values: [0.05]}")                                                               \
+    IMAGE("b", "slice: {field: f, planes: [{point: [0.8, 0.9, 0.9], normal: [1, 2, 3]}]}")
+
+static drawn draw_few(const char *scene, const order_mesh *mesh, int64_t *bytes)
+{
+    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, &mesh->mesh, &mesh->field);
+    drawn out = step_drawn(session, 0);
+    *bytes = insitu_last_report(session)->bytes_copied;
+    MPI_Allreduce(MPI_IN_PLACE, bytes, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    insitu_destroy(&session);
+    return out;
+}
+
+/* Statistics are sums over all pieces, so that with them all cells are refined. Rays hit the same places to the bit.
+ * Where a cell that is not refined has a common node with one that is, its gradient is not part of the mean there, so
+ * that normals differ. */
+static void other_cells_are_not_refined(void **state)
+{
+    (void)state;
+    for (int k = 0; k < order_kind_count; k++) {
+        const order_kind *kind = &order_kinds[k];
+        order_mesh mesh;
+        int64_t bytes[2];
+        if (!is_finer(kind) || kind->order == 1 || kind->order > 3) continue;
+        order_mesh_create(kind, 4, 0.05, order_sphere, own_rank, rank_count, &mesh);
+        drawn few = draw_few(FINER("4") FEW, &mesh, &bytes[0]);
+        drawn all = draw_few("statistics: [{field: f, path: few.csv}]\n" FINER("4") FEW, &mesh, &bytes[1]);
+        bool are_same = true;
+        int hits[2] = {0, 0};
+        for (int i = 0; i < 2 && own_rank == 0; i++)
+            for (int pixel = 0; pixel < PIXELS; pixel++) {
+                const float a = few.pictures[i].depth[pixel], b = all.pictures[i].depth[pixel];
+                are_same = are_same && memcmp(&a, &b, sizeof a) == 0;
+                hits[i] += isfinite((double)a);
+            }
+        if (own_rank == 0)
+            printf("%s: %.1f instead of %.1f MiB; %d and %d hits\n", kind->name, (double)bytes[0] / 1048576,
+                   (double)bytes[1] / 1048576, hits[0], hits[1]);
+        everywhere(own_rank || (are_same && hits[0] > 20 && hits[1] > 20));
+        everywhere(bytes[0] < bytes[1] / 3);
+        free_drawn(&few);
+        free_drawn(&all);
+        order_mesh_free(&mesh);
+    }
+}
+
 /* ---- changes ----------------------------------------------------------------------------------------------------- */
 
 enum { VALUES, NODES, SCENE, NO_SCENE, CHANGES };
@@ -391,6 +441,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(an_index_out_of_range_is_told),
         cmocka_unit_test(cells_are_counted_as_the_caller_gave_them),
         cmocka_unit_test(mixed_cells_draw_the_same),
+        cmocka_unit_test(other_cells_are_not_refined),
         cmocka_unit_test(changes_are_drawn),
         cmocka_unit_test(limits_are_told),
     };

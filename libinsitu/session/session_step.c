@@ -64,8 +64,10 @@ static void reload_scene(insitu_session *s, session_changes *changes)
         session_drop_scalars(s->meshes.items[i]);
         session_drop_derived(s->meshes.items[i]);
     }
-    const scene *new = &s->scene_file.scene;
-    if (new->finer_pieces == old.finer_pieces &&new->finer_memory == old.finer_memory) return;
+    const scene *now = &s->scene_file.scene;
+    const bool are_same_pieces = now->finer_pieces == old.finer_pieces && now->finer_memory == old.finer_memory;
+    /* statistics need all cells to be refined (views/session_wishes.c) */
+    if (are_same_pieces && now->statistics_count == old.statistics_count) return;
     session_end_finer(&s->meshes);
     s->meshes.are_cells_changed = s->meshes.are_names_changed = true;
     changes->are_cells_changed = changes->are_names_changed = true;
@@ -163,24 +165,23 @@ static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed
     return status;
 }
 
-/* Reads cells of higher order as finer ones, if the scene says so. A fixed number of pieces is that of the cells, one
- * by surface_error is that of the images that are due. *are_cells_changed is set if cells are split otherwise on any
- * rank. Collective. */
+/* Reads cells of higher order as finer ones, if the scene says so. Which cells are refined follows from the images that
+ * are due, and so does the number of pieces by surface_error. *are_cells_changed is set if cells are split otherwise on
+ * any rank. Collective. */
 static insitu_status refine_cells(insitu_session *s, const session_moment *moment, bool *are_cells_changed,
                                   base_error *error)
 {
     const scene *scene = &s->scene_file.scene;
     const session_pieces_basis basis = {scene, moment, &s->catalogue, &s->team, &s->meshes};
-    const bool is_chosen = !scene->finer_pieces && session_count_due(scene, moment) > 0;
     bool are_changed = false;
-    if (scene->finer_pieces == 1 || !(*are_cells_changed || is_chosen)) return INSITU_OK;
+    if (scene->finer_pieces == 1 || !(*are_cells_changed || session_count_due(scene, moment) > 0)) return INSITU_OK;
     session_finer_choice *choices = base_calloc((size_t)s->catalogue.mesh_count + 1, sizeof *choices);
     if (!choices) session_fail_for_memory(error, s->catalogue.mesh_count * (int64_t)sizeof *choices, "finer pieces");
     insitu_status status = session_agree(s->team.comm, error);
     if (!status) status = session_count_finer(&s->meshes, &s->catalogue, s->team.comm, choices, error);
     if (!status) status = session_choose_pieces(&basis, choices, &s->report, error);
     if (!status) status = session_make_finer(&s->meshes, &s->catalogue, choices, &s->team, &are_changed, error);
-    base_free(choices);
+    session_free_choices(choices, s->catalogue.mesh_count);
     if (status || !are_changed) return status;
     *are_cells_changed = true;
     return session_check_meshes(&s->meshes, &s->team, error);

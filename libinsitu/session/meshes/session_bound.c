@@ -592,7 +592,8 @@ bool session_may_cross(const session_bound *of, const double *values, const sess
         low = fmin(low, job.coefficients[i]);
         high = fmax(high, job.coefficients[i]);
     }
-    return zero == 0 && is_any_between(isovalues, low, high);
+    const double rounding = 1e-6 * fmax(fabs(low), fabs(high)), tolerance = isovalues->tolerance + rounding;
+    return zero == 0 && is_any_between(isovalues, low - tolerance, high + tolerance);
 }
 
 session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,

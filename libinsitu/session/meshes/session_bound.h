@@ -48,7 +48,7 @@ typedef struct session_bound {
 } session_bound;
 
 /* Returns false if memory runs out; the caller must drop *out in any case. of: cells other than pyramids, of an order
- * from 2 to BOUND_MOST_ORDER. order and is_lobatto: as in session_make_interpolation(). */
+ * from 1 to BOUND_MOST_ORDER. order and is_lobatto: as in session_make_interpolation(). */
 bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, session_bound *out);
 void session_drop_bound(session_bound *bound);
 
@@ -56,12 +56,14 @@ void session_drop_bound(session_bound *bound);
 typedef struct session_isovalues {
     int count;
     const double *values;
+    double tolerance; /* a cell may be crossed if its range is so near to a value */
 } session_isovalues;
 
 /* Returns the number of doubles that the functions below need as working memory. */
 size_t session_bound_room(const session_bound *of);
 
-/* Returns whether a cell may have a part of an isosurface; false if a value is not finite. values: the field at its
+/* Returns whether a cell may have a part of an isosurface, also if values are rounded to float32; false if a value is
+ * not finite. values: the field at its
  * nodes, in the order of its row. */
 bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *room);
 

@@ -20,9 +20,11 @@ static const insitu_mesh *find_nodal(const session_mesh *mesh)
     return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
 }
 
-static bool is_measured(const session_nodes *of)
+/* Returns whether the cells have bounds. Linear ones are not measured, but are marked, since their neighbours may be of
+ * higher order. */
+static bool has_bound(const session_nodes *of)
 {
-    return of->order > 1 && of->order <= BOUND_MOST_ORDER && of->type != GRID_PYRAMID;
+    return of->order <= BOUND_MOST_ORDER && of->type != GRID_PYRAMID;
 }
 
 static bool begin_work(const session_mesh *mesh, const session_deviation_wish *wish, deviation_work *w)
@@ -34,7 +36,7 @@ static bool begin_work(const session_mesh *mesh, const session_deviation_wish *w
                           .field_size = wish->values ? wish->values->component_count : 1};
     session_list_kinds(&w->rows);
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
-        if (is_measured(&w->rows.kinds[i].nodes))
+        if (has_bound(&w->rows.kinds[i].nodes))
             is_made = session_make_bound(&w->rows.kinds[i].nodes, nodal->vertex_order, wish->is_lobatto, &w->bounds[i]);
     return is_made;
 }
@@ -71,30 +73,54 @@ static void read_values(const deviation_work *w, int64_t cell, int count, double
     }
 }
 
-/* Most cells are not crossed, so that their positions are not read. */
+static void read_distances(const deviation_work *w, int64_t cell, int count, double *out)
+{
+    const session_plane *plane = w->wish->plane;
+    const int64_t first = session_row_first(&w->rows, cell);
+    for (int n = 0; n < count; n++) {
+        double at[3];
+        grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + n), at);
+        out[n] = 0;
+        for (int x = 0; x < 3; x++) out[n] += plane->normal[x] * (at[x] - plane->point[x]);
+    }
+}
+
+/* Returns whether an isosurface or the plane may cross the cell, and marks it. */
+static bool may_cross(const deviation_work *w, const session_bound *of, int64_t cell, double *room)
+{
+    const session_deviation_wish *wish = w->wish;
+    const int count = of->nodes.of.count;
+    double *values = room + w->field_size;
+    if (!wish->values && !wish->plane) return true;
+    if (wish->values)
+        read_values(w, cell, count, room, values);
+    else
+        read_distances(w, cell, count, values);
+    if (!session_may_cross(of, values, &wish->isovalues, values + 5 * count)) return false;
+    if (wish->marks) wish->marks[cell] = 1;
+    return true;
+}
+
+/* Computes the bound of a cell whose values have been read. */
 static session_cell_bound bound_cell(const deviation_work *w, const session_bound *of, int64_t cell, int level,
                                      double *room)
 {
-    const session_isovalues *isovalues = w->wish->values ? w->wish->isovalues : NULL;
+    const bool has_values = w->wish->values != NULL;
     const int64_t first = session_row_first(&w->rows, cell);
     const int count = of->nodes.of.count;
-    double *values = room + w->field_size, *tuples = values + count, *rest = tuples + 4 * count;
-    if (isovalues) {
-        read_values(w, cell, count, room, values);
-        if (!session_may_cross(of, values, isovalues, rest)) return (session_cell_bound){.is_crossed = false};
-    }
+    double *values = room + w->field_size, *tuples = values + count;
     for (int n = 0; n < count; n++) {
         grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + n), tuples + 4 * n);
-        tuples[4 * n + 3] = isovalues ? values[n] : 0;
+        tuples[4 * n + 3] = has_values ? values[n] : 0;
     }
-    return session_bound_cell(of, tuples, isovalues, level, rest);
+    return session_bound_cell(of, tuples, has_values ? &w->wish->isovalues : NULL, level, tuples + 4 * count);
 }
 
-/* Returns the largest error that counts. With linear pieces between two nodes, a surface whose radius of curvature is
- * half their distance is off by a quarter of it. Where it bends more, nodes do not resolve it. */
+/* Returns the largest error that counts: half the distance between two nodes. With linear pieces between nodes, half a
+ * circle from node to node is off by that. Where surfaces bend more, nodes do not resolve them. */
 static double limit_error(const session_cell_bound *bound)
 {
-    return 0.25 * bound->node_distance + bound->position_error;
+    return 0.5 * bound->node_distance + bound->position_error;
 }
 
 /* Finds the bound of the isosurfaces in a cell, by the lattices as fine as needed: it need not be below `enough` if it
@@ -115,7 +141,8 @@ static void measure_cell(const deviation_work *w, int64_t cell, double *room, se
 {
     const session_bound *of = &w->bounds[session_kind_of(&w->rows, cell)];
     const session_pixels *pixels = &w->wish->pixels;
-    if (!of->level_count || grid_is_ghost(&w->rows.cells, cell)) return;
+    if (!of->level_count || grid_is_ghost(&w->rows.cells, cell) || !may_cross(w, of, cell, room)) return;
+    if (w->wish->marks_only || of->nodes.of.order < 2) return;
     const session_cell_bound bound = bound_cell(w, of, cell, 0, room);
     const double size = bound.is_crossed ? pixels->size(pixels->of, bound.centre, bound.radius) : INFINITY;
     if (size == INFINITY) return;

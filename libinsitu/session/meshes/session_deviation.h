@@ -15,11 +15,16 @@ typedef struct session_pixels {
 
 /* What of a mesh is measured. */
 typedef struct session_deviation_wish {
-    const session_node_values *values;  /* a field; NULL: the positions of all cells are measured */
-    int component;                      /* component of the field */
-    const session_isovalues *isovalues; /* isosurfaces of the field */
+    /* a field whose isosurfaces are measured; NULL: the positions of the cells that the plane may cross or, if there is
+     * none, of all cells */
+    const session_node_values *values;
+    int component;               /* component of the field */
+    session_isovalues isovalues; /* values of the field; or 0, the distance from the plane */
+    const session_plane *plane;
     session_pixels pixels;
-    bool is_lobatto; /* as in session_make_interpolation() */
+    bool is_lobatto;      /* as in session_make_interpolation() */
+    bool marks_only;      /* set if only marks are wanted */
+    unsigned char *marks; /* one byte per cell, which is set if the cell may be crossed; NULL: not wanted */
 } session_deviation_wish;
 
 typedef struct session_deviation {
@@ -29,8 +34,8 @@ typedef struct session_deviation {
     int64_t cell_count, unbounded_count;
 } session_deviation;
 
-/* Measures the caller's cells of a mesh with cells of higher order, ghosts excepted, and adds the result to *out.
- * Parallel. Local. */
+/* Measures the caller's cells of a mesh with cells of higher order, ghosts excepted, adds the result to *out, and sets
+ * the marks. Parallel. Local. */
 insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_wish *wish, int threads,
                                         session_deviation *out, base_error *error);
 

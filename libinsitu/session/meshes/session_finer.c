@@ -11,47 +11,55 @@
 #include "session_split.h"
 #include "session_topology.h"
 
-/* What the ranks count of a mesh, in session_finer.counts: the blocks whose highest order is each one; cells; and by
- * the number of parts, bytes, and the blocks that have them. */
-enum {
-    LOBATTO = NODES_MOST_ORDER + 1,
-    EQUISPACED,
-    PYRAMIDS,
-    SERENDIPITY,
-    BYTES,
-    COMPONENT_BYTES = BYTES + FINER_MOST_PARTS + 1,
-    BLOCKS = COMPONENT_BYTES + FINER_MOST_PARTS + 1
-};
-_Static_assert(BLOCKS + FINER_MOST_PARTS + 1 == SESSION_FINER_COUNTS, "each count has a place");
+/* What the ranks count of a mesh, in session_finer.counts: the blocks whose highest order is each one, and cells. */
+enum { LOBATTO = NODES_MOST_ORDER + 1, EQUISPACED, PYRAMIDS, SERENDIPITY, SHELLS };
+_Static_assert((int)SHELLS < (int)SESSION_FINER_COUNTS, "each count has a place");
 
 /* ---- all cells of a mesh ----------------------------------------------------------------------------------------- */
 
 typedef struct finer_work {
     session_rows rows; /* rows of the caller's cells */
     const session_finer *finer;
-    session_interpolation kinds[ROWS_MOST_KINDS];
+    const unsigned char *marks; /* while lattices are made: set for cells that are refined; NULL: all cells are */
+    /* for each kind of row, with the parts of refined cells, and with one part */
+    session_interpolation kinds[ROWS_MOST_KINDS][2];
     int64_t node_count; /* number of nodes of all finer lattices */
 } finer_work;
 
 static void end_work(finer_work *w)
 {
-    for (int i = 0; i < w->rows.kind_count; i++) session_drop_interpolation(&w->kinds[i]);
+    for (int i = 0; i < w->rows.kind_count; i++)
+        for (int n = 0; n < 2; n++) session_drop_interpolation(&w->kinds[i][n]);
 }
 
-static bool begin_work(const session_finer *finer, finer_work *w)
+static bool begin_work(const session_finer *finer, const unsigned char *marks, finer_work *w)
 {
-    *w = (finer_work){.rows = session_given_rows(&finer->nodal), .finer = finer};
+    *w = (finer_work){.rows = session_given_rows(&finer->nodal), .finer = finer, .marks = marks};
     session_list_kinds(&w->rows);
     bool is_made = true;
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
-        is_made = session_make_interpolation(&w->rows.kinds[i].nodes, finer->nodal.vertex_order, finer->parts,
-                                             finer->is_lobatto, &w->kinds[i]);
+        for (int n = 0; n < 2 && is_made; n++)
+            is_made = session_make_interpolation(&w->rows.kinds[i].nodes, finer->nodal.vertex_order,
+                                                 n ? 1 : finer->parts, finer->is_lobatto, &w->kinds[i][n]);
     return is_made;
+}
+
+/* Returns whether a cell of finished lattices is refined. count: number of nodes of refined cells of its kind. */
+static bool is_refined(const session_finer *finer, int count, int64_t cell)
+{
+    return !finer->offsets || finer->offsets[cell + 1] - finer->offsets[cell] == count;
+}
+
+static const session_interpolation *find_interpolation(const finer_work *w, int64_t cell)
+{
+    const session_interpolation *kind = w->kinds[session_kind_of(&w->rows, cell)];
+    if (w->marks) return &kind[!w->marks[cell]];
+    return &kind[w->finer->fine.cell_count > 0 && !is_refined(w->finer, kind[0].fine.count, cell)];
 }
 
 static int64_t find_first_node(const finer_work *w, int64_t cell)
 {
-    return w->finer->offsets ? w->finer->offsets[cell] : cell * w->kinds[0].fine.count;
+    return w->finer->offsets ? w->finer->offsets[cell] : cell * w->kinds[0][0].fine.count;
 }
 
 /* Returns the number of doubles that the values of a cell need while they are computed. */
@@ -59,8 +67,8 @@ static size_t find_room(const finer_work *w, int components)
 {
     size_t most = 0;
     for (int i = 0; i < w->rows.kind_count; i++) {
-        const size_t own = (size_t)w->kinds[i].of.count * (size_t)components;
-        const size_t all = own + session_interpolation_room(&w->kinds[i], components);
+        const size_t own = (size_t)w->kinds[i][0].of.count * (size_t)components;
+        const size_t all = own + session_interpolation_room(&w->kinds[i][0], components);
         most = all > most ? all : most;
     }
     return most;
@@ -69,7 +77,7 @@ static size_t find_room(const finer_work *w, int components)
 static void interpolate_cell(const finer_work *w, const session_node_values *values, int64_t cell, double *room,
                              double *out)
 {
-    const session_interpolation *of = &w->kinds[session_kind_of(&w->rows, cell)];
+    const session_interpolation *of = find_interpolation(w, cell);
     const int64_t first = session_row_first(&w->rows, cell);
     const int size = values->component_count;
     double corners[8][3];
@@ -106,7 +114,7 @@ insitu_status session_interpolate_values(const session_mesh *mesh, const session
                                          double *out, base_error *error)
 {
     finer_work *w = base_alloc(sizeof *w);
-    bool is_made = w && begin_work(&mesh->finer, w);
+    bool is_made = w && begin_work(&mesh->finer, NULL, w);
     if (is_made) w->node_count = mesh->finer.fine.vertex_count;
     is_made = is_made && interpolate_cells(w, values, threads, out);
     if (w) end_work(w);
@@ -126,15 +134,15 @@ static void read_vertex(const void *of, int64_t position, double *tuple)
 static bool number_nodes(finer_work *w, session_finer *finer)
 {
     const int64_t cells = w->rows.cells.cell_count;
-    if (w->rows.kind_count == 1) {
-        w->node_count = cells * w->kinds[0].fine.count;
+    if (w->rows.kind_count == 1 && !w->marks) {
+        w->node_count = cells * w->kinds[0][0].fine.count;
         return true;
     }
     finer->offsets = base_alloc(((size_t)cells + 1) * sizeof *finer->offsets);
     finer->types = base_alloc((size_t)cells + 1);
     if (!finer->offsets || !finer->types) return false;
     for (int64_t cell = 0; cell < cells; cell++) {
-        const session_nodes *fine = &w->kinds[session_kind_of(&w->rows, cell)].fine;
+        const session_nodes *fine = &find_interpolation(w, cell)->fine;
         finer->offsets[cell] = w->node_count;
         finer->types[cell] = (unsigned char)session_lagrange_type(fine->type);
         w->node_count += fine->count;
@@ -162,15 +170,15 @@ static void describe_cells(const finer_work *w, session_finer *finer)
         fine->offsets = (insitu_array){finer->offsets, INSITU_INT64, 0};
         fine->cell_types = (insitu_array){finer->types, INSITU_UINT8, 0};
     } else {
-        fine->order = w->kinds[0].fine.order;
-        fine->cell_type = (insitu_cell_type)session_lagrange_type(w->kinds[0].fine.type);
+        fine->order = w->kinds[0][0].fine.order;
+        fine->cell_type = (insitu_cell_type)session_lagrange_type(w->kinds[0][0].fine.type);
     }
 }
 
-static bool make_cells(session_finer *finer, int threads)
+static bool make_cells(session_finer *finer, const unsigned char *marks, int threads)
 {
     finer_work *w = base_alloc(sizeof *w);
-    bool is_made = w && begin_work(finer, w) && number_nodes(w, finer);
+    bool is_made = w && begin_work(finer, marks, w) && number_nodes(w, finer);
     if (is_made) {
         const session_node_values places = {&w->rows.cells, false, 3, read_vertex};
         const size_t bytes = 3 * (size_t)w->node_count * sizeof *finer->coordinates;
@@ -208,28 +216,48 @@ void session_end_finer(session_meshes *meshes)
     }
 }
 
-static void make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const session_finer_choice *choice, int threads,
-                            base_error *error)
+/* Returns whether the lattices are those of the marks. */
+static bool has_marks(const session_finer *finer, const unsigned char *marks)
 {
-    session_finer made = mesh->finer;
-    const int parts = choice->parts > 1 ? choice->parts : 0;
-    const session_sizes sizes = made.parts ? made.sizes : session_sizes_of(mesh);
-    if (made.parts == parts && (!made.parts || made.is_lobatto == choice->is_lobatto)) return;
-    made = (session_finer){.is_counted = true, .parts = parts, .is_lobatto = choice->is_lobatto, .sizes = sizes};
-    memcpy(made.counts, mesh->finer.counts, sizeof made.counts);
+    session_rows rows = session_given_rows(&finer->nodal);
+    int counts[ROWS_MOST_KINDS];
+    bool is_same = true;
+    session_list_kinds(&rows);
+    for (int i = 0; i < rows.kind_count; i++) {
+        const session_nodes *of = &rows.kinds[i].nodes;
+        counts[i] = session_complete_nodes(of->type, finer->parts * of->order).count;
+    }
+    for (int64_t cell = 0; is_same && cell < finer->nodal.cell_count; cell++)
+        is_same = (!marks || marks[cell]) == is_refined(finer, counts[session_kind_of(&rows, cell)], cell);
+    return is_same;
+}
+
+/* Returns whether the mesh has another description than before. */
+static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const session_finer_choice *choice,
+                            const unsigned char *marks, int threads, base_error *error)
+{
+    const session_finer *old = &mesh->finer;
+    session_finer made = {.is_counted = true,
+                          .parts = choice->parts > 1 ? choice->parts : 0,
+                          .is_lobatto = choice->is_lobatto,
+                          .sizes = old->parts ? old->sizes : session_sizes_of(mesh)};
+    memcpy(made.counts, old->counts, sizeof made.counts);
+    if (old->parts == made.parts && (!made.parts || (old->is_lobatto == made.is_lobatto && has_marks(old, marks))))
+        return false;
     end_finer_mesh(meshes, mesh);
-    if (!made.parts || !session_has_higher_order(&mesh->given)) return;
+    if (!made.parts || !session_has_higher_order(&mesh->given)) return true;
     made.nodal = mesh->given;
-    if (!make_cells(&made, threads)) {
+    if (!make_cells(&made, marks, threads)) {
         const int64_t bytes = made.bytes;
         session_drop_finer(&made);
         session_fail_for_memory(error, bytes, "finer lattices of nodes in cells of higher order");
-        return;
+        return true;
     }
     session_drop_finer(&mesh->finer);
     mesh->finer = made;
     mesh->given = made.fine;
     drop_node_data(meshes, mesh);
+    return true;
 }
 
 /* ---- choices ----------------------------------------------------------------------------------------------------- */
@@ -257,18 +285,9 @@ static void count_spacings(const session_polynomials *of, int64_t counts[SESSION
     }
 }
 
-/* Adds what finer lattices take in so many cells: vertices and parents of pieces of 4 bytes, and nodes. */
-static void count_bytes(const session_nodes *nodes, int64_t cells, int64_t counts[SESSION_FINER_COUNTS])
+static bool is_flat(const session_nodes *nodes)
 {
-    const bool is_flat = nodes->type == GRID_TRIANGLE || nodes->type == GRID_QUAD;
-    counts[PYRAMIDS] += nodes->type == GRID_PYRAMID ? cells : 0;
-    counts[SERENDIPITY] += nodes->is_complete ? 0 : cells;
-    for (int parts = 2; parts <= FINER_MOST_PARTS; parts++) {
-        const int64_t m = parts * nodes->order, pieces = is_flat ? m * m : m * m * m;
-        const int64_t fine = session_complete_nodes(nodes->type, (int)m).count;
-        counts[BYTES + parts] += cells * (pieces * 4 * (grid_type_vertices(nodes->type) + 1) + fine * 24);
-        counts[COMPONENT_BYTES + parts] += cells * fine * 8;
-    }
+    return nodes->type == GRID_TRIANGLE || nodes->type == GRID_QUAD;
 }
 
 /* Counts the cells of a mesh that is read as the caller gave it. */
@@ -288,8 +307,12 @@ static bool count_mesh(session_mesh *mesh)
     double(*places)[3] = base_alloc((size_t)nodes * sizeof *places);
     is_made = is_made && places;
     if (is_made) count_spacings(&polynomials, counts, places, cells);
-    for (int i = 0; i < polynomials.rows.kind_count; i++)
-        count_bytes(&polynomials.rows.kinds[i].nodes, cells[i], counts);
+    for (int i = 0; i < polynomials.rows.kind_count; i++) {
+        const session_nodes *of = &polynomials.rows.kinds[i].nodes;
+        counts[PYRAMIDS] += of->type == GRID_PYRAMID ? cells[i] : 0;
+        counts[SERENDIPITY] += of->is_complete ? 0 : cells[i];
+        counts[SHELLS] += is_flat(of) ? cells[i] : 0;
+    }
     if (is_made) counts[order]++;
     base_free(places);
     session_polynomials_free(&polynomials);
@@ -306,7 +329,6 @@ static bool sum_counts(const session_meshes *meshes, const char *name, int64_t s
         if (!part->is_given || !part->topology.is_split) continue;
         is_made = is_made && (part->finer.is_counted || count_mesh(part));
         for (int n = 0; n < SESSION_FINER_COUNTS; n++) sums[n] += part->finer.counts[n];
-        sums[BLOCKS + part->finer.parts]++;
     }
     return is_made;
 }
@@ -322,12 +344,10 @@ static session_finer_choice make_choice(const int64_t sums[SESSION_FINER_COUNTS]
     session_finer_choice out = {.order = NODES_MOST_ORDER,
                                 .pyramid_count = sums[PYRAMIDS],
                                 .serendipity_count = sums[SERENDIPITY],
+                                .shell_count = sums[SHELLS],
                                 .is_lobatto = sums[LOBATTO] > sums[EQUISPACED],
                                 .parts = 1};
     while (out.order > 0 && !sums[out.order]) out.order--;
-    memcpy(out.bytes, sums + BYTES, sizeof out.bytes);
-    memcpy(out.bytes_per_component, sums + COMPONENT_BYTES, sizeof out.bytes_per_component);
-    memcpy(out.blocks, sums + BLOCKS, sizeof out.blocks);
     return out;
 }
 
@@ -350,25 +370,70 @@ insitu_status session_count_finer(session_meshes *meshes, const session_catalogu
     return status;
 }
 
-/* Returns whether some block has another number of parts than the chosen one. */
-static bool is_new_choice(const session_finer_choice *choice)
+/* ---- marks ------------------------------------------------------------------------------------------------------- */
+
+bool session_begin_marks(session_finer_choice *choice, const session_parts *parts)
 {
-    bool is_new = false;
-    for (int parts = 0; parts <= FINER_MOST_PARTS; parts++)
-        is_new = is_new || (choice->blocks[parts] && parts != (choice->parts > 1 ? choice->parts : 0));
-    return is_new;
+    choice->marks = base_calloc((size_t)parts->count + 1, sizeof *choice->marks);
+    bool is_made = choice->marks;
+    if (is_made) choice->mark_count = parts->count;
+    for (int i = 0; i < parts->count && is_made; i++) {
+        choice->marks[i] = base_calloc((size_t)parts->items[i]->given.cell_count + 1, 1);
+        is_made = choice->marks[i];
+    }
+    return is_made;
+}
+
+void session_free_choices(session_finer_choice *choices, int count)
+{
+    for (int m = 0; choices && m < count; m++) {
+        for (int i = 0; i < choices[m].mark_count; i++) base_free(choices[m].marks[i]);
+        base_free(choices[m].marks);
+    }
+    base_free(choices);
+}
+
+/* Adds the bytes of the lattices of so many cells with these parts: vertices and parents of pieces of 4 bytes, and
+ * nodes. */
+static void add_bytes(const session_nodes *nodes, int parts, int64_t cells, session_finer_bytes *out)
+{
+    const int64_t m = parts * nodes->order, pieces = is_flat(nodes) ? m * m : m * m * m;
+    const int64_t fine = session_complete_nodes(nodes->type, (int)m).count;
+    out->own += cells * (pieces * 4 * (grid_type_vertices(nodes->type) + 1) + fine * 24);
+    out->per_component += cells * fine * 8;
+}
+
+void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *marks,
+                               session_finer_bytes out[FINER_MOST_PARTS + 1])
+{
+    const insitu_mesh *nodal = mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
+    session_rows rows = session_given_rows(nodal);
+    int64_t counts[ROWS_MOST_KINDS][2] = {{0}};
+    session_list_kinds(&rows);
+    for (int64_t cell = 0; cell < nodal->cell_count; cell++)
+        counts[session_kind_of(&rows, cell)][marks && !marks[cell]]++;
+    for (int i = 0; i < rows.kind_count; i++)
+        for (int parts = 2; parts <= FINER_MOST_PARTS; parts++) {
+            add_bytes(&rows.kinds[i].nodes, parts, counts[i][0], &out[parts]);
+            add_bytes(&rows.kinds[i].nodes, 1, counts[i][1], &out[parts]);
+        }
 }
 
 insitu_status session_make_finer(session_meshes *meshes, const session_catalogue *catalogue,
                                  const session_finer_choice *choices, const session_team *team, bool *are_changed,
                                  base_error *error)
 {
+    int mine = 0, any = 0;
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_parts of = session_find_parts(meshes, catalogue->meshes[m].name);
-        *are_changed = *are_changed || is_new_choice(&choices[m]);
         for (int i = 0; i < of.count && !error->status; i++)
             if (of.items[i]->is_given && of.items[i]->topology.is_split)
-                make_finer_mesh(meshes, of.items[i], &choices[m], team->threads, error);
+                mine |= make_finer_mesh(meshes, of.items[i], &choices[m], session_marks_of(&choices[m], i),
+                                        team->threads, error);
     }
-    return session_agree(team->comm, error);
+    insitu_status status = session_agree(team->comm, error);
+    if (!status)
+        status = session_check_mpi(error, MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
+    *are_changed = *are_changed || any;
+    return status;
 }

@@ -1,10 +1,10 @@
 /* Evaluates the polynomials of cells of higher order between their nodes.
  *
  * A cell of order p each of whose edges between two nodes is cut into n parts is read as a cell of order n p whose
- * nodes have the polynomial's values and places. All other code reads these cells in place of the caller's: it splits
- * them into linear pieces, finds their gradients, and counts them by the same numbers. Each cell has its nodes for
- * itself. Nodes on common faces have the same bits in all cells (session_interpolation.h), so that they are found by
- * their coordinates. */
+ * nodes have the polynomial's values and places. Cells that are not refined have n = 1. All other code reads these
+ * cells in place of the caller's: it splits them into linear pieces, finds their gradients, and counts them by the same
+ * numbers. Each cell has its nodes for itself. Nodes on common faces have the same bits in all cells
+ * (session_interpolation.h), so that they are found by their coordinates. */
 #ifndef SESSION_FINER_H
 #define SESSION_FINER_H
 
@@ -16,19 +16,26 @@ void session_drop_ids(const session_meshes *meshes);
 
 enum { FINER_MOST_PARTS = 8 };
 
+/* Bytes of finer lattices: of their pieces and nodes, and for each component of a field. */
+typedef struct session_finer_bytes {
+    int64_t own, per_component;
+} session_finer_bytes;
+
 /* The cells of higher order of a mesh on all ranks, and the number of pieces that was chosen for them; the same on
- * every rank. */
+ * every rank, apart from the marks. */
 typedef struct session_finer_choice {
     int order; /* highest order of its cells; 0: no rank has cells of higher order */
-    int64_t pyramid_count, serendipity_count;
+    int64_t pyramid_count, serendipity_count, shell_count;
     bool is_lobatto; /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
-    /* bytes that finer lattices take on all ranks, by the number of parts: their pieces and nodes, and for each
-     * component of a field */
-    int64_t bytes[FINER_MOST_PARTS + 1], bytes_per_component[FINER_MOST_PARTS + 1];
-    /* number of blocks on all ranks, by the number of parts that they have so far; 0: finer lattices are not made */
-    int64_t blocks[FINER_MOST_PARTS + 1];
     int parts; /* number of parts of each edge between two nodes, 1 .. FINER_MOST_PARTS; it is chosen by the caller */
+    /* For each part of the mesh on this rank, one byte per cell, which the caller sets if the cell is refined; NULL:
+     * all cells of the part are. */
+    int mark_count;
+    unsigned char **marks;
 } session_finer_choice;
+
+/* Frees the choices of `count` meshes. */
+void session_free_choices(session_finer_choice *choices, int count);
 
 /* Returns the largest number of parts that is supported for the mesh. */
 int session_most_parts(const session_finer_choice *choice);
@@ -38,8 +45,24 @@ int session_most_parts(const session_finer_choice *choice);
 insitu_status session_count_finer(session_meshes *meshes, const session_catalogue *catalogue, MPI_Comm comm,
                                   session_finer_choice *choices, base_error *error);
 
-/* Makes finer lattices with the chosen numbers of parts, or none for 1 part. Meshes that change must be checked again.
- * *are_changed is set if a mesh on some rank gets another number. Collective; all ranks return the same status. */
+/* Allocates marks for each part of the mesh, none of which is set. Without marks all cells are refined. Returns false
+ * if memory runs out. Local. */
+bool session_begin_marks(session_finer_choice *choice, const session_parts *parts);
+
+/* Returns the marks of a part of the mesh; NULL: all of its cells are refined. */
+static inline unsigned char *session_marks_of(const session_finer_choice *choice, int part)
+{
+    return part < choice->mark_count ? choice->marks[part] : NULL;
+}
+
+/* Adds the bytes that finer lattices in the marked cells take, and those in other cells, by the number of parts. There
+ * are none for 1 part. Local. */
+void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *marks,
+                               session_finer_bytes out[FINER_MOST_PARTS + 1]);
+
+/* Makes finer lattices in the marked cells with the chosen numbers of parts, or none for 1 part. Other cells are then
+ * split between their own nodes, of which serendipity cells get all. *are_changed is set if the cells of some mesh
+ * change on any rank; these meshes must be checked again. Collective; all ranks return the same status. */
 insitu_status session_make_finer(session_meshes *meshes, const session_catalogue *catalogue,
                                  const session_finer_choice *choices, const session_team *team, bool *are_changed,
                                  base_error *error);

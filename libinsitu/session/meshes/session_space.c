@@ -25,7 +25,8 @@ static double half_diagonal(const double lower[3], const double upper[3])
     return hypot(hypot(half[0], half[1]), half[2]);
 }
 
-/* Computes the global bounds. by_nodes: meshes with finer lattices count as if they had none. */
+/* Computes the global bounds, which are those of the caller's nodes: those of finer lattices would change with the
+ * cells that images show. by_nodes: cells are counted and measured as if meshes had no finer lattices, too. */
 static insitu_status reduce_extent(const session_meshes *meshes, bool by_nodes, MPI_Comm comm, session_extent *out,
                                    base_error *error)
 {
@@ -35,11 +36,12 @@ static insitu_status reduce_extent(const session_meshes *meshes, bool by_nodes, 
     for (int i = 0; i < 6; i++) mine[i] = INFINITY;
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
-        const session_sizes of = by_nodes && mesh->finer.parts ? mesh->finer.sizes : session_sizes_of(mesh);
+        const session_sizes own = session_sizes_of(mesh), *nodal = mesh->finer.parts ? &mesh->finer.sizes : &own;
+        const session_sizes of = by_nodes ? *nodal : own;
         if (of.drawn_count == 0) continue;
         for (int axis = 0; axis < 3; axis++) {
-            mine[axis] = fmin(mine[axis], of.lower[axis]);
-            mine[3 + axis] = fmin(mine[3 + axis], -of.upper[axis]);
+            mine[axis] = fmin(mine[axis], nodal->lower[axis]);
+            mine[3 + axis] = fmin(mine[3 + axis], -nodal->upper[axis]);
         }
         counts[0] += of.drawn_count;
         counts[2] += of.drawn_count - of.flat_count;

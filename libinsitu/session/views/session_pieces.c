@@ -3,7 +3,8 @@
  * follows from it. A mesh has one number, so that pieces of neighbours fit together.
  *
  * All that the number depends on is the same for any partition: cells' errors are those of their own nodes, cameras fit
- * the bounds of the nodes, and the memory is that of all ranks together. */
+ * the bounds of the nodes, and the memory is that of all ranks together. So are the cells that are refined, which
+ * follow from their own values and positions. */
 #include "session_pieces.h"
 
 #include <math.h>
@@ -13,219 +14,34 @@
 
 #include "memory.h"
 #include "session_agree.h"
-#include "session_camera.h"
 #include "session_deviation.h"
+#include "session_distances.h"
 #include "session_filled.h"
 #include "session_indexed.h"
-#include "session_scalars.h"
-#include "vector3.h"
+#include "session_wishes.h"
 
 static const double bytes_per_mib = 1048576;
-
-/* ---- cameras ----------------------------------------------------------------------------------------------------- */
-
-/* The cameras of the due images. */
-typedef struct piece_views {
-    int count; /* number of images of the scene */
-    bool *are_due;
-    render_camera *cameras; /* of due images */
-} piece_views;
-
-static void free_views(piece_views *views)
-{
-    base_free(views->are_due);
-    base_free(views->cameras);
-}
-
-/* Makes the cameras of the due images. A camera that has no direction of view is an error of the drawing of its image,
- * and is not due here. Collective. */
-static insitu_status make_views(const session_pieces_basis *basis, piece_views *out, base_error *error)
-{
-    const scene *scene = basis->scene;
-    session_extent extent = {.cell_count = 0};
-    bool needs_extent = false;
-    out->count = scene->image_count;
-    out->are_due = base_calloc((size_t)out->count, sizeof *out->are_due);
-    out->cameras = base_calloc((size_t)out->count, sizeof *out->cameras);
-    if (!out->are_due || !out->cameras)
-        session_fail_for_memory(error, out->count * (int64_t)sizeof *out->cameras, "cameras");
-    if (session_agree(basis->team->comm, error)) return error->status;
-    for (int i = 0; i < out->count; i++) {
-        out->are_due[i] = session_is_due(&scene->images[i], basis->moment);
-        needs_extent = needs_extent || (out->are_due[i] && scene->images[i].camera.is_automatic);
-    }
-    if (needs_extent && session_find_nodal_extent(basis->meshes, basis->team->comm, &extent, error))
-        return error->status;
-    for (int i = 0; i < out->count; i++) {
-        scene_image placed = scene->images[i];
-        placed.camera = scene_camera_at(&placed.camera, basis->moment->cycle, basis->moment->time);
-        out->are_due[i] = out->are_due[i] && session_make_camera(&extent, &placed, &out->cameras[i]);
-    }
-    return INSITU_OK;
-}
-
-/* Returns a lower bound of the size of a pixel on a sphere; INFINITY if the camera does not see the sphere. In
- * perspective, a shift d at the distance z along the camera's axis and s from the eye is seen as one of at most
- * d s / z^2. Nearer than its radius a sphere counts as if it were its radius away. */
-static double size_in_view(const render_camera *camera, const double centre[3], double radius)
-{
-    const double aspect = (double)camera->width / camera->height, half = camera->half_height;
-    double to[3];
-    for (int a = 0; a < 3; a++) to[a] = centre[a] - camera->eye[a];
-    const double z = vector3_dot(to, camera->forward), right = fabs(vector3_dot(to, camera->right));
-    const double up = fabs(vector3_dot(to, camera->up));
-    if (z + radius < 0) return INFINITY;
-    if (camera->is_orthographic)
-        return right > half * aspect + radius || up > half + radius ? INFINITY : 2 * half / camera->height;
-    if (right - z * half * aspect > radius * hypot(1, half * aspect) || up - z * half > radius * hypot(1, half))
-        return INFINITY;
-    const double near = fmax(z - radius, radius);
-    return 2 * half * near * near / (camera->height * fmax(vector3_length(to) + radius, near));
-}
-
-/* ---- what images show of a mesh ---------------------------------------------------------------------------------- */
-
-/* A field of whose isosurfaces, or a mesh of whose positions, the error is found. */
-typedef struct piece_wish {
-    const piece_views *views;
-    bool *images; /* images that show it */
-    bool is_shown;
-    const char *field; /* NULL: the positions */
-    int component;
-    int value_count;
-    double *values; /* isovalues */
-} piece_wish;
-
-enum { MOST_WISHES = 256 };
-
-/* The first wish is that of the positions. */
-typedef struct piece_wishes {
-    int count;
-    bool is_complete; /* set as long as memory has sufficed */
-    piece_wish items[MOST_WISHES];
-} piece_wishes;
-
-static double find_pixel_size(const void *of, const double centre[3], double radius)
-{
-    const piece_wish *wish = of;
-    double least = INFINITY;
-    for (int i = 0; i < wish->views->count; i++)
-        if (wish->images[i]) least = fmin(least, size_in_view(&wish->views->cameras[i], centre, radius));
-    return least;
-}
-
-static void free_wishes(piece_wishes *wishes)
-{
-    for (int i = 0; i < wishes->count; i++) {
-        base_free(wishes->items[i].images);
-        base_free(wishes->items[i].values);
-    }
-}
-
-/* Returns the wish of a field, or of the positions if it is NULL. Further fields than there is space for count as
- * positions. */
-static piece_wish *find_wish(piece_wishes *wishes, const piece_views *views, const char *field, int component)
-{
-    for (int i = 0; i < wishes->count; i++) {
-        piece_wish *wish = &wishes->items[i];
-        const bool is_same = field && wish->field && strcmp(field, wish->field) == 0 && wish->component == component;
-        if (is_same || (!field && !wish->field)) return wish;
-    }
-    if (wishes->count == MOST_WISHES) return &wishes->items[0];
-    piece_wish *wish = &wishes->items[wishes->count++];
-    *wish = (piece_wish){.views = views, .field = field, .component = component};
-    wish->images = base_calloc((size_t)views->count, sizeof *wish->images);
-    wishes->is_complete = wishes->is_complete && wish->images;
-    return wish;
-}
-
-static void show_in(piece_wishes *wishes, piece_wish *wish, int image)
-{
-    wish->is_shown = true;
-    if (wishes->is_complete) wish->images[image] = true;
-}
-
-static void add_value(piece_wishes *wishes, piece_wish *wish, double value)
-{
-    for (int i = 0; i < wish->value_count; i++)
-        if (wish->values[i] == value) return;
-    double *values = base_realloc(wish->values, ((size_t)wish->value_count + 1) * sizeof *values);
-    wishes->is_complete = wishes->is_complete && values;
-    if (!values) return;
-    values[wish->value_count++] = value;
-    wish->values = values;
-}
-
-/* Returns whether the layer's field is a polynomial in each cell: the caller's values at nodes, or one component. */
-static bool is_polynomial(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
-                          const scene_field *shown)
-{
-    return field->derived_index < 0 && field->centring != INSITU_CELL &&
-           !session_is_recentred(shown, field->centring, mesh->is_refined) &&
-           session_resolve_component(shown, field->component_count) >= 0;
-}
-
-static void add_isosurface(piece_wishes *wishes, const piece_views *views, const session_catalogue_mesh *mesh,
-                           const scene_image *image, int index, int layer, session_report *report)
-{
-    const scene_isosurface *shown = &image->isosurfaces[layer];
-    const session_catalogue_field *field =
-        scene_field_is_on(&shown->field, mesh->name) ? session_catalogue_find(mesh, shown->field.name) : NULL;
-    if (!field) return;
-    const bool is_bounded = is_polynomial(mesh, field, &shown->field);
-    piece_wish *wish = find_wish(wishes, views, is_bounded ? field->name : NULL,
-                                 is_bounded ? session_resolve_component(&shown->field, field->component_count) : 0);
-    show_in(wishes, wish, index);
-    for (int i = 0; i < shown->value_count && wish->field && image->variant.view == 0; i++)
-        add_value(wishes, wish, shown->values[i]);
-    session_warn(report, &(session_warning){WARNING_PIECES, image->name, mesh->name, layer}, !is_bounded,
-                 "image \"%s\": surface_error does not hold for the isosurface of \"%s\" on mesh \"%s\": only "
-                 "components of fields at vertices and corners are polynomials, but not derived fields, magnitudes and "
-                 "means",
-                 image->name, field->name, mesh->name);
-}
-
-/* Returns whether a layer other than isosurfaces shows the mesh. */
-static bool has_other_layers(const session_catalogue_mesh *mesh, const scene_image *image)
-{
-    bool is_any = false;
-    for (int i = 0; i < image->volume_count; i++) {
-        const scene_field *field = &image->volumes[i].field;
-        is_any = is_any || (scene_field_is_on(field, mesh->name) && session_catalogue_find(mesh, field->name));
-    }
-    for (int i = 0; i < image->slice_count; i++) {
-        const scene_field *field = &image->slices[i].field;
-        is_any = is_any || (scene_field_is_on(field, mesh->name) && session_catalogue_find(mesh, field->name));
-    }
-    for (int i = 0; i < image->surface_count; i++)
-        is_any = is_any || scene_field_is_on(&image->surfaces[i].meshes_field, mesh->name);
-    return is_any;
-}
-
-static void list_wishes(const session_pieces_basis *basis, const piece_views *views, int mesh, piece_wishes *out,
-                        session_report *report)
-{
-    const session_catalogue_mesh *of = &basis->catalogue->meshes[mesh];
-    *out = (piece_wishes){.is_complete = true};
-    piece_wish *positions = find_wish(out, views, NULL, 0);
-    for (int i = 0; i < views->count; i++) {
-        const scene_image *image = &basis->scene->images[i];
-        if (!views->are_due[i]) continue;
-        if (has_other_layers(of, image)) show_in(out, positions, i);
-        for (int layer = 0; layer < image->isosurface_count; layer++)
-            add_isosurface(out, views, of, image, i, layer, report);
-    }
-}
 
 /* ---- errors ------------------------------------------------------------------------------------------------------ */
 
 /* The errors of one mesh, and what follows from them. */
 typedef struct piece_error {
-    bool is_shown;         /* set if some due image shows the mesh; the same on every rank */
-    session_deviation all; /* counts are those of isosurfaces */
-    int components;        /* number of components of the fields that images of the scene show */
-    int wanted;            /* number of pieces without a limit of memory */
+    bool is_shown; /* set if some due image shows the mesh, or a fixed number is that of all cells; the same on every
+                      rank */
+    session_deviation all;                           /* counts are those of isosurfaces */
+    session_finer_bytes bytes[FINER_MOST_PARTS + 1]; /* that finer lattices take on all ranks */
+    int components; /* number of components of the fields that images of the scene show */
+    int wanted;     /* number of pieces without a limit of memory */
 } piece_error;
+
+/* The work on one mesh. */
+typedef struct mesh_work {
+    const session_pieces_basis *basis;
+    session_finer_choice *choice;
+    bool marks_only; /* set if errors are not needed */
+    session_wishes wishes;
+    piece_error *out;
+} mesh_work;
 
 /* A part of a mesh that is being measured. */
 typedef struct part_work {
@@ -242,42 +58,68 @@ static insitu_status measure_values(void *of, const session_node_values *values,
     return session_measure_deviation(work->mesh, &work->wish, work->threads, work->out, error);
 }
 
-static void measure_part(const session_pieces_basis *basis, const session_mesh *mesh, const piece_wish *wish,
-                         bool is_lobatto, session_deviation *out, base_error *error)
+static void measure_wish(const mesh_work *w, const session_mesh *mesh, unsigned char *marks, const session_wish *wish,
+                         base_error *error)
 {
-    const session_isovalues isovalues = {wish->value_count, wish->values};
+    static const double zero = 0;
     part_work work = {.mesh = mesh,
                       .wish = {.component = wish->component,
-                               .isovalues = &isovalues,
-                               .pixels = {wish, find_pixel_size},
-                               .is_lobatto = is_lobatto},
-                      .threads = basis->team->threads,
-                      .out = out};
-    if (!wish->is_shown || !mesh->is_given || !mesh->topology.is_split) return;
+                               .isovalues = {wish->value_count, wish->values, 0},
+                               .plane = wish->has_plane ? &wish->plane : NULL,
+                               .pixels = {wish, session_wish_pixel_size},
+                               .is_lobatto = w->choice->is_lobatto,
+                               .marks_only = w->marks_only,
+                               .marks = marks},
+                      .threads = w->basis->team->threads,
+                      .out = &w->out->all};
+    if (!wish->is_shown || (w->marks_only && !marks)) return;
+    /* A slice at the border of the data may be moved by as much (session_slice_distance()). */
+    if (wish->has_plane)
+        work.wish.isovalues =
+            (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * wish->views->extent.half_diagonal};
     const int field = wish->field ? session_find_field(mesh, wish->field) : -1;
-    if (!wish->field) session_measure_deviation(mesh, &work.wish, work.threads, out, error);
+    if (!wish->field) session_measure_deviation(mesh, &work.wish, work.threads, work.out, error);
     if (field >= 0) session_read_nodes(mesh, field, measure_values, &work, error);
 }
 
-static void measure_mesh(const session_pieces_basis *basis, const piece_views *views, int mesh, bool is_lobatto,
-                         piece_error *out, session_report *report, base_error *error)
+static void measure_parts(const mesh_work *w, const char *name, base_error *error)
 {
-    piece_wishes *wishes = base_alloc(sizeof *wishes);
-    const session_parts parts = session_find_parts(basis->meshes, basis->catalogue->meshes[mesh].name);
-    if (wishes) list_wishes(basis, views, mesh, wishes, report);
-    for (int w = 0; wishes && w < wishes->count; w++) {
-        out->is_shown = out->is_shown || wishes->items[w].is_shown;
-        for (int i = 0; i < parts.count && wishes->is_complete && !error->status; i++)
-            measure_part(basis, parts.items[i], &wishes->items[w], is_lobatto, &out->all, error);
+    const session_parts parts = session_find_parts(w->basis->meshes, name);
+    if (!w->wishes.needs_all && !session_begin_marks(w->choice, &parts))
+        session_fail_for_memory(error, parts.count, "marks of cells of higher order");
+    for (int i = 0; i < parts.count && !error->status; i++) {
+        const session_mesh *mesh = parts.items[i];
+        unsigned char *marks = session_marks_of(w->choice, i);
+        if (!mesh->is_given || !mesh->topology.is_split) continue;
+        for (int n = 0; n < w->wishes.count && !error->status; n++)
+            measure_wish(w, mesh, marks, &w->wishes.items[n], error);
+        session_count_finer_bytes(mesh, marks, w->out->bytes);
     }
-    if (!wishes || !wishes->is_complete) session_fail_for_memory(error, sizeof *wishes, "bounds of isosurfaces");
-    if (wishes) free_wishes(wishes);
-    base_free(wishes);
+}
+
+static void measure_mesh(const session_pieces_basis *basis, const session_wish_views *views, int mesh,
+                         session_finer_choice *choice, piece_error *out, session_report *report, base_error *error)
+{
+    const scene *scene = basis->scene;
+    mesh_work *w = base_alloc(sizeof *w);
+    if (w) {
+        w->basis = basis;
+        w->choice = choice;
+        w->marks_only = scene->finer_pieces > 0;
+        w->out = out;
+        session_list_wishes(scene, views, &basis->catalogue->meshes[mesh], choice->shell_count > 0, &w->wishes,
+                            w->marks_only ? NULL : report);
+        out->is_shown = w->wishes.is_shown || (w->marks_only && w->wishes.needs_all);
+        if (w->wishes.is_complete) measure_parts(w, basis->catalogue->meshes[mesh].name, error);
+    }
+    if (!w || !w->wishes.is_complete) session_fail_for_memory(error, sizeof *w, "bounds of isosurfaces");
+    if (w) session_free_wishes(&w->wishes);
+    base_free(w);
 }
 
 /* Calls the fill functions of fields that isosurfaces show. If one fails, the field is not measured, and the plan
  * returns the error. Local, but fill functions may communicate. */
-static void fill_fields(const session_pieces_basis *basis, const piece_views *views)
+static void fill_fields(const session_pieces_basis *basis, const session_wish_views *views)
 {
     base_error unheard = {.status = INSITU_OK};
     for (int i = 0; i < views->count; i++)
@@ -287,41 +129,52 @@ static void fill_fields(const session_pieces_basis *basis, const piece_views *vi
     session_want_no_fields(basis->meshes);
 }
 
+/* What is summed over the ranks of one mesh. */
+typedef struct piece_sums {
+    int64_t cell_count, unbounded_count;
+    session_finer_bytes bytes[FINER_MOST_PARTS + 1];
+} piece_sums;
+
 static insitu_status reduce_errors(piece_error *errors, int count, MPI_Comm comm, base_error *error)
 {
+    enum { WORDS = sizeof(piece_sums) / sizeof(int64_t) };
     double *most = base_calloc((size_t)count + 1, sizeof *most);
-    int64_t *sums = base_calloc(2 * (size_t)count + 1, sizeof *sums);
-    if (!most || !sums) session_fail_for_memory(error, count * 24, "bounds of isosurfaces");
+    piece_sums *sums = base_calloc((size_t)count + 1, sizeof *sums);
+    if (!most || !sums) session_fail_for_memory(error, count * (int64_t)sizeof *sums, "bounds of isosurfaces");
     insitu_status status = session_agree(comm, error);
     for (int m = 0; m < count && !status; m++) {
         most[m] = errors[m].all.error;
-        sums[2 * m] = errors[m].all.cell_count;
-        sums[2 * m + 1] = errors[m].all.unbounded_count;
+        sums[m] =
+            (piece_sums){.cell_count = errors[m].all.cell_count, .unbounded_count = errors[m].all.unbounded_count};
+        memcpy(sums[m].bytes, errors[m].bytes, sizeof sums[m].bytes);
     }
     if (!status)
         status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, most, count, MPI_DOUBLE, MPI_MAX, comm),
                                    "MPI_Allreduce");
     if (!status)
-        status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, 2 * count, MPI_INT64_T, MPI_SUM, comm),
+        status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, WORDS * count, MPI_INT64_T, MPI_SUM, comm),
                                    "MPI_Allreduce");
-    for (int m = 0; m < count && !status; m++)
-        errors[m].all = (session_deviation){most[m], sums[2 * m], sums[2 * m + 1]};
+    for (int m = 0; m < count && !status; m++) {
+        errors[m].all = (session_deviation){most[m], sums[m].cell_count, sums[m].unbounded_count};
+        memcpy(errors[m].bytes, sums[m].bytes, sizeof sums[m].bytes);
+    }
     base_free(most);
     base_free(sums);
     return status;
 }
 
-static insitu_status find_errors(const session_pieces_basis *basis, const session_finer_choice *choices,
-                                 piece_error *errors, session_report *report, base_error *error)
+static insitu_status find_errors(const session_pieces_basis *basis, session_finer_choice *choices, piece_error *errors,
+                                 session_report *report, base_error *error)
 {
-    piece_views views = {.count = 0};
-    insitu_status status = make_views(basis, &views, error);
+    session_wish_views views = {.count = 0};
+    insitu_status status =
+        session_make_wish_views(basis->scene, basis->moment, basis->meshes, basis->team->comm, &views, error);
     if (!status) fill_fields(basis, &views);
     for (int m = 0; m < basis->catalogue->mesh_count && !status; m++)
-        if (choices[m].order > 1 && !choices[m].pyramid_count)
-            measure_mesh(basis, &views, m, choices[m].is_lobatto, &errors[m], report, error);
+        if (choices[m].order > 0 && !choices[m].pyramid_count)
+            measure_mesh(basis, &views, m, &choices[m], &errors[m], report, error);
     if (!status) status = reduce_errors(errors, basis->catalogue->mesh_count, basis->team->comm, error);
-    free_views(&views);
+    session_free_wish_views(&views);
     return status;
 }
 
@@ -337,10 +190,11 @@ static int find_pieces(const session_finer_choice *choice, const piece_error *of
     return parts;
 }
 
-static void choose_fixed(const char *mesh, const scene *scene, session_finer_choice *choice, session_report *report)
+static void choose_fixed(const char *mesh, const scene *scene, const piece_error *of, session_finer_choice *choice,
+                         session_report *report)
 {
     const int wanted = scene->finer_pieces, most = session_most_parts(choice);
-    choice->parts = choice->pyramid_count ? 1 : wanted < most ? wanted : most;
+    choice->parts = choice->pyramid_count || !of->is_shown ? 1 : wanted < most ? wanted : most;
     session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 1}, !choice->pyramid_count && most < wanted,
                  "mesh \"%s\": it has cells of order %d, and so finer_pieces is %d on it instead of %d: at most %d "
                  "pieces along an edge of a cell are supported",
@@ -386,10 +240,11 @@ static int count_components(const scene *scene, const session_catalogue_mesh *me
     return count;
 }
 
-/* Returns the bytes that so many finer pieces of a mesh take. They grow with the number of pieces. */
-static double find_bytes(const session_finer_choice *choice, const piece_error *of, int parts)
+/* Returns the bytes that so many finer pieces of a mesh take. They do not fall with the number of pieces. */
+static double find_bytes(const piece_error *of, int parts)
 {
-    return (double)choice->bytes[parts] + of->components * (double)choice->bytes_per_component[parts];
+    const session_finer_bytes *bytes = &of->bytes[parts];
+    return (double)bytes->own + of->components * (double)bytes->per_component;
 }
 
 /* A number of pieces that a mesh may lose one of, and the bytes that they take. */
@@ -398,12 +253,13 @@ typedef struct piece_step {
     int mesh, parts;
 } piece_step;
 
-/* Orders steps by decreasing bytes, and those of the same bytes by their meshes. */
+/* Orders steps by decreasing bytes, those of the same bytes by their meshes, and those of a mesh by decreasing pieces.
+ */
 static int compare_steps(const void *a, const void *b)
 {
     const piece_step *x = a, *y = b;
     if (x->bytes != y->bytes) return x->bytes > y->bytes ? -1 : 1;
-    return x->mesh - y->mesh;
+    return x->mesh != y->mesh ? x->mesh - y->mesh : y->parts - x->parts;
 }
 
 /* Takes pieces from the mesh whose pieces need most memory, until those of all meshes fit. steps: space for
@@ -414,16 +270,16 @@ static double take_pieces(int mesh_count, double limit, const piece_error *error
     double all = 0;
     int count = 0;
     for (int m = 0; m < mesh_count; m++) {
-        all += find_bytes(&choices[m], &errors[m], choices[m].parts);
+        all += find_bytes(&errors[m], choices[m].parts);
         for (int parts = choices[m].parts; parts > 1; parts--)
-            steps[count++] = (piece_step){find_bytes(&choices[m], &errors[m], parts), m, parts};
+            steps[count++] = (piece_step){find_bytes(&errors[m], parts), m, parts};
     }
     if (!(all > limit)) return all;
     qsort(steps, (size_t)count, sizeof *steps, compare_steps);
     double sum = all;
     for (const piece_step *step = steps; step < steps + count && sum > limit; step++) {
         choices[step->mesh].parts = step->parts - 1;
-        sum += find_bytes(&choices[step->mesh], &errors[step->mesh], step->parts - 1) - step->bytes;
+        sum += find_bytes(&errors[step->mesh], step->parts - 1) - step->bytes;
     }
     return all;
 }
@@ -467,7 +323,7 @@ static void choose_all(const session_pieces_basis *basis, piece_error *errors, p
         if (!choices[m].order) continue;
         warn_of_pyramids(name, scene, &choices[m], report);
         if (scene->finer_pieces)
-            choose_fixed(name, scene, &choices[m], report);
+            choose_fixed(name, scene, &errors[m], &choices[m], report);
         else
             choose_by_error(name, scene, &errors[m], &choices[m], report);
         errors[m].components = count_components(scene, &catalogue->meshes[m]);
@@ -488,7 +344,7 @@ insitu_status session_choose_pieces(const session_pieces_basis *basis, session_f
         session_fail_for_memory(error, (int64_t)(count * (sizeof *errors + FINER_MOST_PARTS * sizeof *steps)),
                                 "numbers of pieces");
     insitu_status status = session_agree(basis->team->comm, error);
-    if (!status && !basis->scene->finer_pieces) status = find_errors(basis, choices, errors, report, error);
+    if (!status) status = find_errors(basis, choices, errors, report, error);
     if (!status) choose_all(basis, errors, steps, choices, report);
     base_free(errors);
     base_free(steps);

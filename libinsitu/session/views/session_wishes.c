@@ -1,0 +1,244 @@
+/* Isosurfaces and slices are drawn from the pieces that they cross. If an isovalue is outside the range of the
+ * Bernstein coefficients of a cell, it is outside the range of all of the cell's faces, too, so that the surface
+ * crosses none of them, however the cells on both sides are split. So only cells that may be crossed need finer pieces.
+ *
+ * All cells need them if faces of pieces are drawn or compared with those of neighbours (outer surfaces, contours of
+ * shells), if rays pass cell by cell (volumes), if values at vertices are means or derivatives over neighbours, if
+ * pieces are counted (percentiles), or if sums over the pieces are written (statistics). */
+#include "session_wishes.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_camera.h"
+#include "session_distances.h"
+#include "session_scalars.h"
+#include "vector3.h"
+
+/* ---- cameras ----------------------------------------------------------------------------------------------------- */
+
+void session_free_wish_views(session_wish_views *views)
+{
+    base_free(views->are_due);
+    base_free(views->cameras);
+}
+
+insitu_status session_make_wish_views(const scene *scene, const session_moment *moment, const session_meshes *meshes,
+                                      MPI_Comm comm, session_wish_views *out, base_error *error)
+{
+    bool needs_extent = false;
+    *out = (session_wish_views){.count = scene->image_count};
+    out->are_due = base_calloc((size_t)out->count, sizeof *out->are_due);
+    out->cameras = base_calloc((size_t)out->count, sizeof *out->cameras);
+    if (!out->are_due || !out->cameras)
+        session_fail_for_memory(error, out->count * (int64_t)sizeof *out->cameras, "cameras");
+    if (session_agree(comm, error)) return error->status;
+    for (int i = 0; i < out->count; i++) {
+        const scene_image *image = &scene->images[i];
+        out->are_due[i] = session_is_due(image, moment);
+        needs_extent = needs_extent || (out->are_due[i] && (image->camera.is_automatic || image->slice_count > 0));
+    }
+    if (needs_extent && session_find_nodal_extent(meshes, comm, &out->extent, error)) return error->status;
+    for (int i = 0; i < out->count; i++) {
+        scene_image placed = scene->images[i];
+        placed.camera = scene_camera_at(&placed.camera, moment->cycle, moment->time);
+        out->are_due[i] = out->are_due[i] && session_make_camera(&out->extent, &placed, &out->cameras[i]);
+    }
+    return INSITU_OK;
+}
+
+/* Returns a lower bound of the size of a pixel on a sphere; INFINITY if the camera does not see the sphere. In
+ * perspective, a shift d at the distance z along the camera's axis and s from the eye is seen as one of at most
+ * d s / z^2. Nearer than its radius a sphere counts as if it were its radius away. */
+static double size_in_view(const render_camera *camera, const double centre[3], double radius)
+{
+    const double aspect = (double)camera->width / camera->height, half = camera->half_height;
+    double to[3];
+    for (int a = 0; a < 3; a++) to[a] = centre[a] - camera->eye[a];
+    const double z = vector3_dot(to, camera->forward), right = fabs(vector3_dot(to, camera->right));
+    const double up = fabs(vector3_dot(to, camera->up));
+    if (z + radius < 0) return INFINITY;
+    if (camera->is_orthographic)
+        return right > half * aspect + radius || up > half + radius ? INFINITY : 2 * half / camera->height;
+    if (right - z * half * aspect > radius * hypot(1, half * aspect) || up - z * half > radius * hypot(1, half))
+        return INFINITY;
+    const double near = fmax(z - radius, radius);
+    return 2 * half * near * near / (camera->height * fmax(vector3_length(to) + radius, near));
+}
+
+double session_wish_pixel_size(const void *of, const double centre[3], double radius)
+{
+    const session_wish *wish = of;
+    double least = INFINITY;
+    for (int i = 0; i < wish->views->count; i++)
+        if (wish->images[i]) least = fmin(least, size_in_view(&wish->views->cameras[i], centre, radius));
+    return least;
+}
+
+/* ---- what images show of a mesh ---------------------------------------------------------------------------------- */
+
+void session_free_wishes(session_wishes *wishes)
+{
+    for (int i = 0; i < wishes->count; i++) {
+        base_free(wishes->items[i].images);
+        base_free(wishes->items[i].values);
+    }
+}
+
+static bool is_same_plane(const session_plane *a, const session_plane *b)
+{
+    bool is_same = true;
+    for (int x = 0; x < 3; x++) is_same = is_same && a->normal[x] == b->normal[x] && a->point[x] == b->point[x];
+    return is_same;
+}
+
+static bool is_same_wish(const session_wish *a, const session_wish *b)
+{
+    if (a->has_plane || b->has_plane) return a->has_plane && b->has_plane && is_same_plane(&a->plane, &b->plane);
+    if (!a->field || !b->field) return !a->field && !b->field;
+    return strcmp(a->field, b->field) == 0 && a->component == b->component;
+}
+
+/* Returns the wish that is shown in the image in the same way as `like`. Further ones than there is space for count as
+ * positions of all cells. */
+static session_wish *find_wish(session_wishes *wishes, const session_wish_views *views, const session_wish *like)
+{
+    for (int i = 0; i < wishes->count; i++)
+        if (is_same_wish(&wishes->items[i], like)) return &wishes->items[i];
+    wishes->needs_all = wishes->needs_all || wishes->count == SESSION_MOST_WISHES;
+    if (wishes->count == SESSION_MOST_WISHES) return &wishes->items[0];
+    session_wish *wish = &wishes->items[wishes->count++];
+    *wish = *like;
+    wish->views = views;
+    wish->images = base_calloc((size_t)views->count, sizeof *wish->images);
+    wishes->is_complete = wishes->is_complete && wish->images;
+    return wish;
+}
+
+static session_wish *show_wish(session_wishes *wishes, const session_wish_views *views, const session_wish *like,
+                               int image)
+{
+    session_wish *wish = find_wish(wishes, views, like);
+    wish->is_shown = wishes->is_shown = true;
+    if (wishes->is_complete) wish->images[image] = true;
+    return wish;
+}
+
+static void add_value(session_wishes *wishes, session_wish *wish, double value)
+{
+    for (int i = 0; i < wish->value_count; i++)
+        if (wish->values[i] == value) return;
+    double *values = base_realloc(wish->values, ((size_t)wish->value_count + 1) * sizeof *values);
+    wishes->is_complete = wishes->is_complete && values;
+    if (!values) return;
+    values[wish->value_count++] = value;
+    wish->values = values;
+}
+
+static const session_catalogue_field *find_shown(const session_catalogue_mesh *mesh, const scene_field *field)
+{
+    return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
+}
+
+/* Returns whether the values are the caller's, so that they depend on no other cell. */
+static bool is_own(const session_catalogue_mesh *mesh, const session_catalogue_field *field, const scene_field *shown)
+{
+    return field->derived_index < 0 && !session_is_recentred(shown, field->centring, mesh->is_refined);
+}
+
+/* Returns whether the layer's field is a polynomial in each cell: the caller's values at nodes, or one component. */
+static bool is_polynomial(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
+                          const scene_field *shown)
+{
+    return is_own(mesh, field, shown) && field->centring != INSITU_CELL &&
+           session_resolve_component(shown, field->component_count) >= 0;
+}
+
+static bool counts_cells(const scene_colour_map *map)
+{
+    return !map->range.is_fixed && map->range.source == SCENE_RANGE_PERCENTILES;
+}
+
+static void add_isosurface(session_wishes *wishes, const session_wish_views *views, const session_catalogue_mesh *mesh,
+                           const scene_image *image, int index, int layer, session_report *report)
+{
+    const scene_isosurface *shown = &image->isosurfaces[layer];
+    const session_catalogue_field *field = find_shown(mesh, &shown->field);
+    session_wish like = {.field = NULL};
+    if (!field) return;
+    const bool is_bounded = is_polynomial(mesh, field, &shown->field);
+    if (is_bounded) like.field = field->name;
+    if (is_bounded) like.component = session_resolve_component(&shown->field, field->component_count);
+    session_wish *wish = show_wish(wishes, views, &like, index);
+    for (int i = 0; i < shown->value_count && wish->field && image->variant.view == 0; i++)
+        add_value(wishes, wish, shown->values[i]);
+    /* Central differences also sample neighbours of crossed cells. */
+    wishes->needs_all = wishes->needs_all || !is_bounded || shown->normals == SCENE_DIFFERENCES ||
+                        (shown->has_colour_by && counts_cells(&shown->colour_map));
+    if (!report) return;
+    session_warn(report, &(session_warning){WARNING_PIECES, image->name, mesh->name, layer}, !is_bounded,
+                 "image \"%s\": surface_error does not hold for the isosurface of \"%s\" on mesh \"%s\": only "
+                 "components of fields at vertices and corners are polynomials, but not derived fields, magnitudes and "
+                 "means",
+                 image->name, field->name, mesh->name);
+}
+
+static void add_slice(session_wishes *wishes, const session_wish_views *views, const session_catalogue_mesh *mesh,
+                      const scene_image *image, int index, int layer)
+{
+    const scene_slice *shown = &image->slices[layer];
+    if (!find_shown(mesh, &shown->field)) return;
+    for (int i = 0; i < shown->plane_count; i++) {
+        session_wish like = {.has_plane = true};
+        memcpy(like.plane.normal, shown->planes[i].normal, sizeof like.plane.normal);
+        session_find_plane_point(&shown->planes[i], &views->extent, like.plane.point);
+        show_wish(wishes, views, &like, index);
+    }
+    wishes->needs_all = wishes->needs_all || counts_cells(&shown->colour_map);
+}
+
+/* Returns whether a layer shows the mesh from all of its cells. */
+static bool has_whole_layers(const session_catalogue_mesh *mesh, const scene_image *image)
+{
+    bool is_any = false;
+    for (int i = 0; i < image->volume_count; i++) is_any = is_any || find_shown(mesh, &image->volumes[i].field);
+    for (int i = 0; i < image->surface_count; i++)
+        is_any = is_any || scene_field_is_on(&image->surfaces[i].meshes_field, mesh->name);
+    return is_any;
+}
+
+static bool has_fields_of_neighbours(const session_catalogue_mesh *mesh, const scene_image *image)
+{
+    scene_field_walk walk = {.image = image};
+    for (const scene_field *field; (field = scene_next_field(&walk)) != NULL;) {
+        const session_catalogue_field *of = find_shown(mesh, field);
+        if (of && !is_own(mesh, of, field)) return true;
+    }
+    return false;
+}
+
+void session_list_wishes(const scene *scene, const session_wish_views *views, const session_catalogue_mesh *mesh,
+                         bool has_shells, session_wishes *out, session_report *report)
+{
+    const session_wish positions = {.field = NULL};
+    bool are_any_due = false;
+    *out = (session_wishes){.is_complete = true, .needs_all = has_shells || scene->statistics_count > 0};
+    find_wish(out, views, &positions);
+    for (int i = 0; i < views->count; i++) {
+        const scene_image *image = &scene->images[i];
+        out->needs_all = out->needs_all || image->condition.is_given;
+        are_any_due = are_any_due || views->are_due[i];
+        if (!views->are_due[i]) continue;
+        if (has_whole_layers(mesh, image)) {
+            show_wish(out, views, &positions, i);
+            out->needs_all = true;
+        }
+        out->needs_all = out->needs_all || has_fields_of_neighbours(mesh, image);
+        for (int layer = 0; layer < image->isosurface_count; layer++)
+            add_isosurface(out, views, mesh, image, i, layer, report);
+        for (int layer = 0; layer < image->slice_count; layer++) add_slice(out, views, mesh, image, i, layer);
+    }
+    out->needs_all = out->needs_all || !are_any_due;
+}

@@ -1,0 +1,59 @@
+/* What the due images show of a mesh with cells of higher order: of which isosurfaces and positions the error is found,
+ * and which cells are refined. */
+#ifndef SESSION_WISHES_H
+#define SESSION_WISHES_H
+
+#include "render.h"
+#include "session_finer.h"
+#include "session_plan.h"
+
+/* The cameras of the due images. */
+typedef struct session_wish_views {
+    int count; /* number of images of the scene */
+    bool *are_due;
+    render_camera *cameras; /* of due images */
+    session_extent extent;  /* bounds of the caller's nodes; of no cells if neither cameras nor slices need them */
+} session_wish_views;
+
+/* Makes the cameras of the images that are due at the moment. A camera that has no direction of view is an error of the
+ * drawing of its image, and is not due here. The caller must free *out in any case. Collective. */
+insitu_status session_make_wish_views(const scene *scene, const session_moment *moment, const session_meshes *meshes,
+                                      MPI_Comm comm, session_wish_views *out, base_error *error);
+void session_free_wish_views(session_wish_views *views);
+
+/* A field of whose isosurfaces, a plane of whose slice, or a mesh of whose positions the error is found. */
+typedef struct session_wish {
+    const session_wish_views *views;
+    bool *images; /* images that show it */
+    bool is_shown;
+    const char *field; /* NULL: no field */
+    int component;
+    int value_count;
+    double *values; /* isovalues */
+    bool has_plane;
+    session_plane plane;
+} session_wish;
+
+enum { SESSION_MOST_WISHES = 256 };
+
+/* The first wish is that of the positions of all cells. */
+typedef struct session_wishes {
+    int count;
+    bool is_complete; /* set as long as memory has sufficed */
+    bool is_shown;    /* set if some due image shows the mesh */
+    bool needs_all;   /* set if all cells are refined, not only those that isosurfaces and slices may cross */
+    session_wish items[SESSION_MOST_WISHES];
+} session_wishes;
+
+/* Lists what the due images show of a mesh. has_shells: some of its cells, on any rank, are triangles or quads. report:
+ * receives warnings of isosurfaces without a bound; NULL: none is wanted. Local; the result is the same on every rank.
+ * The caller must free *out. */
+void session_list_wishes(const scene *scene, const session_wish_views *views, const session_catalogue_mesh *mesh,
+                         bool has_shells, session_wishes *out, session_report *report);
+void session_free_wishes(session_wishes *wishes);
+
+/* Returns a lower bound of the size, in scene units, of a pixel on a sphere in the images that show a wish; INFINITY if
+ * none of them shows the sphere. of: a session_wish. */
+double session_wish_pixel_size(const void *of, const double centre[3], double radius);
+
+#endif
