@@ -175,15 +175,43 @@ static void shells_have_their_derivatives(void **state)
                     places[count][1] = (double)j / p;
                 }
             assert_true(session_nodes_of(is_quad ? INSITU_LAGRANGE_QUAD : INSITU_LAGRANGE_TRIANGLE, count, &of));
-            assert_true(session_make_derivatives(&of, INSITU_ORDER_LEXICOGRAPHIC, false, &d));
+            assert_true(session_make_derivatives(&of, INSITU_ORDER_LEXICOGRAPHIC, false, 1, &d));
             assert_int_equal(d.axis_count, 2);
             derivatives_are_right("shell", &of, &d, (const double(*)[3])places, 1);
             session_drop_derivatives(&d);
         }
     assert_true(session_nodes_of(INSITU_QUADRATIC_QUAD, 8, &of));
-    assert_true(session_make_derivatives(&of, INSITU_ORDER_VTK, false, &d));
+    assert_true(session_make_derivatives(&of, INSITU_ORDER_VTK, false, 1, &d));
     derivatives_are_right("quad of 8 nodes", &of, &d, of8, 1);
     session_drop_derivatives(&d);
+}
+
+/* In a lattice whose edges have `parts` times as many nodes, polynomials of the lower order have their derivatives,
+ * each from as few nodes as determine them. */
+static void finer_lattices_have_derivatives(void **state)
+{
+    (void)state;
+    static const int types[] = {GRID_TRIANGLE, GRID_QUAD, GRID_TET, GRID_WEDGE, GRID_HEX};
+    for (int i = 0; i < 5 * 3 * 2; i++) {
+        const int type = types[i % 5], p = 1 + i / 5 % 3, parts = 2 + i / 15, fine = parts * p;
+        const session_nodes of = session_complete_nodes(type, fine);
+        double(*places)[3] = malloc((size_t)of.count * sizeof *places);
+        session_derivatives d;
+        for (int n = 0; n < (fine + 1) * (fine + 1) * (fine + 1); n++) {
+            const int at[3] = {n % (fine + 1), n / (fine + 1) % (fine + 1), n / (fine + 1) / (fine + 1)};
+            if (!session_is_node(&of, at[0], at[1], at[2])) continue;
+            double *place = places[session_node_index(&of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2])];
+            for (int a = 0; a < 3; a++) place[a] = (double)at[a] / fine;
+        }
+        assert_true(session_make_derivatives(&of, INSITU_ORDER_LEXICOGRAPHIC, false, parts, &d));
+        session_nodes coarse = session_complete_nodes(type, p);
+        const int most = 2 * coarse.count * d.axis_count * of.count;
+        coarse.count = of.count; /* derivatives at all nodes of polynomials of the lower order */
+        derivatives_are_right("finer lattice", &coarse, &d, (const double(*)[3])places, 1);
+        assert_true(d.starts[d.axis_count * of.count] <= most);
+        session_drop_derivatives(&d);
+        free(places);
+    }
 }
 
 int main(void)
@@ -192,6 +220,7 @@ int main(void)
         cmocka_unit_test(solid_cells_have_their_derivatives),
         cmocka_unit_test(lobatto_points_are_recognised),
         cmocka_unit_test(shells_have_their_derivatives),
+        cmocka_unit_test(finer_lattices_have_derivatives),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

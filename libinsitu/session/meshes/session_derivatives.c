@@ -6,6 +6,9 @@
  * at the barycentric coordinates a, b, c, d (Silvester 1969). A wedge's polynomial is the product of a triangle's and
  * a line's.
  *
+ * In finer lattices (session_finer.h) the polynomials have a lower order than the lattice, and follow from fewer nodes:
+ * those on the line, or in the triangle or tet, that are multiples of `parts`. The sums are then short.
+ *
  * The polynomials of serendipity cells are those of complete cells of order 2 whose values at the missing nodes follow
  * from the others: at the middle of a face half the sum of the midpoints around it, less a quarter of that of the
  * corners; at the middle of a hex a quarter of the sum of all midpoints, less a quarter of that of the corners. */
@@ -23,10 +26,12 @@ typedef struct term_list {
     session_derivatives *out;
     const session_nodes *of;
     insitu_vertex_order order;
+    int parts, order_of_polynomial;
     int count;
-    double lines[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE]; /* [i][j]: derivative at node i of the function of node j */
-    double values[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE],
-        slopes[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE]; /* derivatives of B_n(t), as defined at the top of this file */
+    /* [i][j]: derivative at node i of the function of the j-th node that is used */
+    double lines[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE];
+    /* B_n(t / parts) and its derivatives, as defined at the top of this file */
+    double values[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE], slopes[MOST_NODES_OF_LINE][MOST_NODES_OF_LINE];
 } term_list;
 
 /* ---- one dimension --------------------------------------------------------------------------------------------- */
@@ -61,37 +66,36 @@ void session_place_nodes(int p, bool is_lobatto, double out[MOST_NODES_OF_LINE])
 
 static void derive_lines(term_list *list, bool is_lobatto)
 {
-    const int p = list->of->order;
-    double x[MOST_NODES_OF_LINE] = {0}, products[MOST_NODES_OF_LINE] = {0};
-    session_place_nodes(p, is_lobatto, x);
+    const int p = list->order_of_polynomial, parts = list->parts;
+    double x[MOST_NODES_OF_LINE] = {0};
+    session_place_nodes(list->of->order, is_lobatto, x);
     list->out->first_segment = x[1];
-    for (int i = 0; i <= p; i++) {
-        products[i] = 1;
-        for (int m = 0; m <= p; m++) products[i] *= m == i ? 1 : x[i] - x[m];
-    }
-    for (int i = 0; i <= p; i++) {
-        list->lines[i][i] = 0;
-        for (int m = 0; m <= p; m++)
-            if (m != i) {
-                list->lines[i][m] = products[i] / products[m] / (x[i] - x[m]);
-                list->lines[i][i] += 1 / (x[i] - x[m]);
+    for (int i = 0; i <= list->of->order; i++)
+        for (int m = 0; m <= p; m++) {
+            double sum = 0, scale = 1;
+            for (int skipped = 0; skipped <= p; skipped++) {
+                double product = skipped == m ? 0 : 1;
+                for (int k = 0; k <= p; k++) product *= k == m || k == skipped ? 1 : x[i] - x[k * parts];
+                sum += product;
+                scale *= skipped == m ? 1 : x[m * parts] - x[skipped * parts];
             }
-    }
+            list->lines[i][m] = sum / scale;
+        }
 }
 
-/* Computes B_n and its derivative at whole numbers t. */
+/* Computes B_n and its derivative at multiples t of 1 / parts. */
 static void derive_products(term_list *list)
 {
-    const int p = list->of->order;
-    for (int n = 0; n <= p; n++)
-        for (int t = 0; t <= p; t++) {
+    for (int n = 0; n <= list->order_of_polynomial; n++)
+        for (int i = 0; i <= list->of->order; i++) {
+            const double t = (double)i / list->parts;
             double value = 1, slope = 0;
             for (int m = 0; m < n; m++) {
                 slope = (slope * (t - m) + value) / (m + 1);
-                value *= (double)(t - m) / (m + 1);
+                value *= (t - m) / (m + 1);
             }
-            list->values[n][t] = value;
-            list->slopes[n][t] = slope;
+            list->values[n][i] = value;
+            list->slopes[n][i] = slope;
         }
 }
 
@@ -153,8 +157,8 @@ static void add_term(term_list *list, int i, int j, int k, double weight)
 static void add_line(term_list *list, const int at[3], int axis)
 {
     int node[3] = {at[0], at[1], at[2]};
-    for (int m = 0; m <= list->of->order; m++) {
-        node[axis] = m;
+    for (int m = 0; m <= list->order_of_polynomial; m++) {
+        node[axis] = m * list->parts;
         add_term(list, node[0], node[1], node[2], list->lines[at[axis]][m]);
     }
 }
@@ -163,19 +167,19 @@ static void add_line(term_list *list, const int at[3], int axis)
  * sign. b: the barycentric coordinates of the node times the order; b[2] is 0 in triangles. */
 static void add_barycentric(term_list *list, const int b[4], int coordinate, int k, double sign)
 {
-    const int p = list->of->order, others[3] = {(coordinate + 1) % 4, (coordinate + 2) % 4, (coordinate + 3) % 4};
-    int n[4];
-    for (n[others[0]] = 0; n[others[0]] <= b[others[0]]; n[others[0]]++)
-        for (n[others[1]] = 0; n[others[1]] <= b[others[1]]; n[others[1]]++)
-            for (n[others[2]] = 0; n[others[2]] <= b[others[2]]; n[others[2]]++) {
+    const int p = list->order_of_polynomial, parts = list->parts;
+    int n[4], most[4]; /* above most[m], B_n is 0 */
+    for (int m = 0; m < 4; m++) most[m] = m != coordinate && b[m] % parts == 0 ? b[m] / parts : p;
+    if (list->of->type != GRID_TET) most[2] = 0;
+    for (n[2] = 0; n[2] <= most[2]; n[2]++)
+        for (n[1] = 0; n[1] <= most[1] && n[1] <= p - n[2]; n[1]++)
+            for (n[0] = 0; n[0] <= most[0] && n[0] <= p - n[2] - n[1]; n[0]++) {
                 double weight = sign * p;
-                n[coordinate] = p;
-                for (int m = 0; m < 3; m++) {
-                    n[coordinate] -= n[others[m]];
-                    weight *= list->values[n[others[m]]][b[others[m]]];
-                }
-                weight *= list->slopes[n[coordinate]][b[coordinate]];
-                add_term(list, n[0], n[1], list->of->type == GRID_TET ? n[2] : k, weight);
+                n[3] = p - n[0] - n[1] - n[2];
+                for (int m = 0; m < 4; m++)
+                    weight *= m == coordinate ? list->slopes[n[m]][b[m]] : list->values[n[m]][b[m]];
+                if (n[3] <= most[3])
+                    add_term(list, n[0] * parts, n[1] * parts, list->of->type == GRID_TET ? n[2] * parts : k, weight);
             }
 }
 
@@ -217,7 +221,7 @@ static void find_nodes(const session_nodes *of, insitu_vertex_order order, int (
             }
 }
 
-bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order, bool is_lobatto,
+bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, int parts,
                               session_derivatives *out)
 {
     *out = (session_derivatives){0};
@@ -228,7 +232,8 @@ bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order
     term_list *list = base_calloc(1, sizeof *list);
     bool is_made = out->starts && nodes_at && list;
     if (is_made) {
-        *list = (term_list){.out = out, .of = of, .order = order};
+        *list =
+            (term_list){.out = out, .of = of, .order = order, .parts = parts, .order_of_polynomial = of->order / parts};
         find_nodes(of, order, nodes_at);
         derive_lines(list, is_lobatto);
         derive_products(list);
@@ -258,28 +263,48 @@ bool session_has_two_spacings(const session_nodes *of)
     return of->order > 2 && (of->type == GRID_HEX || of->type == GRID_QUAD);
 }
 
+/* Finds the derivatives of the cells' polynomials at the nodes of finer lattices. */
+static bool derive_finer(const session_mesh *mesh, session_polynomials *out)
+{
+    bool is_made = true;
+    for (int i = 0; i < out->nodal.kind_count && is_made; i++) {
+        const session_nodes *of = &out->nodal.kinds[i].nodes;
+        for (int n = 0; n < 2 && is_made; n++) {
+            const int parts = n ? 1 : mesh->finer.parts;
+            const session_nodes fine = session_complete_nodes(of->type, parts * of->order);
+            if (n == 0) out->refined_counts[i] = fine.count;
+            is_made = session_make_derivatives(&fine, out->order, false, parts, &out->kinds[2 * i + n]);
+        }
+    }
+    return is_made;
+}
+
 bool session_polynomials_create(const session_mesh *mesh, session_polynomials *out)
 {
     *out = (session_polynomials){.rows = session_rows_of(mesh),
                                  .first_pieces = mesh->topology.first_pieces,
                                  .cell_count = mesh->given.cell_count,
-                                 .order = mesh->given.vertex_order,
-                                 .are_equispaced = mesh->finer.parts > 0};
+                                 .order = mesh->given.vertex_order};
     session_list_kinds(&out->rows);
-    out->kinds = base_calloc((size_t)out->rows.kind_count * 2, sizeof *out->kinds);
+    if (mesh->finer.parts) {
+        out->nodal = session_given_rows(&mesh->finer.nodal);
+        session_list_kinds(&out->nodal);
+    }
+    out->kinds = base_calloc((size_t)ROWS_MOST_KINDS * 2, sizeof *out->kinds);
     bool is_made = out->kinds != NULL;
+    if (mesh->finer.parts) return is_made && derive_finer(mesh, out);
     for (int i = 0; i < out->rows.kind_count && is_made; i++) {
         const session_nodes *of = &out->rows.kinds[i].nodes;
-        is_made = session_make_derivatives(of, out->order, false, &out->kinds[2 * i]);
+        is_made = session_make_derivatives(of, out->order, false, 1, &out->kinds[2 * i]);
         if (is_made && session_has_two_spacings(of))
-            is_made = session_make_derivatives(of, out->order, true, &out->kinds[2 * i + 1]);
+            is_made = session_make_derivatives(of, out->order, true, 1, &out->kinds[2 * i + 1]);
     }
     return is_made;
 }
 
 void session_polynomials_free(session_polynomials *polynomials)
 {
-    for (int i = 0; i < 2 * polynomials->rows.kind_count && polynomials->kinds; i++)
+    for (int i = 0; i < 2 * ROWS_MOST_KINDS && polynomials->kinds; i++)
         session_drop_derivatives(&polynomials->kinds[i]);
     base_free(polynomials->kinds);
     *polynomials = (session_polynomials){0};
@@ -316,10 +341,15 @@ static double mean_end_segment(const session_nodes *of, insitu_vertex_order orde
 const session_derivatives *session_derivatives_of(const session_polynomials *polynomials, int64_t cell,
                                                   const double *positions, int stride)
 {
+    if (polynomials->nodal.kind_count) {
+        const int nodal = session_kind_of(&polynomials->nodal, cell);
+        const bool is_refined = session_row_size(&polynomials->rows, cell) == polynomials->refined_counts[nodal];
+        return &polynomials->kinds[2 * nodal + !is_refined];
+    }
     const int kind = session_kind_of(&polynomials->rows, cell);
     const session_nodes *of = &polynomials->rows.kinds[kind].nodes;
     const session_derivatives *equispaced = &polynomials->kinds[2 * kind], *lobatto = equispaced + 1;
-    if (polynomials->are_equispaced || !session_has_two_spacings(of)) return equispaced;
+    if (!session_has_two_spacings(of)) return equispaced;
     const double between = 0.5 * (equispaced->first_segment + lobatto->first_segment);
     return mean_end_segment(of, polynomials->order, positions, stride) < between ? lobatto : equispaced;
 }

@@ -16,8 +16,10 @@ typedef struct session_derivatives {
 } session_derivatives;
 
 /* Finds the derivatives of a kind of cell. is_lobatto: nodes along edges are Gauss-Lobatto points, otherwise they are
- * equispaced. Returns false if memory runs out; the caller must drop *out in any case. */
-bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order, bool is_lobatto,
+ * equispaced. parts: the polynomial's order is that of the nodes divided by this number, so that it is known from every
+ * parts-th node along each axis; 1 for serendipity cells. Returns false if memory runs out; the caller must drop *out
+ * in any case. */
+bool session_make_derivatives(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, int parts,
                               session_derivatives *out);
 void session_drop_derivatives(session_derivatives *derivatives);
 
@@ -38,8 +40,13 @@ typedef struct session_polynomials {
     const int64_t *first_pieces; /* same as session_topology.first_pieces */
     int64_t cell_count;          /* number of the caller's cells */
     insitu_vertex_order order;
-    bool are_equispaced;        /* set if the nodes of no cell are Gauss-Lobatto points */
-    session_derivatives *kinds; /* for each kind, the derivatives for equispaced nodes, then those for Gauss-Lobatto */
+    /* for each kind, the derivatives for equispaced nodes, then those for Gauss-Lobatto points; if the mesh has finer
+     * lattices, those at the nodes of refined cells, then of others */
+    session_derivatives *kinds;
+    /* If the mesh has finer lattices: the caller's rows, by whose kinds the derivatives are listed, and for each kind
+     * the number of nodes of refined cells. Otherwise the list of kinds is empty. */
+    session_rows nodal;
+    int64_t refined_counts[ROWS_MOST_KINDS];
 } session_polynomials;
 
 /* Finds the polynomials of a mesh's cells. Returns false if memory runs out; the caller must free *out in any case.
