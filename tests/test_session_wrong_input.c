@@ -187,6 +187,7 @@ static void corrupt_choice(formed_mesh *m, dice *d)
 {
     static const int types[] = {0, 5, 7, 9, 10, 11, 12, 13, 14, 41, 42, -1};
     static const int64_t rows[] = {-1, 0, 3, 6, 9, 12, (int64_t)1 << 60, INT64_MIN, INT64_MAX};
+    static const int64_t component_strides[] = {0, 3, 6, (int64_t)1 << 60, INT64_MIN, INT64_MAX};
     insitu_mesh *a = &m->mesh;
     insitu_field *field = &m->fields[roll(d, FORMED_FIELDS)];
     switch (roll(d, 11)) {
@@ -199,7 +200,7 @@ static void corrupt_choice(formed_mesh *m, dice *d)
     case 6: field->corner_row = PICK(d, rows); return;
     case 7: field->centring = (insitu_centring)(roll(d, field->index.data ? 2 : 5) - 1); return;
     case 8: field->component_count = (int)roll(d, 3) - 1; return;
-    case 9: field->component_stride_bytes = PICK(d, rows); return;
+    case 9: field->component_stride_bytes = PICK(d, component_strides); return;
     default: m->patch.first_face = PICK(d, rows);
     }
 }
