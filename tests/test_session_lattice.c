@@ -24,8 +24,8 @@ static const char *const images[] = {
     "[{volume: {field: c, opacity: [[0, 0.2], [1, 0.9]]}}]",
     "[{isosurface: {field: c, values: [0.4], normals: vertex}}]",
     "[{surface: {colour_by: {field: c}, threshold: {field: f, from: 0.2}}}]",
-    "[{isosurface: {field: f, values: [0.9]}}, {slice: {planes: [{normal: [1, 2, 3]}], field: f}}], "
-    "lights: [{direction: [2, 1, 1]}], shadows: true, ambient_occlusion: {samples: 4, radius: 0.2}",
+    ("[{isosurface: {field: f, values: [0.9]}}, {slice: {planes: [{normal: [1, 2, 3]}], field: f}}], "
+     "lights: [{direction: [2, 1, 1]}], shadows: true, ambient_occlusion: {samples: 4, radius: 0.2}"),
 };
 enum { IMAGES = sizeof images / sizeof images[0] };
 
