@@ -107,14 +107,12 @@ static bool read_strides(const blueprint_mesh *mesh, blueprint_field *field)
     int64_t counts[3], offsets[3] = {0, 0, 0};
     int count = 0;
     element_counts(mesh, field->is_element, counts);
-    field->strides[0] = 1;
-    field->strides[1] = counts[0];
-    field->strides[2] = counts[0] * counts[1];
-    if (!mesh->mesh.lattice) return true;
+    if (!mesh->mesh.lattice) {
+        node_strides(NULL, NULL, counts, field->strides);
+        return true;
+    }
     node_integers(&field->field_node, "offsets", offsets, &count);
-    if (node_integers(&field->field_node, "strides", field->strides, &count))
-        for (int axis = 1; axis < 3; axis++)
-            if (axis >= count) field->strides[axis] = field->strides[axis - 1] * counts[axis - 1];
+    node_strides(&field->field_node, "strides", counts, field->strides);
     for (int axis = 0; axis < 3; axis++) {
         if (field->strides[axis] < 1 || offsets[axis] < 0)
             return node_set_error(&field->field_node, field->strides[axis] < 1 ? "strides" : "offsets",

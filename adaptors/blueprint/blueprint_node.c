@@ -266,3 +266,12 @@ bool node_integers(const node *parent, const char *path, int64_t out[3], int *co
     for (int i = 0; i < *count; i++) out[i] = node_element(&array.array, i);
     return true;
 }
+
+void node_strides(const node *parent, const char *path, const int64_t counts[3], int64_t strides[3])
+{
+    int count = 0;
+    strides[0] = 1;
+    if (parent) node_integers(parent, path, strides, &count);
+    for (int axis = 1; axis < 3; axis++)
+        if (axis >= count) strides[axis] = strides[axis - 1] * (counts[axis - 1] > 0 ? counts[axis - 1] : 1);
+}

@@ -28,21 +28,13 @@ static bool set_vertex_counts(const node *of, const char *path, const int64_t co
     return true;
 }
 
-/* Sets the strides of an array without padding, in which i varies fastest. */
-static void set_packed(const int64_t counts[3], int64_t strides[3])
-{
-    strides[0] = 1;
-    strides[1] = counts[0] > 0 ? counts[0] : 1;
-    strides[2] = strides[1] * (counts[1] > 0 ? counts[1] : 1);
-}
-
 /* Sets packed strides for vertices and cells. */
 static void pack_lattice(blueprint_mesh *out)
 {
     int64_t counts[3];
     for (int axis = 0; axis < 3; axis++) counts[axis] = out->lattice.cells[axis] + 1;
-    set_packed(counts, out->lattice.vertex_strides);
-    set_packed(out->lattice.cells, out->lattice.cell_strides);
+    node_strides(NULL, NULL, counts, out->lattice.vertex_strides);
+    node_strides(NULL, NULL, out->lattice.cells, out->lattice.cell_strides);
     out->mesh.vertex_count = blueprint_element_span(counts, out->lattice.vertex_strides);
     out->mesh.cell_count = blueprint_element_span(out->lattice.cells, out->lattice.cell_strides);
 }
@@ -148,7 +140,7 @@ static bool read_explicit(const node *coordset, blueprint_mesh *out)
 static bool read_dims(const node *topology, int64_t counts[3], int64_t offsets[3], int64_t strides[3])
 {
     static const char *const dims[3] = {"elements/dims/i", "elements/dims/j", "elements/dims/k"};
-    int offset_count = 0, stride_count = 0;
+    int offset_count = 0;
     for (int axis = 0; axis < 3; axis++) {
         int64_t cells = 0;
         if (!node_integer(topology, dims[axis], axis == 0, &cells)) return false;
@@ -157,11 +149,8 @@ static bool read_dims(const node *topology, int64_t counts[3], int64_t offsets[3
                                   (long long)cells);
         counts[axis] = cells + 1;
     }
-    set_packed(counts, strides);
     node_integers(topology, "elements/dims/offsets", offsets, &offset_count);
-    if (node_integers(topology, "elements/dims/strides", strides, &stride_count))
-        for (int axis = 1; axis < 3; axis++)
-            if (axis >= stride_count) strides[axis] = strides[axis - 1] * counts[axis - 1];
+    node_strides(topology, "elements/dims/strides", counts, strides);
     for (int axis = 0; axis < 3 && !topology->log->status; axis++)
         if (offsets[axis] < 0 || strides[axis] < 1)
             return node_set_error(topology, offsets[axis] < 0 ? "elements/dims/offsets" : "elements/dims/strides",
