@@ -383,8 +383,7 @@ void place_bars(layout_state &s, insitu_anchor at)
     }
 }
 
-/* ---- covered parts and other decorations
- * ------------------------------------------------------------------------------------------ */
+/* ---- covered parts and other decorations ------------------------------------------------------------------------ */
 
 /* Adds blocks for the covered parts, with a gap around each, so that nothing touches the frame of the other picture. */
 void place_covered(layout_state &s)

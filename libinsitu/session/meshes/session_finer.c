@@ -285,11 +285,6 @@ static void count_spacings(const session_polynomials *of, int64_t counts[SESSION
     }
 }
 
-static bool is_flat(const session_nodes *nodes)
-{
-    return nodes->type == GRID_TRIANGLE || nodes->type == GRID_QUAD;
-}
-
 /* Counts the cells of a mesh that is read as the caller gave it. */
 static bool count_mesh(session_mesh *mesh)
 {
@@ -311,7 +306,7 @@ static bool count_mesh(session_mesh *mesh)
         const session_nodes *of = &polynomials.rows.kinds[i].nodes;
         counts[PYRAMIDS] += of->type == GRID_PYRAMID ? cells[i] : 0;
         counts[SERENDIPITY] += of->is_complete ? 0 : cells[i];
-        counts[SHELLS] += is_flat(of) ? cells[i] : 0;
+        counts[SHELLS] += grid_is_shell_type(of->type) ? cells[i] : 0;
     }
     if (is_made) counts[order]++;
     base_free(places);
@@ -397,7 +392,7 @@ void session_free_choices(session_finer_choice *choices, int count)
  * nodes. */
 static void add_bytes(const session_nodes *nodes, int parts, int64_t cells, session_finer_bytes *out)
 {
-    const int64_t m = parts * nodes->order, pieces = is_flat(nodes) ? m * m : m * m * m;
+    const int64_t m = parts * nodes->order, pieces = grid_is_shell_type(nodes->type) ? m * m : m * m * m;
     const int64_t fine = session_complete_nodes(nodes->type, (int)m).count;
     out->own += cells * (pieces * 4 * (grid_type_vertices(nodes->type) + 1) + fine * 24);
     out->per_component += cells * fine * 8;

@@ -253,8 +253,7 @@ typedef struct piece_step {
     int mesh, parts;
 } piece_step;
 
-/* Orders steps by decreasing bytes, those of the same bytes by their meshes, and those of a mesh by decreasing pieces.
- */
+/* Orders steps by decreasing bytes; if these are equal, by meshes, and in a mesh by decreasing pieces. */
 static int compare_steps(const void *a, const void *b)
 {
     const piece_step *x = a, *y = b;
