@@ -296,6 +296,36 @@ SIMD_INLINE kernel_wide_doubles kernel_raw_to_double(bool is_narrow, const kerne
     return is_narrow ? kernel_wide_doubles_widen(v->narrow) : v->wide;
 }
 
+/* ---- cells of uniform and rectilinear lattices ---- */
+
+/* Coordinates of cells of a lattice whose axes are those of coordinates: at both ends of each cell, by axis. */
+typedef struct kernel_lattice_cells {
+    kernel_wide_doubles ends[2][3];
+} kernel_lattice_cells;
+
+SIMD_INLINE bool kernel_arrays_have_axes(const kernel_arrays *p)
+{
+    return p->coordinates[0].array.axis != NULL;
+}
+
+/* Reads the coordinates of hexes of a lattice with axes, given their first vertices: 6 numbers instead of 24. */
+static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arrays *p, const int32_t first[SIMD_WIDTH],
+                                                                kernel_lattice_cells *out)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const grid_axis *along = p->coordinates[axis].array.axis;
+        double ends[2][SIMD_WIDTH];
+        for (int n = 0; n < SIMD_WIDTH; n++) {
+            const double *at = along->axis_coordinates + grid_index_along(along->vertices, axis, first[n]);
+            ends[0][n] = at[0];
+            ends[1][n] = at[1];
+        }
+        for (int end = 0; end < 2; end++) memcpy(&out->ends[end][axis], ends[end], sizeof ends[end]);
+    }
+}
+
+/* ---- comparisons with a value ---- */
+
 /* A value to compare with: in double, as a sum of two float32 (middle + rest), and the least float32 that is not below
  * it. */
 typedef struct kernel_level {

@@ -296,12 +296,6 @@ SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, int type, co
     }
 }
 
-SIMD_INLINE void kernel_f64_store(float lanes[SIMD_WIDTH], int half, kernel_f64 v)
-{
-    const kernel_f64_floats floats = kernel_f64_narrow(v);
-    memcpy(lanes + half * KERNEL_HALF, &floats, sizeof floats);
-}
-
 /* Computes the two planes, perpendicular to row i of the inverse Jacobian at the centre, between which all vertices
  * lie. They are moved outward by `pad`, the error of a ray's positions. */
 SIMD_INLINE void kernel_f64_planes(const kernel_bounds_lanes *b, int type, int i, kernel_f64 pad, int half,

@@ -40,6 +40,7 @@ typedef struct kernel_transformed_curved {
     kernel_triangle_lines triangles[KERNEL_MAX_TRIANGLES];
     /* least sum of weights of each triangle that is accurate enough (kernel_triangle_least()) */
     float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];
+    unsigned cuboids; /* mask of the lanes with a hex whose edges are parallel to the axes */
     /* The following members are used only by kernel_transformed_curved_cell(), which extracts one lane's cell. */
     kernel_wide_doubles world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
@@ -189,10 +190,26 @@ SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_curved *h, boo
     return out;
 }
 
+/* Returns the lanes whose hex has edges parallel to the axes: sorted, vertices that differ from vertex 0 along x, y and
+ * z are vertex 4, 3 and 1 and those beside them. */
+SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_curved *h, bool is_narrow)
+{
+    static const int neighbours[3] = {4, 3, 1};
+    static const signed char beside[3][8] = {
+        {0, 0, 0, 0, 1, 1, 1, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 1, 1, 0, 0, 1, 1, 0}};
+    vm out = vm_all_lanes();
+    for (int axis = 0; axis < 3; axis++)
+        for (int i = 1; i < 8; i++) {
+            const int like = beside[axis][i] ? neighbours[axis] : 0;
+            if (i != like) out = vm_and(out, kernel_raw_eq(is_narrow, &h->at[i][axis], &h->at[like][axis]));
+        }
+    return out;
+}
+
 /* Reads the vertices and permutes them into canonical order; stores vertex indices, coordinates and ranks. Returns the
  * lanes with an edge of length zero. */
 SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const kernel_arrays *p, bool is_narrow,
-                                          int type, int32_t (*const vertices)[SIMD_WIDTH], vf rank[8])
+                                          int type, int32_t (*const vertices)[SIMD_WIDTH])
 {
     const int count = grid_type_vertices(type);
     kernel_sorted_curved h;
@@ -205,10 +222,10 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
     for (int i = 0; i < count; i++) {
         const vi own_rank = vi_from_vf(h.rank[i]);
         for (int a = 0; a < 3; a++) out->world[a][i] = kernel_raw_to_double(is_narrow, &h.at[i][a]);
-        rank[i] = h.rank[i];
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
         memcpy(out->vertex[i], &h.vertex[i], sizeof h.vertex[i]);
     }
+    out->cuboids = kernel_is_box(type) ? vm_bits(kernel_sorted_curved_cuboids(&h, is_narrow)) : 0;
     return kernel_sorted_curved_collapsed(&h, is_narrow, type);
 }
 
@@ -324,12 +341,17 @@ SIMD_INLINE void kernel_transformed_triangle(kernel_transformed_curved *out, int
     vf_store(out->least[face - kernel_first_triangle(type)], error * extent * (0.5f / KERNEL_WEIGHT_ERROR));
 }
 
-/* Computes the corners of all faces, and the edge functions of the triangular ones. */
-SIMD_INLINE void kernel_transformed_faces(kernel_transformed_curved *out, const kernel_frame *f,
-                                          const kernel_tile *tile, int type, const vf rank[8])
+SIMD_INLINE void kernel_transformed_faces_of(kernel_transformed_curved *out, const kernel_frame *f,
+                                             const kernel_tile *tile, int type)
 {
     const kernel_shape *shape = kernel_cell_shape(type);
     kernel_lanes_lines lines;
+    vf rank[8];
+    for (int i = 0; i < grid_type_vertices(type); i++) {
+        vi own_rank;
+        memcpy(&own_rank, out->rank[i], sizeof own_rank);
+        rank[i] = vf_from_vi(own_rank);
+    }
     if (kernel_has_triangles(type)) kernel_lanes_edge_functions(out, f, tile, type, &lines);
     for (int face = 0; face < shape->face_count; face++) {
         if (kernel_has_triangles(type) && shape->faces[face].count == 3) {
@@ -341,7 +363,91 @@ SIMD_INLINE void kernel_transformed_faces(kernel_transformed_curved *out, const 
     }
 }
 
+/* Computes the corners of all faces, and the edge functions of the triangular ones. */
+static __attribute__((noinline)) void kernel_transformed_faces(kernel_transformed_curved *out, const kernel_frame *f,
+                                                               const kernel_tile *tile, int type)
+{
+    KERNEL_OF_TYPE(type, kernel_transformed_faces_of, out, f, tile);
+}
+
+/* ---- cells of lattices ---- */
+
+/* Returns whether coordinates increase along all axes, so that the sorted order of vertices is known. */
+SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_lattice_cells *cells)
+{
+    vm sorted = vm_all_lanes();
+    for (int axis = 0; axis < 3; axis++)
+        sorted = vm_and(sorted, kernel_wide_doubles_lt(&cells->ends[0][axis], &cells->ends[1][axis]));
+    return vm_bits(sorted) == vm_bits(vm_all_lanes());
+}
+
+/* Transforms the vertices of cuboids, as kernel_lanes_transform() does for single vertices, with the same bits: each
+ * product is computed once for the vertices that share it. Sorted, bit 0, 1 and 2 of a vertex's reference coordinates
+ * are along z, y and x. */
+SIMD_INLINE void kernel_lattice_cells_transform(const kernel_lattice_cells *cells, const kernel_frame *f,
+                                                const kernel_tile *tile, int half, kernel_transformed_curved *out)
+{
+    static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
+    const double *eye = f->job->camera.eye;
+    kernel_f64 parts[3][3][2];
+    for (int axis = 0; axis < 3; axis++)
+        for (int end = 0; end < 2; end++) {
+            const kernel_f64 d = cells->ends[end][axis].half[half] - eye[axis];
+            for (int a = 0; a < 3; a++) parts[a][axis][end] = f->scaled_axes[a][axis] * d;
+        }
+    for (int b = 0; b < 8; b++) {
+        const int z = b & 1, y = b >> 1 & 1, x = b >> 2, to = vertex[b];
+        kernel_f64 at[3];
+        for (int a = 0; a < 3; a++) at[a] = parts[a][0][x] + parts[a][1][y] + parts[a][2][z];
+        const kernel_f64 depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
+        kernel_f64_store(out->at[0][to], half, at[0] - tile->centre_x * depth);
+        kernel_f64_store(out->at[1][to], half, at[1] - tile->centre_y * depth);
+        kernel_f64_store(out->at[2][to], half, at[2] - tile->depth_shift);
+    }
+}
+
+/* Stores lattice cells in sorted order. The result has the same bits as that of other hexes. */
+SIMD_INLINE void kernel_lattice_cells_store(const kernel_lattice_cells *cells, int32_t (*const vertices)[SIMD_WIDTH],
+                                            const kernel_frame *f, const kernel_tile *tile,
+                                            kernel_transformed_curved *out)
+{
+    /* for each vertex in sorted order: its number in the lattice's order, and its rank */
+    static const signed char given[8] = {0, 4, 7, 3, 1, 5, 6, 2}, rank[8] = {0, 1, 3, 2, 4, 5, 7, 6};
+    for (int i = 0; i < 8; i++) {
+        const vi own_rank = vi_set(rank[i]);
+        memcpy(out->vertex[i], vertices[(int)given[i]], sizeof out->vertex[i]);
+        memcpy(out->rank[i], &own_rank, sizeof own_rank);
+        for (int axis = 0; axis < 3; axis++) out->world[axis][i] = cells->ends[rank[i] >> (2 - axis) & 1][axis];
+    }
+    for (int half = 0; half < 2; half++) kernel_lattice_cells_transform(cells, f, tile, half, out);
+    out->cuboids = vm_bits(vm_all_lanes());
+}
+
 /* ---- whole cells ---- */
+
+/* Sorts and transforms the vertices. Returns the lanes with an edge of length zero. */
+SIMD_INLINE vm kernel_transform_curved_vertices(kernel_transformed_curved *out, const kernel_arrays *p,
+                                                const kernel_frame *f, const kernel_tile *tile,
+                                                int32_t vertices[8][SIMD_WIDTH], int type)
+{
+    if (kernel_is_box(type) && kernel_arrays_have_axes(p)) {
+        kernel_lattice_cells lattice;
+        kernel_lattice_cells_read(p, vertices[0], &lattice);
+        if (kernel_lattice_cells_are_sorted(&lattice)) {
+            kernel_lattice_cells_store(&lattice, vertices, f, tile, out);
+            return vm_none();
+        }
+    }
+    const vm collapsed = p->has_narrow_positions ? kernel_sorted_curved_fetch(out, p, true, type, vertices)
+                                                 : kernel_sorted_curved_fetch(out, p, false, type, vertices);
+    for (int i = 0; i < grid_type_vertices(type); i++) {
+        const kernel_wide_doubles *const world[3] = {&out->world[0][i], &out->world[1][i], &out->world[2][i]};
+        vf at[3];
+        kernel_lanes_transform(f, tile, world, at);
+        for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);
+    }
+    return collapsed;
+}
 
 SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, const kernel_arrays *p,
                                                const kernel_frame *f, const kernel_tile *tile,
@@ -350,27 +456,20 @@ SIMD_INLINE vm kernel_transform_curved_of_type(kernel_transformed_curved *out, c
 {
     const int count = grid_type_vertices(type);
     kernel_wide_doubles values[8];
-    vf relative[8], rank[8];
-    const vm collapsed = p->has_narrow_positions ? kernel_sorted_curved_fetch(out, p, true, type, vertices, rank)
-                                                 : kernel_sorted_curved_fetch(out, p, false, type, vertices, rank);
+    vf relative[8];
+    const vm collapsed = kernel_transform_curved_vertices(out, p, f, tile, vertices, type);
     for (int i = 0; i < count; i++) {
-        const kernel_wide_doubles *world[3];
         vi vertex;
-        vf at[3];
         memcpy(&vertex, out->vertex[i], sizeof vertex);
         values[i] = kernel_numbers_gather(&p->values, vertex);
-        for (int a = 0; a < 3; a++) world[a] = &out->world[a][i];
-        kernel_lanes_transform(f, tile, world, at);
-        for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);
     }
     kernel_lanes_relative(values, count, isovalues, relative);
     for (int i = 0; i < count; i++) vf_store(out->at[3][i], relative[i]);
-    kernel_transformed_faces(out, f, tile, type, rank);
     return collapsed;
 }
 
 /* Fetches, permutes and transforms cells of one type, given their vertex indices by vertex and lane. Returns the lanes
- * with an edge of length zero. */
+ * with an edge of length zero. kernel_transformed_faces() computes their faces. */
 static __attribute__((noinline)) vm kernel_transform_curved(kernel_transformed_curved *out, const kernel_arrays *p,
                                                             const kernel_frame *f, const kernel_tile *tile,
                                                             int32_t vertices[8][SIMD_WIDTH],

@@ -169,10 +169,45 @@ SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_curv
     }
 }
 
+/* Does what kernel_curved_lanes_transform() does, with the same bits, for hexes of a lattice with axes: vertices share
+ * coordinates and their products. */
+static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kernel_finder *s, const kernel_cells *c,
+                                                                     kernel_curved_lanes *l)
+{
+    static const signed char ends[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                           {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+    const render_camera *camera = &s->frame->job->camera;
+    const double *axes[3] = {camera->right, camera->up, camera->forward};
+    kernel_lattice_cells cells;
+    vf parts[3][3][2];
+    kernel_lattice_cells_read(&s->arrays, c->vertex[0], &cells);
+    l->count = 8;
+    l->fitting_lanes = vm_all_lanes();
+    for (int end = 0; end < 2; end++) {
+        vf place[3];
+        for (int k = 0; k < 3; k++) {
+            const kernel_raw_numbers world = {.wide = cells.ends[end][k]};
+            place[k] =
+                kernel_raw_minus(&s->arrays.coordinates[k], &world, &s->eye[k]) * (float)s->frame->job->space.scale;
+            for (int a = 0; a < 3; a++) parts[a][k][end] = place[k] * (float)axes[a][k];
+        }
+        l->fitting_lanes = kernel_positions_fit_lanes(l->fitting_lanes, place);
+    }
+    for (int i = 0; i < 8; i++) {
+        const signed char *at = ends[i];
+        for (int a = 0; a < 3; a++)
+            l->at[i][a] = (parts[a][0][(int)at[0]] + parts[a][1][(int)at[1]]) + parts[a][2][(int)at[2]];
+    }
+}
+
 /* Reads the vertices' positions and rotates them into the camera's axes. */
 SIMD_INLINE void kernel_curved_lanes_transform(const kernel_finder *s, const kernel_cells *c, int count,
                                                kernel_curved_lanes *l)
 {
+    if (count == 8 && kernel_arrays_have_axes(&s->arrays)) {
+        kernel_lattice_lanes_transform(s, c, l);
+        return;
+    }
     l->count = count;
     l->fitting_lanes = vm_all_lanes();
     for (int i = 0; i < count; i++) {

@@ -60,6 +60,13 @@ SIMD_INLINE void kernel_f64_store_lanes(vf *v, int half, kernel_f64 d)
     memcpy((char *)v + half * (int)sizeof f, &f, sizeof f);
 }
 
+/* As above, for lanes in memory. */
+SIMD_INLINE void kernel_f64_store(float lanes[SIMD_WIDTH], int half, kernel_f64 v)
+{
+    const kernel_f64_floats floats = kernel_f64_narrow(v);
+    memcpy(lanes + half * KERNEL_HALF, &floats, sizeof floats);
+}
+
 SIMD_INLINE kernel_f64 kernel_f64_abs(kernel_f64 a)
 {
     return (kernel_f64)((kernel_f64_mask)a & INT64_MAX);

@@ -1,7 +1,8 @@
 /* Traces batches of SIMD_WIDTH hexes, wedges or pyramids of one type in a tile. A cell of a few pixels would leave most
  * lanes of a block's packet idle, and half of the rays in the cell have no crossing. So rays of several cells are
  * processed side by side, and after each stage the remaining rays are put side by side again:
- *     pixels of boxes       is the only crossing known, or is there none?   kernel_contraction.h
+ *     pixels of boxes       where is the only root in a cuboid?             kernel_cuboids.h
+ *     undecided rays        is the only crossing known, or is there none?   kernel_contraction.h
  *     undecided rays        which faces does the ray cross?                 signs of edge functions
  *     rays with two faces   where, and what is the field there?             bilinear patches
  *     rays with one root    where is it, and what is its normal?            Newton's method
@@ -10,8 +11,9 @@
  * whether there is a root. Rays of other cells are searched for roots.
  *
  * Rays with an edge function of uncertain sign, and rays that do not cross exactly two faces once each, are traced one
- * by one in the cell (kernel_surface.h). All operations are those for a single cell in the same order, so a hit has the
- * same bits whichever way it is computed. */
+ * by one in the cell (kernel_surface.h). All operations but those of kernel_cuboids.h are those for a single cell in
+ * the same order, so a hit has the same bits whichever way it is computed. Which rays kernel_cuboids.h decides depends
+ * on their own cell alone. */
 #ifndef RENDER_KERNEL_CURVED_BATCH_H
 #define RENDER_KERNEL_CURVED_BATCH_H
 
@@ -25,6 +27,7 @@
 #include "kernel_cell.h"
 #include "kernel_colour.h"
 #include "kernel_contraction.h"
+#include "kernel_cuboids.h"
 #include "kernel_curved_rays.h"
 #include "kernel_lines.h"
 #include "kernel_map.h"
@@ -49,6 +52,8 @@ typedef struct kernel_curved_batch {
     /* colour field by vertex and lane, as in kernel_cell.g; set only if the layer has one */
     float colours[8][SIMD_WIDTH];
     float lines[8][SIMD_WIDTH]; /* field of the contour lines by vertex and lane; set only if the layer has lines */
+    kernel_cuboids cuboids;
+    bool has_bounds; /* set if the bounds and the faces of the transformed cells have been computed */
     kernel_bounds bounds;
     unsigned copied_lanes; /* mask of the lanes whose cells have been copied to `cells` */
     kernel_cell cells[SIMD_WIDTH];
@@ -144,6 +149,19 @@ SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane,
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
 }
 
+/* Stores those of the vector of rays from index n on whose bit is set in the list from index `kept` on. Returns the new
+ * number of kept rays. */
+SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned rays, int kept)
+{
+    for (; rays; rays &= rays - 1) {
+        const int i = n + __builtin_ctz(rays);
+        h->rays.pixel[kept] = h->rays.pixel[i];
+        h->rays.lane[kept] = h->rays.lane[i];
+        kept++;
+    }
+    return kept;
+}
+
 /* Appends the rays in at->one to the list of found crossings, and their depths and reference coordinates to found_ends.
  * Of the other rays, the undecided ones are stored in the list from index `kept` on. Returns the new number of kept
  * rays. */
@@ -156,13 +174,7 @@ SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const ke
         for (int a = 0; a < 3; a++) h->found_ends.r[0][a][to] = at->r[a][i];
         kernel_curved_ray_add(&h->found, &h->rays, n + i);
     }
-    for (; undecided; undecided &= undecided - 1) {
-        const int i = n + __builtin_ctz(undecided);
-        h->rays.pixel[kept] = h->rays.pixel[i];
-        h->rays.lane[kept] = h->rays.lane[i];
-        kept++;
-    }
-    return kept;
+    return kernel_curved_batch_keep(h, n, undecided, kept);
 }
 
 /* Decides as many rays as possible without intersecting faces: by the slab that contains the isosurface, and by
@@ -355,17 +367,23 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_accept(kernel_tile
     return blocks;
 }
 
-/* Computes the field's gradients at the reference coordinates r, in camera axes. If the layer has normals from vertices
- * (RENDER_VERTEX), r is stored instead, from which kernel_vertex_normals() computes normals later. */
+/* Rotates gradients of the field from tile space into camera axes. If the layer has normals from vertices
+ * (RENDER_VERTEX), the reference coordinates r are stored instead, from which kernel_vertex_normals() computes normals
+ * later. */
+SIMD_INLINE void kernel_curved_batch_orient(const kernel_tile_trace *t, const vf gradient[3], const vf r[3],
+                                            vf normal[3])
+{
+    const bool is_later = t->surface->layer->normal == RENDER_VERTEX;
+    for (int a = 0; a < 3; a++) normal[a] = is_later ? r[a] : gradient[a];
+    if (!is_later) normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y;
+}
+
 SIMD_INLINE void kernel_curved_batch_normal(const kernel_tile_trace *t, const kernel_map *map, const vf r[3],
                                             vf normal[3])
 {
-    if (t->surface->layer->normal == RENDER_VERTEX) {
-        for (int a = 0; a < 3; a++) normal[a] = r[a];
-        return;
-    }
-    kernel_lanes_normal(map, r, normal);
-    normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y;
+    vf gradient[3] = {vf_set(0), vf_set(0), vf_set(0)};
+    if (t->surface->layer->normal != RENDER_VERTEX) kernel_lanes_normal(map, r, gradient);
+    kernel_curved_batch_orient(t, gradient, r, normal);
 }
 
 /* Accepts the hits of a vector of the rays in `found`, from index n on. Returns a mask of the blocks that contain a ray
@@ -379,6 +397,38 @@ SIMD_INLINE unsigned kernel_curved_batch_accept_hits(kernel_tile_trace *t, kerne
     kernel_curved_batch_normal(t, map, at->r, places.normal);
     memcpy(places.r, at->r, sizeof places.r);
     return kernel_curved_batch_accept(t, h, &h->found, n, p, vm_bits(hit), &places);
+}
+
+/* Accepts the visible hits of rays in cuboids that have exactly one root. Rays whose roots are uncertain, and rays in
+ * other cells, remain in `rays`. Returns a mask of the blocks that contain a ray whose hit is nearer than its previous
+ * one. */
+static __attribute__((noinline)) unsigned kernel_curved_batch_cross_cuboids(kernel_tile_trace *t,
+                                                                            kernel_curved_batch *h)
+{
+    const float(*const at)[8][SIMD_WIDTH] = (const float(*)[8][SIMD_WIDTH])h->transformed.at;
+    unsigned nearer = 0;
+    int kept = 0;
+    for (int n = 0; n < h->rays.count; n += SIMD_WIDTH) {
+        kernel_lane_rays p;
+        kernel_cuboid_roots roots;
+        kernel_lane_rays_begin(&p, t, &h->rays, n);
+        p.far = kernel_pixel_far(t, p.at);
+        p.active = vm_and(p.active, vf_le(kernel_gather_lane(h->queued->near, p.lane), p.far));
+        const vm cuboid = vf_lt(kernel_gather_lane(h->cuboids.domain_margin, p.lane), vf_set(INFINITY));
+        const vm rays = vm_and(p.active, cuboid);
+        kernel_cuboid_roots_of(&h->cuboids, at, &p, rays, &roots);
+        const vm hit = vm_and(roots.one, vm_and(vf_le(vf_set(t->t_near), roots.t), vf_le(roots.t, p.far)));
+        if (vm_any(hit)) {
+            kernel_curved_batch_points places = {.t = roots.t};
+            kernel_curved_batch_orient(t, roots.normal, roots.r, places.normal);
+            memcpy(places.r, roots.r, sizeof places.r);
+            nearer |= kernel_curved_batch_accept(t, h, &h->rays, n, &p, vm_bits(hit), &places);
+        }
+        kept = kernel_curved_batch_keep(h, n, vm_bits(vm_andnot(p.active, vm_or(roots.one, roots.none))), kept);
+    }
+    h->rays.count = kept;
+    kernel_pixel_list_close(&h->rays);
+    return nearer;
 }
 
 /* Refines the roots that have been found, and accepts those that are visible. is_contracted: the roots come from
@@ -470,10 +520,22 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile
 
 /* ---- batches ---- */
 
-/* Traces all rays in the list `rays`, stage by stage. */
-static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trace *t, kernel_curved_batch *h)
+/* Computes the cells' faces and bounds, unless that has been done. */
+static void kernel_curved_batch_set_bounds(const kernel_tile_trace *t, kernel_curved_batch *h)
 {
-    kernel_pixel_list_close(&h->rays);
+    const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
+    if (h->has_bounds) return;
+    kernel_transformed_faces(&h->transformed, t->frame, &t->tile, h->queued->type);
+    kernel_bounds_of(h->queued->type, (const float(*)[8][SIMD_WIDTH])h->transformed.at, &beam, &h->bounds);
+    h->has_bounds = true;
+}
+
+/* Traces the rays in the list `rays` that are not decided by cuboids, stage by stage. Returns a mask of the blocks that
+ * contain a ray whose hit is nearer than its previous one. */
+static unsigned kernel_curved_batch_trace_others(kernel_tile_trace *t, kernel_curved_batch *h)
+{
+    if (!h->rays.count) return 0;
+    kernel_curved_batch_set_bounds(t, h);
     kernel_curved_batch_contract(t, h);
     unsigned nearer = kernel_curved_batch_hit_contracted(t, h);
     nearer |= kernel_curved_batch_find_faces(t, h);
@@ -482,6 +544,15 @@ static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trac
     kernel_pixel_list_close(&h->others);
     nearer |= kernel_curved_batch_hit(t, h);
     for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_curved_batch_search(t, h, n);
+    return nearer;
+}
+
+/* Traces all rays in the list `rays`. */
+static __attribute__((noinline)) void kernel_curved_batch_trace(kernel_tile_trace *t, kernel_curved_batch *h)
+{
+    kernel_pixel_list_close(&h->rays);
+    unsigned nearer = h->transformed.cuboids ? kernel_curved_batch_cross_cuboids(t, h) : 0;
+    nearer |= kernel_curved_batch_trace_others(t, h);
     for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
     h->rays.count = 0;
 }
@@ -500,13 +571,13 @@ SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                     kernel_surface_cells *queued)
 {
-    const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
     const bool by_ray = kernel_tile_layer_batches(t);
     kernel_surface_cells_close(queued);
     h->queued = queued;
     const vm collapsed = kernel_transform_curved(&h->transformed, &queued->arrays, t->frame, &t->tile, queued->vertex,
                                                  queued->isovalue, queued->type);
-    kernel_bounds_of(queued->type, (const float(*)[8][SIMD_WIDTH])h->transformed.at, &beam, &h->bounds);
+    h->has_bounds = false;
+    if (h->transformed.cuboids && by_ray) kernel_cuboids_of(&h->transformed, t->frame, &t->tile, &h->cuboids);
     if (t->surface->layer->colour_map) kernel_curved_batch_fetch_colours(t, h);
     if (t->surface->layer->lines) kernel_curved_batch_fetch_lines(t, h);
     h->copied_lanes = 0;
@@ -520,6 +591,7 @@ static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_
             kernel_curved_batch_rays_of(t, h, n, queued->box[n], queued->blocks[n]);
             continue;
         }
+        kernel_curved_batch_set_bounds(t, h);
         kernel_curved_ready(t, h, n);
         cells.lane = n;
         kernel_blocks_trace(t, blocks, h->queued->part, queued->cell[n], &h->cells[n], queued->value[n]);

@@ -1,0 +1,260 @@
+/* Measures uniform grids that are handed over as one lattice, as hexes, or as blocks of BLOCK^3 cells: the first step,
+ * steps with new values and bytes per cell, in turns in one process. Prints CSV. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <mpi.h>
+
+#include "bench_command.h"
+#include "bench_scene.h"
+#include "bench_stats.h"
+#include "insitu/insitu.h"
+
+enum { BLOCK = 16, CORNERS = 8, PHASES = 2, FULL_TREE = 12 };
+
+typedef enum bench_form { AS_LATTICE, AS_HEXES, AS_BLOCKS, FORM_COUNT } bench_form;
+
+static const char *const form_names[FORM_COUNT] = {"lattice", "hexes", "blocks"};
+
+/* The grid in one form, with two states of its values. Forms are made when they are needed, and freed after it. */
+typedef struct bench_grid {
+    const bench_scene *scene;
+    bench_form form;
+    int cells; /* along each axis, of a block */
+    int64_t block_count, block_vertices, block_cells;
+    float *values[PHASES]; /* blocks × vertices of a block */
+    float *coordinates[3]; /* of hexes */
+    int32_t *connectivity;
+} bench_grid;
+
+static void *allocate(int64_t count, size_t size)
+{
+    void *p = malloc((size_t)count * size);
+    if (!p) abort();
+    return p;
+}
+
+static void place_of_block(const bench_grid *g, int64_t block, int64_t first[3])
+{
+    const int64_t along = g->scene->subject.n / g->cells;
+    first[0] = block % along * g->cells;
+    first[1] = block / along % along * g->cells;
+    first[2] = block / along / along * g->cells;
+}
+
+static double coordinate(const bench_grid *g, int64_t index)
+{
+    const double spacing = 2.0 / g->scene->subject.n;
+    return -1 + spacing * (double)index;
+}
+
+static void fill_block(const bench_grid *g, int64_t block)
+{
+    const int64_t side = g->cells + 1;
+    int64_t first[3];
+    place_of_block(g, block, first);
+    for (int64_t v = 0; v < g->block_vertices; v++) {
+        const int64_t at[3] = {v % side, v / side % side, v / side / side};
+        double p[3];
+        for (int axis = 0; axis < 3; axis++) {
+            p[axis] = coordinate(g, first[axis] + at[axis]);
+            if (g->coordinates[axis]) g->coordinates[axis][v] = (float)p[axis];
+        }
+        for (int phase = 0; phase < PHASES; phase++) {
+            const double moved[3] = {p[0] + 0.01 * phase, p[1] + 0.02 * phase, p[2] + 0.03 * phase};
+            g->values[phase][block * g->block_vertices + v] = (float)test_wave(moved);
+        }
+    }
+}
+
+static void fill_connectivity(bench_grid *g)
+{
+    static const int corners[CORNERS][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                            {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+    const int64_t n = g->cells, side = n + 1;
+#pragma omp parallel for schedule(static)
+    for (int64_t c = 0; c < g->block_cells; c++)
+        for (int i = 0; i < CORNERS; i++)
+            g->connectivity[CORNERS * c + i] = (int32_t)(c % n + corners[i][0] + side * (c / n % n + corners[i][1]) +
+                                                         side * side * (c / n / n + corners[i][2]));
+}
+
+static void create_grid(bench_grid *g, const bench_scene *scene, bench_form form)
+{
+    const int n = scene->subject.n;
+    *g = (bench_grid){.scene = scene, .form = form, .cells = form == AS_BLOCKS && n > BLOCK ? BLOCK : n};
+    const int64_t cells = g->cells, along = n / cells;
+    g->block_count = along * along * along;
+    g->block_vertices = (cells + 1) * (cells + 1) * (cells + 1);
+    g->block_cells = cells * cells * cells;
+    for (int i = 0; i < PHASES; i++) g->values[i] = allocate(g->block_count * g->block_vertices, sizeof(float));
+    for (int axis = 0; axis < 3 && form == AS_HEXES; axis++)
+        g->coordinates[axis] = allocate(g->block_vertices, sizeof(float));
+    if (form == AS_HEXES) g->connectivity = allocate(CORNERS * g->block_cells, sizeof(int32_t));
+    if (form == AS_HEXES) fill_connectivity(g);
+#pragma omp parallel for schedule(static)
+    for (int64_t block = 0; block < g->block_count; block++) fill_block(g, block);
+}
+
+static void free_grid(bench_grid *g)
+{
+    for (int i = 0; i < PHASES; i++) free(g->values[i]);
+    for (int axis = 0; axis < 3; axis++) free(g->coordinates[axis]);
+    free(g->connectivity);
+}
+
+static void must(insitu_session *session, insitu_status status)
+{
+    if (status == INSITU_OK) return;
+    fprintf(stderr, "bench_blocks: %s\n", insitu_error(session));
+    exit(1);
+}
+
+static insitu_session *open_session(const bench_scene *scene)
+{
+    char path[] = "/tmp/bench_blocks_XXXXXX";
+    insitu_session *session = NULL;
+    const int descriptor = mkstemp(path);
+    FILE *file = descriptor >= 0 ? fdopen(descriptor, "w") : NULL;
+    if (!file) {
+        perror(path);
+        exit(1);
+    }
+    fprintf(file, "threads: %d\nimages:\n  - name: picture\n    size: [%d, %d]\n", scene->subject.threads,
+            scene->job.camera.width, scene->job.camera.height);
+    fprintf(file, "    camera: {position: [%g, %g, %g], focal: [%g, %g, %g], up: [%g, %g, %g], angle: %g}\n",
+            bench_eye[0], bench_eye[1], bench_eye[2], bench_focal[0], bench_focal[1], bench_focal[2], bench_up[0],
+            bench_up[1], bench_up[2], bench_degrees);
+    fprintf(file, "    layers: [isosurface: {field: f, values: [%g]}]\n    outputs: [{path: picture.png}]\n",
+            bench_isovalues[0]);
+    fclose(file);
+    const insitu_status status = insitu_create(MPI_COMM_WORLD, path, &session);
+    unlink(path);
+    must(session, status);
+    return session;
+}
+
+static void set_mesh(insitu_session *session, const bench_grid *g)
+{
+    const double spacing = 2.0 / g->scene->subject.n;
+    for (int64_t block = 0; block < g->block_count; block++) {
+        insitu_lattice lattice = {
+            .cells = {g->cells, g->cells, g->cells}, .origin = {-1, -1, -1}, .spacing = {spacing, spacing, spacing}};
+        insitu_mesh mesh;
+        place_of_block(g, block, lattice.first);
+        insitu_mesh_defaults(&mesh);
+        mesh.vertex_count = g->block_vertices;
+        mesh.cell_count = g->block_cells;
+        if (g->form == AS_HEXES) {
+            mesh.cell_type = INSITU_HEX;
+            mesh.connectivity_count = CORNERS * g->block_cells;
+            mesh.connectivity = (insitu_array){.data = g->connectivity, .type = INSITU_INT32};
+            for (int axis = 0; axis < 3; axis++)
+                mesh.coordinates[axis] = (insitu_array){.data = g->coordinates[axis], .type = INSITU_FLOAT32};
+        } else {
+            mesh.lattice = &lattice;
+        }
+        must(session, g->form == AS_BLOCKS ? insitu_set_block(session, "cube", block, &mesh)
+                                           : insitu_set_mesh(session, "cube", &mesh));
+    }
+}
+
+static void set_values(insitu_session *session, const bench_grid *g, int phase)
+{
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = "f";
+    field.count = g->block_vertices;
+    field.changed = INSITU_CHANGED_VALUES;
+    for (int64_t block = 0; block < g->block_count; block++) {
+        field.values = (insitu_array){.data = g->values[phase] + block * g->block_vertices, .type = INSITU_FLOAT32};
+        must(session, g->form == AS_BLOCKS ? insitu_set_block_field(session, "cube", block, &field)
+                                           : insitu_set_field(session, "cube", &field));
+    }
+}
+
+static void measure_first_step(const bench_grid *g, int number, bench_series *series)
+{
+    insitu_session *session = open_session(g->scene);
+    const double began = bench_begin();
+    set_mesh(session, g);
+    set_values(session, g, 0);
+    must(session, insitu_step(session, 0, 0));
+    bench_end(began, number, series);
+    insitu_destroy(&session);
+}
+
+typedef struct bench_times {
+    bench_series first, whole, trace;
+} bench_times;
+
+static void measure_new_values(insitu_session *session, const bench_grid *g, int number, bench_times *times)
+{
+    set_values(session, g, number % PHASES);
+    const double began = bench_begin();
+    must(session, insitu_step(session, 0, 0));
+    bench_end(began, number, &times->whole);
+    bench_add_sample(1e-3 * insitu_last_report(session)->surface_ms, number, &times->trace);
+}
+
+static void print(const bench_grid *g, const insitu_report *report, bench_times *times)
+{
+    const bench_subject *subject = &g->scene->subject;
+    const char *name = form_names[g->form];
+    const double cells = (double)subject->cells;
+    char measure[64];
+    snprintf(measure, sizeof measure, "%s first step", name);
+    bench_print_series(subject, measure, &times->first);
+    snprintf(measure, sizeof measure, "%s new values", name);
+    bench_print_series(subject, measure, &times->whole);
+    snprintf(measure, sizeof measure, "%s new values trace", name);
+    bench_print_series(subject, measure, &times->trace);
+    snprintf(measure, sizeof measure, "%s peak", name);
+    bench_print_number(subject, measure, "bytes/cell", (double)report->bytes_peak / cells);
+    snprintf(measure, sizeof measure, "%s copied", name);
+    bench_print_number(subject, measure, "bytes/cell", (double)report->bytes_copied / cells);
+}
+
+static void measure(const bench_command *command, test_mesh_kind kind, int n)
+{
+    bench_scene scene = {.subject = {.program = "bench_blocks"}};
+    (void)kind;
+    bench_scene_create(&scene, "bench_blocks", TEST_HEXES, 1);
+    bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
+    scene.subject.n = n;
+    scene.subject.cells = (int64_t)n * n * n;
+    bench_grid grids[FORM_COUNT];
+    bench_times times[FORM_COUNT] = {0};
+    insitu_session *sessions[FORM_COUNT];
+    for (bench_form form = 0; form < FORM_COUNT; form++) create_grid(&grids[form], &scene, form);
+    for (int number = 0; number <= command->runs; number++)
+        for (bench_form form = 0; form < FORM_COUNT; form++)
+            measure_first_step(&grids[form], number, &times[form].first);
+    for (bench_form form = 0; form < FORM_COUNT; form++) {
+        sessions[form] = open_session(&scene);
+        set_mesh(sessions[form], &grids[form]);
+        for (int i = 0; i < FULL_TREE; i++) measure_new_values(sessions[form], &grids[form], 0, &times[form]);
+    }
+    for (int number = 1; number <= command->runs; number++)
+        for (bench_form form = 0; form < FORM_COUNT; form++)
+            measure_new_values(sessions[form], &grids[form], number, &times[form]);
+    for (bench_form form = 0; form < FORM_COUNT; form++) {
+        print(&grids[form], insitu_last_report(sessions[form]), &times[form]);
+        insitu_destroy(&sessions[form]);
+        free_grid(&grids[form]);
+    }
+    bench_scene_free(&scene);
+}
+
+int main(int argc, char **argv)
+{
+    MPI_Init(&argc, &argv);
+    const int status = bench_measure_meshes(
+        argc, argv,
+        "Measures uniform grids of N^3 cells, MESH being hexes, as one lattice, as hexes and as blocks of\n"
+        "16^3 cells: the first step, steps with new values, and bytes per cell.",
+        TEST_HEXES, measure);
+    MPI_Finalize();
+    return status;
+}

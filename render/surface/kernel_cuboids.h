@@ -1,0 +1,286 @@
+/* Finds the crossings of rays with the isovalue in cuboids: hexes whose edges are parallel to the axes, as those of
+ * uniform and rectilinear grids. Their map is affine, so that along a ray the reference coordinates are linear in the
+ * depth, and the field is a cubic polynomial of it:
+ *     r = y + w t,        F(r) = k0 + k1 s + k2 s^2 + k3 s^3,
+ * where s is 0 and 1 at the ends of the ray's interval in the cell, which planes bound. The number of sign changes of
+ * the polynomial's Bernstein coefficients is an upper bound of its number of roots, and exact if it is 0 or 1
+ * (Descartes' rule of signs; Farouki, "The Bernstein polynomial basis", 2012):
+ *     none    All coefficients have the same sign: the ray has no root in the cell.
+ *     one     They change their sign once: Newton's method finds the root.
+ * Rays with two or three sign changes are left to kernel_curved_batch.h. So are those with a root so close to a face
+ * that rounding decides in which cell it is: the interval is that of the cell widened by domain_margin, a root counts
+ * if it is inside by more than that, and a coefficient has a sign if it is larger than value_error. */
+#ifndef RENDER_KERNEL_CUBOIDS_H
+#define RENDER_KERNEL_CUBOIDS_H
+
+#include <math.h>
+
+#include "kernel_bounds.h"
+#include "kernel_cell.h"
+#include "kernel_map.h"
+#include "kernel_tile_trace.h"
+#include "kernel_transformed_curved.h"
+#include "kernel_types.h"
+#include "kernel_wide.h"
+#include "simd.h"
+
+enum { KERNEL_CUBOID_STEPS = 8 };
+
+/* Step of Newton's method, in units of the interval, below which only the last step remains. Its error is at most the
+ * square of that times half the ratio of second to first derivative. */
+#define KERNEL_CUBOID_END 1e-4f
+
+/* Upper bound of the rounding error of a Bernstein coefficient, with u = 6e-8. Values are at most 2, so the field's
+ * coefficients are at most 2, three times 4, three times 8, and 16, and have errors of at most u times 4, 24 and 72
+ * each: 1e-5 together. The sums of the absolute values of all terms of k0 to k3 are at most 54, 108, 72 and 16; each
+ * term has up to nine roundings, which amounts to 9 u × 250 = 1.4e-4. */
+#define KERNEL_CUBOID_ROUNDING 1.5e-4f
+
+/* Numbers of cuboids, one per lane. */
+typedef struct kernel_cuboids {
+    float normal[3][3][SIMD_WIDTH]; /* rows of the inverse of the map's Jacobian, in tile space */
+    float field[8][SIMD_WIDTH];     /* coefficients of the field's polynomial (kernel_map.h) */
+    float value_error[SIMD_WIDTH];
+    float domain_margin[SIMD_WIDTH]; /* infinite for cells that are not cuboids */
+} kernel_cuboids;
+
+/* Computes the rows of the inverse Jacobians in tile space, for half of the lanes. The sorted vertices 1, 3 and 4 are
+ * the neighbours of vertex 0 along z, y and x. */
+SIMD_INLINE void kernel_cuboids_normals(const kernel_transformed_curved *cells, const kernel_frame *f,
+                                        const kernel_tile *tile, int half, kernel_cuboids *out)
+{
+    static const int neighbour[3] = {1, 3, 4};
+    const double scale = f->job->space.scale, shear_x = f->job->camera.is_orthographic ? 0 : tile->centre_x;
+    const double shear_y = f->job->camera.is_orthographic ? 0 : tile->centre_y;
+    for (int i = 0; i < 3; i++) {
+        const int axis = 2 - i;
+        const kernel_f64 size = cells->world[axis][neighbour[i]].half[half] - cells->world[axis][0].half[half];
+        const kernel_f64 inverse = 1 / (size * (scale * scale));
+        kernel_f64 row[3];
+        for (int a = 0; a < 3; a++) row[a] = f->scaled_axes[a][axis] * inverse;
+        row[2] += shear_x * row[0] + shear_y * row[1];
+        for (int a = 0; a < 3; a++) kernel_f64_store(out->normal[i][a], half, row[a]);
+    }
+}
+
+/* Returns an upper bound of the field's derivative along reference axis i. */
+SIMD_INLINE vf kernel_cuboids_slope(const float values[8][SIMD_WIDTH], int i)
+{
+    static const signed char edges[3][4][2] = {
+        {{0, 1}, {3, 2}, {4, 5}, {7, 6}}, {{0, 3}, {1, 2}, {4, 7}, {5, 6}}, {{0, 4}, {1, 5}, {2, 6}, {3, 7}}};
+    vf most = vf_set(0);
+    for (int n = 0; n < 4; n++)
+        most = vf_max(vf_abs(vf_load(values[edges[i][n][0]]) - vf_load(values[edges[i][n][1]])), most);
+    return most;
+}
+
+/* Computes the errors of reference coordinates and values. gap: distance of a face's computed crossing from the ray;
+ * own: error of a ray's reference coordinates. Both are derived at kernel_f64_bounds() and kernel_f64_rate(), and are
+ * doubled as there. */
+SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, const kernel_beam *beam, vm cuboid,
+                                       kernel_cuboids *out)
+{
+    vf reach[3], extent[3], margin = vf_set(4e-6f), error = vf_set(KERNEL_CUBOID_ROUNDING);
+    for (int a = 0; a < 3; a++) {
+        const vf origin = vf_load(cells->at[a][0]);
+        reach[a] = vf_abs(origin);
+        extent[a] = vf_set(0);
+        for (int n = 1; n < 8; n++) {
+            const vf at = vf_load(cells->at[a][n]);
+            reach[a] = vf_max(vf_abs(at), reach[a]);
+            extent[a] = vf_max(vf_abs(at - origin), extent[a]);
+        }
+    }
+    const vf across = 2e-6f * ((reach[0] + reach[1]) + (beam->offset + beam->spread * reach[2]));
+    for (int i = 0; i < 3; i++) {
+        vf size[3];
+        for (int a = 0; a < 3; a++) size[a] = vf_abs(vf_load(out->normal[i][a]));
+        const vf gap = across * (size[0] + size[1]) + 1e-6f * (reach[2] * size[2]);
+        vf own = 0.125f * (across * (size[0] + size[1]));
+        for (int a = 0; a < 3; a++) own += 3e-7f * (size[a] * extent[a]);
+        margin += 2 * (gap + own);
+        error += 2 * ((gap + own) * kernel_cuboids_slope(cells->at[3], i));
+    }
+    cuboid = vm_and(cuboid, vf_lt(margin, vf_set(0.015625f)));
+    vf_store(out->domain_margin, vf_select(cuboid, margin, vf_set(INFINITY)));
+    vf_store(out->value_error, error);
+}
+
+/* Computes the numbers of the lanes' cells. */
+static __attribute__((noinline)) void kernel_cuboids_of(const kernel_transformed_curved *cells, const kernel_frame *f,
+                                                        const kernel_tile *tile, kernel_cuboids *out)
+{
+    const kernel_beam beam = kernel_tile_beam(f, tile);
+    vf v[8], c[8];
+    for (int i = 0; i < 8; i++) v[i] = vf_load(cells->at[3][i]);
+    KERNEL_HEX_FIT(c, v);
+    for (int i = 0; i < 8; i++) vf_store(out->field[i], c[i]);
+    for (int half = 0; half < 2; half++) kernel_cuboids_normals(cells, f, tile, half, out);
+    kernel_cuboids_errors(cells, &beam, vm_from_bits(cells->cuboids), out);
+}
+
+/* The part of a ray in its cell, and the field along it. */
+typedef struct kernel_cuboid_ray {
+    vf normal[3][3], field[8], value_error, domain_margin; /* the cell's numbers */
+    vf origin[3];                                          /* vertex 0 in tile space */
+    vf begin, length; /* depth of the interval's begin, relative to vertex 0, and its length */
+    vf r[3], d[3];    /* reference coordinates at its begin, and their change along it */
+    vf k[4];          /* coefficients of the field by s */
+} kernel_cuboid_ray;
+
+/* Computes the interval of each ray in its widened cell. Returns the rays that have one. */
+SIMD_INLINE vm kernel_cuboid_interval(const kernel_cuboids *cells, const float (*at)[8][SIMD_WIDTH],
+                                      const kernel_lane_rays *p, kernel_cuboid_ray *out)
+{
+    const vi lane = p->lane;
+    const kernel_rays *rays = &p->rays;
+    vf begin = vf_set(-INFINITY), end = vf_set(INFINITY), w[3], y[3];
+    for (int a = 0; a < 3; a++) out->origin[a] = kernel_gather_lane(at[a][0], lane);
+    out->domain_margin = kernel_gather_lane(cells->domain_margin, lane);
+    const vf x_apart = (rays->origin_x + rays->slope_x * out->origin[2]) - out->origin[0];
+    const vf y_apart = (rays->origin_y + rays->slope_y * out->origin[2]) - out->origin[1];
+    for (int i = 0; i < 3; i++) {
+        vf *const normal = out->normal[i];
+        for (int a = 0; a < 3; a++) normal[a] = kernel_gather_lane(cells->normal[i][a], lane);
+        y[i] = normal[0] * x_apart + normal[1] * y_apart;
+        w[i] = (normal[0] * rays->slope_x + normal[1] * rays->slope_y) + normal[2];
+        const vf inverse = 1.0f / w[i];
+        const vf low = (-out->domain_margin - y[i]) * inverse, high = ((1 + out->domain_margin) - y[i]) * inverse;
+        begin = vf_max(vf_min(low, high), begin);
+        end = vf_min(vf_max(low, high), end);
+    }
+    out->begin = begin;
+    out->length = end - begin;
+    for (int i = 0; i < 3; i++) {
+        out->r[i] = y[i] + w[i] * begin;
+        out->d[i] = w[i] * out->length;
+    }
+    return vf_le(begin, end);
+}
+
+/* Computes the field's gradient at the reference coordinates r, in these coordinates. */
+SIMD_INLINE void kernel_cuboid_gradient(const vf c[8], const vf r[3], vf out[3])
+{
+    const vf rs = c[4] + c[7] * r[2];
+    out[0] = (c[1] + rs * r[1]) + c[5] * r[2];
+    out[1] = (c[2] + rs * r[0]) + c[6] * r[2];
+    out[2] = c[3] + ((c[5] * r[0] + c[6] * r[1]) + c[7] * (r[0] * r[1]));
+}
+
+/* Computes the coefficients of the field along each ray's interval. */
+SIMD_INLINE void kernel_cuboid_polynomial(const kernel_cuboids *cells, vi lane, kernel_cuboid_ray *ray)
+{
+    const vf *c = ray->field, *r = ray->r, *d = ray->d;
+    vf g[3];
+    for (int i = 0; i < 8; i++) ray->field[i] = kernel_gather_lane(cells->field[i], lane);
+    ray->value_error = kernel_gather_lane(cells->value_error, lane);
+    kernel_cuboid_gradient(c, r, g);
+    const vf rs = r[0] * r[1];
+    ray->k[0] = ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + rs * c[4];
+    ray->k[0] += r[2] * ((r[0] * c[5] + r[1] * c[6]) + rs * c[7]);
+    ray->k[1] = kernel_dot(g, d);
+    ray->k[2] =
+        (d[0] * d[1]) * (c[4] + c[7] * r[2]) + d[2] * (d[0] * (c[5] + c[7] * r[1]) + d[1] * (c[6] + c[7] * r[0]));
+    ray->k[3] = c[7] * (d[0] * (d[1] * d[2]));
+}
+
+/* Finds the rays without a root in their interval (`none`), and those with exactly one (`one`). For the latter, *s is
+ * where the line between the values at the ends is zero. */
+SIMD_INLINE void kernel_cuboid_count(const kernel_cuboid_ray *ray, vm *none, vm *one, vf *s)
+{
+    const vf *k = ray->k, error = ray->value_error, zero = vf_set(0), third = vf_set(1.0f / 3);
+    const vf b[4] = {k[0], k[0] + third * k[1], k[0] + third * (2 * k[1] + k[2]), (k[0] + k[1]) + (k[2] + k[3])};
+    const vf low = vf_min(vf_min(b[0], b[1]), vf_min(b[2], b[3]));
+    const vf high = vf_max(vf_max(b[0], b[1]), vf_max(b[2], b[3]));
+    const vm falls = vf_lt(b[3], b[0]);
+    const vf first = vf_select(falls, b[0], -b[0]), second = vf_select(falls, b[1], -b[1]);
+    const vf third_one = vf_select(falls, b[2], -b[2]), last = vf_select(falls, b[3], -b[3]);
+    const vm ends = vm_and(vf_lt(error, first), vf_lt(last, -error));
+    *none = vm_or(vf_lt(error, low), vf_lt(high, -error));
+    *one = vm_andnot(ends, vm_and(vf_lt(second, error), vf_lt(-error, third_one)));
+    *s = vf_select(ends, b[0] / (b[0] - b[3]), zero);
+}
+
+SIMD_INLINE vf kernel_cuboid_at(const vf k[4], vf s)
+{
+    return k[0] + s * (k[1] + s * (k[2] + s * k[3]));
+}
+
+SIMD_INLINE vf kernel_cuboid_rate(const vf k[4], vf s)
+{
+    return k[1] + s * (2 * k[2] + s * (3 * k[3]));
+}
+
+/* Refines the root *s of the given rays by Newton's method, and by bisection if that leaves the bracket. Returns those
+ * that have not converged. A ray that has converged is not changed any more, so that its root does not depend on the
+ * other rays. */
+SIMD_INLINE vm kernel_cuboid_newton(const kernel_cuboid_ray *ray, vm rays, vf *s)
+{
+    vf low = vf_set(0), high = vf_set(1);
+    const vm falls = vf_lt(vf_set(0), ray->k[0]);
+    vm open = rays;
+    for (int step = 0; step < KERNEL_CUBOID_STEPS && vm_any(open); step++) {
+        const vf value = kernel_cuboid_at(ray->k, *s);
+        const vm before = vm_not(vm_xor(falls, vf_lt(vf_set(0), value)));
+        low = vf_select(before, *s, low);
+        high = vf_select(before, high, *s);
+        vf next = *s - value / kernel_cuboid_rate(ray->k, *s);
+        next = vf_select(vm_and(vf_le(low, next), vf_le(next, high)), next, 0.5f * (low + high));
+        const vf move = vf_abs(next - *s);
+        *s = vf_select(open, next, *s);
+        open = vm_andnot(open, vf_lt(move, vf_set(KERNEL_CUBOID_END)));
+    }
+    return open;
+}
+
+/* Returns the field at the reference coordinates r, interpolated between the values at the vertices. Its error is four
+ * roundings of the largest value; that of the polynomial is larger. */
+SIMD_INLINE vf kernel_cuboid_value(const float values[8][SIMD_WIDTH], vi lane, const vf r[3])
+{
+    vf v[8];
+    for (int i = 0; i < 8; i++) v[i] = kernel_gather_lane(values[i], lane);
+    for (int i = 0; i < 8; i += 4) {
+        const vf low = v[i] + r[0] * (v[i + 1] - v[i]), high = v[i + 3] + r[0] * (v[i + 2] - v[i + 3]);
+        v[i] = low + r[1] * (high - low);
+    }
+    return v[0] + r[2] * (v[4] - v[0]);
+}
+
+/* The roots of a vector of rays: depth, and reference coordinates. */
+typedef struct kernel_cuboid_roots {
+    vm one, none;          /* rays with exactly one root, rays without a root */
+    vf t, r[3], normal[3]; /* of the rays in `one`; the normal is the field's gradient in tile space */
+} kernel_cuboid_roots;
+
+/* Finds the roots of the given rays, all of which have cuboids. */
+SIMD_INLINE void kernel_cuboid_roots_of(const kernel_cuboids *cells, const float (*at)[8][SIMD_WIDTH],
+                                        const kernel_lane_rays *p, vm rays, kernel_cuboid_roots *out)
+{
+    kernel_cuboid_ray ray;
+    vf s, g[3];
+    const vm within = kernel_cuboid_interval(cells, at, p, &ray);
+    out->one = vm_none();
+    out->none = vm_andnot(rays, within);
+    rays = vm_and(rays, within);
+    if (!vm_any(rays)) return;
+    kernel_cuboid_polynomial(cells, p->lane, &ray);
+    vm none;
+    kernel_cuboid_count(&ray, &none, &out->one, &s);
+    out->none = vm_or(out->none, vm_and(rays, none));
+    out->one = vm_and(rays, out->one);
+    if (!vm_any(out->one)) return;
+    out->one = vm_andnot(out->one, kernel_cuboid_newton(&ray, out->one, &s));
+    for (int i = 0; i < 3; i++) out->r[i] = ray.r[i] + s * ray.d[i];
+    s -= kernel_cuboid_value(at[3], p->lane, out->r) / kernel_cuboid_rate(ray.k, s);
+    for (int i = 0; i < 3; i++) {
+        out->r[i] = ray.r[i] + s * ray.d[i];
+        const vm inside = vm_and(vf_lt(ray.domain_margin, out->r[i]), vf_lt(out->r[i], 1 - ray.domain_margin));
+        out->one = vm_and(out->one, inside);
+    }
+    out->t = ray.origin[2] + (ray.begin + s * ray.length);
+    kernel_cuboid_gradient(ray.field, out->r, g);
+    for (int a = 0; a < 3; a++)
+        out->normal[a] = (g[0] * ray.normal[0][a] + g[1] * ray.normal[1][a]) + g[2] * ray.normal[2][a];
+}
+
+#endif
