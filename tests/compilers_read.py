@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Has another compiler read the sources of a build, without making objects: every warning is an error.
 
-compilers_read.py clang BUILD    all C, and the C++ of what is installed, by clang and clang++; compilers_clang_whole builds the rest
+compilers_read.py clang BUILD    what users build: all but tests and benchmarks; compilers_clang_whole builds these too
 compilers_read.py aarch64 BUILD  the library's C, by the cross compiler for aarch64, without what is compiled for x86 alone
 
 The flags are those of BUILD/compile_commands.json. Ends with 77 if the compiler is not installed.
@@ -95,7 +95,7 @@ def main():
 
     def is_wanted(source):
         if who == "clang":
-            return source.suffix == ".c" or not any(root / room in source.parents for room in ("tests", "bench"))
+            return not any(root / room in source.parents for room in ("tests", "bench"))
         return source.suffix == ".c" and any(root / room in source.parents for room in LIBRARY)
 
     jobs = [(folder, command(source, flags)) for folder, source, flags in entries(build, is_wanted)]

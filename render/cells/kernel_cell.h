@@ -133,10 +133,17 @@ SIMD_INLINE float kernel_least_weight_bound(kernel_edge_error most)
 
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2 };
 
+/* The field of contour lines in a tet, in the domain of the levels (kernel_lines.h). */
+typedef struct kernel_tet_line {
+    float value;       /* at the last corner */
+    float gradient[3]; /* per scaled unit, in camera axes */
+    float along;       /* change per unit along the third axis of tile space, which is the tile's middle ray */
+} kernel_tet_line;
+
 typedef struct kernel_cell {
     uint32_t serial, index; /* key of the cell cache: number of the tile, index of the cell */
     int part, layer;        /* key of the cell cache: mesh part, and the layer whose field the cell has */
-    bool is_finite, is_transformed, is_constant, has_lines, has_normal;
+    bool is_finite, is_transformed, is_constant, has_lines, has_normal, has_line_field;
     int type, count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];
@@ -153,7 +160,8 @@ typedef struct kernel_cell {
         /* least sum of weights that is accurate enough: for a tet, of each face; for other cells least[0] bounds that
          * of all triangles */
         least[4];
-    float normal[3]; /* for a tet: gradient from kernel_tet_normal(); valid if has_normal is set */
+    float normal[3];      /* for a tet: gradient from kernel_tet_normal(); valid if has_normal is set */
+    kernel_tet_line line; /* for a tet: the field of contour lines; valid if has_line_field is set */
 } kernel_cell;
 
 /* Points at which rays cross a face: depth t, value v of the field, and reference coordinates r. */
@@ -370,7 +378,7 @@ static __attribute__((noinline, unused)) void kernel_cell_move_to_tile_space(ker
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
     for (int i = 0; i < c->count; i++) kernel_transform_in_tile(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->is_transformed = true;
-    c->has_lines = c->has_normal = false;
+    c->has_lines = c->has_normal = c->has_line_field = false;
 }
 
 SIMD_INLINE void kernel_cell_transform_in_tile(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile,

@@ -16,6 +16,7 @@
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
 #include "kernel_crossings.h"
+#include "kernel_lines.h"
 #include "kernel_map.h"
 #include "kernel_transformed_tets.h"
 #include "kernel_shapes.h"
@@ -40,6 +41,9 @@ typedef struct kernel_batch {
     bool is_of_faces;                   /* copy of the layer's is_of_faces */
     bool has_normals;
     vf normal[3];
+    /* field of the contour lines in each lane's cell; valid in the lanes whose bits are set in line_lanes */
+    unsigned line_lanes;
+    float line_value[SIMD_WIDTH], line_gradient[3][SIMD_WIDTH], line_along[SIMD_WIDTH];
     kernel_pixel_list rays; /* list of rays to be traced */
 } kernel_batch;
 
@@ -85,9 +89,11 @@ static __attribute__((noinline)) void kernel_batch_cell(const kernel_tile_trace 
     c->has_normal = true;
     for (int a = 0; a < 3; a++) c->normal[a] = b->normal[a][n];
     if (layer->normal == RENDER_DIFFERENCES || layer->lines) kernel_transformed_tets_double(&b->tets, n, c);
+    c->has_line_field = layer->lines != NULL;
     if (!layer->colour_map && !layer->lines) return;
     for (int i = 0; i < 4; i++) c->vertices[i] = b->tets.vertex[i][n];
     if (layer->colour_map) kernel_values_colours(t->surface, c->part, c->index, c->vertices, 4, c->g);
+    if (layer->lines) kernel_cell_line_of(t->frame, &t->tile, t->surface, c, &c->line);
 }
 
 /* ---- lanes are pixels ---- */
@@ -108,27 +114,95 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, float t_near, const kerne
     return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, far)));
 }
 
-/* Accepts the hits of one vector of rays. Returns a mask of the blocks that contain a ray whose hit is nearer than its
- * previous one. */
-static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi places, const uint8_t *lanes,
-                                    unsigned hit, vf depth)
+/* Computes the field of the contour lines in lane n's cell. */
+static __attribute__((noinline)) void kernel_batch_line_field(const kernel_tile_trace *t, kernel_batch *b, int n)
+{
+    const grid_field *field = &t->surface->layer->lines->field.fields[b->queued->part];
+    double world[4][3], value[4];
+    const double *const corner[4] = {world[0], world[1], world[2], world[3]};
+    kernel_tet_line line;
+    for (int i = 0; i < 4; i++) {
+        value[i] = kernel_lines_value(t->surface, field, b->tets.vertex[i][n]);
+        for (int a = 0; a < 3; a++) world[i][a] = kernel_wide_doubles_lane(&b->tets.world[a][i], n);
+    }
+    kernel_tet_line_of(t->frame, &t->tile, corner, value, &line);
+    b->line_value[n] = line.value;
+    b->line_along[n] = line.along;
+    for (int a = 0; a < 3; a++) b->line_gradient[a][n] = line.gradient[a];
+    b->line_lanes |= 1U << n;
+}
+
+/* Draws contour lines over the colours of hits. lanes: the lane that holds each hit's cell; it is below SIMD_WIDTH. */
+static __attribute__((noinline)) void kernel_batch_draw_lines(const kernel_tile_trace *t, kernel_batch *b,
+                                                              const kernel_lane_rays *r, const uint8_t *lanes,
+                                                              unsigned hit, vf depth, float colour[3][SIMD_WIDTH])
+{
+    vf normal[3], drawn[3];
+    kernel_line_field along;
+    memset(colour, 0, 3 * sizeof *colour);
+    if (!b->line_lanes) {
+        memset(b->line_value, 0, sizeof b->line_value);
+        memset(b->line_along, 0, sizeof b->line_along);
+        memset(b->line_gradient, 0, sizeof b->line_gradient);
+    }
+    for (; hit; hit &= hit - 1) {
+        const int i = __builtin_ctz(hit), n = lanes[i];
+        const float *own = t->surface->layer->colours + 3 * b->queued->value[n];
+        if (!(b->line_lanes >> n & 1)) kernel_batch_line_field(t, b, n);
+        for (int a = 0; a < 3; a++) colour[a][i] = own[a];
+    }
+    kernel_lane_lines lines = {.value = vf_permute(vf_load(b->line_value), r->lane),
+                               .along = vf_permute(vf_load(b->line_along), r->lane)};
+    for (int a = 0; a < 3; a++) {
+        lines.gradient[a] = vf_permute(vf_load(b->line_gradient[a]), r->lane);
+        lines.last[a] = vf_permute(b->tets.at[a][3], r->lane);
+        normal[a] = vf_permute(b->normal[a], r->lane);
+        drawn[a] = vf_load(colour[a]);
+    }
+    kernel_lane_lines_at(&lines, &r->rays, depth, normal, &along);
+    kernel_draw_lines(t->frame, &t->tile, t->surface, &r->rays, depth, &along, drawn);
+    for (int a = 0; a < 3; a++) vf_store(colour[a], drawn[a]);
+}
+
+/* Accepts the hits of one vector of rays. colours: the hits' colours; NULL: those of their isovalues. Returns a mask of
+ * the blocks that contain a ray whose hit is nearer than its previous one. */
+SIMD_INLINE unsigned kernel_batch_accept_coloured(kernel_tile_trace *t, kernel_batch *b, vi places,
+                                                  const uint8_t *lanes, unsigned hit, vf depth,
+                                                  const float (*colours)[SIMD_WIDTH])
 {
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
     memcpy(at, &places, sizeof at);
-    if (!b->has_normals) kernel_batch_normals(b, t->frame);
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), n = lanes[i];
-        const float *colour = t->surface->layer->colours + 3 * b->queued->value[n];
-        const kernel_ray_hit one = {.part = b->queued->part,
-                                    .value = b->queued->value[n],
-                                    .cell = b->queued->cell[n],
-                                    .depth = depth[i],
-                                    .normal = {b->normal[0][n], b->normal[1][n], b->normal[2][n]},
-                                    .colour = {colour[0], colour[1], colour[2]}};
+        const float *plain = t->surface->layer->colours + 3 * b->queued->value[n];
+        kernel_ray_hit one = {.part = b->queued->part,
+                              .value = b->queued->value[n],
+                              .cell = b->queued->cell[n],
+                              .depth = depth[i],
+                              .normal = {b->normal[0][n], b->normal[1][n], b->normal[2][n]}};
+        for (int a = 0; a < 3; a++) one.colour[a] = colours ? colours[a][i] : plain[a];
         blocks |= kernel_ray_accept(t, at[i], &one);
     }
     return blocks;
+}
+
+static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi places, const uint8_t *lanes,
+                                    unsigned hit, vf depth)
+{
+    if (!b->has_normals) kernel_batch_normals(b, t->frame);
+    return kernel_batch_accept_coloured(t, b, places, lanes, hit, depth, NULL);
+}
+
+/* As above, with contour lines. */
+static __attribute__((noinline)) unsigned kernel_batch_accept_lined(kernel_tile_trace *t, kernel_batch *b,
+                                                                    const kernel_lane_rays *r, const uint8_t *lanes,
+                                                                    unsigned hit, vf depth)
+{
+    float drawn[3][SIMD_WIDTH];
+    if (!b->has_normals) kernel_batch_normals(b, t->frame);
+    kernel_batch_draw_lines(t, b, r, lanes, hit, depth, drawn);
+    return kernel_batch_accept_coloured(t, b, r->at, lanes, hit, depth, (const float(*)[SIMD_WIDTH])drawn);
 }
 
 SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
@@ -143,7 +217,13 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
         r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->queued->near), r.lane), r.far));
         if (!vm_any(r.active)) continue;
         const vm hit = kernel_batch_hit(b, t->t_near, &r, &depth);
-        if (vm_any(hit)) nearer |= kernel_batch_accept(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
+        if (!vm_any(hit)) continue;
+        if (__builtin_expect(t->surface->layer->lines != NULL, 0)) {
+            const kernel_lane_rays own = r; /* the address of r itself would keep it in memory */
+            nearer |= kernel_batch_accept_lined(t, b, &own, b->rays.lane + first, vm_bits(hit), depth);
+        } else {
+            nearer |= kernel_batch_accept(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
+        }
     }
     for (; nearer; nearer &= nearer - 1) kernel_block_update_far(t, __builtin_ctz(nearer));
     b->rays.count = 0;
@@ -155,8 +235,8 @@ static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t,
                                                            kernel_surface_cells *queued)
 {
     const render_surface_layer *layer = t->surface->layer;
-    /* layers that need more of a hit than its depth and normal are traced cell by cell */
-    const bool by_ray = kernel_tile_layer_batches(t) && !layer->colour_map && !layer->lines;
+    /* layers with a field of colours are traced cell by cell, because lanes do not have its values */
+    const bool by_ray = kernel_tile_layer_batches(t) && !layer->colour_map;
     const int most = by_ray ? KERNEL_BATCH_PIXELS : 0;
     kernel_surface_cells_close(queued);
     kernel_transform_tets(&b->tets, &queued->arrays, t->frame, &t->tile, queued->vertex, queued->count);
@@ -164,6 +244,7 @@ static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t,
     b->queued = queued;
     b->is_of_faces = layer->is_of_faces;
     b->has_normals = false;
+    b->line_lanes = 0;
     b->rays.count = 0;
     for (int n = 0; n < queued->count; n++) {
         unsigned blocks = queued->blocks[n] & kernel_blocks_beyond(t, queued->near[n]);

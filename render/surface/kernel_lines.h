@@ -67,26 +67,63 @@ SIMD_INLINE void kernel_tet_gradient(const kernel_frame *f, const double *const 
     }
 }
 
-/* Computes the contour lines' field, its gradient and the surface's normal at hits in a tet. t, normal: depths of the
- * hits, and normals from kernel_tet_normal(). */
+/* Computes the contour lines' field in the tet with these corners. */
+static __attribute__((noinline)) void kernel_tet_line_of(const kernel_frame *f, const kernel_tile *tile,
+                                                         const double *const corner[4], const double value[4],
+                                                         kernel_tet_line *out)
+{
+    double g[3];
+    kernel_tet_gradient(f, corner, value, g);
+    /* in tile space the third axis is the direction of the tile's middle ray */
+    const double shear[2] = {(double)tile->shear_x, (double)tile->shear_y};
+    out->value = (float)value[3];
+    out->along = (float)(g[2] + (g[0] * shear[0] + g[1] * shear[1]));
+    for (int a = 0; a < 3; a++) out->gradient[a] = (float)g[a];
+}
+
+/* Computes the contour lines' field in a tet of which the positions in double are set. */
+SIMD_INLINE void kernel_cell_line_of(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
+                                     const kernel_cell *c, kernel_tet_line *out)
+{
+    const grid_field *field = &s->layer->lines->field.fields[c->part];
+    const double *const corner[4] = {c->world[0], c->world[1], c->world[2], c->world[3]};
+    double value[4];
+    for (int i = 0; i < 4; i++) value[i] = kernel_lines_value(s, field, c->vertices[i]);
+    kernel_tet_line_of(f, tile, corner, value, out);
+}
+
+/* The field of contour lines in the tet of each lane, and the position of the tet's last corner in tile space. */
+typedef struct kernel_lane_lines {
+    vf value, gradient[3], along, last[3];
+} kernel_lane_lines;
+
+/* Computes the contour lines' field at hits of depth t; normal: the surface's. */
+SIMD_INLINE void kernel_lane_lines_at(const kernel_lane_lines *l, const kernel_rays *rays, vf t, const vf normal[3],
+                                      kernel_line_field *out)
+{
+    const vf x = (rays->origin_x + rays->slope_x * t) - l->last[0];
+    const vf y = (rays->origin_y + rays->slope_y * t) - l->last[1];
+    out->value = (l->value + x * l->gradient[0]) + (y * l->gradient[1] + (t - l->last[2]) * l->along);
+    for (int a = 0; a < 3; a++) {
+        out->gradient[a] = l->gradient[a];
+        out->normal[a] = normal[a];
+    }
+}
+
+/* Computes the contour lines' field, its gradient and the surface's normal at the hits of a packet in one tet. t,
+ * normal: depths of the hits, and normals from kernel_tet_normal(). */
 static __attribute__((noinline)) void kernel_tet_line_field(const kernel_packet *p, const kernel_surface *s,
                                                             const kernel_cell *c, vf t, const vf normal[3],
                                                             kernel_line_field *out)
 {
-    const grid_field *field = &s->layer->lines->field.fields[c->part];
-    const double *const corner[4] = {c->world[0], c->world[1], c->world[2], c->world[3]};
-    double value[4], g[3];
-    for (int i = 0; i < 4; i++) value[i] = kernel_lines_value(s, field, c->vertices[i]);
-    kernel_tet_gradient(p->frame, corner, value, g);
-    /* in tile space the third axis is the direction of the tile's middle ray */
-    const double shear[2] = {(double)p->tile->shear_x, (double)p->tile->shear_y};
-    const vf x = (p->origin_x + p->slope_x * t) - c->x[3], y = (p->origin_y + p->slope_y * t) - c->y[3];
-    const float along = (float)(g[2] + (g[0] * shear[0] + g[1] * shear[1]));
-    out->value = ((float)value[3] + x * (float)g[0]) + (y * (float)g[1] + (t - c->z[3]) * along);
-    for (int a = 0; a < 3; a++) {
-        out->gradient[a] = vf_set((float)g[a]);
-        out->normal[a] = normal[a];
-    }
+    const kernel_rays rays = kernel_packet_rays(p);
+    kernel_tet_line line = c->line;
+    if (!c->has_line_field) kernel_cell_line_of(p->frame, p->tile, s, c, &line);
+    kernel_lane_lines lanes = {.value = vf_set(line.value),
+                               .along = vf_set(line.along),
+                               .last = {vf_set(c->x[3]), vf_set(c->y[3]), vf_set(c->z[3])}};
+    for (int a = 0; a < 3; a++) lanes.gradient[a] = vf_set(line.gradient[a]);
+    kernel_lane_lines_at(&lanes, &rays, t, normal, out);
 }
 
 /* Computes the contour lines' field, its gradient and the surface's normal at the reference coordinates r, each lane in

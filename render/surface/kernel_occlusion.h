@@ -164,7 +164,7 @@ SIMD_INLINE void kernel_occlusion_transform(const kernel_packet *p, kernel_cell 
         return;
     }
     for (int i = 0; i < c->count; i++) kernel_transform(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
-    c->has_lines = c->has_normal = false;
+    c->has_lines = c->has_normal = c->has_line_field = false;
 }
 
 /* Removes the rays that the cell's surface blocks from the packet's active rays. */
