@@ -198,7 +198,7 @@ static void make_cuboids(test_mesh_kind kind, bool random, uint64_t seed, test_m
 
 static void verify_cuboids(test_mesh_kind kind, bool random, tally *t)
 {
-    for (uint64_t seed = 0; seed < 6; seed++)
+    for (uint64_t seed = 0; seed < (test_is_whole() ? 12 : 3); seed++)
         for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
             const test_layout layout = {.wide_coordinates = seed % 2, .wide_values = seed % 3 == 0};
             test_mesh mesh;
@@ -224,7 +224,7 @@ static void opaque_hits_in_cuboids_match_the_reference(void **state)
         verify_cuboids(kind, random, &t);
         printf("%s values, ", random ? "random" : "smooth");
         print_tally(test_mesh_kind_name(kind), &t);
-        assert_true(t.hits > 8000);
+        assert_true(t.hits > 3500);
         assert_int_equal(t.different, 0);
         assert_depths(&t, 250);
         /* across the thin cells other values change so fast that the rounding of a vertex changes them by up to 1e-3 */
