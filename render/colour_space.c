@@ -168,7 +168,7 @@ void colour_between(colour_space space, const double a[3], const double b[3], do
     }
 }
 
-int colour_points_entries(const colour_point *points, int count)
+int colour_table_entries(const colour_point *points, int count)
 {
     enum { EVEN = 256, UNEVEN = 1025 };
     const double low = points[0].at, width = points[count - 1].at - low;
@@ -177,7 +177,7 @@ int colour_points_entries(const colour_point *points, int count)
     return (EVEN - 1 + count - 2) / (count - 1) * (count - 1) + 1;
 }
 
-void colour_points_fill(const colour_point *points, int count, colour_space space, float *table, int entries)
+void colour_fill_table(const colour_point *points, int count, colour_space space, float *table, int entries)
 {
     const double low = points[0].at, width = points[count - 1].at - low;
     int i = 0;

@@ -24,8 +24,8 @@ typedef struct colour_point {
 /* Returns how many entries an evenly spaced table through the points (2 or more) should have: 256 or a few more if the
  * points are evenly spaced, so that each is an entry; else 1025, where a step between two points at one position is
  * spread over the interval between two entries. */
-int colour_points_entries(const colour_point *points, int count);
+int colour_table_entries(const colour_point *points, int count);
 /* Fills the table (entries × 3, linear light), from the first point to the last. */
-void colour_points_fill(const colour_point *points, int count, colour_space space, float *table, int entries);
+void colour_fill_table(const colour_point *points, int count, colour_space space, float *table, int entries);
 
 #endif

@@ -167,7 +167,7 @@ typedef struct render_difference_samples {
 } render_difference_samples;
 
 /* Value of `transmittance` that marks the placeholder fragments of these hits while a frame is traced. */
-#define RENDER_WAITS 2.0f
+#define RENDER_PENDING_TRANSMITTANCE 2.0f
 
 /* The value range of each surface's field over all ranks (low > high if no rank has the field), and the list of hits
  * that need samples of other ranks. */

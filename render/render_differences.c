@@ -173,8 +173,8 @@ static insitu_status process_chunks(const render_job *job, chunk_work *work, int
     return status;
 }
 
-insitu_status render_differences_sample(const render_job *job, const render_pending_hit *hits,
-                                        render_difference_samples *out, int64_t count, base_error *error)
+insitu_status render_sample_pending_hits(const render_job *job, const render_pending_hit *hits,
+                                         render_difference_samples *out, int64_t count, base_error *error)
 {
     chunk_work work = {.hits = hits, .samples = out};
     if (count && !job->part_count) memset(out, 0, (size_t)count * sizeof *out);
@@ -192,9 +192,9 @@ void render_differences_merge(render_difference_samples *into, const render_diff
     }
 }
 
-insitu_status render_differences_light(const render_job *job, const render_pending_list *list,
-                                       const render_difference_samples *samples, int64_t first, int64_t count,
-                                       fragment *out, base_error *error)
+insitu_status render_light_pending_hits(const render_job *job, const render_pending_list *list,
+                                        const render_difference_samples *samples, int64_t first, int64_t count,
+                                        fragment *out, base_error *error)
 {
     /* offsets by which hits, samples and fragments of a list that begins at hit `first` have the same indices, from 0
      * on */

@@ -31,15 +31,15 @@ bool render_differences_sort(const render_job *job, render_pending_list *list);
 bool render_differences_meet(const render_job *job, const render_pending_hit *hit, const render_box *box);
 
 /* Samples this rank's cells around the hits, which may belong to any rank. Local. */
-insitu_status render_differences_sample(const render_job *job, const render_pending_hit *hits,
-                                        render_difference_samples *out, int64_t count, base_error *error);
+insitu_status render_sample_pending_hits(const render_job *job, const render_pending_hit *hits,
+                                         render_difference_samples *out, int64_t count, base_error *error);
 
 void render_differences_merge(render_difference_samples *into, const render_difference_samples *other);
 
 /* Lights `count` hits of the list from `first` on by their samples (samples[0] belongs to hit `first`), as the job
  * paints them: the fragments are those that render_frame() would have computed. Local. */
-insitu_status render_differences_light(const render_job *job, const render_pending_list *list,
-                                       const render_difference_samples *samples, int64_t first, int64_t count,
-                                       fragment *out, base_error *error);
+insitu_status render_light_pending_hits(const render_job *job, const render_pending_list *list,
+                                        const render_difference_samples *samples, int64_t first, int64_t count,
+                                        fragment *out, base_error *error);
 
 #endif

@@ -108,7 +108,7 @@ static void drop_placeholders(fragment_list *list, int64_t first)
 {
     fragment *to = list->items + first;
     for (int64_t i = first; i < list->count; i++)
-        if (list->items[i].kind < FRAGMENT_SURFACE || list->items[i].transmittance != RENDER_WAITS)
+        if (list->items[i].kind < FRAGMENT_SURFACE || list->items[i].transmittance != RENDER_PENDING_TRANSMITTANCE)
             *to++ = list->items[i];
     list->count = to - list->items;
 }

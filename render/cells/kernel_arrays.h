@@ -103,11 +103,12 @@ SIMD_INLINE int64_t kernel_arrays_first(const grid *g, uint32_t cell, int vertic
     return g->offsets.data ? grid_array_index(&g->offsets, cell) : (int64_t)cell * vertices;
 }
 
-/* Stores the vertex indices of a lattice's cell. Vertex i of the cell is stored in out[i * room]. */
-static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, int vertices, int32_t *out, int room)
+/* Stores the vertex indices of a lattice's cell. Vertex i of the cell is stored in out[i * out_stride]. */
+static inline void kernel_lattice_indices(const grid_lattice *l, uint32_t cell, int vertices, int32_t *out,
+                                          int out_stride)
 {
     const int64_t first = grid_lattice_first(l, cell);
-    for (int i = 0; i < vertices; i++) out[i * room] = (int32_t)(first + l->corner_offsets[i]);
+    for (int i = 0; i < vertices; i++) out[i * out_stride] = (int32_t)(first + l->corner_offsets[i]);
 }
 
 /* Reads the vertex indices of `count` cells into lanes lane, lane + 1, ... of `out`. vertices: number of vertices of
@@ -142,13 +143,14 @@ SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int v
                 __builtin_prefetch(p->prefetched[k].data + vertex[i][n] * p->prefetched[k].stride);
 }
 
-/* Stores a cell's vertex indices, that of vertex i in out[i * room], and prefetches the coordinates and values of these
- * vertices. */
-SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out, int room)
+/* Stores a cell's vertex indices, that of vertex i in out[i * out_stride], and prefetches the coordinates and values of
+ * these vertices. */
+SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, int vertices, int32_t *out,
+                                        int out_stride)
 {
     const grid_array c = p->cells->connectivity;
     if (__builtin_expect(p->cells->lattice != NULL, 0)) {
-        kernel_lattice_indices(p->cells->lattice, cell, vertices, out, room);
+        kernel_lattice_indices(p->cells->lattice, cell, vertices, out, out_stride);
         return;
     }
     const char *at = c.data + kernel_arrays_first(p->cells, cell, vertices) * c.stride;
@@ -156,7 +158,7 @@ SIMD_INLINE void kernel_arrays_vertices(const kernel_arrays *p, uint32_t cell, i
         const int64_t index = c.is_wide ? *(const int64_t *)(const void *)at : *(const int32_t *)(const void *)at;
         const int32_t vertex = (int32_t)(index - c.base);
         for (int k = 0; k < 4; k++) __builtin_prefetch(p->prefetched[k].data + vertex * p->prefetched[k].stride);
-        out[i * room] = vertex;
+        out[i * out_stride] = vertex;
     }
 }
 

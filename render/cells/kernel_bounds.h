@@ -542,16 +542,16 @@ SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_til
 static __attribute__((noinline, unused)) void kernel_curved_single_bounds(const kernel_cell *c, const kernel_beam *beam,
                                                                           kernel_curved *out)
 {
-    kernel_curved_storage *room = out->storage;
+    kernel_curved_storage *storage = out->storage;
     const float *const numbers[4] = {c->x, c->y, c->z, c->f};
-    for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, room->at[n]);
-    kernel_map_spread(c->g, c->count, room->colours);
-    kernel_bounds_of(c->type, (const float(*)[8][SIMD_WIDTH])room->at, beam, &room->bounds);
+    for (int n = 0; n < 4; n++) kernel_map_spread(numbers[n], c->count, storage->at[n]);
+    kernel_map_spread(c->g, c->count, storage->colours);
+    kernel_bounds_of(c->type, (const float(*)[8][SIMD_WIDTH])storage->at, beam, &storage->bounds);
     out->type = c->type;
     out->lane = 0;
-    out->at = (const float(*)[8][SIMD_WIDTH])room->at;
-    out->colours = (const float(*)[SIMD_WIDTH])room->colours;
-    out->bounds = &room->bounds;
+    out->at = (const float(*)[8][SIMD_WIDTH])storage->at;
+    out->colours = (const float(*)[SIMD_WIDTH])storage->colours;
+    out->bounds = &storage->bounds;
 }
 
 #endif

@@ -402,8 +402,8 @@ static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const k
 
 /* Computes the points at which rays meet the patches of `count` quads. once[n] has the rays that cross exactly one
  * triangle of quad n. Quads are processed together because each step of Newton's method depends on the one before.
- * are_beside: no ray meets an edge, and the quads' edge functions are not set. */
-SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], bool are_beside,
+ * are_off_edges: no ray meets an edge, and the quads' edge functions are not set. */
+SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], bool are_off_edges,
                                     kernel_quad_point *out)
 {
     kernel_patch patch[2];
@@ -419,7 +419,7 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
         const vm left = vm_andnot(once[n], kernel_patch_converged(&patch[n], s[n], r[n]));
         out[n] = (kernel_quad_point){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
         if (__builtin_expect(!vm_any(left), 1)) continue;
-        if (are_beside)
+        if (are_off_edges)
             kernel_quad_single_point_off_edges(&q[n], left, &out[n]);
         else
             kernel_quad_single_point(&q[n], left, &out[n]);

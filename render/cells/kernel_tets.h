@@ -26,8 +26,8 @@ typedef struct kernel_tets {
 
 /* Returns a number that belongs to each ray's tet: a member of kernel_cell if there is one tet, and otherwise one of
  * kernel_transformed_tets. */
-#define KERNEL_TET_NUMBER(t, of_one, of_placed)                                                                        \
-    ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->transformed->of_placed, (t)->lane_rays->lane))
+#define KERNEL_TET_NUMBER(t, of_one, of_transformed)                                                                   \
+    ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->transformed->of_transformed, (t)->lane_rays->lane))
 
 /* Returns a copy for a function that is not inlined, so that the original stays in registers. */
 SIMD_INLINE kernel_tets kernel_tets_copy(const kernel_tets *t, kernel_lane_rays *rays)
@@ -108,10 +108,10 @@ typedef struct kernel_sums {
     vf depth, value, colour, weight;
 } kernel_sums;
 
-#define KERNEL_TET_WEIGH(t, face, ij, jk, ik, of_one, of_placed)                                                       \
-    vf_muladd(ij, KERNEL_TET_NUMBER(t, of_one[(int)(face)[2]], of_placed[(int)(face)[2]]),                             \
-              vf_muladd(-(ik), KERNEL_TET_NUMBER(t, of_one[(int)(face)[1]], of_placed[(int)(face)[1]]),                \
-                        (jk)*KERNEL_TET_NUMBER(t, of_one[(int)(face)[0]], of_placed[(int)(face)[0]])))
+#define KERNEL_TET_WEIGH(t, face, ij, jk, ik, of_one, of_transformed)                                                  \
+    vf_muladd(ij, KERNEL_TET_NUMBER(t, of_one[(int)(face)[2]], of_transformed[(int)(face)[2]]),                        \
+              vf_muladd(-(ik), KERNEL_TET_NUMBER(t, of_one[(int)(face)[1]], of_transformed[(int)(face)[1]]),           \
+                        (jk)*KERNEL_TET_NUMBER(t, of_one[(int)(face)[0]], of_transformed[(int)(face)[0]])))
 
 /* Returns the weighted sums for a face. has_colour: the colour field is included, which only a single tet has. */
 SIMD_INLINE kernel_sums kernel_tets_sums(const kernel_tets *t, const signed char *face, vf ij, vf jk, vf ik,

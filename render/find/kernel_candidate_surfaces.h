@@ -133,12 +133,14 @@ static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lan
 
 /* Computes the bounds of the slab's polytope: of the vertices that lie in the slab, and of the points where lines
  * between two vertices cross the slab's sides. */
-static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l,
-                                                               const kernel_curved_slab *slab, kernel_ends_lanes *e)
+static __attribute__((noinline)) void kernel_curved_lanes_view_bounds(const kernel_finder *s,
+                                                                      const kernel_curved_lanes *l,
+                                                                      const kernel_curved_slab *slab,
+                                                                      kernel_view_bounds *e)
 {
-    *e = kernel_empty_ends();
+    *e = kernel_view_bounds_empty();
     for (int i = 0; i < l->count; i++) {
-        kernel_ends_add(s, e, l->at[i], vf_le(vf_abs(slab->at[i]), slab->thickness));
+        kernel_view_bounds_add(s, e, l->at[i], vf_le(vf_abs(slab->at[i]), slab->thickness));
         for (int j = 0; j < i; j++) {
             const vf inverse = 1.0f / (slab->at[j] - slab->at[i]);
             for (int side = 0; side < 2; side++) {
@@ -147,7 +149,7 @@ static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_find
                 vf point[3];
                 if (!vm_any(crossed)) continue;
                 for (int a = 0; a < 3; a++) point[a] = l->at[i][a] + along * (l->at[j][a] - l->at[i][a]);
-                kernel_ends_add(s, e, point, crossed);
+                kernel_view_bounds_add(s, e, point, crossed);
             }
         }
     }
@@ -155,17 +157,17 @@ static __attribute__((noinline)) void kernel_curved_lanes_ends(const kernel_find
 
 /* Computes the bounds of the points where the isovalue crosses the edges of tets. negative: the vertices whose values
  * are below the isovalue, compared exactly. */
-SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_curved_lanes *l, const vm negative[4],
-                                       kernel_ends_lanes *e)
+SIMD_INLINE void kernel_tet_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l,
+                                              const vm negative[4], kernel_view_bounds *e)
 {
-    *e = kernel_empty_ends();
+    *e = kernel_view_bounds_empty();
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         const vm crossed = vm_xor(negative[i], negative[j]);
         const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* max() replaces the NaN of 0 / 0 by 0 */
         vf point[3];
         for (int a = 0; a < 3; a++) point[a] = l->at[i][a] + along * (l->at[j][a] - l->at[i][a]);
-        kernel_ends_add(s, e, point, crossed);
+        kernel_view_bounds_add(s, e, point, crossed);
     }
 }
 
@@ -235,12 +237,12 @@ SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_r
 
 /* Adds the cells of the lanes in `crossed`, which the isovalue crosses, to the candidates. Cells whose numbers are too
  * large, too small or NaN for lanes are tested one by one. */
-SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int value, vm usual, unsigned crossed,
-                                    const kernel_ends_lanes *e)
+SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int value, vm fitting, unsigned crossed,
+                                    const kernel_view_bounds *e)
 {
-    const unsigned good = crossed & vm_bits(vm_and(usual, vf_le(e->near, e->far)));
+    const unsigned good = crossed & vm_bits(vm_and(fitting, vf_le(e->near, e->far)));
     kernel_add_lanes(s, e, kernel_arrays_drawn(&s->arrays, c->cell, good), c->cell, s->source + (uint32_t)value);
-    for (unsigned odd = crossed & ~vm_bits(usual); odd; odd &= odd - 1) {
+    for (unsigned odd = crossed & ~vm_bits(fitting); odd; odd &= odd - 1) {
         kernel_cell own;
         kernel_cell_fetch(&own, s->arrays.cells, &s->field->fields[s->part], c->cell[__builtin_ctz(odd)]);
         kernel_find_surface(s, &own, value);
@@ -258,12 +260,12 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
     kernel_raw_numbers v[4];
     for (int i = 0; i < 4; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     kernel_curved_lanes_transform(s, c, 4, &l);
-    const vm usual = l.fitting_lanes;
+    const vm fitting = l.fitting_lanes;
     for (int value = 0; value < s->surface->layer->value_count; value++) {
         const kernel_level level = kernel_level_of(s->surface->layer->values[value]);
         vm negative[4], any = vm_none(), every = vm_all_lanes();
-        kernel_ends_lanes e;
-        l.fitting_lanes = usual;
+        kernel_view_bounds e;
+        l.fitting_lanes = fitting;
         kernel_curved_lanes_values(s, v, 4, &level, &l);
         for (int i = 0; i < 4; i++) {
             negative[i] = kernel_raw_below(&s->arrays.values, &v[i], &level);
@@ -272,7 +274,7 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
         }
         const unsigned crossed = all & vm_bits(vm_andnot(any, every));
         if (!crossed) continue;
-        kernel_tet_lanes_ends(s, &l, negative, &e);
+        kernel_tet_lanes_view_bounds(s, &l, negative, &e);
         kernel_add_crossed(s, c, value, l.fitting_lanes, crossed, &e);
     }
 }
@@ -286,7 +288,7 @@ SIMD_INLINE void kernel_crossed_queue_process(kernel_finder *s, kernel_crossed_q
     const kernel_cells *c = &h->cells;
     kernel_curved_lanes l;
     kernel_curved_slab slab;
-    kernel_ends_lanes e;
+    kernel_view_bounds e;
     kernel_raw_numbers v[8];
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     kernel_curved_lanes_transform(s, c, vertices, &l);
@@ -296,7 +298,7 @@ SIMD_INLINE void kernel_crossed_queue_process(kernel_finder *s, kernel_crossed_q
     const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
     kernel_curved_lanes_slab(&l, c->type, &slab);
-    kernel_curved_lanes_ends(s, &l, &slab, &e);
+    kernel_curved_lanes_view_bounds(s, &l, &slab, &e);
     kernel_add_crossed(s, c, h->value, l.fitting_lanes, (1u << c->count) - 1, &e);
 }
 

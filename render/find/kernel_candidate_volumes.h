@@ -20,8 +20,8 @@ SIMD_INLINE void kernel_finder_fetch_cell(kernel_finder *s, uint32_t cell)
 /* Adds those of the cells, which are all of one type, to the candidates whose values are visible in the volume. */
 static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, const kernel_cells *c)
 {
-    kernel_ends_lanes e = kernel_empty_ends();
-    vm usual = vm_all_lanes();
+    kernel_view_bounds e = kernel_view_bounds_empty();
+    vm fitting = vm_all_lanes();
     vf v[8] = {vf_set(0)};
     for (int i = 0; i < c->vertices; i++) {
         const vi vertex = kernel_cells_vertex(c, i);
@@ -29,17 +29,17 @@ static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, cons
         vf place[3], at[3];
         kernel_arrays_values(&s->arrays, vertex, c->cell, &value);
         v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_wide_doubles_narrow(&value.wide);
-        usual = vm_and(usual, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
+        fitting = vm_and(fitting, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
         kernel_finder_positions(s, vertex, place);
-        usual = kernel_positions_fit_lanes(usual, place);
+        fitting = kernel_positions_fit_lanes(fitting, place);
         kernel_rotate_to_camera(s, place, at);
-        kernel_ends_add(s, &e, at, vm_all_lanes());
+        kernel_view_bounds_add(s, &e, at, vm_all_lanes());
     }
     const vm shows = kernel_visible_values_overlap_cells(s->visible_values, v, c->vertices);
     const unsigned all = (1u << c->count) - 1;
-    const unsigned good = kernel_arrays_drawn(&s->arrays, c->cell, all & vm_bits(vm_and(usual, shows)));
+    const unsigned good = kernel_arrays_drawn(&s->arrays, c->cell, all & vm_bits(vm_and(fitting, shows)));
     if (good) kernel_add_lanes(s, &e, good, c->cell, s->source);
-    for (unsigned odd = all & ~vm_bits(usual); odd; odd &= odd - 1) {
+    for (unsigned odd = all & ~vm_bits(fitting); odd; odd &= odd - 1) {
         kernel_finder_fetch_cell(s, c->cell[__builtin_ctz(odd)]);
         kernel_find_volume(s);
     }

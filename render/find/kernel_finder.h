@@ -288,9 +288,9 @@ SIMD_INLINE void kernel_find_volume(kernel_finder *s)
 
 /* Bounds of one isovalue's surface in each lane's cell: depths from the eye, and positions in columns and rows of
  * pixels. */
-typedef struct kernel_ends_lanes {
+typedef struct kernel_view_bounds {
     vf near, far, left, right, top, bottom;
-} kernel_ends_lanes;
+} kernel_view_bounds;
 
 /* Reads each lane's vertex as a position relative to the eye, multiplied by the space's scale. */
 SIMD_INLINE void kernel_finder_positions(const kernel_finder *s, vi vertex, vf out[3])
@@ -304,12 +304,12 @@ SIMD_INLINE void kernel_finder_positions(const kernel_finder *s, vi vertex, vf o
     }
 }
 
-/* Returns the lanes of `usual` whose coordinates are small enough for float32 lanes and not NaN. Other cells are tested
- * one by one. */
-SIMD_INLINE vm kernel_positions_fit_lanes(vm usual, const vf place[3])
+/* Returns the lanes of `fitting` whose coordinates are small enough for float32 lanes and not NaN. Other cells are
+ * tested one by one. */
+SIMD_INLINE vm kernel_positions_fit_lanes(vm fitting, const vf place[3])
 {
-    for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
-    return usual;
+    for (int a = 0; a < 3; a++) fitting = vm_and(fitting, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
+    return fitting;
 }
 
 /* Rotates positions relative to the eye into the camera's axes: right, up and forward. */
@@ -322,7 +322,7 @@ SIMD_INLINE void kernel_rotate_to_camera(const kernel_finder *s, const vf place[
 }
 
 /* Extends the bounds in the given lanes so that they contain the point. */
-SIMD_INLINE void kernel_ends_add(const kernel_finder *s, kernel_ends_lanes *e, const vf point[3], vm lanes)
+SIMD_INLINE void kernel_view_bounds_add(const kernel_finder *s, kernel_view_bounds *e, const vf point[3], vm lanes)
 {
     const vf most = vf_set(INFINITY);
     vf inverse = vf_set(1);
@@ -336,10 +336,10 @@ SIMD_INLINE void kernel_ends_add(const kernel_finder *s, kernel_ends_lanes *e, c
     e->bottom = vf_max(e->bottom, vf_select(lanes, y, -most));
 }
 
-SIMD_INLINE kernel_ends_lanes kernel_empty_ends(void)
+SIMD_INLINE kernel_view_bounds kernel_view_bounds_empty(void)
 {
     const vf most = vf_set(INFINITY);
-    return (kernel_ends_lanes){most, -most, most, -most, most, -most};
+    return (kernel_view_bounds){most, -most, most, -most, most, -most};
 }
 
 /* Computes the first and the last pixel between each lane's bounds low and high, with the margin of
@@ -355,7 +355,7 @@ SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound
 
 /* Adds the cells of the given lanes (a bit mask) that may be visible to the candidates. It is the version in lanes of
  * kernel_extents_candidate(). */
-static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsigned lanes, const uint32_t *cells,
+static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsigned lanes, const uint32_t *cells,
                              uint32_t source)
 {
     const render_camera *camera = &s->frame->job->camera;

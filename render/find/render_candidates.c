@@ -256,7 +256,7 @@ static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, cov
 
 /* Returns whether the volume's cells are so small that listing them costs more than it saves. A listed cell is fetched
  * twice, once for its pixels and once for its samples; tiles that traverse the trees themselves fetch it once. */
-static bool is_of_small_cells(const kernel_frame *f)
+static bool volume_cells_are_small(const kernel_frame *f)
 {
     coverage c;
     return measure_parts(f, f->job->volumes[0].field.ranges, &c) && c.cells > SMALL_CELLS * c.pixels;
@@ -421,7 +421,7 @@ void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int t
 
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
-    if (is_of_small_cells(frame)) return;
+    if (volume_cells_are_small(frame)) return;
     frame->volume_candidates = find(frame, true, thread_of, threads);
 }
 

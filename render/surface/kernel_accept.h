@@ -290,7 +290,8 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
         p->thread->out_of_memory = true;
         return vm_none();
     }
-    const kernel_fragments place = {t, t, {colour[0], colour[1], colour[2]}, vf_set(RENDER_WAITS), vf_set(0)};
+    const kernel_fragments place = {
+        t, t, {colour[0], colour[1], colour[2]}, vf_set(RENDER_PENDING_TRANSMITTANCE), vf_set(0)};
     kernel_emit(p, waits, s->first_kind + (uint32_t)value, &place);
     for (unsigned left = vm_bits(waits); left; left &= left - 1) {
         const int i = __builtin_ctz(left);

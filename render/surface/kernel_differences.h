@@ -161,8 +161,8 @@ static __attribute__((noinline)) void kernel_sample_differences(const kernel_pac
 /* Replaces the cells' gradients in `normal` (camera axes) by differences of the samples, for the rays in `hit`. The
  * difference is one-sided if one sample of an axis is in no cell. If both are in no cell, the ray keeps its cell's
  * gradient. */
-SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_difference_samples *about, vm hit,
-                                      vf normal[3])
+SIMD_INLINE void kernel_normals_from_samples(const kernel_packet *p, const kernel_difference_samples *about, vm hit,
+                                             vf normal[3])
 {
     const render_camera *c = &p->frame->job->camera;
     const double *axes[3] = {c->right, c->up, c->forward};
@@ -181,13 +181,13 @@ SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_diffe
 }
 
 /* Takes samples around the hits and computes normals from them, for hits with a reach above 0. */
-SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
-                                    vf normal[3])
+SIMD_INLINE void kernel_normals_by_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t,
+                                               vf reach, vf normal[3])
 {
     kernel_difference_samples about;
     hit = vm_and(hit, vf_lt(vf_set(0), reach));
     kernel_sample_differences(p, s, value, hit, t, reach, &about);
-    kernel_differentiate(p, &about, hit, normal);
+    kernel_normals_from_samples(p, &about, hit, normal);
 }
 
 /* Returns half the distance between two samples of a difference, in scaled units. */

@@ -84,10 +84,10 @@ SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float 
         vf_store((float *)(void *)(h->corners + face * SIMD_WIDTH), words[face / 4][face % 4]);
 }
 
-/* The result for each ray-hex pair: the hex blocks the ray (`blocked`), or this is undecided (`doubt`). In all other
- * pairs the hex does not block the ray. */
+/* The result for each ray-hex pair: the hex blocks the ray (`blocked`), or this is undecided (`undecided`). In all
+ * other pairs the hex does not block the ray. */
 typedef struct kernel_pair_result {
-    vm blocked, doubt;
+    vm blocked, undecided;
 } kernel_pair_result;
 
 /* Returns the value, at the distance t along each ray, of the linear function L that defines the slab around the
@@ -141,9 +141,9 @@ SIMD_INLINE kernel_pair_result kernel_pairs_classify(const kernel_curved_pairs *
     out.blocked = vm_and(near, vm_and(change, vm_and(before, behind)));
     const vm whole = vm_and(vf_eq(from, ends[0].t), vf_eq(to, ends[1].t));
     const vm clear = vm_andnot(kernel_pairs_clear(pairs, from, to), vm_and(change, whole));
-    vm doubt = vm_andnot(vm_andnot(near, out.blocked), clear);
-    if (vm_any(doubt)) doubt = vm_andnot(doubt, vm_andnot(kernel_pairs_monotone(pairs, ends), change));
-    out.doubt = vm_or(out.doubt, doubt);
+    vm undecided = vm_andnot(vm_andnot(near, out.blocked), clear);
+    if (vm_any(undecided)) undecided = vm_andnot(undecided, vm_andnot(kernel_pairs_monotone(pairs, ends), change));
+    out.undecided = vm_or(out.undecided, undecided);
     return out;
 }
 
@@ -162,7 +162,7 @@ static __attribute__((noinline)) bool kernel_pairs_process(const kernel_occluder
     const kernel_pair_result verdict = kernel_pairs_classify(pairs, active, vf_load(rays.far));
     for (unsigned bits = vm_bits(verdict.blocked); bits; bits &= bits - 1)
         s->rays[pairs->ray[__builtin_ctz(bits)]].is_open = false;
-    for (unsigned bits = vm_bits(vm_and(verdict.doubt, active)); bits; bits &= bits - 1) {
+    for (unsigned bits = vm_bits(vm_and(verdict.undecided, active)); bits; bits &= bits - 1) {
         const int i = __builtin_ctz(bits);
         if (s->rays[pairs->ray[i]].is_open)
             is_well = kernel_undecided_add(s, pairs->ray[i], pairs->occluder[i]) && is_well;

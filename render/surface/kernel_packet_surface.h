@@ -21,7 +21,7 @@ SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface 
         const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
         if (!vm_any(mine)) continue;
         kernel_shading_input look = kernel_shading_input_of(hits->normal, hits->colour);
-        ready = vm_or(ready, kernel_differ(p, s, value, mine, p->t_far, hits->reach, &look));
+        ready = vm_or(ready, kernel_sample_or_defer_hits(p, s, value, mine, p->t_far, hits->reach, &look));
         for (int a = 0; a < 3; a++) hits->normal[a] = look.normal[a];
     }
     return ready;
@@ -64,7 +64,7 @@ static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, c
             }
         }
         kernel_load_difference_samples(&run, samples + i, &about);
-        kernel_differentiate(&run.packet, &about, run.rays, normal);
+        kernel_normals_from_samples(&run.packet, &about, run.rays, normal);
         const float opacity = run.surface->layer->opacity;
         const vf kind = vf_set((float)((int)run.surface->first_kind + run.value));
         kernel_fragments lit = {

@@ -38,11 +38,11 @@
 
 /* Computes the normals of hits by differences, and returns the hits. If other ranks may have samples, hits are moved to
  * the waiting list instead, and only the remaining ones are returned. */
-SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
-                             kernel_shading_input *look)
+SIMD_INLINE vm kernel_sample_or_defer_hits(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
+                                           kernel_shading_input *look)
 {
     if (p->frame->job->waiting) return kernel_defer_hits(p, s, value, hit, t, reach, look);
-    kernel_differences(p, s, value, hit, t, reach, look->normal);
+    kernel_normals_by_differences(p, s, value, hit, t, reach, look->normal);
     return hit;
 }
 
@@ -61,7 +61,8 @@ static __attribute__((noinline, cold)) void kernel_accept_equal_depth(kernel_pac
 {
     kernel_shading_input own = h->look;
     vm ready = tied;
-    if (s->layer->normal == RENDER_DIFFERENCES) ready = kernel_differ(p, s, h->value, tied, h->t, h->reach, &own);
+    if (s->layer->normal == RENDER_DIFFERENCES)
+        ready = kernel_sample_or_defer_hits(p, s, h->value, tied, h->t, h->reach, &own);
     if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, tied, h->t, &h->cells, own.normal);
     kernel_emit_tied(p, s, h->value, ready, h->t, own.normal, own.colour);
 }
@@ -97,7 +98,8 @@ SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_stat
     const kernel_surface *s = state->surface;
     const uint32_t kind = s->first_kind + (uint32_t)h->value;
     kernel_hits_add_crossing(state->hits, hit, h->t);
-    if (s->layer->normal == RENDER_DIFFERENCES) hit = kernel_differ(p, s, h->value, hit, h->t, h->reach, &h->look);
+    if (s->layer->normal == RENDER_DIFFERENCES)
+        hit = kernel_sample_or_defer_hits(p, s, h->value, hit, h->t, h->reach, &h->look);
     if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, hit, h->t, &h->cells, h->look.normal);
     const vf *colour = h->look.colour;
     kernel_fragments f = {h->t, h->t, {colour[0], colour[1], colour[2]}, 1.0f - h->opacity, vf_set(0)};
@@ -280,8 +282,8 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
         i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
         /* If a ray crosses both triangles of a quad but not its patch, both ends of the interval are the same point
          * outside the ray; such an interval is skipped. */
-        const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        prefetched[n] = vm_and(kernel_is_near(p, i), room);
+        const vm is_nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
+        prefetched[n] = vm_and(kernel_is_near(p, i), is_nonempty);
         any = vm_or(any, prefetched[n]);
     }
     if (!vm_any(any)) return;

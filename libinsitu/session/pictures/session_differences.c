@@ -136,8 +136,8 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
     out->words = base_alloc((size_t)(out->total + 1) * sizeof *out->words);
     if (!out->counts || !out->words) return false;
     for (int r = 0; r < d->ranks; r++) out->counts[r] = in->counts[r] / REQUEST_WORDS * ANSWER_WORDS;
-    render_differences_sample(d->job, (const render_pending_hit *)(const void *)in->words,
-                              (render_difference_samples *)(void *)out->words, count, error);
+    render_sample_pending_hits(d->job, (const render_pending_hit *)(const void *)in->words,
+                               (render_difference_samples *)(void *)out->words, count, error);
     return true;
 }
 
@@ -177,8 +177,8 @@ static void light_round(const differing *d, fragment_list *fragments, base_error
         fragments->items = items;
         fragments->capacity = count;
     }
-    if (!render_differences_light(d->job, d->list, d->samples, d->first, d->count, fragments->items + fragments->count,
-                                  error))
+    if (!render_light_pending_hits(d->job, d->list, d->samples, d->first, d->count, fragments->items + fragments->count,
+                                   error))
         fragments->count = count;
 }
 
@@ -188,7 +188,7 @@ static insitu_status run_rounds(differing *d, fragment_list *fragments, base_err
     for (int64_t round = 0; round < d->rounds && !status; round++) {
         const int64_t left = d->list->count - d->first;
         d->count = left < d->round_hits ? left : d->round_hits;
-        if (!error->status) render_differences_sample(d->job, d->list->items + d->first, d->samples, d->count, error);
+        if (!error->status) render_sample_pending_hits(d->job, d->list->items + d->first, d->samples, d->count, error);
         status = exchange_round(d, error);
         if (!status && !error->status) light_round(d, fragments, error);
         d->first += d->count;

@@ -55,8 +55,8 @@ static insitu_status use_points(const scene_document *d, const scene_colour_poin
                                 scene_colour_map *out)
 {
     if (points->is_banded) return use_bands(d, points, name, out);
-    const insitu_status status = make_table(d, name, colour_points_entries(points->items, points->count), out);
-    if (status == INSITU_OK) colour_points_fill(points->items, points->count, points->space, out->colours, out->count);
+    const insitu_status status = make_table(d, name, colour_table_entries(points->items, points->count), out);
+    if (status == INSITU_OK) colour_fill_table(points->items, points->count, points->space, out->colours, out->count);
     return status;
 }
 
