@@ -17,8 +17,8 @@
 typedef struct kernel_numbers {
     /* first number; NULL if the array cannot be gathered: it is too large, or neither float32 nor float64 */
     const float *data;
-    int32_t stride; /* distance between consecutive numbers, in units of four bytes */
-    bool is_wide;
+    int32_t stride;   /* distance between consecutive numbers, in units of four bytes */
+    bool is_wide;     /* set if the numbers are float64, not float32 */
     grid_array array; /* the array itself, read one by one if data is NULL */
     /* if not NULL, numbers are read by grid_field_value() of this field instead of from `array` */
     const grid_field *field;
@@ -300,7 +300,8 @@ SIMD_INLINE kernel_wide_doubles kernel_raw_to_double(bool is_narrow, const kerne
 
 /* ---- cells of uniform and rectilinear lattices ---- */
 
-/* Coordinates of cells of a lattice whose axes are those of coordinates: at both ends of each cell, by axis. */
+/* Coordinates of cells of a uniform or rectilinear lattice: those of each cell's lower end (ends[0]) and upper end
+ * (ends[1]), by axis. */
 typedef struct kernel_lattice_cells {
     kernel_wide_doubles ends[2][3];
 } kernel_lattice_cells;
@@ -310,7 +311,8 @@ SIMD_INLINE bool kernel_arrays_have_axes(const kernel_arrays *p)
     return p->coordinates[0].array.axis != NULL;
 }
 
-/* Reads the coordinates of hexes of a lattice with axes, given their first vertices: 6 numbers instead of 24. */
+/* Reads the coordinates of hexes of a uniform or rectilinear lattice, given each hex's first vertex. It reads 6 numbers
+ * per hex instead of 24. */
 static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arrays *p, const int32_t first[SIMD_WIDTH],
                                                                 kernel_lattice_cells *out)
 {
@@ -328,14 +330,14 @@ static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arr
 
 /* ---- comparisons with a value ---- */
 
-/* A value to compare with: in double, as a sum of two float32 (middle + rest), and the least float32 that is not below
- * it. */
+/* A value with which numbers are compared: in double, as a sum of two float32 (middle + rest), and the smallest float32
+ * that is not below it (least). */
 typedef struct kernel_level {
     double value;
     float middle, rest, least;
 } kernel_level;
 
-/* Returns the least float32 that is not below x. */
+/* Returns the smallest float32 that is not below x. */
 SIMD_INLINE float kernel_not_below(double x)
 {
     float f = (float)x;

@@ -1,12 +1,12 @@
-/* Bounds of the maps and fields of hexes, wedges or pyramids, one cell per lane. They hold for all rays of a tile (what
- * they bound is defined in kernel_roots.h). A derivative that does not depend on all three coordinates is computed once
- * for all corners that share it.
+/* Computes bounds on the maps and fields of hexes, wedges or pyramids, one cell per lane. The bounds hold for all rays
+ * of a tile; the header comment of kernel_roots.h defines the quantities that are bounded. A derivative that does not
+ * depend on all three coordinates is computed once for all corners that share it.
  *
- * Let J be the Jacobian of the cell's map, L a linear function of the point with the field's gradient at the cell's
- * centre, and E = F - L(X), which is a polynomial like F and small if the field is smooth. Along a ray of direction d,
- * L(X) is linear and the reference coordinates r have the slope J^-1 d. If |grad L . d| is larger than the maximum of
- * grad E . J^-1 d, F is monotone along every ray in the cell. And if L at both ends of an interval is farther from 0
- * than the largest |E|, on the same side, the interval has no root. */
+ * Let the position X and the field F be functions of the reference coordinates r, J the Jacobian of X, L a linear
+ * function of the position whose gradient is the field's at the cell's centre, and E = F - L(X). E is a polynomial like
+ * F, and small if the field is smooth. Along a ray of direction d, L(X) is linear and r has the derivative J^-1 d. If
+ * |grad L . d| is larger than the maximum of grad E . J^-1 d, F is monotone along every ray in the cell. And if L at
+ * both ends of an interval is farther from 0 than the largest |E|, on the same side, the interval has no root. */
 #ifndef RENDER_KERNEL_BOUNDS_H
 #define RENDER_KERNEL_BOUNDS_H
 
@@ -21,10 +21,10 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* Coefficients by which the only root of a ray is found (surface/kernel_contraction.h). Y = inverse (X - vertex 0) +
- * offset equals r + N(r), where r is counted from the domain's middle, or from the apex of a pyramid, and
- * nonlinear_part has the coefficients of N. The field is L + middle + the terms `field`, which multiply the same
- * products of coordinates. */
+/* Coefficients from which surface/kernel_contraction.h computes a ray's only root. J0^-1 (X - vertex 0) + offset equals
+ * r + N(r), where J0 is the map's Jacobian at the domain's middle, r is counted from that middle (or from the apex of a
+ * pyramid), and nonlinear_part has the coefficients of N. The field is L + middle + a polynomial with the coefficients
+ * `field`, in the same products of coordinates as N. kernel_contraction.h defines error_bound and domain_margin. */
 typedef struct kernel_contractions {
     float offset[3][SIMD_WIDTH], middle[SIMD_WIDTH], nonlinear_part[4][3][SIMD_WIDTH], field[4][SIMD_WIDTH];
     /* K / (1 - K), where K < 1 is the contraction constant of the iteration for reference coordinates; infinite if the
@@ -41,25 +41,28 @@ typedef struct kernel_bounds {
     /* The linear function L that approximates the field: its value at vertex 0, its gradient in tile space, and the
      * bound of |E| = |field - L| including rounding. The bound is infinite if nothing is proved about the cell. */
     float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
-    /* Inverse of the map's Jacobian at the cell's centre. The cell lies between pairs of planes: low <= normal . (X -
-     * vertex 0) <= high. */
+    /* normal: inverse of the map's Jacobian at the cell's centre. Its rows are the normals of three pairs of planes
+     * between which the cell lies: low <= normal . (X - vertex 0) <= high. */
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
     float nonlinear_part[3][4][SIMD_WIDTH]; /* coefficients 4 to 7 of the nonlinear part N of the map */
-    /* upper bounds from kernel_roots.h: L, by which reference coordinates are stretched, and G, of the field's
-     * gradient */
+    /* upper bounds that kernel_roots.h calls L (of how much the inverse map stretches distances) and G (of the field's
+     * gradient) */
     float stretch[SIMD_WIDTH], slope[SIMD_WIDTH];
-    /* upper bounds H and K from kernel_roots.h, of the second derivatives of the field and the map; for a pyramid they
-     * are multiplied by its coordinate k */
+    /* upper bounds that kernel_roots.h calls H and K, of the second derivatives of the field and the map; for a pyramid
+     * they are multiplied by its coordinate k */
     float field_curvature[SIMD_WIDTH], map_curvature[SIMD_WIDTH];
     kernel_contractions contractions;
 } kernel_bounds;
 
 /* Intermediate results in double for SIMD_WIDTH / 2 cells. */
 typedef struct kernel_bounds_lanes {
-    /* polynomial coefficients of positions and field, and positions relative to vertex 0 */
+    /* exact: polynomial coefficients of the positions (0 to 2) and the field (3); apart: positions of the vertices
+     * relative to vertex 0 */
     kernel_f64 exact[4][8], apart[3][8];
+    /* nonlinear_part: coefficients 4 to 7 of the map's nonlinear part N; inverse: inverse of the Jacobian at the
+     * centre; reach: largest magnitude of the vertices' coordinates */
     kernel_f64 nonlinear_part[3][4], inverse[3][3], reach[3];
-    kernel_f64_mask is_solid;
+    kernel_f64_mask is_solid; /* cells whose Jacobian at the centre has an inverse */
 } kernel_bounds_lanes;
 
 /* Lists which derivatives of a map are different at the corners of a reference domain (kernel_domain_of()), for each of
@@ -83,7 +86,9 @@ static const kernel_slope_table kernel_slope_tables[3] = {
      {{0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}}},
 };
 
-/* The derivatives that differ from corner to corner, indexed by their number in kernel_slope_table. */
+/* The derivatives that differ from corner to corner, of the map's nonlinear part N minus those at the centre (bend), of
+ * the field (df) and of E (de). The indices are the component of N (for bend only), the axis, and the number in
+ * kernel_slope_table. */
 typedef struct kernel_lanes_slopes {
     kernel_f64 bend[3][3][4], df[3][4], de[3][4];
 } kernel_lanes_slopes;
@@ -329,22 +334,26 @@ typedef struct kernel_f64_rates {
     /* rounding error of positions across the rays; gradient of the linear function L; coefficients of the difference E
      * between field and L */
     kernel_f64 across, gradient[3], e[8];
-    /* bounds that are explained at kernel_f64_bounds(); w is the maximum of |J0^-1 d| over the rays' directions d */
+    /* upper bounds over the cell, in reference coordinates: of the distance of a face's computed crossing from its ray
+     * (gap), of |grad F| (slope), of the norm of J0^-1 J - I (theta), of |grad E| (slant), and of |J0^-1 d| over the
+     * rays' directions d (w); and a lower bound of |grad L . d| (rise) */
     kernel_f64 gap, slope, theta, slant, rise, w;
     kernel_f64_mask is_regular;
 } kernel_f64_rates;
 
-/* Computes the contraction's constant K and the bounds of rounding, in reference coordinates r. With u = 6e-8, e the
- * vertices' largest distance from vertex 0 along an axis, and `wide` the maximum |x| and |y| of rays and vertices: - y
- * and w err by about 4 u |inverse| times `wide` across and times e, including the rounding of the inverse itself:
- *   an eighth of the 2e-6 that kernel_f64_bounds() uses for the positions of faces, and 3e-7 e.
- * - L and E err by 4 u times 2, the bound of values (domain_margin has a factor 2 for this), times the gradient times
- * `wide`
- *   across and e along the ray, and by as much for the gradient's own rounding: 5e-7. Divided by the field's
- *   derivative, and times |w|, that is an error of r.
- * - An iteration adds a few units in the last place of r, and near a pyramid's apex k is at least 1e-6: 1e-6. The
- * faces' crossings lie within `gap` of the ray, and the values there differ from the field by at most KERNEL_FACE_BAND.
- * Each error moves the root by itself / (1 - K). domain_margin is twice the sum. */
+/* Computes error_growth, K / (1 - K) with the contraction's constant K, and the bounds of rounding errors, in reference
+ * coordinates r. Let u = 6e-8, e the vertices' largest distance from vertex 0 along an axis, and `wide` the maximum |x|
+ * and |y| of rays and vertices; y and w are those of kernel_contraction.h.
+ * - y and w have errors of about 4 u |inverse| times `wide` across the ray and times e along each axis, including the
+ *   rounding of the inverse itself: an eighth of the 2e-6 that kernel_f64_bounds() uses for the positions of faces, and
+ *   3e-7 e.
+ * - L and E have errors of 4 u times 2, the bound of values (domain_margin has a factor 2 for this), times the gradient
+ *   times `wide` across and e along the ray, and as much again for the gradient's own rounding: 5e-7. Divided by the
+ *   field's derivative along the ray, and times |w|, that is an error of r.
+ * - An iteration adds a few units in the last place of r, and near a pyramid's apex k is at least 1e-6: 1e-6.
+ * error_bound is the sum of these errors. The computed crossings of faces lie within `gap` of the ray, and the values
+ * there differ from the field by at most KERNEL_FACE_BAND. Each error moves the root by at most itself / (1 - K), and
+ * domain_margin is twice the sum of all. */
 SIMD_INLINE void kernel_f64_rate(const kernel_bounds_lanes *b, int type, const kernel_f64_rates *r, int half,
                                  kernel_contractions *out)
 {

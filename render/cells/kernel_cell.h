@@ -1,4 +1,4 @@
-/* Intersects a ray with a cell: computes where the ray enters and leaves, and the field there.
+/* Intersects a ray with a cell: computes the points at which the ray enters and leaves the cell, and the field there.
  *
  * Which faces a ray crosses is decided on triangles: the triangular faces, and the quads split in two by the diagonal
  * from their smallest vertex, in the lexicographic order of coordinates. The crossing point on a quad is then computed
@@ -8,7 +8,7 @@
  *
  * In the ray's own plane (x, y with the ray at the origin) the edge function of edge ab is xa yb - xb ya: positive on
  * one side. It is computed so that its sign is exact (simd.h). If it is zero, the ray is treated as if it were moved by
- * (e, e²) for an e smaller than every number; that rule is the same for all edges and decides every tie. So a ray meets
+ * (e, e²) for an e smaller than every number; the same rule holds for all edges and decides every tie. So a ray meets
  * exactly those triangles that contain it, never both or neither of two that share an edge, and it crosses a closed
  * surface an even number of times. (Woop, Benthin and Wald 2013 for the edge functions in the ray's plane; Edelsbrunner
  * and Mücke 1990 for the ties.) Sorted along the ray, the crossings form pairs, which are the intervals inside the
@@ -156,10 +156,9 @@ typedef struct kernel_cell {
     int rank[GRID_MAX_CELL_VERTICES];    /* rank of each vertex in the lexicographic order of coordinates */
     kernel_line lines[KERNEL_MAX_LINES]; /* edge functions of the edges, then of the quads' diagonals */
     float doubt;                         /* for a tet: largest error bound of its edge functions */
-    float
-        /* least sum of weights that is accurate enough: for a tet, of each face; for other cells least[0] bounds that
-         * of all triangles */
-        least[4];
+    /* least sum of weights that is accurate enough: for a tet, that of each face; for other cells, least[0] is an upper
+     * bound for all triangles */
+    float least[4];
     float normal[3];      /* for a tet: gradient from kernel_tet_normal(); valid if has_normal is set */
     kernel_tet_line line; /* for a tet: the field of contour lines; valid if has_line_field is set */
 } kernel_cell;
@@ -171,8 +170,8 @@ typedef struct kernel_crossing {
     vf r[3];
 } kernel_crossing;
 
-/* The part of each ray inside the cell, between two crossings: depths, values of f (v) and g (w), and reference
- * coordinates. */
+/* The interval of each ray inside the cell, between two crossings: depths t, values v of kernel_cell.f and w of
+ * kernel_cell.g, and reference coordinates r. */
 typedef struct kernel_interval {
     vm mask;
     vf t_in, t_out, v_in, v_out;
@@ -278,7 +277,7 @@ SIMD_INLINE void kernel_cell_canonical_order(const kernel_cell *c, int from[GRID
     if (kernel_is_box(c->type)) {
         int axes[3] = {1, 2, 4};
         for (int k = 0; k < 3; k++) {
-            const int at = k == 1; /* compares the axes 0 and 1, 1 and 2, 0 and 1, which sorts three of them */
+            const int at = k == 1; /* compares axes 0 and 1, then 1 and 2, then 0 and 1 again, which sorts all three */
             if (kernel_rank_before(c, corner[corner[least] ^ axes[at + 1]], corner[corner[least] ^ axes[at]]))
                 swap = axes[at], axes[at] = axes[at + 1], axes[at + 1] = swap;
         }
@@ -304,7 +303,8 @@ SIMD_INLINE void kernel_cell_canonical_order(const kernel_cell *c, int from[GRID
     }
 }
 
-/* Computes each vertex's rank in the order of coordinates. It has no branches, because they would be unpredictable. */
+/* Computes each vertex's rank in the order of coordinates. The code has no branches, because their outcome would be
+ * unpredictable. */
 SIMD_INLINE void kernel_rank_positions(double (*const world)[3], const int count, int *rank)
 {
     for (int i = 0; i < count; i++) rank[i] = 0;

@@ -66,7 +66,8 @@ static inline bool kernel_has_quads(int type)
     return type == kernel_curved_types[kernel_shape_number(type)];
 }
 
-/* Selects one of three expressions by whether the type is a hex, a wedge or a pyramid. */
+/* Expands to the first expression if the type is a hex, to the second if it is a wedge, and to the third if it is a
+ * pyramid. */
 #define KERNEL_BY_SHAPE(type, hex, wedge, pyramid)                                                                     \
     (kernel_shape_number(type) == KERNEL_SHAPE_HEX     ? (hex)                                                         \
      : kernel_shape_number(type) == KERNEL_SHAPE_WEDGE ? (wedge)                                                       \

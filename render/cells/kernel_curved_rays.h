@@ -28,7 +28,7 @@ SIMD_INLINE void kernel_curved_ray_add(kernel_pixel_list *to, const kernel_pixel
     to->count++;
 }
 
-/* ---- which faces ---- */
+/* ---- faces that each ray crosses ---- */
 
 SIMD_INLINE void kernel_curved_project(const float (*at)[8][SIMD_WIDTH], const kernel_lane_rays *r, int type,
                                        kernel_projected *out)
@@ -40,8 +40,8 @@ SIMD_INLINE void kernel_curved_project(const float (*at)[8][SIMD_WIDTH], const k
     }
 }
 
-/* Returns the bits of an edge function, whose sign is exact. *least becomes the function's absolute value if that is
- * smaller. */
+/* Returns the bits of the edge function from vertex a to b; its sign bit is exact. Lowers *least to the function's
+ * magnitude if that is smaller. */
 SIMD_INLINE vi kernel_curved_side(const kernel_projected *s, int a, int b, vf *least)
 {
     const vf e = vf_diff_of_products(s->x[a], s->y[b], s->x[b], s->y[a]);
@@ -76,9 +76,9 @@ SIMD_INLINE vi kernel_curved_crossed_faces(const kernel_curved_sides *sides, int
     return faces;
 }
 
-/* Returns the rays that cross just one half of a quad, even if it does not look convex; the result does not depend on
- * which diagonal halves it. Rays that may cross the quad's patch twice are added to *alone, the rays to be traced cell
- * by cell. */
+/* Returns the rays that cross exactly one of a quad's two triangles, even if the quad does not look convex; the result
+ * does not depend on the diagonal along which the quad is split. Rays that may cross the quad's patch twice are added
+ * to *alone, the rays to be traced cell by cell. */
 SIMD_INLINE vm kernel_curved_cross_one_triangle(const kernel_projected *s, const kernel_curved_sides *sides,
                                                 const kernel_shape *shape, int face, vm rays, vm *alone)
 {
@@ -116,7 +116,7 @@ SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const k
     kernel_curved_find((const float(*)[8][SIMD_WIDTH])h->at, p, &all, p->active, out, type);
 }
 
-/* ---- where ---- */
+/* ---- crossing points ---- */
 
 /* Corners of a quad that differs from ray to ray: their vertex numbers in the cell, and the field values there. */
 typedef struct kernel_curved_quad {
@@ -196,8 +196,8 @@ static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(con
     for (int i = 0; i < 3; i++) own->e[i] = vf_select(weak, e[i], own->e[i]);
 }
 
-/* Gathers the corners and edge functions of the triangle `face` for the given rays. Other lanes get valid but
- * meaningless numbers. */
+/* Gathers the corners and edge functions of each ray's triangle for the given rays. face: number of the triangular face
+ * in its cell, per ray. Other lanes get valid but meaningless numbers. */
 SIMD_INLINE void kernel_curved_triangle_gather(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
                                                vm rays, vi face, kernel_curved_triangle *own)
 {
@@ -253,7 +253,7 @@ SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const k
         kernel_curved_quad corners[2];
         kernel_quad_point places[2];
         for (int n = 0; n < quads; n++) kernel_curved_quad_gather(h, p, type, face[n], &own[n], &corners[n]);
-        /* these rays' edge functions have certain signs, so no ray meets an edge */
+        /* the signs of these rays' edge functions are certain, so no ray meets an edge */
         kernel_quads_cross(own, quads, once, true, places);
         for (int n = 0; n < quads; n++) kernel_curved_quad_reference(type, &corners[n], &places[n], &out[n]);
     }

@@ -1,5 +1,5 @@
-/* Computes the ends of a ray's segment in a tet in double. That is used for segments that may have no error, or almost
- * none, and for transfer functions with extremely narrow ramps.
+/* Computes the ends of a ray's segment in a tet in double precision. It is used if the job's max_error is below 2e-4
+ * (render_prepare.c) or a transfer function has extremely narrow ramps.
  *
  * In float32 a face's value errs by about 4e-7 of the transfer function's domain: three weights, their sum, and the
  * vertices' positions and values have an error of 6e-8 each. A steep function magnifies that error, near an opacity of
@@ -30,7 +30,8 @@
 /* A ray meets a face's plane outside the face by at most 1e-7 / KERNEL_DOUBLE_EDGE of the face's extent. */
 #define KERNEL_DOUBLE_EDGE 1e-3
 
-/* The exact length in t of an interval whose ends are float32, and the rounding errors of the values at its ends. */
+/* Corrections to an interval whose ends are float32: its length in t, rounded only once, and the parts of the values at
+ * its ends that float32 rounds off. */
 typedef struct kernel_precise_interval {
     vf length, rest_in, rest_out;
 } kernel_precise_interval;
@@ -40,6 +41,8 @@ typedef struct kernel_affine {
     double c[3];
 } kernel_affine;
 
+/* The affine functions of a tet's face: the weighted sums N of depths (depth) and values (value), and the sum of
+ * weights D (weight), as defined at the top of this file. */
 typedef struct kernel_double_face {
     kernel_affine depth, value, weight;
     double least; /* the face is not seen edge on if the weight is larger than this */

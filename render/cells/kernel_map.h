@@ -81,7 +81,7 @@ SIMD_INLINE void kernel_f64_fit(int type, kernel_f64 c[8], const kernel_f64 v[8]
     KERNEL_FIT(type, c, v);
 }
 
-/* The product m of the map's polynomial, and its derivatives. */
+/* The product m in the map's polynomial, and its derivatives along r, s and q. */
 typedef struct kernel_product {
     vf m, dr, ds, dq;
 } kernel_product;
@@ -383,7 +383,8 @@ SIMD_INLINE void kernel_reference_between(const kernel_point *low, const kernel_
     for (int a = 0; a < 3; a++) r[a] = low->r[a] + along * (high->r[a] - low->r[a]);
 }
 
-#define KERNEL_FACE_BAND 1e-6f /* largest difference, by rounding, between a face's value and the field there */
+/* Largest difference that rounding causes between a face's value and the field there. */
+#define KERNEL_FACE_BAND 1e-6f
 #define KERNEL_DOMAIN_RIM 0.03125
 
 /* KERNEL_LOW and KERNEL_HIGH are the ends of the reference domain [0, 1], extended by KERNEL_DOMAIN_RIM to both sides

@@ -1,4 +1,4 @@
-/* Intersects rays with a quad's bilinear patch: how often they meet, and at which points.
+/* Intersects rays with a quad's bilinear patch: computes how often they meet it, and at which points.
  *
  * Corners 0 to 3 are in cyclic order; in the ray's plane, with the ray at the origin, they are c0 to c3. The patch's
  * point (s, r) is (1-r) ((1-s) c0 + s c1) + r ((1-s) c3 + s c2). For a given r these are the points of the line from u
@@ -11,11 +11,12 @@
  *   times, because both surfaces have the same border. A bilinear patch is met at most twice; so odd means once.
  * - The two discriminants b1² - b0 b2 and a1² - a0 a2 are the same number D. At a root the patch's Jacobian in the
  *   plane is J = A'(s) = -B'(r) = 2 sqrt(D) or -2 sqrt(D): its sign pairs the two roots of A with those of B.
- * - Odd: then b0 and b2 differ in sign, or a0 and a2 do. If b0 and b2 do, B rises or falls through (0, 1) once, which
- *   gives the sign of B' and so of J: the root is chosen without any arithmetic. Likewise for A.
- * - Even: twice or never. Twice only if b0 and b2 have one sign, a0 and a2 have one sign, b1 and a1 have the opposite
- *   signs, and D > 0. It is the only decision that depends on rounding, for a ray at the patch's silhouette, whose two
- *   points then differ by less than 1e-8; all cells of the face decide it from the same numbers.
+ * - Odd: b0 and b2 differ in sign, or a0 and a2 do. If b0 and b2 do, B rises or falls through (0, 1) once, which gives
+ *   the sign of B' and so of J: the root is chosen without any arithmetic. Likewise for A.
+ * - Even: the ray meets the patch twice or never, and twice only if b0 and b2 have one sign, a0 and a2 have one sign,
+ *   b1 and a1 have the opposite signs, and D > 0. It is the only decision that depends on rounding, for a ray at the
+ *   patch's silhouette, whose two points then differ by less than 1e-8; all cells of the face decide it from the same
+ *   numbers.
  * If b0 and b2 differ in sign, D is a sum of two positive terms, and a root is a quotient of sums of terms of one sign:
  * nothing cancels. So what is computed in double from the corners' float32 is exact except for rounding, however
  * edge-on, thin or warped the quad is: the crossings of two quads at their common edge come in the order given by the
@@ -124,8 +125,8 @@ static inline double kernel_scalar_zero(double v0, double v1)
     return x >= 0 ? fmin(x, 1) : 0;
 }
 
-/* Returns the limit of the root of the quadratic A or B (see the top of this file) if it vanishes for all parameters.
- * The two lines are from corner i to i2 and from corner j to j2. */
+/* Returns the root of the quadratic A or B (see the top of this file) as a limit, for a quadratic that is zero for all
+ * parameters. The two lines are from corner i to i2 and from corner j to j2. */
 static inline double kernel_scalar_limit(const kernel_scalar_quad *q, int i, int i2, int j, int j2)
 {
     const double y0 = q->y[i2] - q->y[i], y1 = q->y[j2] - q->y[j];
@@ -351,8 +352,8 @@ SIMD_INLINE kernel_patch_at kernel_patch_evaluate(const kernel_patch *p, vf s, v
     return at;
 }
 
-/* Number of steps of Newton's method for a ray's point on the patch, clamped to [0, 1]. The error is squared in each
- * step: from 0.2 it falls to 1e-9 in four. */
+/* Number of steps of Newton's method that compute a ray's point on the patch. The parameters are clamped to [0, 1].
+ * Each step squares the error, so that four steps reduce it from 0.2 to 1e-9. */
 enum { KERNEL_PATCH_STEPS = 4 };
 
 SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
@@ -364,10 +365,10 @@ SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
     *r = vf_clamp(*r + (at.sx * at.dy - at.sy * at.dx) * inverse, zero, one);
 }
 
-/* Returns the rays whose points are accurate: within float32's resolution of the quad's size, across the ray. Excluded
- * are rays for which the quad is so steep that this means an error 8 times as large along the ray, or is nearly folded,
- * and points so near the quad's border that the crossing of a neighbouring face, with an error of 1e-6 of its size,
- * could come in the wrong order. */
+/* Returns the rays whose points are accurate: the distance from the point to the ray is at most float32's resolution of
+ * the quad's size. Three kinds of rays are excluded: those for which the quad is so steep that the error along the ray
+ * would be 8 times as large, those for which it is nearly folded, and those whose point is so near the quad's border
+ * that a neighbouring face's crossing, with an error of 1e-6 of the face's size, could come in the wrong order. */
 SIMD_INLINE vm kernel_patch_converged(const kernel_patch *p, vf s, vf r)
 {
     const vf one = vf_set(1);
@@ -402,7 +403,7 @@ static __attribute__((noinline)) void kernel_quad_single_point_off_edges(const k
 
 /* Computes the points at which rays meet the patches of `count` quads. once[n] has the rays that cross exactly one
  * triangle of quad n. Quads are processed together because each step of Newton's method depends on the one before.
- * are_off_edges: no ray meets an edge, and the quads' edge functions are not set. */
+ * are_off_edges: set if no ray meets an edge; the quads' edge functions are then not read and need not be set. */
 SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], bool are_off_edges,
                                     kernel_quad_point *out)
 {
@@ -458,8 +459,9 @@ SIMD_INLINE vm kernel_quad_may_cross_twice(const kernel_quad *q, vm rays)
     return vm_and(rays, vm_and(a, b));
 }
 
-/* Returns the rays that cross exactly one of a quad's two triangles. around[i]: on which side of the quad's edges the
- * ray lies, in cyclic order from the begin of the diagonal; side: the same for the diagonal. */
+/* Returns the rays that cross exactly one of a quad's two triangles. around[i]: the rays on the negative side of the
+ * quad's edge i; the edges are in cyclic order and begin at the diagonal's first corner. side: the rays on the negative
+ * side of the diagonal. */
 SIMD_INLINE vm kernel_cross_one_triangle(const vm around[4], vm side)
 {
     const vm half0 = vm_andnot(vm_xor(around[1], side), vm_xor(around[0], around[1]));

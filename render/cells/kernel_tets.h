@@ -24,12 +24,13 @@ typedef struct kernel_tets {
     const kernel_transformed_tets *transformed;
 } kernel_tets;
 
-/* Returns a number that belongs to each ray's tet: a member of kernel_cell if there is one tet, and otherwise one of
- * kernel_transformed_tets. */
+/* Expands to a vector with one number of each ray's tet: the member of_one of kernel_cell if all rays share a tet,
+ * otherwise the member of_transformed of kernel_transformed_tets. */
 #define KERNEL_TET_NUMBER(t, of_one, of_transformed)                                                                   \
     ((t)->is_one ? vf_set((t)->one->of_one) : vf_permute((t)->transformed->of_transformed, (t)->lane_rays->lane))
 
-/* Returns a copy for a function that is not inlined, so that the original stays in registers. */
+/* Returns a copy of *t, to be passed to a function that is not inlined, so that the original stays in registers. rays:
+ * memory for a copy of the lane rays. */
 SIMD_INLINE kernel_tets kernel_tets_copy(const kernel_tets *t, kernel_lane_rays *rays)
 {
     kernel_tets out = *t;
@@ -59,7 +60,7 @@ SIMD_INLINE void kernel_tets_edges_projected(const kernel_tets *t, vf e[KERNEL_T
     }
 }
 
-/* Computes the edge functions whose sign is uncertain again, from projected vertices, so that their sign is exact. */
+/* Recomputes the edge functions whose sign is uncertain from projected vertices, which gives the exact sign. */
 static __attribute__((noinline)) void kernel_tets_in_double(const kernel_tets *t, vf e[KERNEL_TET_EDGES])
 {
     vf exact[KERNEL_TET_EDGES];
@@ -190,8 +191,8 @@ SIMD_INLINE kernel_ends kernel_tets_choose_in_double(const kernel_tets *t, vm ra
     return kernel_tets_choose(hit, sums);
 }
 
-/* Calls kernel_tets_choose_in_double() with is_one as a constant. It is not inlined, because few packets have
- * inaccurate weights. */
+/* Calls kernel_tets_choose_in_double() with is_one as a compile-time constant. It is not inlined, because few packets
+ * have inaccurate weights. */
 static __attribute__((noinline, cold)) kernel_ends kernel_tets_recompute(const kernel_tets *t, vm rays,
                                                                          const vf e[KERNEL_TET_EDGES], bool has_colour)
 {

@@ -190,8 +190,8 @@ SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_curved *h, boo
     return out;
 }
 
-/* Returns the lanes whose hex has edges parallel to the axes: sorted, vertices that differ from vertex 0 along x, y and
- * z are vertex 4, 3 and 1 and those beside them. */
+/* Returns the lanes whose hex has edges parallel to the axes. In the sorted order the neighbours of vertex 0 along x, y
+ * and z are vertices 4, 3 and 1. */
 SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_curved *h, bool is_narrow)
 {
     static const int neighbours[3] = {4, 3, 1};
@@ -231,8 +231,8 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
 
 /* ---- edge functions ---- */
 
-/* Returns a word with the corners of a quad's loop, four bits each: from the least corner on, towards the lesser of its
- * neighbours. */
+/* Returns a word with the vertex numbers of a quad's corners, four bits each. They begin at the smallest corner and go
+ * around the quad towards the smaller of its neighbours. */
 SIMD_INLINE vi kernel_curved_quad_word(const signed char *loop, const vf rank[8])
 {
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
@@ -382,8 +382,8 @@ SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_lattice_cells *cel
 }
 
 /* Transforms the vertices of cuboids, as kernel_lanes_transform() does for single vertices, with the same bits: each
- * product is computed once for the vertices that share it. Sorted, bit 0, 1 and 2 of a vertex's reference coordinates
- * are along z, y and x. */
+ * product is computed once for the vertices that share it. In the sorted order, bits 0, 1 and 2 of a vertex's reference
+ * coordinates stand for z, y and x. */
 SIMD_INLINE void kernel_lattice_cells_transform(const kernel_lattice_cells *cells, const kernel_frame *f,
                                                 const kernel_tile *tile, int half, kernel_transformed_curved *out)
 {
@@ -505,7 +505,7 @@ typedef struct kernel_curved_crossed {
     vi first, last;
 } kernel_curved_crossed;
 
-/* Returns the index of the lowest bit that is set; the result is meaningless for 0. */
+/* Returns the index of the lowest bit that is set, per lane; the result is meaningless for 0. */
 SIMD_INLINE vi kernel_least_bit(vi bits)
 {
     return ((vi_from_bits(vf_from_vi(bits & -bits)) >> 23) - 127) & 7;

@@ -4,12 +4,12 @@
  * surface (each face is cut as polygon.h defines), the unique edges, and the centre, which forms with each triangle a
  * tet on which the field is linear. All of this is computed when a ray of a tile first meets the cell, and deleted with
  * the tile: no copy of the mesh is kept. A polyhedron of v vertices has 2 v - 4 triangles and 3 v - 6 edges, and takes
- * about 200 v bytes here, about 6 KB for a Voronoi cell of 27 vertices. A store holds at most STORE_LIMIT bytes of them
- * and one cell more; when that is reached, it is emptied.
+ * about 200 v bytes here, about 6 KB for a Voronoi cell of 27 vertices. A store is emptied before the next cell is
+ * added if it holds more than STORE_LIMIT bytes.
  *
- * Vertices are sorted by coordinates, triangles by their vertices, and edges are in the order in which the triangles
- * have them. So the polyhedron is the same to the bit for any numbering of the mesh and any order of faces or of a
- * face's vertices.
+ * Vertices are sorted by coordinates, triangles by their vertices, and edges are stored in the order in which the
+ * triangles first use them. So the polyhedron is the same to the bit for any numbering of the mesh and any order of
+ * faces or of a face's vertices.
  *
  * The sign of a tet is that of its volume, with its triangle oriented outward (closed_faces.h). */
 #include "render_polyhedra.h"

@@ -27,7 +27,7 @@ typedef struct polyhedron {
     int part, layer;
     bool is_finite, is_transformed, is_constant;
     bool is_star_shaped; /* true if no tet's sign is negative: the cell is star-shaped from its centre */
-    bool has_slopes;
+    bool has_slopes;     /* set if `fall` and `rise` have been computed */
     int vertex_count, edge_count, facet_count;
     double (*world)[3]; /* the arrays from `world` to `lines` have one entry for each vertex, and one for the centre */
     double *values;
@@ -40,8 +40,8 @@ typedef struct polyhedron {
     double fall, rise;
     /* edge functions (kernel_cell.h): of the edges, then of the lines from each vertex to the centre */
     float (*lines)[4];
-    float
-        least; /* least sum of weights that is accurate enough for all of its triangles (kernel_least_weight_bound()) */
+    /* least sum of weights that is accurate enough for all triangles (kernel_least_weight_bound()) */
+    float least;
     int64_t *vertices; /* vertex indices in the mesh, vertex_count of them */
     int (*edges)[2];
     polyhedron_facet *facets;
