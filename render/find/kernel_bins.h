@@ -10,7 +10,7 @@ typedef struct kernel_tile_range {
     unsigned first, last;
 } kernel_tile_range;
 
-/* Clips pixels first .. last to the tile that begins at pixel `begin`. */
+/* Clips the pixels from first to last to the tile whose first pixel is `begin`, and counts them from there. */
 static inline kernel_tile_range kernel_range_in_tile(int first, int last, int begin)
 {
     const int from = first - begin, to = last - begin;
@@ -18,7 +18,7 @@ static inline kernel_tile_range kernel_range_in_tile(int first, int last, int be
                                (unsigned)(to < KERNEL_TILE - 1 ? to : KERNEL_TILE - 1)};
 }
 
-/* Returns a mask with a bit for each row or column of blocks that the pixels meet. */
+/* Returns a mask of the rows (or columns) of blocks that contain one of the pixels. */
 static inline unsigned kernel_range_blocks(kernel_tile_range s)
 {
     return ~0u << s.first / KERNEL_BLOCK & ((2u << s.last / KERNEL_BLOCK) - 1);
@@ -48,7 +48,7 @@ typedef struct kernel_by_depth {
     int first[KERNEL_DEPTHS];
 } kernel_by_depth;
 
-/* Returns the bin of a depth. It increases monotonically with the depth. */
+/* Returns the number of the bin that contains a depth. It never decreases as the depth grows. */
 SIMD_INLINE int kernel_depth_bin(const kernel_by_depth *q, float near)
 {
     const float bin = (near - q->low) * q->scale;

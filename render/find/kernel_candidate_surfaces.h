@@ -1,15 +1,15 @@
-/* Isosurfaces of tets, hexes, wedges and pyramids, found SIMD_WIDTH cells at a time (kernel_candidates.h):
+/* Finds the tets, hexes, wedges and pyramids that isosurfaces cross, SIMD_WIDTH cells at a time (kernel_candidates.h):
  *
  *     cells of one type, one per lane:   do their values straddle an isovalue?
  *     cells that do, one per lane:       the slab of kernel_outline.h and its box of pixels; for tets the points where
  *                                        the isovalue crosses their edges
  *
  * Positions are differences from the eye in float32, along the camera's axes. A hit is the mean of the vertices with
- * non-negative weights, and its value is the mean of their values with the same weights (kernel_outline.h). So |L| <= E
- * holds there for any positions of the vertices, if L and E are computed from these same positions: a hit's error in
- * that slab is at most the vertices', 8 roundings of their distance from the eye, which is less than the margins of
- * kernel_add_lanes(). The properties of cells that are not folded also hold only up to rounding; cells of a size near
- * rounding lie within the margins anyway. */
+ * non-negative weights, and its value is the mean of their values with the same weights (kernel_outline.h). So the hit
+ * lies in the slab |L| <= E of kernel_outline.h, computed from the same rounded positions. The hit's error is then at
+ * most that of the vertices, 8 roundings of their distance from the eye, which is less than the margins of
+ * kernel_add_lanes(). That cells whose map is not folded contain their hits also holds only up to rounding; cells whose
+ * size is near the rounding error lie within the margins anyway. */
 #ifndef RENDER_KERNEL_CANDIDATE_SURFACES_H
 #define RENDER_KERNEL_CANDIDATE_SURFACES_H
 
@@ -32,13 +32,13 @@ typedef struct kernel_curved_lanes {
     /* at: vertex positions relative to the eye, along the camera's axes; f: vertex values minus the isovalue, scaled as
      * by kernel_cell_relative() */
     vf at[8][3], f[8];
-    /* lanes whose numbers are neither too large nor too small for float32 nor NaN; cells of other lanes are tested one
-     * by one */
+    /* lanes whose numbers are in the range of float32 and not NaN; the cells of all other lanes are tested one by one
+     */
     vm fitting_lanes;
 } kernel_curved_lanes;
 
-/* The linear function L of kernel_outline.h at the vertices. The isosurface lies in the slab |L| <= thickness; the
- * thickness is infinite if there is no such slab. */
+/* at: the linear function L of kernel_outline.h at the vertices. The isosurface lies in the slab |L| <= thickness; the
+ * thickness is infinite if no such slab is known. */
 typedef struct kernel_curved_slab {
     vf at[8], thickness;
 } kernel_curved_slab;
@@ -74,8 +74,8 @@ SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const 
 }
 
 /* Computes the linear function L (kernel_outline.h) at the vertices, and the thickness of the slab that contains the
- * isosurface. |f| is at most about 1. Positions have an error of at most one rounding, r, of their coordinates, and
- * their mean has an error of at most 8 r. Lanes whose volume is near float32's minimum are removed from
+ * isosurface. |f| is at most about 1. With r the rounding error of one coordinate, positions have an error of at most
+ * r, and their mean has one of at most 8 r. Lanes whose volume is near float32's minimum are removed from
  * fitting_lanes. */
 SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, kernel_curved_slab *out)
 {
@@ -171,8 +171,9 @@ SIMD_INLINE void kernel_tet_lanes_view_bounds(const kernel_finder *s, const kern
     }
 }
 
-/* Does what kernel_curved_lanes_transform() does, with the same bits, for hexes of a lattice with axes: vertices share
- * coordinates and their products. */
+/* Computes the positions of hexes of a uniform or rectilinear lattice in the camera's axes. The result has the same
+ * bits as that of kernel_curved_lanes_transform(), but each product is computed once for all vertices that share a
+ * coordinate. */
 static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kernel_finder *s, const kernel_cells *c,
                                                                      kernel_curved_lanes *l)
 {
@@ -235,8 +236,8 @@ SIMD_INLINE vf kernel_curved_lanes_values(const kernel_finder *s, const kernel_r
     return size;
 }
 
-/* Adds the cells of the lanes in `crossed`, which the isovalue crosses, to the candidates. Cells whose numbers are too
- * large, too small or NaN for lanes are tested one by one. */
+/* Adds the cells of the lanes in `crossed`, which the isovalue crosses, to the candidates. Cells in lanes that are not
+ * in `fitting`, whose numbers are outside the range of float32 or NaN, are tested one by one. */
 SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int value, vm fitting, unsigned crossed,
                                     const kernel_view_bounds *e)
 {
@@ -293,8 +294,7 @@ SIMD_INLINE void kernel_crossed_queue_process(kernel_finder *s, kernel_crossed_q
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
     kernel_curved_lanes_transform(s, c, vertices, &l);
     const vf size = kernel_curved_lanes_values(s, v, vertices, &level, &l);
-    /* the bits of the power of two that scales the largest value to near 1: its exponent is the negated exponent of the
-     * value */
+    /* the bits of a power of two that scales the largest value to near 1: the exponent is that of the value, negated */
     const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
     kernel_curved_lanes_slab(&l, c->type, &slab);

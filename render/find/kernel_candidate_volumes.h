@@ -17,7 +17,7 @@ SIMD_INLINE void kernel_finder_fetch_cell(kernel_finder *s, uint32_t cell)
     kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], cell);
 }
 
-/* Adds those of the cells, which are all of one type, to the candidates whose values are visible in the volume. */
+/* Adds the cells whose values are visible in the volume to the candidates. All cells of the list have one type. */
 static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, const kernel_cells *c)
 {
     kernel_view_bounds e = kernel_view_bounds_empty();

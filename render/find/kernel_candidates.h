@@ -1,14 +1,14 @@
-/* Finds the cells that show isosurfaces and volumes by one traversal per frame. The trees are traversed once for the
- * whole picture, and each cell that the surface crosses, or that is visible in the volume, is fetched and transformed
- * once, to find the pixels in which it may be visible. The cells are then binned by tile (render_candidates.c;
- * sort-middle in the terms of Molnar et al. 1994). Tiles trace them beginning with the nearest, and skip blocks that
- * have nearer hits (render_kernels.c, kernel_batch.h; for volumes kernel_tile_cells.h):
+/* Finds the cells in which isosurfaces and volumes may be visible by one traversal per frame. The trees are traversed
+ * once for the whole picture. Each cell that the surface crosses, or whose values are visible in the volume, is fetched
+ * and transformed once, and the pixels in which it may be visible are computed. The cells are then binned by tile
+ * (render_candidates.c; sort-middle in the terms of Molnar et al. 1994). Tiles trace them roughly front to back, and
+ * skip blocks that have nearer hits (render_kernels.c, kernel_batch.h; for volumes kernel_tile_cells.h):
  *
  *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
  *
- * A tile's own traversal (kernel_tile_surface.h) instead tests the same nodes as its neighbours' traversals and
- * transforms the same cells, most of which lie beside the tile. It is faster if surfaces hide more cells than they
- * show, because it skips everything behind them. It is used for opaque surfaces with several cells per pixel, and for
+ * Alternatively each tile traverses the trees (kernel_tile_surface.h). It then tests many of the nodes that its
+ * neighbours test too, and transforms cells that mostly lie beside the tile. That is faster if most cells are hidden,
+ * because it skips everything behind the hits. It is used for opaque surfaces with several cells per pixel, and for
  * frames in which too many cells are visible.
  *
  * A cell's pixels are the bounding box of its projected outline (kernel_outline.h), widened by more than all rounding.
@@ -29,7 +29,7 @@
 #include "mmbvh.h"
 #include "simd.h"
 
-/* Adds those of the pending cells that may be visible to the candidates. The pending cells are all of one type. */
+/* Adds the pending cells that may be visible to the candidates. All pending cells in the list have one type. */
 static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 {
     if (!c->count) return;
@@ -106,7 +106,7 @@ static void kernel_find_flush(kernel_finder *s)
 /* Number of nodes that are tested at a time, so that their prefetches overlap in time. */
 enum { KERNEL_FRONT = 16, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
 
-/* A list of nodes, each stored as 2 * node, plus 1 if the node lies completely in the picture. */
+/* A list of nodes to be tested together. An entry is 2 * node, plus 1 if the node lies completely in the picture. */
 typedef struct kernel_front {
     int count;
     int64_t entries[KERNEL_FRONT];

@@ -65,7 +65,7 @@ typedef struct kernel_crossed_queue {
     int value; /* index of the isovalue in its layer, the same for all cells */
 } kernel_crossed_queue;
 
-/* The state of the search of one subtree, or of a tile's search. */
+/* The state of a search for candidates: that of one subtree, or that of one tile. */
 typedef struct kernel_finder {
     const kernel_frame *frame;
     const kernel_surface *surface;   /* the surface layer that is searched; NULL if a volume is searched */
@@ -154,9 +154,10 @@ SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
         for (int i = o->count; i % SIMD_WIDTH; i++) o->point[a][i] = o->point[a][0];
 }
 
-/* Computes the pixels between the extent's ends, clipped to from .. to. Returns false if there are none. `zero` is the
- * pixel at extent 0. error_bound: that of the extent, in pixels. The extent is widened by this bound, by 1/100 pixel
- * and by 3e-5 of the numbers, which is more than the error of rays that hit only by rounding. */
+/* Computes the first and last pixel of an extent, clipped to the pixels from `from` to `to`. Returns false if it
+ * contains none. zero: the pixel at which the extent's coordinate is 0. error_bound: error of the extent, in pixels.
+ * The extent is widened by this bound, by 1/100 pixel and by 3e-5 of the numbers, which is more than the error of rays
+ * that hit only by rounding. */
 SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float error_bound, int from, int to, uint16_t *first,
                                      uint16_t *last)
 {
@@ -169,9 +170,9 @@ SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float error_bo
     return true;
 }
 
-/* Computes the candidate of a cell from the extents of its surface in depth, columns and rows, relative to the axis of
- * view. Returns false if it is not visible. size: an upper bound of the cell's depths. A cell near or behind the eye's
- * plane may be anywhere, so its candidate covers the whole picture. */
+/* Computes the candidate of a cell from the extents in depth, columns and rows of the surface in it. Columns and rows
+ * are relative to the axis of view. Returns false if it is not visible. size: an upper bound of the cell's depths. A
+ * cell near or behind the eye's plane may be anywhere, so its candidate covers the whole picture. */
 SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent depth, float size,
                                           kernel_extent columns, kernel_extent rows, kernel_candidate *out)
 {
@@ -239,7 +240,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     const grid *g = s->frame->job->parts[s->part].cells;
     kernel_outline o = {0};
     kernel_candidate candidate = {.cell = index, .source = s->source};
-    /* the outline is the eight corners of the bounding box of the polyhedron's vertices */
+    /* a polyhedron's outline consists of the eight corners of its vertices' bounding box */
     float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     grid_walk walk = grid_walk_cell(g, index);
     int64_t vertex;
@@ -304,8 +305,8 @@ SIMD_INLINE void kernel_finder_positions(const kernel_finder *s, vi vertex, vf o
     }
 }
 
-/* Returns the lanes of `fitting` whose coordinates are small enough for float32 lanes and not NaN. Other cells are
- * tested one by one. */
+/* Returns the lanes of `fitting` whose coordinates are not NaN and small enough for computations in float32. The cells
+ * of all other lanes are tested one by one. */
 SIMD_INLINE vm kernel_positions_fit_lanes(vm fitting, const vf place[3])
 {
     for (int a = 0; a < 3; a++) fitting = vm_and(fitting, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
@@ -353,8 +354,8 @@ SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float error_bound
     return vf_le(*first, *last);
 }
 
-/* Adds the cells of the given lanes (a bit mask) that may be visible to the candidates. It is the version in lanes of
- * kernel_extents_candidate(). */
+/* Adds the cells of the given lanes (a bit mask) that may be visible to the candidates. kernel_extents_candidate() does
+ * the same for a single cell. */
 static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsigned lanes, const uint32_t *cells,
                              uint32_t source)
 {
@@ -365,7 +366,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_view_bounds *e, unsi
     float near[SIMD_WIDTH], far[SIMD_WIDTH];
     int32_t ends[4][SIMD_WIDTH];
     const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
-    /* All lanes use the largest error bound of any of them. */
+    /* All lanes use the error bound of the lane with the largest one. */
     const float error_bound = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
     const int columns[2] = {s->first[0], s->last[0]}, rows[2] = {s->first[1], s->last[1]};
     vm candidates = kernel_pixel_range(e->left, e->right, s->column_0, error_bound * fabsf(s->column_scale), columns,

@@ -13,8 +13,8 @@ SIMD_INLINE void kernel_prefetch_vertex(const grid *g, const grid_field *field, 
         __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
 }
 
-/* Prefetches a cell's vertex indices and its type. An offset into the connectivity is read without a prefetch, because
- * only this function waits for it. */
+/* Prefetches a cell's vertex indices and its type. The cell's offset into the connectivity is read directly, without a
+ * prefetch: only this function is delayed by the read. */
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 {
     if (g->lattice) return;

@@ -20,8 +20,9 @@
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS };
 
-/* Number of cells per pixel of their trees' bounding boxes above which cells are called small. For surfaces only the
- * cells in leaves that isovalues may cross are counted (docs/development/decisions/find.md). */
+/* SMALL_CELLS and SMALL_CROSSED: number of cells per pixel of their trees' bounding boxes above which the cells of a
+ * volume, or of a surface, count as small. For a surface only the cells in leaves that isovalues may cross are counted
+ * (docs/development/decisions/find.md). SAMPLES: number of tree nodes from which their share is estimated. */
 enum { SMALL_CELLS = 8, SMALL_CROSSED = 3, SAMPLES = 512 };
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */
@@ -119,15 +120,15 @@ static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint3
         }
 }
 
-/* Bins the cells that a thread has found. On entry starts[1 + tile] is the number of each tile's cells. Returns false
- * if the sum is more than `most`, or memory runs out. */
+/* Bins the cells that a thread has found. On entry starts[1 + tile] must be the number of cells in each tile. Returns
+ * false if the sum is more than `most`, or memory runs out. */
 static bool bin_list_fill(bin_list *bin, const kernel_candidate_list *list, int64_t tiles, int64_t most)
 {
     uint32_t *starts = bin->starts;
     uint64_t sum = 0;
     for (int64_t tile = 0; tile < tiles; tile++) {
         const uint32_t count = starts[1 + tile];
-        /* bin_tiles() advances this from the begin of the tile's cells to that of the next tile's cells */
+        /* bin_tiles() advances this index from the tile's first cell to the next tile's first cell */
         starts[1 + tile] = (uint32_t)sum;
         sum += count;
     }
@@ -236,8 +237,8 @@ typedef struct coverage {
     pixel_range all[2]; /* ranges of columns and rows that all boxes together cover */
 } coverage;
 
-/* Measures the parts on which the field has ranges of values, or all parts if ranges is NULL. Returns false if a part
- * does not lie completely in front of the eye. */
+/* Counts the cells and the pixels of the parts on which the field exists (ranges[part].low is set), or of all parts if
+ * ranges is NULL. Returns false if a part does not lie completely in front of the eye. */
 static bool measure_parts(const kernel_frame *f, const mmbvh_ranges *ranges, coverage *out)
 {
     *out = (coverage){.all = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}}};
@@ -267,8 +268,8 @@ typedef struct leaf_sample {
     double cells, crossed;
 } leaf_sample;
 
-/* Adds the counts of `samples` nodes spread over the part's tree; about half of them are leaves, and inner nodes have
- * no cells. */
+/* Adds the counts of `samples` nodes that are spread evenly over the part's tree. About half of them are leaves; inner
+ * nodes have no cells and add 0. */
 static void sample_leaves(const kernel_frame *f, const kernel_surface *s, int part, int64_t samples, leaf_sample *out)
 {
     const mmbvh *tree = f->job->parts[part].tree;
@@ -313,8 +314,8 @@ bool render_surfaces_are_small(const kernel_frame *f)
     return crossed > SMALL_CROSSED * pixels;
 }
 
-/* The margin covers the errors of rays and tree bounds that kernel_tree_planes() allows for, and the half pixel by
- * which pixels extend beyond their centres. */
+/* The rectangle is extended by a margin that covers the errors of rays and tree bounds for which kernel_tree_planes()
+ * allows, and the half pixel by which a pixel extends beyond its centre. */
 void render_trees_cover(kernel_frame *f)
 {
     const render_job *job = f->job;

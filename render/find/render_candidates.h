@@ -12,8 +12,8 @@ bool render_surfaces_are_small(const kernel_frame *frame);
  * thread_of: one state per thread. If too many cells are visible, or memory runs out, frame->candidates stays NULL, and
  * tiles traverse the trees themselves. */
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
-/* Finds the cells of the frame's only volume and stores them in frame->volume_candidates. If they are too small or too
- * many, or memory runs out, that stays NULL, and tiles traverse the tree themselves. */
+/* Finds the cells of the frame's only volume and stores them in frame->volume_candidates. If the cells are too small or
+ * too many, or memory runs out, frame->volume_candidates stays NULL, and tiles traverse the tree themselves. */
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
 /* Gathers the cells of the tile whose upper left pixel is (x0, y0) in thread->bin and volume_bin, for the kernels.
  * Returns false if there is no memory. */
