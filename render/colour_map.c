@@ -13,8 +13,8 @@ enum { most_keys = 11 };
 
 typedef float colour_table[COLOUR_TABLE_SIZE][3];
 
-/* The longest palettes of ColorBrewer. Specifications by Cynthia Brewer, colorbrewer.org (Apache-2.0; the file NOTICE
- * has the licence's text). */
+/* A palette of ColorBrewer, with the largest number of colours that ColorBrewer offers for it. Specifications by
+ * Cynthia Brewer, colorbrewer.org (Apache-2.0; the file NOTICE has the licence's text). */
 typedef struct brewer_palette {
     const char *name;
     int key_count;

@@ -4,10 +4,10 @@
 
 #include <stdbool.h>
 
-/* The space in which colours are interpolated: sRGB; hue, saturation and value (of sRGB, hues not across 0); CIELAB
- * (D65); or Moreland's Msh, the polar form of CIELAB, in which the path between two saturated colours of different hues
- * leads through a neutral colour that is lighter than both. COLOUR_STEP: no interpolation, the colour of the second
- * point. */
+/* The space in which colours are interpolated: sRGB; hue, saturation and value of sRGB (the hue's path does not cross
+ * 0); CIELAB (D65); or Moreland's Msh, the polar form of CIELAB, in which the path between two saturated colours of
+ * different hues leads through a neutral colour that is lighter than both. COLOUR_STEP: no interpolation, the colour of
+ * the second point. */
 typedef enum colour_space { COLOUR_RGB, COLOUR_HSV, COLOUR_LAB, COLOUR_DIVERGING, COLOUR_STEP } colour_space;
 
 /* Interpolates between the sRGB colours a and b (components in [0, 1]); the result is linear light in [0, 1]. */

@@ -8,18 +8,20 @@
  * The result of a frame is a function of the cells and the job alone. It does not depend on the rank that holds a cell,
  * the order of the cells, the trees, or the number of threads.
  *
- * If cells overlap, each contributes its own sample. Samples at one position, of several cells or of several volumes,
- * share what all of them absorb in proportion to what each would absorb alone. A rank cannot know which cells of other
- * ranks overlap its own. So a frame keeps one cell's sample and marks the ray by a second sample, as a fragment of its
- * own at the same depth. Compositing finds the pixels in which fragments of any ranks overlap (comp.h), and these are
- * traced again with separate_samples, which leaves the sharing to compositing. Until then the result in such pixels is
- * undefined. Volumes by segments work the same way: if cells overlap, each cell's segments become separate fragments;
- * segments of several volumes do so on all pixels.
+ * If cells overlap, each contributes its own sample. If several cells or several volumes have a sample at one position,
+ * the light that they absorb together is divided among them in proportion to what each would absorb alone. A rank
+ * cannot know which cells of other ranks overlap its own. If its own cells overlap, a frame therefore keeps one cell's
+ * sample, and marks the ray by a second fragment at the same depth. Compositing finds the pixels in which fragments of
+ * any ranks overlap (comp.h), and these are traced again with separate_samples, which leaves the sharing to
+ * compositing. Until then the result in such pixels is undefined. Volumes that are integrated by segments work the same
+ * way: if cells overlap, each cell's segments become separate fragments; segments of several volumes do so on all
+ * pixels.
  *
  * Faces that coincide but do not have the same bits, as at hanging nodes, leave overlaps and gaps of the size of
  * rounding. Segments that overlap by no more are not reported to compositing: each has its own length, and the sum of
  * lengths is the same on any partition. A sample in such an overlap marks its ray. Separate samples are flagged if they
- * are near their cell's begin or end, so that compositing can distinguish two such owners from cells that overlap. */
+ * are near an end of the ray's interval in their cell, so that compositing can distinguish such an overlap by rounding
+ * from cells that really overlap. */
 #ifndef RENDER_RENDER_H
 #define RENDER_RENDER_H
 
@@ -51,8 +53,8 @@ void render_camera_sample(int count, int k, double offset[2]);
 bool render_camera_look_at(render_camera *camera, const double eye[3], const double focal[3], const double up[3],
                            double vertical_degrees, int width, int height);
 
-/* Computes the ray through pixel (x, y), at its centre plus the offset: p(z) = base + z * direction, z >= 0. direction
- * has length 1 along forward, not length 1. */
+/* Computes the ray through pixel (x, y), at its centre plus the offset: p(z) = base + z * direction, z >= 0. The
+ * component of direction along forward is 1, so its length is 1 or more. */
 void render_camera_ray(const render_camera *camera, int x, int y, double base[3], double direction[3]);
 
 /* The coordinate space of float32 positions. World positions are taken relative to origin and multiplied by scale, a
@@ -143,7 +145,8 @@ enum { RENDER_DIFFERENCE_SAMPLES = 6 };
  * bytes. */
 typedef struct render_pending_hit {
     uint32_t pixel, kind; /* pixel and kind of the fragment that will be made of the hit */
-    /* reach: distance from the hit to its samples, which lie before and behind it along each axis; scaled units */
+    /* t: depth of the hit; reach: distance from the hit to its samples, which lie before and behind it along each axis;
+     * scaled units */
     float t, reach;
 } render_pending_hit;
 
@@ -152,21 +155,22 @@ typedef struct render_pending_shading {
     float normal[3], colour[3];
 } render_pending_shading;
 
-/* Growing lists of hits and their looks, with the same count. Memory comes from memory.h. */
+/* Growing lists of pending hits and of the data for lighting them; both have `count` entries. Memory comes from
+ * memory.h. */
 typedef struct render_pending_list {
     render_pending_hit *items;
     render_pending_shading *shadings;
     int64_t count, capacity;
 } render_pending_list;
 
-/* The samples around a hit: before and behind it along the first axis, then along the second and the third. They take
- * 32 bytes. */
+/* The six samples around a hit, in the order: before and behind it along the first world axis, then along the second
+ * and the third. The struct takes 32 bytes. */
 typedef struct render_difference_samples {
     uint32_t found, unused; /* found: one bit per sample, set if some cell contains the sample's point */
     float values[RENDER_DIFFERENCE_SAMPLES];
 } render_difference_samples;
 
-/* Value of `transmittance` that marks the placeholder fragments of these hits while a frame is traced. */
+/* Value of `transmittance` that marks the placeholder fragments of pending hits while a frame is traced. */
 #define RENDER_PENDING_TRANSMITTANCE 2.0f
 
 /* The value range of each surface's field over all ranks (low > high if no rank has the field), and the list of hits
@@ -221,8 +225,8 @@ typedef struct render_surface_layer {
      * with three such vertices or pyramids with four. */
     float edge_width;
     float edge_colour[3]; /* colour of these edges, linear RGB */
-    /* Set if the surface consists of faces of its cells, which are below the isovalue elsewhere. A ray that meets such
-     * a face only in an edge, and so has an interval of length zero in the cell, then also hits it. */
+    /* Set if the surface consists of faces of its cells; the rest of each cell is below the isovalue. A ray that meets
+     * such a face only in an edge, so that its interval in the cell has length zero, then also hits the surface. */
     bool is_of_faces;
     uint32_t clips; /* clips of the job that cut the surface: bit i stands for clips[i] */
     /* For rays from hits (render_light.h): a cell blocks such a ray only if it is met farther from the hit than this
@@ -235,7 +239,8 @@ typedef struct render_volume_layer {
     const render_transfer *transfer;
 } render_volume_layer;
 
-/* Share of the colour table's length by which rounding may move a value that is at an end of the range. */
+/* Upper bound of how far rounding may move a value that is at an end of the range, as a fraction of the colour table's
+ * length. */
 #define RENDER_END 4e-6f
 
 /* Linear grey level of surfaces at points at which their colour field is NaN. It is the sRGB colour 0.6 in float. */
@@ -246,9 +251,9 @@ typedef struct render_part {
     const grid *cells;
     const mmbvh *tree; /* min-max tree over the cells, in the coordinates of the job's space */
     /* Vertex loops of polygons, for layers with edge lines. If loops[cell] is 0, every edge between vertices in the
-     * surface is drawn. Otherwise the cell stands on a part of a polygon: from loops[loops[cell]] on are the number of
-     * vertices around the polygon, the number of segments of which each of its edges consists, and the vertices, of
-     * which the first is a corner. NULL: the mesh has no polygons. */
+     * surface is drawn. Otherwise the cell stands on a part of a polygon, which is described by the entries from
+     * loops[loops[cell]] on: the number of vertices around the polygon, the number of segments into which each of its
+     * edges is divided, and the vertices in cyclic order, beginning with a corner. NULL: the mesh has no polygons. */
     const int64_t *loops;
 } render_part;
 
@@ -266,7 +271,8 @@ typedef enum render_traversal {
  * several volumes need separate_samples: without it several volumes are sampled. */
 typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integration;
 
-/* Error allowed to mixed segments, in linear light, if the job gives no max_error. */
+/* Largest allowed error of a colour, in linear light, of overlapping segments that compositing blends; used if the job
+ * gives no max_error. */
 #define RENDER_MIXING_ERROR 1e-4
 
 typedef enum render_clip_kind { RENDER_CLIP_PLANE, RENDER_CLIP_BOX, RENDER_CLIP_SPHERE } render_clip_kind;
@@ -345,15 +351,15 @@ typedef struct render_job {
     /* Set if each sample of each cell and volume becomes a fragment of length 0, and each segment one or several
      * fragments, which compositing can mix. */
     bool separate_samples;
-    /* Set if the fragments of the volume, of which there must be only one, are folds of this rank's samples or
-     * segments, which do not depend on the partition (fragment_fold.h). Not allowed with separate_samples. */
+    /* Set if this rank's samples or segments are folded (blended in the fixed order of fragment_fold.h), so that the
+     * picture has the same bits on any partition. There must be only one volume. Not allowed with separate_samples. */
     bool reproducible;
     int threads; /* number of threads, >= 1; 0: OpenMP's default */
 } render_job;
 
 typedef struct render_statistics {
-    int64_t rays; /* number of traced rays, one per pixel */
-    int64_t map_failures;
+    int64_t rays;         /* number of traced rays, one per pixel */
+    int64_t map_failures; /* number of points for which the inversion of a cell's map failed */
     int64_t volume_cells; /* cells that were transformed for volumes, counted once per tile and window of depth */
     double surface_ms, volume_ms;
 } render_statistics;
@@ -361,9 +367,9 @@ typedef struct render_statistics {
 /* Returns the position in [0, 1) of a pixel's first sample in a frame, in steps. It is a hash of both numbers. */
 double render_jitter(uint32_t pixel, uint32_t frame);
 
-/* Compute intervals of visible values: a cell whose range, rounded to float, meets none of them is invisible. The first
- * returns the interval of an isovalue. The second computes the intervals in which a transfer function is not
- * transparent, and returns their number, at most RENDER_MAX_INTERVALS. */
+/* Compute intervals of visible values: a cell whose range, rounded to float, meets none of them is invisible.
+ * render_isovalue_interval() returns the interval of an isovalue. render_visible_intervals() computes the intervals in
+ * which a transfer function is not transparent, and returns their number, at most RENDER_MAX_INTERVALS. */
 mmbvh_interval render_isovalue_interval(double value);
 int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 

@@ -41,20 +41,20 @@ render_box render_differences_box(const render_job *job)
     return hit_box(job, is_by_differences);
 }
 
-/* Margin in scaled units, in which the size of a scene is about 1. The errors of points and of float32 boxes are
- * smaller. */
+/* Margin by which boxes are extended, in scaled units, in which the size of a scene is about 1. It is larger than the
+ * errors of points and of float32 boxes. */
 static const double box_margin = 1e-5;
 
-/* The six sample points are the ends of a cross around the hit, whose three bars are two reaches long. The test is
- * whether one of the bars meets the box. */
+/* The six sample points are the ends of three segments, one along each axis, that are centred at the hit and 2 * reach
+ * long. The function tests whether one of the segments meets the box. */
 bool render_differences_meet(const render_job *job, const render_pending_hit *hit, const render_box *box)
 {
     const uint32_t width = (uint32_t)job->camera.width;
     const double z = (double)hit->t / job->space.scale + job->space.depth_origin;
     const double reach = (double)hit->reach / job->space.scale, margin = box_margin / job->space.scale;
     double base[3], direction[3];
-    /* beside: number of axes along which the hit is outside the box; beyond: number of axes along which the whole cross
-     * is outside. */
+    /* beside: number of axes along which the hit is outside the box; beyond: number of axes along which all sample
+     * points are. */
     int beside = 0, beyond = 0;
     render_camera_ray(&job->camera, (int)(hit->pixel % width), (int)(hit->pixel / width), base, direction);
     for (int a = 0; a < 3; a++) {
@@ -196,8 +196,8 @@ insitu_status render_light_pending_hits(const render_job *job, const render_pend
                                         const render_difference_samples *samples, int64_t first, int64_t count,
                                         fragment *out, base_error *error)
 {
-    /* offsets by which hits, samples and fragments of a list that begins at hit `first` have the same indices, from 0
-     * on */
+    /* the pointers are advanced to hit `first`, so that index 0 belongs to the same hit in the list, in `samples` and
+     * in `out` */
     const render_pending_list some = {list->items + first, list->shadings + first, count, count};
     chunk_work work = {.list = &some, .merged = samples, .out = out};
     return count ? process_chunks(job, &work, 0, count, error) : INSITU_OK;

@@ -1,11 +1,11 @@
 /* Computes normals by central differences whose samples lie in the cells of any rank.
  *
- * A frame whose job has a waiting list is traced first; its hits with normals by differences are added to that list.
- * Around each hit six samples are taken, in this rank's cells and by every rank whose box contains one of their points.
- * The samples are merged, and their differences give the normal with which the hit is lit. Each rank computes the hit's
- * pixel, tile and ray from the camera, which all ranks have, and samples in the same tile space as the rank of the hit.
- * So the result has the same bits as on one rank with all cells. If cells overlap, the sample is the minimum of their
- * values, on whichever ranks they are. */
+ * First a frame is traced whose job has a list of pending hits (render_job.waiting); its hits with normals by
+ * differences are added to that list. The field is then sampled at six points around each hit, by this rank and by
+ * every rank whose box contains one of the points. The samples are merged, and their differences give the normal with
+ * which the hit is lit. Each rank computes the hit's pixel, tile and ray from the camera, which all ranks have, and
+ * samples in the same tile space as the rank of the hit. So the result has the same bits as if one rank had all cells.
+ * If several cells contain a point, on whichever ranks, the sample is the minimum of their values. */
 #ifndef RENDER_RENDER_DIFFERENCES_H
 #define RENDER_RENDER_DIFFERENCES_H
 
@@ -36,8 +36,9 @@ insitu_status render_sample_pending_hits(const render_job *job, const render_pen
 
 void render_differences_merge(render_difference_samples *into, const render_difference_samples *other);
 
-/* Lights `count` hits of the list from `first` on by their samples (samples[0] belongs to hit `first`), as the job
- * paints them: the fragments are those that render_frame() would have computed. Local. */
+/* Computes the normals of `count` hits of the list, from index `first` on, from their samples (samples[0] belongs to
+ * hit `first`), and lights the hits as job->paint requests. The fragments are those that render_frame() would have
+ * computed. Local. */
 insitu_status render_light_pending_hits(const render_job *job, const render_pending_list *list,
                                         const render_difference_samples *samples, int64_t first, int64_t count,
                                         fragment *out, base_error *error);

@@ -1,6 +1,7 @@
-/* A run is a sequence of samples or segments that touch each other, without a surface in between. Between the begin and
- * the end of a run no other rank has fragments, so that halved intervals of t within it can be folded
- * (fragment_fold.h). If only this rank has cells (job->is_alone), everything between two surfaces can be folded. */
+/* A run is a sequence of a pixel's samples or segments that touch each other, without a surface in between. No other
+ * rank has fragments between the begin and the end of a run. So the intervals and halved intervals of t
+ * (fragment_fold.h) that lie within a run can be folded. If only this rank has cells (job->is_alone), everything
+ * between two surfaces can be folded. */
 #include "render_fold.h"
 
 #include <math.h>
@@ -71,14 +72,15 @@ static float error_at(float t)
     return fmaxf(fabsf(t), 1) * RENDER_FACE_ERROR;
 }
 
-/* Ends each fragment of a run earlier by its error bound, so that compositing does not take touching fragments for
- * overlapping ones (kernel_segments.h). */
+/* Moves the end of each fragment of a run forward, towards the eye, by its error bound, so that compositing does not
+ * take touching fragments for overlapping ones (kernel_segments.h). */
 static void shorten(const render_folding *folding, fragment *items, int64_t count)
 {
     for (int64_t i = 0; i < count && folding->has_segments; i++) items[i].t_out -= error_at(items[i].t_out);
 }
 
-/* Folds the fragments of one run, interval by interval (fragment_interval_number()). Returns the end of its output. */
+/* Folds the fragments of one run, interval by interval (fragment_interval_number()), and writes the result from `out`
+ * on. Returns the end of the output. */
 static fragment *fold_run(const render_folding *folding, fragment *run, int64_t count, fragment *out)
 {
     const bool is_alone = folding->job->is_alone;

@@ -62,7 +62,7 @@ bool fragment_reserve(fragment_list *list, int64_t more)
     return true;
 }
 
-/* Closes the gaps at the ends of pieces by moving fragments from behind position `count` into them. */
+/* Fills the gaps at the ends of pieces with the fragments that lie at position `count` and beyond. */
 static void close_gaps(const fragment_pieces *pieces, int64_t count)
 {
     fragment *items = pieces->out->items + pieces->first;

@@ -28,8 +28,8 @@ static double now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Number of fragments that most tiles do not exceed. A thread whose tile has more moves its fragments from its piece to
- * memory of its own. */
+/* Number of fragments for which a thread has space before it begins a tile; most tiles have no more. If a tile has
+ * more, the thread moves the piece's fragments to memory of its own. */
 enum { TILE_FRAGMENTS = KERNEL_TILE * KERNEL_TILE };
 
 /* The destination of fragments: a list, of which each writer has a piece, or a callback that receives them tile by
@@ -189,8 +189,8 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     return has_memory;
 }
 
-/* Returns the number of fragments for which memory is reserved: one at every other pixel. Memory that is never written
- * costs nothing. If only a set of pixels is traced, none is reserved. */
+/* Returns the number of fragments for which memory is reserved: one at every other pixel. Reserved memory that is never
+ * written costs nothing. If only a set of pixels is traced, no memory is reserved. */
 static int64_t expected_fragments(const render_job *job)
 {
     return job->pixels ? 0 : (int64_t)job->camera.width * job->camera.height / 2;

@@ -4,8 +4,8 @@
 #ifndef RENDER_RENDER_ISA_H
 #define RENDER_RENDER_ISA_H
 
-/* Return the process's instruction set as a number of the enum cpu_isa; and limit later frames of the calling thread to
- * a set. */
+/* render_isa_level() returns the process's instruction set as a value of the enum cpu_isa. render_isa_limit() limits
+ * later frames of the calling thread to at most the given set. */
 int render_isa_level(void);
 void render_isa_limit(int level);
 

@@ -1,6 +1,6 @@
 /* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile traces
- * its surfaces first, as opaque ones end the rays of volumes. It traces the cells that are binned there, or traverses
- * the trees once. */
+ * surfaces before volumes, because opaque hits end the rays. It traces the cells that have been binned for it, or finds
+ * cells by traversing the trees itself. */
 #include <stddef.h>
 
 #include "grid.h"
@@ -79,9 +79,11 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
     return candidate->blocks & t->traced_blocks & kernel_blocks_beyond(t, candidate->near);
 }
 
-/* A tile's cells that are queued for tracing: vectors of cells of one type, and cells that are traced one by one. */
+/* Maximum number of queued cells that are traced one by one. */
 enum { KERNEL_ALONE = SIMD_WIDTH };
 
+/* A tile's cells that are queued for tracing: one vector of cells per type, and cells that are traced one by one
+ * (alone). */
 typedef struct kernel_tile_queue {
     int layer, part;      /* layer and mesh part of the last queued cell; -1: there is none yet */
     kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
@@ -113,9 +115,9 @@ SIMD_INLINE void kernel_tile_queue_set_part(const kernel_tile_trace *t, kernel_t
     kernel_arrays_begin(&m->arrays, t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part]);
 }
 
-/* Returns whether a cell of the queue's layer and part is queued in a vector of its type; polyhedra are not. In a mesh
- * of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because their hits
- * then hide other cells sooner. */
+/* Returns whether a cell of the queue's layer and part is to be queued in the vector of its type. Polyhedra never are.
+ * In a mesh of mixed types a tile has few large wedges or pyramids of one type; these are traced one by one, because
+ * their hits then hide other cells sooner. */
 SIMD_INLINE bool kernel_is_traced_in_vectors(const kernel_tile_queue *m, const kernel_tile_candidate *candidate,
                                              int type)
 {
@@ -150,8 +152,8 @@ SIMD_INLINE void kernel_tile_queue_append(kernel_tile_trace *t, kernel_tile_queu
     kernel_surface_cells_add(t, own, candidate, value);
 }
 
-/* Traces the cells that are in no vector, one by one. The vectors are traced first, because their cells were found
- * earlier and their hits may hide these cells. */
+/* Traces the cells that are in no vector, one by one. The vectors of cells are traced before, because their cells were
+ * found earlier and their hits may hide the single cells. */
 static void kernel_tile_queue_trace_singly(kernel_tile_trace *t, kernel_tile_queue *m)
 {
     if (!m->alone_count) return;
@@ -210,8 +212,8 @@ typedef struct kernel_prefetch_queue {
     const kernel_tile_candidate *items[SIMD_WIDTH];
 } kernel_prefetch_queue;
 
-/* Sorts pending cells by their part, and leaves them in order of depth within each: a batch contains cells of one part
- * only, and cells of different blocks of a mesh alternate in depth. */
+/* Sorts pending cells by mesh part, and keeps their order of depth within each part. A batch can contain cells of one
+ * part only, and without the sort cells of different parts would alternate. */
 static void kernel_pending_sort(kernel_prefetch_queue *w)
 {
     for (int n = 1; n < w->count; n++) {
@@ -246,7 +248,8 @@ static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_t
     w->count = 0;
 }
 
-/* Traces the tile's opaque surfaces, or its transparent ones, which must be traced after the opaque ones. */
+/* Traces the tile's transparent surfaces if `transparent` is set, otherwise its opaque ones, which must be traced
+ * first. */
 static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_by_depth *q,
                                                                    bool transparent)
 {

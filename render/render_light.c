@@ -1,4 +1,5 @@
-/* Transforms the rays of hits into the kernels' spaces (kernel_occluders.h, kernel_bundle.h), and lights the hits. */
+/* Transforms the rays of hits to the spaces in which kernels trace them (tree space in kernel_occluders.h, tile space
+ * in kernel_bundle.h), and lights the hits. */
 #include "render_light.h"
 
 #include <math.h>
@@ -71,26 +72,26 @@ enum { LIGHT_TILES = 32 };
 
 struct render_occluders {
     const kernel_table *kernels;
-    render_job job; /* the job that the caller gave */
-    render_job surfaces;
-    kernel_frame frame; /* constants of a frame whose job contains only the surfaces of the given job */
+    render_job job;      /* the job that the caller gave */
+    render_job surfaces; /* the same job without volumes */
+    kernel_frame frame;  /* constants of a frame whose job contains only the surfaces of the given job */
     kernel_occluders trees;
     int threads;
 };
 
-/* Identifies a ray in a chunk. hit: index of the hit in the chunk; number: index of the ray in the hemisphere, or
- * RENDER_MAX_SAMPLES plus the index of a light. */
+/* Identifies a ray of a chunk of hits. hit: index of the hit in the chunk; number: index of the ray in the hemisphere
+ * or, for a ray to a light, RENDER_MAX_SAMPLES plus the light's index. */
 typedef struct ray_id {
     int16_t hit, number;
 } ray_id;
 
-/* The state of a thread that traces rays from hits. Each thread has a copy of the frame with a job of its own, because
- * every tile space has another camera. */
+/* The state of a thread that traces rays from hits. Each thread has its own copy of the frame and the job, because each
+ * tile space has a different camera. */
 typedef struct tracer {
     const render_occluders *of;
     const kernel_table *kernels;
     const render_job *job; /* the job that the caller gave */
-    render_job moved_job;
+    render_job moved_job;  /* the job with the camera of the current tile space, used by `frame` */
     kernel_frame frame;
     kernel_thread thread;
     kernel_bundle bundle;
@@ -225,8 +226,8 @@ static void test_cell(tracer *t, int32_t occluder)
     t->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
-/* Marks an undecided pair (a ray that must be tested exactly in a cell) whose cell has been tested with all of its
- * rays. */
+/* Occluder index that marks an undecided ray-cell pair as done: its cell has been tested with all rays that must be
+ * tested in it. */
 enum { TESTED = -1 };
 
 /* Tests a hit's rays into the hemisphere exactly, in the cells of its `count` undecided pairs, and closes the rays that

@@ -1,4 +1,5 @@
-/* Computes shadows and ambient occlusion of hits: which of a hit's rays are unblocked, and the resulting colour.
+/* Computes shadows and ambient occlusion of hits: determines which of a hit's rays are unblocked, and computes the
+ * resulting colour.
  *
  * A frame painted RENDER_UNLIT is traced first. Each of its hits then has one ray towards each light that casts shadows
  * and that it faces, and a set of rays into the hemisphere above it. Each rank tests which of these rays its opaque

@@ -26,7 +26,7 @@ static float above(double v)
     return (double)f < v ? nextafterf(f, INFINITY) : f;
 }
 
-/* Adds an interval, or extends the last one if they touch; returns the number of intervals. */
+/* Appends an interval to the list, or extends the last one if the two touch. Returns the new number of intervals. */
 static int add_interval(mmbvh_interval *intervals, int count, double low, double high)
 {
     if (count && intervals[count - 1].high >= below(low)) {
@@ -185,8 +185,8 @@ static double value_scale(const render_job *job, int surface)
     return width > 0 && isfinite(width) ? ldexp(1, -ilogb(width)) : 1;
 }
 
-/* Finds the clips that every layer has and that leave a single interval of a ray, and the maximum number of intervals
- * that the volumes' other clips leave. */
+/* Finds the clips that all layers share and that leave a single interval of a ray (common_clips), and computes into how
+ * many intervals the remaining clips of volumes can divide a ray (volume_intervals). */
 static void prepare_clips(kernel_frame *f)
 {
     const render_job *job = f->job;
@@ -200,7 +200,8 @@ static void prepare_clips(kernel_frame *f)
         f->volume_intervals = 1 + __builtin_popcount(job->volume_clips & outside);
 }
 
-/* opaque layers are stored first; kinds number the isovalues in the job's order */
+/* Fills frame->surfaces, opaque layers first. A fragment's kind is FRAGMENT_SURFACE plus the number of its isovalue
+ * among those of the job, in the job's order of layers. */
 static void prepare_surfaces(kernel_frame *f)
 {
     const render_job *job = f->job;
@@ -330,9 +331,10 @@ static bool has_curved_cells(const render_job *job)
     return false;
 }
 
-/* Distributes the job's error bound. An eighth of max_error is allotted to the colour table, and four fifths to the
- * field (docs/development/error_budget.md): half of these over the length of the ray, half over the absorption.
- * Segments that are mixed with other volumes use half of that for the mixing. */
+/* Divides the job's error bound, max_error, among the sources of error (docs/development/error_budget.md). An eighth is
+ * allowed for the colour table. Four fifths are allowed for the field, half of them in proportion to length and half in
+ * proportion to optical depth. If compositing mixes the segments, only half of these four fifths is allowed for the
+ * field, and the other half for the mixing. */
 static insitu_status prepare_segments(kernel_frame *f, base_error *error)
 {
     const render_job *job = f->job;
@@ -344,9 +346,9 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     const double error_of_each = job->max_error / job->volume_count;
     f->allowance = (float)((is_apart ? 0.2 : 0.4) * error_of_each);
     if (is_apart) f->mixing = (float)(0.4 * (error_of_each > 0 ? error_of_each : RENDER_MIXING_ERROR));
-    /* Whether a rank finds overlaps that lie clearly in front of a surface depends on the partition. So compositing and
-     * a rank must give the same result when they cut segments at the surface, to 1e-6. Segments of several volumes are
-     * always cut by compositing. */
+    /* Whether a rank finds overlaps that lie clearly in front of a surface depends on the partition. So segments that
+     * are cut at a surface must give the same result, to 1e-6, whether compositing or a rank cuts them. Segments of
+     * several volumes are always cut by compositing. */
     if (is_apart && job->surface_count && job->volume_count == 1) f->mixing = fminf(f->mixing, 5e-7f);
     const double reach = job->extent > 0 ? job->extent * job->space.scale : scene_reach(job);
     for (int i = 0; i < job->volume_count && status == INSITU_OK; i++) {
@@ -387,7 +389,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     if (segments != INSITU_OK) render_unprepare(frame);
     const bool bins = job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
-    /* a tile's list of cells can be traced only once, because tracing consumes it */
+    /* tracing consumes a tile's list of cells, so the volume must need only one pass over it */
     frame->bins_volume = bins && job->volume_count == 1 && frame->volume_intervals <= 1 &&
                          !(frame->has_segments && job->separate_samples);
     return segments;

@@ -11,7 +11,7 @@
 insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error);
 void render_unprepare(kernel_frame *frame);
 
-/* Computes the range of the surface's field on this rank's parts, low > high if no part has it. */
+/* Computes the range of the surface's field on this rank's parts. range[0] > range[1] if no part has the field. */
 void render_surface_range(const render_job *job, int surface, double range[2]);
 
 #endif
