@@ -32,8 +32,7 @@ typedef struct kernel_curved_lanes {
     /* at: vertex positions relative to the eye, along the camera's axes; f: vertex values minus the isovalue, scaled as
      * by kernel_cell_relative() */
     vf at[8][3], f[8];
-    /* lanes whose numbers are in the range of float32 and not NaN; the cells of all other lanes are tested one by one
-     */
+    /* lanes whose numbers are in float32's range and not NaN; the cells of other lanes are tested one by one */
     vm fitting_lanes;
 } kernel_curved_lanes;
 

@@ -1,5 +1,5 @@
-/* Processes a ray's hits on isosurfaces: tests clips, computes normals and colours, and keeps the nearest hit (thesis,
- * sections 4.3.4 and 4.3.5). */
+/* Processes the hits of rays on isosurfaces: tests clips, computes normals and colours, and keeps each ray's nearest
+ * hit (thesis, sections 4.3.4 and 4.3.5). */
 #ifndef RENDER_KERNEL_ACCEPT_H
 #define RENDER_KERNEL_ACCEPT_H
 
@@ -18,12 +18,12 @@
 #include "render.h"
 #include "simd.h"
 
-/* Normals from gradients at the vertices. The gradient's three components are interpolated in the hit's cell like
- * values, so that they are continuous from cell to cell, and so is the light on the surface.
+/* Normals from gradients at the vertices (RENDER_VERTEX). The gradient's three components are interpolated in the hit's
+ * cell like values. They are continuous from cell to cell, so that the surface's lighting is, too.
  *
- * Only visible hits get such a normal. Until no nearer hit can come, a hit stores its cell, and its reference
- * coordinates instead of the normal. Then rays are processed one by one, and those that hit the same cell share its
- * coefficients. */
+ * Such normals are computed for visible hits only. While a nearer hit may still be found, a hit stores its cell, and
+ * its reference coordinates in place of the normal. When all cells have been traced, the rays are processed one by one,
+ * and consecutive rays that hit the same cell share its coefficients. */
 
 /* The gradients at a cell's vertices, in camera axes, and their interpolating polynomials. */
 typedef struct kernel_smooth_cell {
@@ -257,8 +257,8 @@ SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const v
         kernel_paint_numbers(p, normal, kind, f->colour);
 }
 
-/* Emits hits with the same depth as the nearest ones, which folded cells may have, as fragments of their own.
- * Compositing selects one of them by their bits, so that the result does not depend on the order of cells. */
+/* Emits hits with the same depth as their ray's nearest hit, which occur if a cell's map is folded, as separate
+ * fragments. Compositing selects one of them by their bits, so that the order of cells does not matter. */
 static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, int value,
                                                              vm tied, vf t, const vf normal[3], const vf colour[3])
 {
@@ -267,7 +267,7 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
     kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
 }
 
-/* Properties of hits before lighting: a vector along the normal, in camera axes, and the colour. */
+/* Properties of hits before lighting: a vector of any length along the normal, in camera axes, and the unlit colour. */
 typedef struct kernel_shading_input {
     vf normal[3], colour[3];
 } kernel_shading_input;
@@ -277,9 +277,9 @@ SIMD_INLINE kernel_shading_input kernel_shading_input_of(const vf normal[3], con
     return (kernel_shading_input){{normal[0], normal[1], normal[2]}, {colour[0], colour[1], colour[2]}};
 }
 
-/* Moves hits whose normals need samples of other ranks to the thread's waiting list, and emits a placeholder fragment
- * for each, at which volumes are cut. Returns the remaining hits. reach: distance to the samples; hits with reach 0
- * need no samples and remain. */
+/* Adds hits whose normals need samples of other ranks to the thread's list of pending hits, and emits a placeholder
+ * fragment for each, so that volumes end there. Returns the remaining hits. reach: distance to the samples; hits with
+ * reach 0 need no samples and remain. */
 static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, const kernel_surface *s, int value,
                                                             vm hit, vf t, vf reach, const kernel_shading_input *look)
 {
@@ -302,8 +302,9 @@ static __attribute__((noinline, cold)) vm kernel_defer_hits(kernel_packet *p, co
     return vm_andnot(hit, waits);
 }
 
-/* Hits of rays: the depth; a vector along the normal, or the reference coordinates from which kernel_vertex_normals()
- * computes one; the value w of the colour field; and the field of contour lines (NULL if the surface has none). */
+/* Hits of rays. t: depth; normal: a vector along the normal, or the reference coordinates from which
+ * kernel_vertex_normals() computes one; w: value of the colour field; along: the field of contour lines, NULL if the
+ * surface has none. */
 typedef struct kernel_hit_points {
     vf t, normal[3], w;
     const kernel_line_field *along;
@@ -382,9 +383,9 @@ static __attribute__((noinline, cold)) void kernel_ray_emit_equal_depth(kernel_p
     kernel_emit_tied(p, s, hit->value, tied, depth, normal, colour);
 }
 
-/* Keeps one ray's hit if it is the nearest, as kernel_accept() does for a packet; two lanes may belong to the same
- * pixel, so they are processed one by one. Returns the bit of the ray's block if the hit is nearer than the last one,
- * else 0. */
+/* Keeps one ray's hit if it is the ray's nearest, as kernel_accept() does for the rays of a packet. Several lanes may
+ * hold rays of the same pixel, so hits in lanes are accepted one by one. Returns the bit of the ray's block if the hit
+ * is nearer than the last one, else 0. */
 SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_ray_hit *hit)
 {
     const kernel_surface *s = t->surface;

@@ -2,9 +2,9 @@
  *     lanes are cells:     fetched, sorted, transformed; edge functions computed    (once per batch)
  *     lanes are pixels:    each uses the edge functions of its own cell             (cells of few pixels)
  *                          or a packet of a block's rays, all with one cell         (other cells)
- * If cells are small, most rays of a block's packet would lie beside the cell. So the pixels of several cells' boxes
- * are processed side by side instead, and each lane reads its cell's numbers from the batch's vectors by a permutation.
- * All operations are those for a single cell (kernel_crossings.h, kernel_surface.h) in the same order, so a hit has the
+ * If cells are small, most rays of a block's packet miss the cell. So the pixels of several cells' boxes are processed
+ * side by side instead, and each lane reads its cell's numbers from the batch's vectors by a permutation. All
+ * operations are those for a single cell (kernel_crossings.h, kernel_surface.h) in the same order, so a hit has the
  * same bits whichever way it is computed. */
 #ifndef RENDER_KERNEL_BATCH_H
 #define RENDER_KERNEL_BATCH_H
@@ -49,8 +49,8 @@ typedef struct kernel_batch {
 
 /* ---- lanes are cells ---- */
 
-/* Computes the gradients in all cells of the batch, by the operations of kernel_tet_normal(), when one of them is hit
- * for the first time. */
+/* Computes the gradients in all cells of the batch, by the operations of kernel_tet_normal(). It is called when one of
+ * the cells is hit for the first time. */
 static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, const kernel_frame *f)
 {
     const double scale = f->job->space.scale;
@@ -194,7 +194,7 @@ static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, vi pl
     return kernel_batch_accept_coloured(t, b, places, lanes, hit, depth, NULL);
 }
 
-/* As above, with contour lines. */
+/* Does the same as kernel_batch_accept_coloured(), and draws contour lines over the hits' colours. */
 static __attribute__((noinline)) unsigned kernel_batch_accept_lined(kernel_tile_trace *t, kernel_batch *b,
                                                                     const kernel_lane_rays *r, const uint8_t *lanes,
                                                                     unsigned hit, vf depth)
@@ -219,7 +219,7 @@ SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
         const vm hit = kernel_batch_hit(b, t->t_near, &r, &depth);
         if (!vm_any(hit)) continue;
         if (__builtin_expect(t->surface->layer->lines != NULL, 0)) {
-            const kernel_lane_rays own = r; /* the address of r itself would keep it in memory */
+            const kernel_lane_rays own = r; /* a copy, because taking the address of r would keep r in memory */
             nearer |= kernel_batch_accept_lined(t, b, &own, b->rays.lane + first, vm_bits(hit), depth);
         } else {
             nearer |= kernel_batch_accept(t, b, r.at, b->rays.lane + first, vm_bits(hit), depth);
@@ -235,7 +235,7 @@ static __attribute__((noinline)) void kernel_batch_process(kernel_tile_trace *t,
                                                            kernel_surface_cells *queued)
 {
     const render_surface_layer *layer = t->surface->layer;
-    /* layers with a field of colours are traced cell by cell, because lanes do not have its values */
+    /* layers with a colour field are traced cell by cell, because the batch does not store the field's values */
     const bool by_ray = kernel_tile_layer_batches(t) && !layer->colour_map;
     const int most = by_ray ? KERNEL_BATCH_PIXELS : 0;
     kernel_surface_cells_close(queued);

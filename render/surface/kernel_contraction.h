@@ -6,7 +6,7 @@
  * d, with y = J0^-1 X0 and w = J0^-1 d, the two equations
  *     r + N(r) = y + t w                          r is on the ray
  *     L(X0) + t grad L . d + E(r) = 0             the field is the isovalue there
- * become one when t is eliminated by the second:
+ * become one equation when the second is used to eliminate t:
  *     r = f(r) = a - N(r) - w E(r) / (grad L . d),        a = y - w L(X0) / (grad L . d).
  * f changes by no more than K = theta + |w| |grad E| / |grad L . d| per unit length in the domain (the norms are those
  * of kernel_bounds.h). If K < 1, f is a contraction, and by the theorems of Banach and Krawczyk, for a point q of the
@@ -16,11 +16,11 @@
  *     none    A root x in a convex part D of the domain satisfies |f(q) - x| <= K |q - x|, hence
  *             |s|^2 <= 2 s . (x - q), which is at most its maximum over the corners of D. If |s|^2 is larger, D has no
  *             root. With q = f(q) moved to the nearest point of D, that is the case whenever f(q) is outside.
- * Rounding: f has an error of at most error_bound, from positions, and from the field times |w| / |grad L . d|.
- * Crossings of faces have rounding errors of their own, which move a root by at most domain_margin, including the
- * factor 1 / (1 - K). A root is accepted if it is inside by more than that, and excluded if the domain widened by
- * domain_margin has none. For rays with a root closer to a face, the faces are intersected. So the result agrees with
- * that of the faces, in this cell and in its neighbour. */
+ * Rounding: f has an error of at most error_bound, which comes from the rounding of positions, and from that of the
+ * field times |w| / |grad L . d|. Crossings of faces have rounding errors of their own, which move a root by at most
+ * domain_margin, including the factor 1 / (1 - K). A root is accepted if it is inside by more than that, and excluded
+ * if the domain widened by domain_margin has none. For rays with a root closer to a face, the faces are intersected. So
+ * the result agrees with that of the faces, in this cell and in its neighbour. */
 #ifndef RENDER_KERNEL_CONTRACTION_H
 #define RENDER_KERNEL_CONTRACTION_H
 
@@ -37,13 +37,13 @@
 
 enum { KERNEL_CONTRACTION_STEPS = 7 };
 
-/* Error of the reference coordinates r below which one step of Newton's method is the last. That step leaves 2 K / (1 -
- * K) times the square of the error, where K is the contraction constant, because the derivative of f changes by about 4
- * K per unit length: 1.8e-7 at most. */
+/* Error of the reference coordinates r below which only one more step of Newton's method is done. That step leaves 2 K
+ * / (1 - K) times the square of the error, where K is the contraction constant, because the derivative of f changes by
+ * about 4 K per unit length: 1.8e-7 at most. */
 #define KERNEL_CONTRACTION_END 1e-4f
 
-/* A ray in the reference space of its cell. y and w are defined at the top of this file, and y is that of the ray's
- * point at the depth of vertex 0. level: L at that point; rise: the derivative of L along the ray. */
+/* A ray in the reference space of its cell. y and w are defined at the top of this file, with the ray's point at the
+ * depth of vertex 0 as X0. level: L at that point; rise: the derivative of L along the ray. */
 typedef struct kernel_cell_ray {
     vf y[3], w[3], level, rise;
 } kernel_cell_ray;

@@ -36,11 +36,11 @@ enum { KERNEL_CUBOID_STEPS = 8 };
  * term has up to nine roundings, which amounts to 9 u × 250 = 1.4e-4. */
 #define KERNEL_CUBOID_ROUNDING 1.5e-4f
 
-/* Numbers of cuboids, one per lane. */
+/* Coefficients and error bounds of cuboids, one cuboid per lane. */
 typedef struct kernel_cuboids {
-    float normal[3][3][SIMD_WIDTH]; /* rows of the inverse of the map's Jacobian, in tile space */
-    float field[8][SIMD_WIDTH];     /* coefficients of the field's polynomial (kernel_map.h) */
-    float value_error[SIMD_WIDTH];
+    float normal[3][3][SIMD_WIDTH];  /* rows of the inverse of the map's Jacobian, in tile space */
+    float field[8][SIMD_WIDTH];      /* coefficients of the field's polynomial (kernel_map.h) */
+    float value_error[SIMD_WIDTH];   /* error bound of the field's Bernstein coefficients along a ray */
     float domain_margin[SIMD_WIDTH]; /* infinite for cells that are not cuboids */
 } kernel_cuboids;
 
@@ -74,9 +74,9 @@ SIMD_INLINE vf kernel_cuboids_slope(const float values[8][SIMD_WIDTH], int i)
     return most;
 }
 
-/* Computes the errors of reference coordinates and values. gap: distance of a face's computed crossing from the ray;
- * own: error of a ray's reference coordinates. Both are derived at kernel_f64_bounds() and kernel_f64_rate(), and are
- * doubled as there. */
+/* Computes value_error and domain_margin. In the code, gap is the distance of a face's computed crossing from the ray,
+ * and own is the error of a ray's reference coordinates. Both are derived at kernel_f64_bounds() and kernel_f64_rate(),
+ * and are doubled as there. */
 SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, const kernel_beam *beam, vm cuboid,
                                        kernel_cuboids *out)
 {
@@ -106,7 +106,7 @@ SIMD_INLINE void kernel_cuboids_errors(const kernel_transformed_curved *cells, c
     vf_store(out->value_error, error);
 }
 
-/* Computes the numbers of the lanes' cells. */
+/* Computes the coefficients and error bounds of the lanes' cells. */
 static __attribute__((noinline)) void kernel_cuboids_of(const kernel_transformed_curved *cells, const kernel_frame *f,
                                                         const kernel_tile *tile, kernel_cuboids *out)
 {
@@ -119,13 +119,13 @@ static __attribute__((noinline)) void kernel_cuboids_of(const kernel_transformed
     kernel_cuboids_errors(cells, &beam, vm_from_bits(cells->cuboids), out);
 }
 
-/* The part of a ray in its cell, and the field along it. */
+/* A ray's interval in its widened cell, and the field along it. */
 typedef struct kernel_cuboid_ray {
-    vf normal[3][3], field[8], value_error, domain_margin; /* the cell's numbers */
+    vf normal[3][3], field[8], value_error, domain_margin; /* copies of the members of kernel_cuboids */
     vf origin[3];                                          /* vertex 0 in tile space */
-    vf begin, length; /* depth of the interval's begin, relative to vertex 0, and its length */
-    vf r[3], d[3];    /* reference coordinates at its begin, and their change along it */
-    vf k[4];          /* coefficients of the field by s */
+    vf begin, length; /* depth of the interval's begin relative to vertex 0, and the interval's length in depth */
+    vf r[3], d[3];    /* reference coordinates at the interval's begin, and their change from there to its end */
+    vf k[4];          /* coefficients k0 to k3 of the field's polynomial in s */
 } kernel_cuboid_ray;
 
 /* Computes the interval of each ray in its widened cell. Returns the rays that have one. */
@@ -184,8 +184,8 @@ SIMD_INLINE void kernel_cuboid_polynomial(const kernel_cuboids *cells, vi lane, 
     ray->k[3] = c[7] * (d[0] * (d[1] * d[2]));
 }
 
-/* Finds the rays without a root in their interval (`none`), and those with exactly one (`one`). For the latter, *s is
- * where the line between the values at the ends is zero. */
+/* Finds the rays without a root in their interval (`none`) and those with exactly one (`one`). For the latter, *s
+ * becomes the zero of the line through the values at the interval's ends. */
 SIMD_INLINE void kernel_cuboid_count(const kernel_cuboid_ray *ray, vm *none, vm *one, vf *s)
 {
     const vf *k = ray->k, error = ray->value_error, zero = vf_set(0), third = vf_set(1.0f / 3);

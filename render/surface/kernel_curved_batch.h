@@ -131,9 +131,9 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_trace_singly(kerne
 
 /* ---- rays ---- */
 
-/* Returns the rays that are outside the slab that contains the isosurface, throughout the part of the ray between the
- * cell's bounding planes. On these rays the faces' values have L's sign, so there is no root. Depths are relative to
- * vertex 0. */
+/* Returns the rays that have no root because they do not meet the slab |L| <= thickness that contains the isosurface
+ * (kernel_bounds.h) between the cell's bounding planes. The values at the faces then have L's sign. Depths are relative
+ * to vertex 0. */
 SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane, const kernel_cell_ray *ray)
 {
     const vf thick = kernel_gather_lane(h->bounds.thickness, lane);
@@ -149,8 +149,8 @@ SIMD_INLINE vm kernel_curved_batch_beside(const kernel_curved_batch *h, vi lane,
     return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
 }
 
-/* Stores those of the vector of rays from index n on whose bit is set in the list from index `kept` on. Returns the new
- * number of kept rays. */
+/* Moves rays of the list `rays` towards its front: of the vector of rays that begins at index n, those whose bits are
+ * set are stored from index `kept` on. Returns the new number of kept rays. */
 SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned rays, int kept)
 {
     for (; rays; rays &= rays - 1) {
@@ -162,9 +162,8 @@ SIMD_INLINE int kernel_curved_batch_keep(kernel_curved_batch *h, int n, unsigned
     return kept;
 }
 
-/* Appends the rays in at->one to the list of found crossings, and their depths and reference coordinates to found_ends.
- * Of the other rays, the undecided ones are stored in the list from index `kept` on. Returns the new number of kept
- * rays. */
+/* Appends the rays in at->one to the list `found`, and their depths and reference coordinates to found_ends. The rays
+ * in `undecided` are stored in the list `rays` from index `kept` on. Returns the new number of kept rays. */
 SIMD_INLINE int kernel_curved_batch_part(kernel_curved_batch *h, int n, const kernel_contracted *at, vf depth,
                                          unsigned undecided, int kept)
 {
@@ -476,8 +475,8 @@ static __attribute__((noinline)) unsigned kernel_curved_batch_hit_contracted(ker
     return KERNEL_OF_TYPE(h->queued->type, kernel_curved_batch_hit_of, t, h, true);
 }
 
-/* Searches a vector of the rays in `others`, from index n on, for their first visible root, and accepts it. Returns a
- * mask of the blocks that contain a ray whose hit is nearer than its previous one. */
+/* Searches for the first visible root of each of a vector of rays in `others`, from index n on, and accepts it. Returns
+ * a mask of the blocks that contain a ray whose hit is nearer than its previous one. */
 static __attribute__((noinline)) unsigned kernel_curved_batch_search(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                      int n)
 {
@@ -530,8 +529,8 @@ static void kernel_curved_batch_set_bounds(const kernel_tile_trace *t, kernel_cu
     h->has_bounds = true;
 }
 
-/* Traces the rays in the list `rays` that are not decided by cuboids, stage by stage. Returns a mask of the blocks that
- * contain a ray whose hit is nearer than its previous one. */
+/* Traces the rays in the list `rays` that kernel_cuboids.h has not decided, stage by stage. Returns a mask of the
+ * blocks that contain a ray whose hit is nearer than its previous one. */
 static unsigned kernel_curved_batch_trace_others(kernel_tile_trace *t, kernel_curved_batch *h)
 {
     if (!h->rays.count) return 0;
@@ -566,8 +565,8 @@ SIMD_INLINE void kernel_curved_batch_rays_of(kernel_tile_trace *t, kernel_curved
     if (h->rays.count >= KERNEL_LIST_PIXELS) kernel_curved_batch_trace(t, h);
 }
 
-/* Transforms the queued cells, and lists their rays; cells whose rays are not traced in lanes go to packets one by one.
- */
+/* Transforms the queued cells, and lists their rays; cells whose rays are not traced in lanes are traced one by one in
+ * packets. */
 static __attribute__((noinline)) void kernel_curved_batch_transform(kernel_tile_trace *t, kernel_curved_batch *h,
                                                                     kernel_surface_cells *queued)
 {

@@ -26,8 +26,9 @@
  * Samples are the field minus the isovalue, so that the hit's own value is 0. If cells overlap, several contain a
  * point: the sample is the least of their values, whichever is tested first and on whichever rank.
  *
- * If other ranks have cells, their samples are needed too. Then hits wait for their normals (render_differences.h); the
- * second half of this file samples and lights hits of any pixels, in the tiles and packets in which they were hit. */
+ * If other ranks have cells, their samples are needed too. Hits are then pending until the samples of all ranks have
+ * been merged (render_differences.h). The second half of this file samples around pending hits and lights them, in the
+ * same tiles and packets in which they were hit. */
 
 /* One point per ray at which the field is sampled, for normals by central differences, and the field there. */
 typedef struct kernel_probe {
@@ -39,7 +40,7 @@ typedef struct kernel_probe {
     vf sample;
 } kernel_probe;
 
-/* Sets f to the values minus the isovalue, scaled equally in all cells. */
+/* Sets c->f to the values minus the isovalue, times a scale that is the same for all cells. */
 SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
 {
     for (int i = 0; i < c->count; i++) {
@@ -197,11 +198,11 @@ SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_s
     return (float)(0.5 * layer->difference * kernel_cell_size(c->world, c->count) * p->frame->job->space.scale);
 }
 
-/* ---- hits that wait for samples of other ranks ---- */
+/* ---- pending hits, which need samples of other ranks ---- */
 
-/* A run of consecutive hits of a list that belong to one packet and one isovalue, each in its own lane. */
+/* A group of consecutive pending hits of a list that belong to one packet and one isovalue, each in its own lane. */
 typedef struct kernel_pending_group {
-    kernel_tile tile; /* the run's tile, which is kept for the next run */
+    kernel_tile tile; /* the group's tile, which the next group may reuse */
     kernel_packet packet;
     const kernel_surface *surface;
     int value, count;
@@ -230,7 +231,8 @@ SIMD_INLINE void kernel_pending_surface(kernel_pending_group *run, const kernel_
     }
 }
 
-/* Sets up the run that begins with the first of the hits; run->count becomes its length. */
+/* Sets up the group that begins with hits[0], and stores its number of hits in run->count. count: number of hits that
+ * remain in the list. */
 static void kernel_pending_group_begin(kernel_pending_group *run, const kernel_frame *f, kernel_thread *thread,
                                        const render_pending_hit *hits, int64_t count)
 {

@@ -1,5 +1,5 @@
-/* Draws lines along edges of cells that lie in the surface. The cells are tets and pyramids that stand on faces of a
- * mesh (the session's outer surfaces). The distance from a hit to an edge is measured in the picture, so that lines
+/* Draws lines along edges of cells that lie in the surface. The cells are tets and pyramids, each built on a face of a
+ * mesh by the session (outer surfaces). The distance from a hit to an edge is measured in the picture, so that lines
  * have the same width for any orientation of a face. */
 #ifndef RENDER_KERNEL_EDGES_H
 #define RENDER_KERNEL_EDGES_H
@@ -39,8 +39,8 @@ SIMD_INLINE void kernel_edge_position(const kernel_packet *p, float x, float y, 
     out[1] = y - (p->origin_y + p->slope_y * z);
 }
 
-/* Returns the squared distance from each ray to the nearest edge of a polygon, and raises *length to the squared length
- * of its longest edge. loop: as in render_part.loops. */
+/* Returns the squared distance from each ray to the nearest edge of a polygon. *length becomes the squared length of
+ * the polygon's longest edge if that is larger. loop: the polygon's entries in render_part.loops. */
 SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, const int64_t *loop, vf *length)
 {
     const int64_t count = loop[0], step = loop[1], *corners = loop + 2;
@@ -78,9 +78,9 @@ SIMD_INLINE vf kernel_nearest_edge(const kernel_packet *p, const kernel_cell *c,
     return nearest;
 }
 
-/* Draws edge lines over the unlit colours of hits at depth t. A line covers the share of a pixel that a strip of its
- * width through the pixel covers. On faces that are hardly wider than a line, lines fade, because otherwise only lines
- * would be visible. */
+/* Draws edge lines over the unlit colours of hits at depth t. The weight of the line's colour is the share of the pixel
+ * that a strip of the line's width covers. Lines fade on faces that are hardly wider than a line, because otherwise
+ * only lines would be visible there. */
 static __attribute__((noinline)) void kernel_draw_edges(const kernel_packet *p, const render_surface_layer *layer,
                                                         const kernel_cell *c, vf t, vf colour[3])
 {

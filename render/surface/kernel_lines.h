@@ -6,9 +6,10 @@
  * plane next to the hit. With a ray of direction d (1 along the view's axis), a surface normal n and the gradient g of
  * f, a step across the view at the hit's depth, and then along the ray back to the plane, changes f by
  *      G = (gx, gy) - (nx, ny) (g.d) / (n.d)
- * times the step's length, which is a pixel's size at that depth. A line covers the share of a pixel that a strip of
- * its width covers of a box of one pixel: a ramp one pixel wide on either side. Lines that are less than two widths
- * apart fade, and at a distance of one width they vanish, because otherwise only lines would be visible.
+ * times the step's length, which is a pixel's size at that depth. The weight of the line's colour is the share of a box
+ * of one pixel that a strip of the line's width covers: with the distance from the line it falls along a ramp that is
+ * one pixel wide. Lines that are less than two widths apart fade, and at a distance of one width they vanish, because
+ * otherwise only lines would be visible.
  *
  * Everything is computed from the cell and the ray alone, so that lines are the same on any partition. */
 #ifndef RENDER_KERNEL_LINES_H
@@ -81,7 +82,7 @@ static __attribute__((noinline)) void kernel_tet_line_of(const kernel_frame *f, 
     for (int a = 0; a < 3; a++) out->gradient[a] = (float)g[a];
 }
 
-/* Computes the contour lines' field in a tet of which the positions in double are set. */
+/* Computes the contour lines' field in a tet. c->world must be set. */
 SIMD_INLINE void kernel_cell_line_of(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
                                      const kernel_cell *c, kernel_tet_line *out)
 {
@@ -97,7 +98,7 @@ typedef struct kernel_lane_lines {
     vf value, gradient[3], along, last[3];
 } kernel_lane_lines;
 
-/* Computes the contour lines' field at hits of depth t; normal: the surface's. */
+/* Computes the contour lines' field at hits of depth t. normal: vectors along the surface's normal. */
 SIMD_INLINE void kernel_lane_lines_at(const kernel_lane_lines *l, const kernel_rays *rays, vf t, const vf normal[3],
                                       kernel_line_field *out)
 {
@@ -199,7 +200,8 @@ kernel_lines_coverage(const kernel_frame *f, const kernel_tile *tile, const kern
     return out;
 }
 
-/* Draws contour lines over unlit colours; returns the share of each pixel that a line covers. */
+/* Draws contour lines over the unlit colours of hits at depth t. Returns the share of each hit's pixel that a line
+ * covers. */
 SIMD_INLINE vf kernel_draw_lines(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
                                  const kernel_rays *rays, vf t, const kernel_line_field *at, vf colour[3])
 {

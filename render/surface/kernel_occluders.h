@@ -2,7 +2,7 @@
  *
  * Once per frame they are put into trees of their own, whose nodes have as many children as a vector has lanes. A ray
  * traverses a tree alone and tests all children of a node, or all pieces of a leaf, at once. So rays need not be
- * coherent, and a ray ends at the first root that is found on it.
+ * coherent, and the traversal ends as soon as the ray is known to be blocked.
  *     tets              their pieces of the surface are stored as triangles, which a ray meets or not
  *     other cells       a box, and two planes between which the surface lies: most rays pass outside
  *     hexes             the faces and the values there decide next, one ray-hex pair per lane
@@ -31,7 +31,7 @@
  * different rows. */
 enum {
     KERNEL_TRIANGLE_CORNERS = 0, /* x, y, z of the three corners */
-    KERNEL_TRIANGLE_REACH = 9,
+    KERNEL_TRIANGLE_REACH = 9,   /* distance from a ray's hit within which the cell does not block the ray */
     KERNEL_TRIANGLE_ROWS,
     KERNEL_SLAB_LOWER = 0, /* bounding box of the cell: lower and upper corner */
     KERNEL_SLAB_UPPER = 3,
@@ -41,7 +41,7 @@ enum {
     KERNEL_SLAB_LEVEL = 9,
     KERNEL_SLAB_THICKNESS,
     KERNEL_SLAB_ERROR, /* rounding error of the slab's linear function L, divided by the size of positions */
-    KERNEL_SLAB_REACH,
+    KERNEL_SLAB_REACH, /* distance from a ray's hit within which the cell does not block the ray */
     KERNEL_SLAB_ROWS
 };
 
@@ -99,11 +99,13 @@ typedef struct kernel_secondary_rays {
 
 typedef struct kernel_prepared_ray {
     const kernel_secondary_ray *ray;
-    /* A plane is met at the distance plane * inverse + shift. The shifts of near and far planes extend boxes by their
-     * rounding. */
+    /* The ray meets an axis-aligned plane at the distance plane * inverse + shift. The shifts for near and far planes
+     * differ so that boxes are extended by more than the rounding error. */
     vf inverse[3], near_shift[3], far_shift[3];
+    /* for each axis, offset in a node's rows of boxes of the plane that the ray meets first, and of the other one */
     int near_row[3], far_row[3];
     int kx, ky, kz; /* kz is the axis with the largest component of the direction; kx and ky follow it cyclically */
+    /* the direction's components along kx and ky divided by that along kz, and the reciprocal of the latter */
     float shear_x, shear_y, stretch;
     float size; /* size of positions, from which the rounding error of the slabs' linear functions is computed */
 } kernel_prepared_ray;
@@ -119,8 +121,9 @@ SIMD_INLINE void kernel_prepared_ray_axes(const kernel_secondary_ray *ray, kerne
     p->shear_y = ray->direction[p->ky] * p->stretch;
 }
 
-/* Prepares a ray for a tree. The distance to a plane, two products and a difference, rounds by at most 3 units of the
- * positions' size, the inverse by one more; boxes are extended by more than that. */
+/* Prepares a ray for a tree. The computed distance to a plane (two products and a difference) has an error of at most 3
+ * rounding units (6e-8) of the positions' size, and the rounding of `inverse` adds one; boxes are extended by more than
+ * that. */
 SIMD_INLINE void kernel_prepared_ray_begin(const kernel_secondary_ray *ray, float tree_size, kernel_prepared_ray *p)
 {
     float size = tree_size;

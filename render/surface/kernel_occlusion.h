@@ -1,6 +1,6 @@
-/* Tests exactly whether a cell's opaque surface blocks rays from hits to lights or to the sky. Any root in [t_near,
- * t_far) blocks the ray, so the result does not depend on the order of cells or on the partition. Roots are found as
- * for primary rays, but no normal, no colour and no order is needed. */
+/* Tests exactly whether a cell's opaque surface blocks rays from hits, towards lights or into the hemisphere. Any root
+ * in [t_near, t_far) blocks the ray, so the result does not depend on the order of cells or on the partition. Roots are
+ * found as for primary rays, but no normal, no colour and no order is needed. */
 #ifndef RENDER_KERNEL_OCCLUSION_H
 #define RENDER_KERNEL_OCCLUSION_H
 
@@ -30,12 +30,12 @@ typedef struct kernel_occlusion {
     int layer;
     const kernel_bundle *bundle;
     int first; /* index, in the bundle, of the packet's first ray */
-    /* The cell in which the rays are traced: its vertices in world coordinates. */
+    /* world coordinates of the vertices of the cell in which the rays are traced */
     double (*world)[3];
     int vertex_count;
 } kernel_occlusion;
 
-/* Returns the rays whose root at t is farther from the hit than the layer's `contact` distance. */
+/* Returns the rays whose root at t is at least as far from the hit as the layer's `contact` times the cell's size. */
 static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet *p, const kernel_occlusion *o, vf t)
 {
     const double size = kernel_cell_size((const double(*)[3])o->world, o->vertex_count);
@@ -44,7 +44,7 @@ static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet 
     return vf_le(vf_set((float)reach), (t - p->t_near) * length);
 }
 
-/* Returns the rays whose root at t is kept by all clips of the layer. */
+/* Returns the rays of `hit` whose root at t is kept by all clips of the layer. */
 static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_packet *p, const kernel_occlusion *o,
                                                                 vm hit, vf t)
 {
@@ -138,7 +138,7 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
     }
 }
 
-/* Tests a polyhedron. Cells stay in the cache, decomposed and sorted, from bundle to bundle; each bundle transforms
+/* Tests a polyhedron. Decomposed polyhedra stay in the thread's store from bundle to bundle, and each bundle transforms
  * them into its own space. */
 static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {

@@ -16,6 +16,8 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
+/* Ray-hex pairs, one per lane. level and rise: the slab's linear function L along the ray is level + rise * t;
+ * thickness and reach: those of the slab (kernel_occluders.h). */
 typedef struct kernel_curved_pairs {
     int count;
     int32_t ray[SIMD_WIDTH], occluder[SIMD_WIDTH];
@@ -30,7 +32,7 @@ SIMD_INLINE bool kernel_undecided_add(kernel_secondary_rays *s, int32_t ray, int
     return true;
 }
 
-/* Vectors of rays, each with origin and shear along its own axes. */
+/* The rays of the pairs. Origins and shears are along each ray's own axes kx, ky and kz (kernel_prepared_ray). */
 typedef struct kernel_prepared_ray_lanes {
     int32_t record[SIMD_WIDTH]; /* index of the first float of the hex's record */
     float axis[SIMD_WIDTH];     /* number of the axis kz, as a float; kx and ky follow it cyclically */
@@ -59,8 +61,8 @@ SIMD_INLINE vi kernel_load_ints(const int32_t *from)
     return out;
 }
 
-/* Computes the vertices as seen by their rays: x and y across the ray, which is at the origin, and the distance along
- * it. */
+/* Transforms each hex's vertices to the space of its ray: x and y across the ray, which is at their origin, and the
+ * distance along the ray. */
 SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float *hexes,
                                         const kernel_prepared_ray_lanes *rays)
 {
@@ -84,7 +86,7 @@ SIMD_INLINE void kernel_pairs_transform(kernel_curved_pairs *pairs, const float 
         vf_store((float *)(void *)(h->corners + face * SIMD_WIDTH), words[face / 4][face % 4]);
 }
 
-/* The result for each ray-hex pair: the hex blocks the ray (`blocked`), or this is undecided (`undecided`). In all
+/* The results for ray-hex pairs. blocked: the hex blocks the ray; undecided: the pair must be traced exactly. In all
  * other pairs the hex does not block the ray. */
 typedef struct kernel_pair_result {
     vm blocked, undecided;
@@ -134,8 +136,8 @@ SIMD_INLINE kernel_pair_result kernel_pairs_classify(const kernel_curved_pairs *
     const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
     const vm near = vm_and(crossed.two, vf_le(from, to));
     const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
-    /* If the sign changes, the interval has a root. It counts only if it is not in the parts of the interval that are
-     * excluded, before `from` and behind `to`. */
+    /* If the sign changes, the interval has a root. The root blocks the ray only if it lies between `from` and `to`, so
+     * the parts of the interval before and behind these must be known to have none. */
     const vm before = vm_or(vf_eq(from, ends[0].t), kernel_pairs_clear(pairs, ends[0].t, from));
     const vm behind = vm_or(vm_and(vf_eq(to, ends[1].t), vf_lt(to, far)), kernel_pairs_clear(pairs, to, ends[1].t));
     out.blocked = vm_and(near, vm_and(change, vm_and(before, behind)));

@@ -10,9 +10,9 @@
 #include "render.h"
 #include "simd.h"
 
-/* Size of the stack of nodes, and of leaves stored as ~leaf, that a ray has yet to visit. Each level of the tree leaves
- * at most all its children but one on the stack, and the tree is no deeper than a binary tree whose leaves are divided
- * once more. */
+/* Size of the stack of nodes that a ray has yet to visit; leaves are stored as ~leaf. On each level of the tree all
+ * children of a node but one may be left on the stack, and the tree is at most one level deeper than the binary tree
+ * from which it was built. */
 enum { KERNEL_PATH_STACK = (MMBVH_MAX_DEPTH + 1) * (SIMD_WIDTH - 1) + 1 };
 
 typedef struct kernel_path {
@@ -80,7 +80,8 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
 
 /* ---- slabs --------------------------------------------------------------------------------------------------- */
 
-/* The results of testing one ray against the cells of a leaf, one cell per lane. */
+/* The results of testing one ray against the slabs of a leaf, one cell per lane. Along the ray L is level + rise * t.
+ */
 typedef struct kernel_leaf_lanes {
     int ray;
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];

@@ -1,5 +1,5 @@
-/* Lights a packet's nearest opaque hits and emits them as fragments, and lights hits that waited for other ranks'
- * samples. */
+/* Lights a packet's nearest opaque hits and emits them as fragments. Also lights pending hits, for which the samples of
+ * all ranks have been merged. */
 #ifndef RENDER_KERNEL_PACKET_SURFACE_H
 #define RENDER_KERNEL_PACKET_SURFACE_H
 
@@ -13,7 +13,7 @@
 #include "simd.h"
 
 /* Computes normals by differences for the nearest opaque hits of a surface. Returns the hits that have a normal; the
- * others wait for samples of other ranks. */
+ * others are added to the list of pending hits, because they need samples of other ranks. */
 SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)
 {
     vm ready = vm_none();
@@ -45,8 +45,8 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
     }
 }
 
-/* Lights `count` hits of the waiting list from index `first` on, by the merged samples of all ranks. out[i] becomes the
- * fragment of hit i. */
+/* Lights `count` hits of the list of pending hits, from index `first` on, by the merged samples of all ranks. out[i]
+ * becomes the fragment of hit i. */
 static void kernel_light_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_list *list,
                                  const render_difference_samples *samples, int64_t first, int64_t count, fragment *out)
 {

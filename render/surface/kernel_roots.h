@@ -1,10 +1,10 @@
-/* Computes all crossings of an isovalue in a cell's interval: each is isolated, then refined.
+/* Computes all crossings of an isovalue in a ray's interval in a cell. Each crossing is isolated, then refined.
  *
  * Along the ray a point has the reference coordinates r*(u), 0 <= u <= 1, a curve whose image X(r*(u)) is straight, and
- * the field is F(r*(u)). On a piece of the curve from a to b take the chord c(u) = a + u (b - a). F(c(u)) is a cubic (F
- * is trilinear) of which both ends and both end slopes are known, and so its four Bernstein coefficients, which bound
- * it. The distance from the chord to the curve is bounded as follows. Let Y = J0^-1 X with J0 the Jacobian at the
- * cell's centre: Y(r) = r + N(r) + const, where N's derivative is at most theta (computed at the corners of the
+ * the field is F(r*(u)). On a piece of the curve from a to b take the chord c(u) = a + u (b - a). F(c(u)) is a cubic,
+ * because F is trilinear. Its values and slopes at both ends are known; they determine its four Bernstein coefficients,
+ * which bound it. The distance from the chord to the curve is bounded as follows. Let Y = J0^-1 X with J0 the Jacobian
+ * at the cell's centre: Y(r) = r + N(r) + const, where N's derivative is at most theta (computed at the corners of the
  * reference domain, as a norm is convex along each axis). So |r1 - r2| <= L |Y(r1) - Y(r2)|, L = 1 / (1 - theta). And
  * Y(c(u)) - Y(r*(u)) = e(u) is N(c(u)) minus the line between its ends: again a cubic, with the known coefficients 0,
  * e1, e2, 0. Hence
@@ -224,8 +224,8 @@ SIMD_INLINE vf kernel_linear_at(const kernel_curved *c, const kernel_rays *rays,
     return (kernel_gather_lane(c->bounds->level, lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
 }
 
-/* Decides rays by the values at the ends of their intervals and the bounds of their cells. *found: rays with exactly
- * one root. Returns the rays that remain undecided; all others have no root. */
+/* Decides rays by the values at the ends of their intervals and the bounds of their cells. *found becomes the rays with
+ * exactly one root. Returns the rays that remain undecided. Rays in neither mask have no root. */
 SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *rays, vi lane, vm wanted,
                                   const kernel_point *in, const kernel_point *out, vm *found)
 {
@@ -242,7 +242,8 @@ SIMD_INLINE vm kernel_ends_decide(const kernel_curved *c, const kernel_rays *ray
     return vm_andnot(left, vm_and(searched, far));
 }
 
-/* Tests the whole interval as one piece, by the coordinates and values at the faces, which decides most rays. */
+/* Tests the whole interval as one piece, from the reference coordinates and values at the faces. This decides most
+ * rays. */
 SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
 {
     const kernel_interval *i = s->interval;
@@ -314,7 +315,7 @@ SIMD_INLINE void kernel_search_advance(kernel_search *s, vm rays, const kernel_p
     s->ended = vm_or(s->ended, over);
 }
 
-/* Searches for the next root of each open ray. */
+/* Advances each open ray, piece by piece, until a root is isolated on it or its pieces are exhausted. */
 SIMD_INLINE void kernel_search_next(kernel_search *s)
 {
     vm going = s->open;
@@ -399,8 +400,8 @@ SIMD_INLINE kernel_f64 kernel_f64_value(const kernel_f64 c[8], const kernel_f64 
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
-/* Computes in double how far the points with reference coordinates r at depth t are from their rays, and the field
- * there. The results are exact except for the rounding of r and t. */
+/* Computes in double the differences between the points at reference coordinates r and the rays' points at depth t, and
+ * the field there. The results are exact except for the rounding of r and t. */
 SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map *map, const kernel_point *at, vf off[3],
                                   vf *value)
 {
@@ -424,8 +425,8 @@ SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map *map
     }
 }
 
-/* The residuals at a point of the four equations X(r) = ray(t) and F(r) = 0, which state that it lies on the ray and
- * has the isovalue, and the map's product m there. */
+/* The residuals at a point of the four equations X(r) = ray(t) (distance) and F(r) = 0 (value), which hold if the point
+ * lies on the ray and has the isovalue; and the map's product m there. */
 typedef struct kernel_residual {
     kernel_product m;
     vf distance[3], value;
@@ -470,8 +471,8 @@ SIMD_INLINE void kernel_polish_last(const kernel_rays *rays, const kernel_map *m
     kernel_residual residual;
     residual.m = kernel_product_at(map->is_pyramid, out->r);
     kernel_residuals(rays, map, out, residual.distance, &residual.value);
-    /* at a double root the field's derivative is only a rounding error, so that a step by it leads away and is not
-     * taken */
+    /* at a double root the computed derivative of the field is only a rounding error; a step that uses it would lead
+     * away from the root, and is not taken */
     const vm away = kernel_polish_step(rays, map, low, high, wanted, &residual, &last);
     kernel_point_move(vm_andnot(wanted, away), &last, out);
 }

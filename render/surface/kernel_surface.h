@@ -36,8 +36,9 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* Computes the normals of hits by differences, and returns the hits. If other ranks may have samples, hits are moved to
- * the waiting list instead, and only the remaining ones are returned. */
+/* Computes the normals of hits by differences, and returns the hits. If other ranks may have samples (job->waiting is
+ * set), hits with a reach above 0 are added to the list of pending hits instead, and only the remaining hits are
+ * returned. */
 SIMD_INLINE vm kernel_sample_or_defer_hits(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
                                            kernel_shading_input *look)
 {
@@ -55,7 +56,7 @@ typedef struct kernel_accepted {
     kernel_hit_cells cells;
 } kernel_accepted;
 
-/* Emits hits with the same depth as the nearest ones as fragments of their own. */
+/* Emits hits with the same depth as their ray's nearest hit as separate fragments. */
 static __attribute__((noinline, cold)) void kernel_accept_equal_depth(kernel_packet *p, const kernel_surface *s,
                                                                       vm tied, const kernel_accepted *h)
 {
@@ -150,8 +151,8 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
         kernel_accept_transparent(p, state, hit, &h);
 }
 
-/* Traces the isosurface in a tet. This is a function of its own so that its vectors stay in registers; the one for
- * other cells needs more of them. */
+/* Traces the isosurface in a tet. It is separate from the function for other cells, which needs more vectors, so that
+ * its own vectors stay in registers. */
 static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kernel_surface_state *state,
                                                          const kernel_cell *c, int value, vm rays)
 {
@@ -310,9 +311,9 @@ SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *sta
         kernel_curved_surface(p, state, c, curved, value, rays);
 }
 
-/* Isosurfaces in polyhedra are the points of a ray's profile at which the sign changes. They are exact, because a
- * linear piece has at most one root. All of them are computed, even on rays that are on the same side of the isovalue
- * at both faces.
+/* A ray's profile is the piecewise linear field along the ray in a polyhedron (kernel_polyhedron.h). Hits on
+ * isosurfaces are the points of the profile at which the sign changes. They are exact, because a linear piece has at
+ * most one root. All of them are computed, even on rays that are on the same side of the isovalue at both faces.
  *
  * Most such rays stay on that side, and need not be followed. A bound identifies many of them, from the faces' values
  * alone:
@@ -326,8 +327,8 @@ SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *sta
  *                                        and likewise for rays below the isovalue.
  *
  * Isovalues outside the range of the vertices' values are not searched for: if tets overlap, their sum may exceed that
- * range, but trees and the session's plan assume that only isovalues between vertex values have a surface in the
- * cell. */
+ * range, but trees and the session's plan assume that a cell has surfaces only for isovalues between its vertices'
+ * values. */
 
 /* Computes the gradient of the field in the tet of a surface triangle, in camera axes and in double. */
 static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron *c, int facet, double out[3])
@@ -445,7 +446,7 @@ static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_pack
     }
 }
 
-/* ---- selection of the rays to follow ---- */
+/* ---- rays whose profiles need not be followed ---- */
 
 /* Computes upper bounds of how fast a tet's field falls and rises along the tile's rays, per unit of depth. */
 static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet, double spread, double *fall,
@@ -544,10 +545,10 @@ SIMD_INLINE void kernel_piece_select(vm rays, const kernel_profile_piece *from, 
     to->w1 = vf_select(rays, from->w1, to->w1);
 }
 
-/* Advances the rays in `left` to the next piece. Returns those whose profile continues behind it; a jump at the last
- * face counts as a piece. A value inside the cell that equals the isovalue up to rounding is treated as if it were on
- * the side from which the ray comes: a ray may meet several sheets at one point, each with its own rounding, and their
- * signs would alternate. The values at the faces are not changed. */
+/* Advances the rays in `left` to the next piece. Returns the rays whose profile continues behind that piece; a jump at
+ * the last face counts as a piece. A value inside the cell that equals the isovalue up to rounding is treated as if it
+ * were on the side from which the ray comes: at one point a ray may meet several faces between tets, whose values are
+ * rounded differently, so that their signs would alternate. The values at the faces are not changed. */
 SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r,
                                            const kernel_polyhedron_interval *polyhedron_interval, vm left,
                                            kernel_profile_walk *walk)

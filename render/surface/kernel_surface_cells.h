@@ -1,5 +1,5 @@
-/* Queue of cells of one type, layer and part whose surface is to be traced. They are traced when SIMD_WIDTH are queued.
- */
+/* A queue of cells of one type, layer and mesh part, in which the layer's surface is to be traced when SIMD_WIDTH cells
+ * are queued. */
 #ifndef RENDER_KERNEL_SURFACE_CELLS_H
 #define RENDER_KERNEL_SURFACE_CELLS_H
 
@@ -14,9 +14,10 @@ typedef struct kernel_surface_cells {
     int layer, part;      /* layer and mesh part of the queued cells; -1: there are none yet */
     kernel_arrays arrays; /* arrays of the layer's field on the mesh part */
     uint32_t cell[SIMD_WIDTH];
+    /* copies of the members of kernel_tile_candidate */
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
     float near[SIMD_WIDTH];
-    int value[SIMD_WIDTH];
+    int value[SIMD_WIDTH]; /* index of the isovalue in the layer */
     double isovalue[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
 } kernel_surface_cells;

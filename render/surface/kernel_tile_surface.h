@@ -1,10 +1,10 @@
-/* Traces isosurfaces in a tile that traverses the trees itself, roughly beginning with the nearest nodes, and fetches
- * nothing behind the hits that its pixels already have:
+/* Traces isosurfaces in a tile that traverses the trees itself, roughly front to back. Cells behind the hits that the
+ * tile's pixels already have are not fetched:
  *     nodes, one per lane:  ranges, depths, box of pixels ---> stack, the nearest on top
  *     from the stack:       has any pixel of the box no nearer hit?
  *     leaves' cells:        tested in lanes (kernel_candidates.h), restricted to the tile's pixels
  *     cells with pixels:    traced in batches (render_kernels.c), whose hits hide what is behind
- * A node that lies between the pixels' centres is skipped, too. The box of pixels is computed from the distances of the
+ * A node whose box contains no pixel's centre is skipped, too. The box of pixels is computed from the distances of the
  * node's box to the planes through the tile's borders, divided by the box's farthest depth: that gives a lower bound of
  * how far beyond a border the box is. Margins are larger than all rounding. */
 #ifndef RENDER_KERNEL_TILE_SURFACE_H
@@ -50,7 +50,7 @@ typedef struct kernel_tile_finder {
  * the data of further nodes are prefetched. */
 enum { KERNEL_NODES_AT_ONCE = SIMD_WIDTH / 2, KERNEL_NODES_ROOM = (KERNEL_NODES_AT_ONCE + 1) * MMBVH_MAX_DEPTH };
 
-/* A node that may be visible. ref: its first cell if it is a leaf, else its left child. */
+/* A node that may be visible. ref: index of the node's first cell if it is a leaf, otherwise of its left child. */
 typedef struct kernel_tile_node {
     int64_t ref;
     float near;
@@ -113,8 +113,8 @@ SIMD_INLINE void kernel_nodes_fetch(const mmbvh *tree, const mmbvh_ranges *range
     out->range_high = vf_gather((const float *)(const void *)ranges->high, pair);
 }
 
-/* The result of testing nodes, per lane: least depth, box of pixels, position along the tile's direction, and a mask of
- * the nodes that may be visible. */
+/* The results of testing one node per lane. near: least depth; box: box of pixels; along: position along the tile's
+ * direction, by which nodes are sorted; visible_mask: mask of the nodes that may be visible. */
 typedef struct kernel_node_bounds {
     float near[SIMD_WIDTH];
     int32_t box[SIMD_WIDTH];
@@ -122,9 +122,9 @@ typedef struct kernel_node_bounds {
     unsigned visible_mask;
 } kernel_node_bounds;
 
-/* Adds the first and last column (shift 0) or row (shift 8) to the boxes of pixels. low: lower bound of the distance
- * from the tile's first border; high: upper bound of that from its last border. Returns the lanes that meet a pixel. A
- * NaN counts as meeting all pixels. */
+/* Adds the first and last column (shift 0) or row (shift 8) to the boxes of pixels. low: lower bound of the signed
+ * distance from the tile's first border; high: upper bound of that from its last border. Returns the lanes that meet a
+ * pixel. A NaN counts as meeting all pixels. */
 SIMD_INLINE vm kernel_node_pixels(vf low, vf high, vf scale, float pad, vi *box, int shift)
 {
     const vf end = vf_set(KERNEL_TILE), zero = vf_set(0);

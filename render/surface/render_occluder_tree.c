@@ -1,7 +1,7 @@
-/* Builds a tree with one child per lane. mmbvh first builds a binary tree over the pieces' boxes; then its nodes are
- * merged: a node's child with the largest surface is repeatedly replaced by its two children, until the node has as
- * many children as there are lanes, or all of them fit into leaves. A binary leaf with more pieces than lanes is
- * divided. */
+/* Builds a tree whose nodes have one child per lane. mmbvh first builds a binary tree over the boxes of the pieces
+ * (triangles or slabs). Then nodes are merged: the child with the largest surface area is repeatedly replaced by its
+ * two children, until the node has as many children as there are lanes, or all of them fit into leaves. A leaf of the
+ * binary tree that has more pieces than there are lanes is divided. */
 #include "render_occluder_tree.h"
 
 #include <math.h>

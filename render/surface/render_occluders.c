@@ -1,11 +1,11 @@
 /* Collects occluders. Threads go through the subtrees of the meshes' trees, and each lists the occluders in its cells.
- * The lists are joined, and render_occluder_tree.c builds trees of them. Their order does not matter
+ * The lists are joined, and render_occluder_tree.c builds trees over them. The order of the lists does not matter
  * (kernel_occluders.h).
  *
  * A slab contains the part of the surface in a cell. It lies between two planes on which a linear function L is
- * constant. L is the linear function closest to the values at the vertices. The position and the value of any point of
- * the cell are means of the vertices' with the same weights, so the field differs from L by no more than at some
- * vertex. */
+ * constant. L is fitted to the values at the vertices by least squares. The position and the value of any point of the
+ * cell are weighted means of those of the vertices, with the same weights. So the field differs from L nowhere by more
+ * than the largest difference at a vertex, which determines the slab's thickness. */
 #include "render_occluders.h"
 
 #include <math.h>
@@ -80,7 +80,7 @@ typedef struct occluder_search {
     const kernel_frame *frame;
     int surface, part, value;
     uint32_t index;
-    int count; /* number of vertices; those of a polyhedron occur several times */
+    int count; /* number of vertices in `places` and `values`; a polyhedron lists some vertices several times */
     list places, values;
     double reach;
 } occluder_search;
@@ -105,7 +105,8 @@ static void bounds_of(const occluder_search *s, double low[3], double high[3])
         }
 }
 
-/* Returns the distance from a hit within which the cell blocks nothing (kernel_occlusion_beyond()), in tree space. */
+/* Returns the distance from a hit, in tree space, within which the cell does not block the hit's rays
+ * (kernel_occlusion_beyond()). */
 static double contact_distance(const occluder_search *s, double contact)
 {
     return contact > 0 ? contact * kernel_cell_size((const double(*)[3])s->places.items, s->count) : 0;
@@ -165,8 +166,8 @@ static void add_tet(occluder_search *s, double isovalue)
             below[belows++] = i;
         else
             above[aboves++] = i;
-    /* the crossings must be in cyclic order around the piece, so that the edges of every second vertex below the
-     * isovalue are visited in reverse */
+    /* the crossings must be in cyclic order around the piece, so the edges from every second vertex below the isovalue
+     * are visited in reverse order */
     for (int i = 0; i < belows; i++)
         for (int k = 0; k < aboves; k++) {
             const int j = i % 2 ? aboves - 1 - k : k, p = below[i], q = above[j];
@@ -245,8 +246,9 @@ static void fill_slab(const occluder_search *s, double isovalue, slab *out)
         out->rows[KERNEL_SLAB_GRADIENT + a] = (float)gradient[a];
     }
     out->rows[KERNEL_SLAB_LEVEL] = (float)level;
-    /* Error of L: values are rounded to 6e-8 of the largest, and roots have an error of KERNEL_ROOT_BAND and that of
-     * the rounding of positions. */
+    /* The slab must also contain points at which the computed field is zero only by rounding. The thickness therefore
+     * includes 1e-5, which exceeds the rounding of values (6e-8 of the largest) and the error of roots
+     * (KERNEL_ROOT_BAND). KERNEL_SLAB_ERROR is the error of L by the rounding of positions, per unit of their size. */
     out->rows[KERNEL_SLAB_THICKNESS] = (float)(off * 1.0001 + 1e-5);
     out->rows[KERNEL_SLAB_ERROR] = (float)(16 * 6e-8 * steep);
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
