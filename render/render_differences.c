@@ -69,9 +69,9 @@ bool render_differences_meet(const render_job *job, const render_pending_hit *hi
 /* ---- order ----------------------------------------------------------------------------------------------------- */
 
 typedef struct hit_location {
-    uint64_t tile; /* number of the tile, and of the block in the tile */
-    uint32_t kind, within;
-    int64_t index;
+    uint64_t tile;         /* 256 times the number of the tile, plus the number of the block in the tile */
+    uint32_t kind, within; /* kind of the hit, and number of its pixel in the block */
+    int64_t index;         /* index of the hit among those that are sorted together */
 } hit_location;
 
 static int compare_locations(const void *a, const void *b)
@@ -92,15 +92,15 @@ static hit_location place_of(const render_camera *camera, const render_pending_h
 }
 
 static void sort_hits(const render_camera *camera, render_pending_list *list, int64_t first, int64_t count,
-                      hit_location *places, render_pending_list *room)
+                      hit_location *places, render_pending_list *scratch)
 {
     for (int64_t i = 0; i < count; i++) places[i] = place_of(camera, &list->items[first + i], i);
-    memcpy(room->items, list->items + first, (size_t)count * sizeof *room->items);
-    memcpy(room->shadings, list->shadings + first, (size_t)count * sizeof *room->shadings);
+    memcpy(scratch->items, list->items + first, (size_t)count * sizeof *scratch->items);
+    memcpy(scratch->shadings, list->shadings + first, (size_t)count * sizeof *scratch->shadings);
     qsort(places, (size_t)count, sizeof *places, compare_locations);
     for (int64_t i = 0; i < count; i++) {
-        list->items[first + i] = room->items[places[i].index];
-        list->shadings[first + i] = room->shadings[places[i].index];
+        list->items[first + i] = scratch->items[places[i].index];
+        list->shadings[first + i] = scratch->shadings[places[i].index];
     }
 }
 
@@ -108,17 +108,17 @@ bool render_differences_sort(const render_job *job, render_pending_list *list)
 {
     const int64_t most = list->count < SORTED_HITS ? list->count : SORTED_HITS;
     hit_location *places = base_alloc((size_t)(most + 1) * sizeof *places);
-    render_pending_list room = {.items = base_alloc((size_t)(most + 1) * sizeof *room.items),
-                                .shadings = base_alloc((size_t)(most + 1) * sizeof *room.shadings)};
-    const bool has_room = places && room.items && room.shadings;
-    for (int64_t first = 0; first < list->count && has_room; first += most) {
+    render_pending_list scratch = {.items = base_alloc((size_t)(most + 1) * sizeof *scratch.items),
+                                   .shadings = base_alloc((size_t)(most + 1) * sizeof *scratch.shadings)};
+    const bool has_memory = places && scratch.items && scratch.shadings;
+    for (int64_t first = 0; first < list->count && has_memory; first += most) {
         const int64_t left = list->count - first;
-        sort_hits(&job->camera, list, first, left < most ? left : most, places, &room);
+        sort_hits(&job->camera, list, first, left < most ? left : most, places, &scratch);
     }
     base_free(places);
-    base_free(room.items);
-    base_free(room.shadings);
-    return has_room;
+    base_free(scratch.items);
+    base_free(scratch.shadings);
+    return has_memory;
 }
 
 /* ---- samples and light ----------------------------------------------------------------------------------------- */

@@ -28,10 +28,10 @@ static void close_piece(fragment_writer *w)
     if (w->piece >= 0) w->pieces->filled[w->piece] = (int)w->list.count;
 }
 
-void fragment_writer_advance(fragment_writer *w, int64_t room)
+void fragment_writer_advance(fragment_writer *w, int64_t more)
 {
     fragment_pieces *pieces = w->pieces;
-    if (w->list.capacity - w->list.count >= room || (w->piece < 0 && w->list.items)) return;
+    if (w->list.capacity - w->list.count >= more || (w->piece < 0 && w->list.items)) return;
     int64_t piece;
 #pragma omp atomic capture
     piece = pieces->taken++;

@@ -29,8 +29,8 @@ typedef struct fragment_writer {
  * memory ran out. */
 bool fragment_pieces_begin(fragment_pieces *pieces, fragment_list *out, int64_t expected);
 
-/* Ensures space for `room` more fragments; may continue in a new chunk. */
-void fragment_writer_advance(fragment_writer *writer, int64_t room);
+/* Ensures space for `more` more fragments; the writer may continue in another piece or in its own memory. */
+void fragment_writer_advance(fragment_writer *writer, int64_t more);
 
 /* Ensures space for `more` more fragments in a writer's list, which stays contiguous; returns false if memory ran
  * out. */

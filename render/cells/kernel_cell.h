@@ -143,7 +143,10 @@ typedef struct kernel_tet_line {
 typedef struct kernel_cell {
     uint32_t serial, index; /* key of the cell cache: number of the tile, index of the cell */
     int part, layer;        /* key of the cell cache: mesh part, and the layer whose field the cell has */
-    bool is_finite, is_transformed, is_constant, has_lines, has_normal, has_line_field;
+    bool is_finite;         /* set if the values at all vertices are finite */
+    bool is_transformed;    /* set if x, y and z are computed */
+    bool is_constant;       /* set if all values in f are equal; computed for volumes only */
+    bool has_lines, has_normal, has_line_field; /* set if `lines`, `normal` and `line` are computed */
     int type, count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];

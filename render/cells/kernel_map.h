@@ -6,7 +6,9 @@
  * with m = r s. The trilinear hex has all terms, the wedge lacks c4 and c7. The pyramid is the collapsed hex, whose map
  * is singular at the apex. In the coordinates a = (1-q) r, b = (1-q) s, k = 1-q its map is apex + a c1 + b c2 + k c3 +
  * c4 m with m = a b / k, which is linear except for the last term; that term vanishes if the base is a parallelogram.
- * So Newton's method meets no singularity there: m is bounded by k. */
+ * So Newton's method meets no singularity there: m is bounded by k.
+ *
+ * A cell is called folded if its map is not one-to-one, so that a point may have several reference coordinates. */
 #ifndef RENDER_KERNEL_MAP_H
 #define RENDER_KERNEL_MAP_H
 

@@ -25,6 +25,8 @@ typedef struct polyhedron {
     struct polyhedron *next; /* next polyhedron in the same slot of the store's hash table */
     uint32_t index;
     int part, layer;
+    /* is_finite: the values at all vertices are finite; is_transformed: x, y and z are computed; is_constant: all
+     * values are equal */
     bool is_finite, is_transformed, is_constant;
     bool is_star_shaped; /* true if no tet's sign is negative: the cell is star-shaped from its centre */
     bool has_slopes;     /* set if `fall` and `rise` have been computed */

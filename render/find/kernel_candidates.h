@@ -71,7 +71,8 @@ static void kernel_find_queued(kernel_finder *s)
         }
         kernel_cells *c = &s->pending[kernel_lane_type_index(type)];
         if (c->count == SIMD_WIDTH) kernel_find_pending(s, c);
-        const int room = SIMD_WIDTH - c->count, last = room < s->queued_count - n ? n + room : s->queued_count;
+        const int free_lanes = SIMD_WIDTH - c->count,
+                  last = free_lanes < s->queued_count - n ? n + free_lanes : s->queued_count;
         while (end < last && kernel_arrays_type(p, s->queued[end]) == type) end++;
         for (int k = n; k < end; k++) c->cell[c->count + k - n] = s->queued[k];
         kernel_arrays_cells(p, s->queued + n, end - n, c->vertices, c->vertex, c->count);

@@ -262,8 +262,8 @@ SIMD_INLINE void kernel_curved_batch_cross_of(const kernel_tile_trace *t, kernel
         vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(vf_set(t->t_near), ends[1].t));
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
         const vm change = vm_xor(vf_lt(ends[0].value, zero), vf_lt(ends[1].value, zero));
-        const vm room = vm_and(near, vm_or(change, vf_lt(ends[0].t, ends[1].t)));
-        const vm left = kernel_ends_decide(&cells, &p.rays, p.lane, room, &ends[0], &ends[1], &found);
+        const vm nonempty = vm_and(near, vm_or(change, vf_lt(ends[0].t, ends[1].t)));
+        const vm left = kernel_ends_decide(&cells, &p.rays, p.lane, nonempty, &ends[0], &ends[1], &found);
         kernel_curved_ends_add(&h->met, n, ends, vm_bits(found), &h->found, &h->found_ends);
         kernel_curved_ends_add(&h->met, n, ends, vm_bits(left), &h->others, &h->other_ends);
     }

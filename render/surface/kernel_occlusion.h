@@ -100,8 +100,8 @@ static __attribute__((noinline)) void kernel_occlusion_curved(kernel_packet *p, 
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
-    kernel_curved_storage room;
-    kernel_curved curved = {.storage = &room};
+    kernel_curved_storage storage;
+    kernel_curved curved = {.storage = &storage};
     const int count = kernel_curved_intervals(p, c, rays, list);
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];

@@ -80,8 +80,7 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
 
 /* ---- slabs --------------------------------------------------------------------------------------------------- */
 
-/* The results of testing one ray against the slabs of a leaf, one cell per lane. Along the ray L is level + rise * t.
- */
+/* The results of testing one ray against the slabs of a leaf, one cell per lane. L along the ray: level + rise * t. */
 typedef struct kernel_leaf_lanes {
     int ray;
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];

@@ -283,8 +283,8 @@ static __attribute__((noinline)) void kernel_curved_surface(kernel_packet *p, ke
         i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
         /* If a ray crosses both triangles of a quad but not its patch, both ends of the interval are the same point
          * outside the ray; such an interval is skipped. */
-        const vm is_nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
-        prefetched[n] = vm_and(kernel_is_near(p, i), is_nonempty);
+        const vm nonempty = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
+        prefetched[n] = vm_and(kernel_is_near(p, i), nonempty);
         any = vm_or(any, prefetched[n]);
     }
     if (!vm_any(any)) return;

@@ -53,14 +53,14 @@ typedef struct occluder_list {
 static void *add(occluder_list *f, list *l, size_t size)
 {
     if (l->count == l->capacity) {
-        const int64_t room = l->capacity + l->capacity / 2 + 256;
-        void *items = base_realloc(l->items, (size_t)room * size);
+        const int64_t capacity = l->capacity + l->capacity / 2 + 256;
+        void *items = base_realloc(l->items, (size_t)capacity * size);
         if (!items) {
             f->out_of_memory = true;
             return NULL;
         }
         l->items = items;
-        l->capacity = room;
+        l->capacity = capacity;
     }
     return (char *)l->items + (size_t)l->count++ * size;
 }
