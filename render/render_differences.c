@@ -128,10 +128,10 @@ typedef struct chunk_work {
     kernel_frame frame;
     const kernel_table *kernels;
     int threads;
-    const render_pending_hit *hits;
-    render_difference_samples *samples;
-    const render_pending_list *list; /* hits to be lit; NULL if samples are to be taken */
-    const render_difference_samples *merged;
+    const render_pending_hit *hits;          /* hits around which samples are taken */
+    render_difference_samples *samples;      /* the samples that are taken */
+    const render_pending_list *list;         /* hits to be lit; NULL if samples are to be taken */
+    const render_difference_samples *merged; /* samples of all ranks around the hits in `list` */
     fragment *out;
 } chunk_work;
 

@@ -14,8 +14,8 @@ typedef struct fragment_pieces {
     fragment_list *out;
     int64_t first;       /* index in out at which the first piece begins */
     int64_t piece_count; /* number of pieces that fit into out */
-    int64_t taken;
-    int *filled; /* number of fragments in each piece, set when the piece is closed */
+    int64_t taken;       /* number of pieces that threads have asked for; may exceed piece_count */
+    int *filled;         /* number of fragments in each piece, set when the piece is closed */
 } fragment_pieces;
 
 /* The list to which a thread writes: a piece of the common list, or memory of its own. */

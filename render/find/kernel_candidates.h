@@ -11,8 +11,9 @@
  * because it skips everything behind the hits. It is used for opaque surfaces with several cells per pixel, and for
  * frames in which too many cells are visible.
  *
- * A cell's pixels are the bounding box of its projected outline (kernel_outline.h), widened by more than all rounding.
- * Rays then test the cells themselves, so the picture is the same to the last bit for any traversal. */
+ * A cell's pixels are the bounding box of its projected outline (kernel_outline.h), widened by a margin that is larger
+ * than all rounding errors. Rays then test the cells themselves, so the picture is the same to the last bit for any
+ * traversal. */
 #ifndef RENDER_KERNEL_CANDIDATES_H
 #define RENDER_KERNEL_CANDIDATES_H
 

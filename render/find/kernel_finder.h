@@ -78,9 +78,12 @@ typedef struct kernel_finder {
     uint32_t source;     /* candidates' `source` number for the layer's first isovalue */
     kernel_tile picture; /* the whole picture as a single tile whose axis is the direction of view */
     kernel_planes planes;
-    float t_near, column_scale, row_scale, column_0, row_0;
+    float t_near; /* ray parameter t at the eye's plane */
+    /* pixels per unit of slope (per scaled unit if the camera is orthographic) along columns and rows, and the pixel
+     * coordinates of the axis of view */
+    float column_scale, row_scale, column_0, row_0;
     int first[2], last[2]; /* first and last column, and row, of pixels to which candidates are clipped */
-    kernel_level eye[3];
+    kernel_level eye[3];   /* the eye's position in world coordinates */
     kernel_cell cell;
     uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is being prefetched */
     int queued_count;

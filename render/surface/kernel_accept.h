@@ -27,6 +27,7 @@
 
 /* The gradients at a cell's vertices, in camera axes, and their interpolating polynomials. */
 typedef struct kernel_smooth_cell {
+    /* mesh part and index of the cell */
     int part;
     int32_t index;
     kernel_cell cell;

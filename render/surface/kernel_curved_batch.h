@@ -57,9 +57,12 @@ typedef struct kernel_curved_batch {
     kernel_bounds bounds;
     unsigned copied_lanes; /* mask of the lanes whose cells have been copied to `cells` */
     kernel_cell cells[SIMD_WIDTH];
+    /* rays: undecided rays; met: rays that cross two faces; found: rays with exactly one root; others: rays that are
+     * searched for roots */
     kernel_pixel_list rays, met, found, others;
     /* for each ray in `met`, the two faces that it crosses: number of the first plus 8 times that of the second */
     uint8_t faces[KERNEL_LIST_ROOM];
+    /* depths, values and reference coordinates of the rays in `found` and in `others` */
     kernel_curved_ends found_ends, other_ends;
 } kernel_curved_batch;
 

@@ -35,9 +35,9 @@ typedef struct kernel_probe {
     const kernel_surface *surface;
     int layer; /* number of the layer, which is part of the key of cached cells */
     double isovalue;
-    vf z; /* depths of the points at which the field is sampled */
-    vm found;
-    vf sample;
+    vf z;      /* depths of the points at which the field is sampled */
+    vm found;  /* rays whose point is in a cell */
+    vf sample; /* least value of the field at the point over the cells that contain it */
 } kernel_probe;
 
 /* Sets c->f to the values minus the isovalue, times a scale that is the same for all cells. */
@@ -76,8 +76,8 @@ SIMD_INLINE void kernel_probe_cell(kernel_packet *p, kernel_probe *probe, const 
     }
 }
 
-/* Returns the rays whose point may be in the cell: it lies in the cell's bounding box in tile space, widened by more
- * than all rounding. */
+/* Returns the rays whose point may be in the cell: it lies in the cell's bounding box in tile space, widened by a
+ * margin that is larger than all rounding errors. */
 SIMD_INLINE vm kernel_probe_in_box(const kernel_packet *p, const kernel_probe *probe, const kernel_cell *c, vm rays)
 {
     const float *const places[3] = {c->x, c->y, c->z};
@@ -206,14 +206,14 @@ typedef struct kernel_pending_group {
     kernel_packet packet;
     const kernel_surface *surface;
     int value, count;
-    int lanes[SIMD_WIDTH];
-    vm rays;
-    vf t, reach;
+    int lanes[SIMD_WIDTH]; /* lane of each hit of the group */
+    vm rays;               /* lanes that have a hit */
+    vf t, reach;           /* members of render_pending_hit, by lane */
 } kernel_pending_group;
 
-SIMD_INLINE void kernel_pending_packet_begin(kernel_pending_group *run)
+SIMD_INLINE void kernel_pending_packet_begin(kernel_pending_group *group)
 {
-    run->tile.x0 = run->tile.y0 = -1;
+    group->tile.x0 = group->tile.y0 = -1;
 }
 
 SIMD_INLINE int kernel_pending_lane(int x, int y)
@@ -221,19 +221,19 @@ SIMD_INLINE int kernel_pending_lane(int x, int y)
     return y % KERNEL_PACKET_ROWS * KERNEL_PACKET_COLUMNS + x % KERNEL_PACKET_COLUMNS;
 }
 
-SIMD_INLINE void kernel_pending_surface(kernel_pending_group *run, const kernel_frame *f, uint32_t kind)
+SIMD_INLINE void kernel_pending_surface(kernel_pending_group *group, const kernel_frame *f, uint32_t kind)
 {
     for (int n = 0; n < f->surface_count; n++) {
         const kernel_surface *s = &f->surfaces[n];
         if (kind < s->first_kind || kind - s->first_kind >= (uint32_t)s->layer->value_count) continue;
-        run->surface = s;
-        run->value = (int)(kind - s->first_kind);
+        group->surface = s;
+        group->value = (int)(kind - s->first_kind);
     }
 }
 
-/* Sets up the group that begins with hits[0], and stores its number of hits in run->count. count: number of hits that
+/* Sets up the group that begins with hits[0], and stores its number of hits in group->count. count: number of hits that
  * remain in the list. */
-static void kernel_pending_group_begin(kernel_pending_group *run, const kernel_frame *f, kernel_thread *thread,
+static void kernel_pending_group_begin(kernel_pending_group *group, const kernel_frame *f, kernel_thread *thread,
                                        const render_pending_hit *hits, int64_t count)
 {
     const uint32_t width = (uint32_t)f->job->camera.width, kind = hits->kind;
@@ -241,63 +241,63 @@ static void kernel_pending_group_begin(kernel_pending_group *run, const kernel_f
     const int x0 = x - x % KERNEL_PACKET_COLUMNS, y0 = y - y % KERNEL_PACKET_ROWS;
     float t[SIMD_WIDTH] = {0}, reach[SIMD_WIDTH] = {0};
     unsigned bits = 0;
-    if (x - x % KERNEL_TILE != run->tile.x0 || y - y % KERNEL_TILE != run->tile.y0) {
-        kernel_tile_setup(&run->tile, f, x - x % KERNEL_TILE, y - y % KERNEL_TILE);
-        kernel_tile_rays(&run->tile, f);
+    if (x - x % KERNEL_TILE != group->tile.x0 || y - y % KERNEL_TILE != group->tile.y0) {
+        kernel_tile_setup(&group->tile, f, x - x % KERNEL_TILE, y - y % KERNEL_TILE);
+        kernel_tile_rays(&group->tile, f);
         thread->serial++;
     }
-    kernel_pending_surface(run, f, kind);
-    for (run->count = 0; run->count < count; run->count++) {
-        const render_pending_hit *hit = &hits[run->count];
+    kernel_pending_surface(group, f, kind);
+    for (group->count = 0; group->count < count; group->count++) {
+        const render_pending_hit *hit = &hits[group->count];
         const int column = (int)(hit->pixel % width) - x0, row = (int)(hit->pixel / width) - y0;
         if (hit->kind != kind || column < 0 || column >= KERNEL_PACKET_COLUMNS || row < 0 || row >= KERNEL_PACKET_ROWS)
             break;
         const int lane = kernel_pending_lane(column, row);
         if (bits >> lane & 1) break;
         bits |= 1u << lane;
-        run->lanes[run->count] = lane;
+        group->lanes[group->count] = lane;
         t[lane] = hit->t;
         reach[lane] = hit->reach;
     }
-    run->rays = vm_from_bits(bits);
-    run->t = vf_load(t);
-    run->reach = vf_load(reach);
-    kernel_packet_begin(&run->packet, f, &run->tile, thread, x0, y0);
-    kernel_packet_complete(&run->packet);
+    group->rays = vm_from_bits(bits);
+    group->t = vf_load(t);
+    group->reach = vf_load(reach);
+    kernel_packet_begin(&group->packet, f, &group->tile, thread, x0, y0);
+    kernel_packet_complete(&group->packet);
 }
 
 /* Samples this rank's cells around all hits of the list; out[i] gets the samples of hits[i]. */
 static void kernel_sample_pending(const kernel_frame *f, kernel_thread *thread, const render_pending_hit *hits,
                                   render_difference_samples *out, int64_t count)
 {
-    kernel_pending_group run;
-    kernel_pending_packet_begin(&run);
-    for (int64_t i = 0; i < count; i += run.count) {
+    kernel_pending_group group;
+    kernel_pending_packet_begin(&group);
+    for (int64_t i = 0; i < count; i += group.count) {
         kernel_difference_samples about;
-        kernel_pending_group_begin(&run, f, thread, hits + i, count - i);
-        kernel_sample_differences(&run.packet, run.surface, run.value, run.rays, run.t, run.reach, &about);
-        for (int n = 0; n < run.count; n++) {
+        kernel_pending_group_begin(&group, f, thread, hits + i, count - i);
+        kernel_sample_differences(&group.packet, group.surface, group.value, group.rays, group.t, group.reach, &about);
+        for (int n = 0; n < group.count; n++) {
             render_difference_samples *own = &out[i + n];
             *own = (render_difference_samples){0, 0, {0}};
             for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
-                const bool is_found = vm_bits(about.found[k]) >> run.lanes[n] & 1;
+                const bool is_found = vm_bits(about.found[k]) >> group.lanes[n] & 1;
                 own->found |= (uint32_t)is_found << k;
-                own->values[k] = is_found ? about.values[k][run.lanes[n]] : 0;
+                own->values[k] = is_found ? about.values[k][group.lanes[n]] : 0;
             }
         }
     }
 }
 
-SIMD_INLINE void kernel_load_difference_samples(const kernel_pending_group *run,
+SIMD_INLINE void kernel_load_difference_samples(const kernel_pending_group *group,
                                                 const render_difference_samples *samples,
                                                 kernel_difference_samples *out)
 {
     for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
         float values[SIMD_WIDTH] = {0};
         unsigned found = 0;
-        for (int n = 0; n < run->count; n++) {
-            values[run->lanes[n]] = samples[n].values[k];
-            found |= (samples[n].found >> k & 1) << run->lanes[n];
+        for (int n = 0; n < group->count; n++) {
+            values[group->lanes[n]] = samples[n].values[k];
+            found |= (samples[n].found >> k & 1) << group->lanes[n];
         }
         out->found[k] = vm_from_bits(found);
         out->values[k] = vf_load(values);

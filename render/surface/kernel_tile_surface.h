@@ -6,7 +6,7 @@
  *     cells with pixels:    traced in batches (render_kernels.c), whose hits hide what is behind
  * A node whose box contains no pixel's centre is skipped, too. The box of pixels is computed from the distances of the
  * node's box to the planes through the tile's borders, divided by the box's farthest depth: that gives a lower bound of
- * how far beyond a border the box is. Margins are larger than all rounding. */
+ * how far beyond a border the box is. Margins are larger than all rounding errors. */
 #ifndef RENDER_KERNEL_TILE_SURFACE_H
 #define RENDER_KERNEL_TILE_SURFACE_H
 
@@ -31,6 +31,8 @@ enum {
     KERNEL_FIND_PLANES
 };
 
+/* A plane of kernel_planes (kernel_tile.h). A point's signed distance from it is normal . position + offset, with a
+ * rounding error of at most `error`. size: absolute values of the normal's components. */
 typedef struct kernel_find_plane {
     float normal[3], size[3], offset, error;
 } kernel_find_plane;
