@@ -18,10 +18,10 @@
  * pixels.
  *
  * Faces that coincide but do not have the same bits, as at hanging nodes, leave overlaps and gaps of the size of
- * rounding. Segments that overlap by no more are not reported to compositing: each has its own length, and the sum of
- * lengths is the same on any partition. A sample in such an overlap marks its ray. Separate samples are flagged if they
- * are near an end of the ray's interval in their cell, so that compositing can distinguish such an overlap by rounding
- * from cells that really overlap. */
+ * rounding. Segments whose overlap is that small are not reported to compositing: each has its own length, and the sum
+ * of lengths is the same on any partition. A sample in such an overlap marks its ray. Separate samples are flagged if
+ * they are near an end of the ray's interval in their cell, so that compositing can distinguish such an overlap by
+ * rounding from cells that really overlap. */
 #ifndef RENDER_RENDER_H
 #define RENDER_RENDER_H
 

@@ -35,7 +35,8 @@ typedef struct kernel_arrays {
     bool has_narrow_positions; /* set if the coordinates are float32 and can be gathered */
     const grid *cells;         /* the mesh part's cells */
     int type;                  /* type of all cells, or GRID_NO_TYPE if the mesh has several types */
-    /* field that is not finite for cells without a value of their own; NULL if all cells have one */
+    /* cell field from which the vertex values were averaged; cells in which it is not finite are not drawn; NULL: none
+     */
     const grid_field *source_cells;
     bool is_by_cell; /* set if values belong to cells, not to vertices */
     kernel_numbers coordinates[3], values;
@@ -179,7 +180,7 @@ SIMD_INLINE void kernel_arrays_cells(const kernel_arrays *p, const uint32_t *cel
     }
 }
 
-/* Returns those of the given lanes (a bit mask) whose cells have a finite value of their own. */
+/* Returns the lanes of the given ones (a bit mask) whose cells are drawn: their value in source_cells is finite. */
 SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t *cells, unsigned lanes)
 {
     for (unsigned left = p->source_cells ? lanes : 0; left; left &= left - 1)

@@ -2,7 +2,8 @@
  *
  * Corners 0 to 3 are in cyclic order; in the ray's plane, with the ray at the origin, they are c0 to c3. The patch's
  * point (s, r) is (1-r) ((1-s) c0 + s c1) + r ((1-s) c3 + s c2). For a given r these are the points of the line from u
- * = (1-r) c0 + r c3 to w = (1-r) c1 + r c2, which passes through the origin if B(r) = u × w = 0; likewise A(s) = 0:
+ * = (1-r) c0 + r c3 to w = (1-r) c1 + r c2, which passes through the origin if B(r) = u × w = 0. In the same way A(s) =
+ * 0 is the condition for s:
  *     B(r) = (1-r)² b0 + 2 r (1-r) b1 + r² b2,   b0 = c0×c1,  2 b1 = c0×c2 + c3×c1,  b2 = c3×c2
  *     A(s) = (1-s)² a0 + 2 s (1-s) a1 + s² a2,   a0 = c0×c3,  2 a1 = c0×c2 + c1×c3,  a2 = c1×c2
  * b0, b2, a0 and a2 are the edge functions of the four sides. Their exact signs, with ties decided, are the same for

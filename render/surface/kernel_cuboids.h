@@ -2,14 +2,15 @@
  * uniform and rectilinear grids. Their map is affine, so that along a ray the reference coordinates are linear in the
  * depth, and the field is a cubic polynomial of it:
  *     r = y + w t,        F(r) = k0 + k1 s + k2 s^2 + k3 s^3,
- * where s is 0 and 1 at the ends of the ray's interval in the cell, which planes bound. The number of sign changes of
- * the polynomial's Bernstein coefficients is an upper bound of its number of roots, and exact if it is 0 or 1
- * (Descartes' rule of signs; Farouki, "The Bernstein polynomial basis", 2012):
+ * where s is 0 and 1 at the ends of the ray's interval in the cell, which lies between the planes of the cell's faces.
+ * The number of sign changes of the polynomial's Bernstein coefficients is an upper bound of its number of roots, and
+ * exact if it is 0 or 1 (Descartes' rule of signs; Farouki, "The Bernstein polynomial basis", 2012):
  *     none    All coefficients have the same sign: the ray has no root in the cell.
  *     one     They change their sign once: Newton's method finds the root.
- * Rays with two or three sign changes are left to kernel_curved_batch.h. So are those with a root so close to a face
- * that rounding decides in which cell it is: the interval is that of the cell widened by domain_margin, a root counts
- * if it is inside by more than that, and a coefficient has a sign if it is larger than value_error. */
+ * Rays with two or three sign changes are left to kernel_curved_batch.h. So are rays with a root so close to a face
+ * that rounding decides in which cell it is. Therefore the interval is that of the cell widened by domain_margin, a
+ * root is accepted only if it is inside the cell by more than domain_margin, and the sign of a coefficient counts only
+ * if its magnitude exceeds value_error. */
 #ifndef RENDER_KERNEL_CUBOIDS_H
 #define RENDER_KERNEL_CUBOIDS_H
 
@@ -234,7 +235,7 @@ SIMD_INLINE vm kernel_cuboid_newton(const kernel_cuboid_ray *ray, vm rays, vf *s
 }
 
 /* Returns the field at the reference coordinates r, interpolated between the values at the vertices. Its error is four
- * roundings of the largest value; that of the polynomial is larger. */
+ * roundings of the largest value, which is less than the polynomial's error. */
 SIMD_INLINE vf kernel_cuboid_value(const float values[8][SIMD_WIDTH], vi lane, const vf r[3])
 {
     vf v[8];

@@ -105,7 +105,7 @@ typedef struct kernel_prepared_ray {
     /* for each axis, offset in a node's rows of boxes of the plane that the ray meets first, and of the other one */
     int near_row[3], far_row[3];
     int kx, ky, kz; /* kz is the axis with the largest component of the direction; kx and ky follow it cyclically */
-    /* the direction's components along kx and ky divided by that along kz, and the reciprocal of the latter */
+    /* with d the ray's direction: d[kx] / d[kz], d[ky] / d[kz] and 1 / d[kz] */
     float shear_x, shear_y, stretch;
     float size; /* size of positions, from which the rounding error of the slabs' linear functions is computed */
 } kernel_prepared_ray;

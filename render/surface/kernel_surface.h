@@ -136,7 +136,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     kernel_accepted h = {.value = value, .t = at->t};
     for (int a = 0; a < 3; a++) h.look.normal[a] = at->normal[a];
     h.cells = (kernel_hit_cells){vi_set(c ? c->part : -1), vi_set(c ? (int32_t)c->index : -1)};
-    /* differences are not used for polyhedra, which have gradients of their own or normals from their vertices */
+    /* polyhedra have normals from the gradient in the cell or at the vertices, never by differences */
     h.reach = vf_set(s->layer->normal == RENDER_DIFFERENCES && c ? kernel_difference_reach(p, s->layer, c) : 0);
     kernel_base_colour(s, value, at->w, h.look.colour);
     if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
