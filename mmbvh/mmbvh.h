@@ -18,19 +18,20 @@
 
 enum {
     MMBVH_MAX_LEAF = 7,
-    MMBVH_MAX_DEPTH =
-        80 /* maximum depth of a leaf, where the root has depth 1; also the maximum size of a traversal's stack */
+    /* maximum depth of a leaf, where the root has depth 1; also the maximum size of a traversal's stack */
+    MMBVH_MAX_DEPTH = 80
 };
 
+/* A node of the reference layout: 40 bytes, as in figure 4.1 of the thesis. */
 typedef struct mmbvh_node {
     float lower[3];
     float range_low;
     float upper[3];
     float range_high;
     uint64_t count : 3; /* number of cells in a leaf; 0 for an inner node */
-    uint64_t
-        ref : 61; /* leaf: first index in cells; inner node: index of the left child, which the right one follows */
-} mmbvh_node;     /* 40 bytes, as in figure 4.1 of the thesis */
+    /* leaf: first index in `cells`; inner node: index of the left child; the right child follows it */
+    uint64_t ref : 61;
+} mmbvh_node;
 
 typedef enum mmbvh_layout {
     MMBVH_COMPACT,  /* 24 bytes per node, bounds in steps of a grid (mmbvh_compact.h) */
@@ -44,8 +45,8 @@ typedef enum mmbvh_builder {
 } mmbvh_builder;
 
 typedef struct mmbvh {
-    mmbvh_node *nodes;           /* nodes in the reference layout, otherwise NULL */
-    mmbvh_compact_node *compact; /* nodes in the compact layout, otherwise NULL */
+    mmbvh_node *nodes;           /* nodes in the reference layout; NULL in the compact layout */
+    mmbvh_compact_node *compact; /* nodes in the compact layout; NULL in the reference layout */
     mmbvh_grid grid;             /* quantization grid of the compact layout */
     int64_t node_count;          /* number of nodes; 0 if there are no cells */
     uint32_t *cells;             /* cell indices (or mesh indices in a parent tree), leaf by leaf */
@@ -55,10 +56,10 @@ typedef struct mmbvh {
     double built_cost; /* SAH cost (mmbvh_cost()) when the tree was built */
     double area;       /* sum over all nodes of half the box's surface area times the tests in the node (mmbvh_cost());
                           updated when bounds are refitted */
-    double built_area; /* value of area when the tree was built; a faster growth than that of the mesh's surface means
-                          that the tree has degraded */
-    int64_t unusable_cells; /* number of cells with non-finite values, which have the empty range in the nodes' own
-                               ranges */
+    double built_area; /* value of `area` when the tree was built; if `area` has grown faster than the surface area of
+                          the mesh, the tree has degraded */
+    /* number of cells with non-finite values; the ranges stored in the nodes do not include them */
+    int64_t unusable_cells;
 } mmbvh;
 
 /* Functions that read nodes of either layout; traversals use them instead of the arrays. The box is in elements 0 to 2
@@ -112,9 +113,9 @@ typedef struct mmbvh_selection {
 } mmbvh_selection;
 
 typedef struct mmbvh_options {
-    int threads; /* number of threads; 0 means the default of OpenMP */
-    const mmbvh_selection
-        *selection; /* for a build: only these cells, none of which may be a ghost or flat; NULL: all drawn cells */
+    int threads;                      /* number of threads; 0 means the default of OpenMP */
+    const mmbvh_selection *selection; /* used by a build: the cells to put in the tree, none of which may be a ghost or
+                                         flat; NULL: all drawn cells */
     mmbvh_layout layout;
     mmbvh_builder builder;
 } mmbvh_options;
@@ -138,10 +139,10 @@ typedef struct mmbvh_query {
     const mmbvh_interval *intervals;
 } mmbvh_query;
 
-/* Selects the cells that at least one of the queries (wishes) finds. Ghosts, flat cells and cells with non-finite
- * values are never selected; unusable[i] receives the number of cells whose values are not finite for query i.
- * Parallel; reads each cell's values once per query, about as fast as a refit of ranges. As long as cells, values and
- * queries do not change, a tree over the selection (mmbvh_options) gives the same picture as the full tree. */
+/* Selects the cells that match at least one query. Ghosts, flat cells and cells with non-finite values are never
+ * selected; unusable[i] receives the number of cells whose values are not finite for query i. Parallel; reads each
+ * cell's values once per query, about as fast as a refit of ranges. As long as cells, values and queries do not change,
+ * a tree over the selection (mmbvh_options) gives the same picture as the full tree. */
 insitu_status mmbvh_select(const grid *g, const mmbvh_query *queries, int query_count, const mmbvh_options *options,
                            mmbvh_selection *out, int64_t *unusable, base_error *error);
 void mmbvh_selection_free(mmbvh_selection *selection);
@@ -152,7 +153,7 @@ insitu_status mmbvh_build_boxes(const float *lower, const float *upper, const fl
 
 void mmbvh_free(mmbvh *tree);
 
-/* Computes the nodes' own ranges from new values on the same cells. Parallel; keeps no new memory. */
+/* Computes the ranges stored in the nodes from new values of the same cells. Parallel; keeps no additional memory. */
 insitu_status mmbvh_refit_ranges(mmbvh *tree, const grid *g, const grid_field *field, const mmbvh_options *options);
 
 /* Computes the bounds from moved vertices of the same cells. The ranges do not change. */
@@ -165,9 +166,10 @@ typedef struct mmbvh_visible {
     const mmbvh_interval *intervals;
 } mmbvh_visible;
 
-/* Same as mmbvh_refit_bounds(), but may skip nodes that are in none of the visible parts; *is_whole is set to whether
- * no node was skipped. If some were, the bounds of a node cover only its visible descendants until values, intervals or
- * vertices change. A traversal that skips invisible nodes finds the same cells, but mmbvh_check() fails. */
+/* As mmbvh_refit_bounds(), but may skip nodes that no visible part contains. *is_whole is set to true if no node was
+ * skipped. Otherwise the bounds of a node contain only its visible descendants, and are valid only until values,
+ * intervals or vertices change. A traversal that skips invisible nodes finds the same cells as before, but
+ * mmbvh_check() fails. */
 insitu_status mmbvh_refit_visible_bounds(mmbvh *tree, const grid *g, const mmbvh_visible *visible, int visible_count,
                                          const mmbvh_options *options, bool *is_whole);
 
@@ -194,7 +196,7 @@ static inline mmbvh_ranges mmbvh_pair_ranges(const float *pairs)
 }
 
 /* Returns the tree's current SAH cost: the expected number of boxes and cells that a random ray tests if it hits the
- * root. Each box and each cell counts 1. Of the options only the number of threads is used. */
+ * root's box; a box and a cell count the same. Only the number of threads is read from the options. */
 double mmbvh_cost(const mmbvh *tree, const mmbvh_options *options);
 
 typedef struct mmbvh_statistics {

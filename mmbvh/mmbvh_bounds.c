@@ -10,7 +10,7 @@
     {                                                                                                                  \
         for (int i = 0; i < count; i++) {                                                                              \
             fetch_box_empty(&boxes[i]);                                                                                \
-            fetch_box_cells(&boxes[i], source->g, cells + i, 1, shape, wide_index, wide_number);                       \
+            extend_box_by_cells(&boxes[i], source->g, cells + i, 1, shape, wide_index, wide_number);                   \
         }                                                                                                              \
     }
 FETCH_INSTANCES(DEFINE_READ, read)
@@ -21,7 +21,7 @@ MMBVH_INLINE void read_float_boxes(const grid *g, const uint32_t *cells, int cou
     for (int i = 0; i < count; i++) {
         fetch_float_box float_box = fetch_float_box_empty();
         prefetch_later_cell(g, cells[i], shape);
-        fetch_float_box_cell(&float_box, g, cells[i], shape, wide_index, is_packed);
+        extend_float_box(&float_box, g, cells[i], shape, wide_index, is_packed);
         float_boxes[i] = float_box;
     }
 }
@@ -29,7 +29,7 @@ MMBVH_INLINE void read_float_boxes(const grid *g, const uint32_t *cells, int cou
 #define DEFINE_READ_FLOAT_BOXES(name, shape, wide_index, wide_number)                                                  \
     static void name(const bounds_source *source, const uint32_t *cells, int count, fetch_float_box *float_boxes)      \
     {                                                                                                                  \
-        if (fetch_is_packed(&source->g->coordinates[0])) {                                                             \
+        if (fetch_is_contiguous(&source->g->coordinates[0])) {                                                         \
             read_float_boxes(source->g, cells, count, float_boxes, shape, wide_index, true);                           \
         } else {                                                                                                       \
             read_float_boxes(source->g, cells, count, float_boxes, shape, wide_index, false);                          \
@@ -40,19 +40,19 @@ FETCH_FLOAT_INSTANCES(DEFINE_READ_FLOAT_BOXES, read_float_boxes)
 MMBVH_INLINE void prefetch_cells(const grid *g, const uint32_t *cells, int cell_count, const fetch_shape shape)
 {
     for (int k = 0; k < cell_count; k++) {
-        const int64_t first = fetch_first(g, cells[k], fetch_vertex_count(g, cells[k], shape), shape);
+        const int64_t first = fetch_first_entry(g, cells[k], fetch_vertex_count(g, cells[k], shape), shape);
         prefetch_connectivity(g, first, shape);
     }
 }
 
-#define DEFINE_UNITE(name, shape, wide_index, wide_number)                                                             \
+#define DEFINE_EXTEND(name, shape, wide_index, wide_number)                                                            \
     static void name(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,             \
                      fetch_box *box)                                                                                   \
     {                                                                                                                  \
         if (later) prefetch_cells(source->g, later, count, shape);                                                     \
-        fetch_box_cells(box, source->g, cells, count, shape, wide_index, wide_number);                                 \
+        extend_box_by_cells(box, source->g, cells, count, shape, wide_index, wide_number);                             \
     }
-FETCH_INSTANCES(DEFINE_UNITE, unite)
+FETCH_INSTANCES(DEFINE_EXTEND, extend)
 
 static void read_any(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes)
 {
@@ -62,8 +62,8 @@ static void read_any(const bounds_source *source, const uint32_t *cells, int cou
     }
 }
 
-static void unite_any(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
-                      fetch_box *box)
+static void extend_by_any_cells(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
+                                fetch_box *box)
 {
     (void)later;
     for (int i = 0; i < count; i++) fetch_box_any_cell(box, source->g, cells[i]);
@@ -79,14 +79,14 @@ static void read_given_boxes(const bounds_source *source, const uint32_t *cells,
     }
 }
 
-static void unite_given_boxes(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
-                              fetch_box *box)
+static void extend_by_given_boxes(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
+                                  fetch_box *box)
 {
     (void)later;
     for (int i = 0; i < count; i++) {
         fetch_box given;
         read_given_boxes(source, cells + i, 1, &given);
-        fetch_box_unite(box, &given);
+        unite_boxes(box, &given);
     }
 }
 
@@ -95,20 +95,20 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
 {
     static bounds_read *const reads[FETCH_SHAPES][2][2] = FETCH_TABLE(read);
     static bounds_read_float_boxes *const reads_float_boxes[FETCH_SHAPES][2] = FETCH_FLOAT_TABLE(read_float_boxes);
-    static bounds_unite *const unites[FETCH_SHAPES][2][2] = FETCH_TABLE(unite);
+    static bounds_extend *const extends[FETCH_SHAPES][2][2] = FETCH_TABLE(extend);
     bounds_source s = {.g = g, .scale = scale, .lower = lower, .upper = upper, .box_count = count};
     s.read = g ? read_any : read_given_boxes;
-    s.unite = g ? unite_any : unite_given_boxes;
+    s.extend = g ? extend_by_any_cells : extend_by_given_boxes;
     for (int axis = 0; axis < 3; axis++) s.origin[axis] = origin[axis];
-    if (!g || !fetch_is_plain(g)) return s;
+    if (!g || !fetch_can_read_boxes(g)) return s;
     s.read = reads[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
     if (!g->coordinates[0].is_wide)
         s.read_float_boxes = reads_float_boxes[fetch_grid_shape(g)][g->connectivity.is_wide];
-    s.unite = unites[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
+    s.extend = extends[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
     return s;
 }
 
-/* Finds the smallest and largest finite number of an array of any type. */
+/* Computes the smallest and largest finite value of an array of any type. */
 static void array_range_any(const grid_array *a, int64_t count, int threads, double *least, double *most)
 {
     double low = INFINITY, high = -INFINITY;
@@ -133,7 +133,7 @@ static inline float load_float(const char *p)
     return *(const float *)(const void *)p;
 }
 
-/* Finds the smallest and largest of an array of floats, four at a time. NaN is ignored. */
+/* Computes the smallest and largest value of an array of floats, four at a time. NaN is ignored. */
 MMBVH_INLINE void array_range_floats(const char *data, const int64_t stride, int64_t count, float *least, float *most)
 {
     enum { LANES = 4 };
@@ -219,7 +219,8 @@ item_grid item_grid_make(const double lower[3], const double upper[3])
         has_extent[axis] = extent > 0 && extent < INFINITY;
         longest = has_extent[axis] && extent > longest ? extent : longest;
         grid.origin[axis] = lower[axis];
-        /* A finer grid would not separate more cells, because the nodes' bounds are floats. */
+        /* The grid is the finest useful one if its steps are below the precision of the nodes' bounds, which are
+         * floats. */
         if (extent > far * 0x1p-22) grid.is_finest = false;
     }
     grid.step = longest / ITEM_TOP;
@@ -235,8 +236,8 @@ static int list_block_cells(const item *items, int64_t count, uint32_t cells[BOU
     return n;
 }
 
-/* Maps floats in the source's coordinates to grid steps. The origin is a float too: the difference from a coordinate
- * near it is exact, and from a distant one has a relative error of at most 2^-24. */
+/* Maps floats in the source's coordinates to grid steps. The origin is rounded to float, so that the difference from a
+ * nearby coordinate is exact; the difference from a distant one has a relative error of at most 2^-24. */
 typedef struct float_mapping {
     vec4 origin;
     vec4 factor;
@@ -275,7 +276,7 @@ static void quantize_float_boxes(const bounds_source *source, const item_grid *g
         const int n = list_block_cells(items + begin, count - begin, cells);
         source->read_float_boxes(source, cells, n, float_boxes);
         for (int i = 0; i < n; i++) {
-            fetch_float_box_unite(exact, &float_boxes[i]);
+            unite_float_boxes(exact, &float_boxes[i]);
             items[begin + i] = item_of_float_box(&m, &float_boxes[i], cells[i]);
             item_set_add(set, items[begin + i]);
         }
@@ -291,7 +292,7 @@ static void quantize_boxes(const bounds_source *source, const item_grid *grid, i
         const int n = list_block_cells(items + begin, count - begin, cells);
         source->read(source, cells, n, boxes);
         for (int i = 0; i < n; i++) {
-            fetch_box_unite(exact, &boxes[i]);
+            unite_boxes(exact, &boxes[i]);
             bounds_transform(source, &boxes[i]);
             items[begin + i] = item_make(grid, boxes[i].lower, boxes[i].upper, cells[i]);
             item_set_add(set, items[begin + i]);
@@ -313,5 +314,5 @@ void bounds_fill_items(const bounds_source *source, const item_grid *grid, item 
         quantize_boxes(source, grid, items, count, &own, &box);
     }
     item_set_merge(set, &own);
-    if (exact) fetch_box_unite(exact, &box);
+    if (exact) unite_boxes(exact, &box);
 }

@@ -9,14 +9,14 @@
 /* Reads the boxes of `count` cells, in the source's own coordinates. */
 typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
 
-/* Same as bounds_read, for coordinates that are floats. */
+/* As bounds_read, for coordinates that are floats. */
 typedef void bounds_read_float_boxes(const bounds_source *source, const uint32_t *cells, int count,
                                      fetch_float_box *float_boxes);
 
-/* Extends *box by the boxes of `count` cells. `later`, unless NULL, lists as many cells that will be read later and may
- * be prefetched. */
-typedef void bounds_unite(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
-                          fetch_box *box);
+/* Extends *box by the boxes of `count` cells. `later` lists `count` cells that will be read soon, so that their data
+ * can be prefetched; NULL: none. */
+typedef void bounds_extend(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *later,
+                           fetch_box *box);
 
 struct bounds_source {
     const grid *g; /* grid whose cells are read; NULL if the boxes are given */
@@ -25,8 +25,8 @@ struct bounds_source {
     const float *lower, *upper; /* corners of the given boxes, count × 3 values */
     int64_t box_count;          /* number of boxes, including those of ghosts */
     bounds_read *read;
-    bounds_read_float_boxes *read_float_boxes; /* reads boxes of floats; NULL unless all coordinates are floats */
-    bounds_unite *unite;
+    bounds_read_float_boxes *read_float_boxes; /* reads boxes as floats; NULL unless all coordinates are floats */
+    bounds_extend *extend;
 };
 
 enum { BOUNDS_BLOCK = 64 }; /* number of boxes that are read at once */
@@ -44,12 +44,12 @@ static inline void bounds_transform(const bounds_source *source, fetch_box *box)
     }
 }
 
-/* Returns the box of all vertices with finite coordinates, in the tree's coordinates. It contains all such cells, but
- * is larger than necessary if some vertices belong to no cell. */
+/* Returns the box of all vertices with finite coordinates, in the tree's coordinates. It contains all cells whose
+ * coordinates are finite, but is larger than necessary if some vertices belong to no cell. */
 fetch_box bounds_estimate(const bounds_source *source, int threads);
 
-/* Computes the boxes of items that have only an index. Extends *set by the items, and *exact, unless NULL, by the boxes
- * in the source's coordinates. */
+/* Computes the boxes of items of which only the index is set. Extends *set by the items. Extends *exact by the boxes in
+ * the source's coordinates; exact may be NULL. */
 void bounds_fill_items(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
                        fetch_box *exact);
 

@@ -59,7 +59,7 @@ static insitu_status check_cell_bounds(const check_state *w, int64_t index, int6
     return INSITU_OK;
 }
 
-/* Finds the range of the cell's values; returns false if one of them is not finite. */
+/* Computes the range of the cell's values. Returns false if a value is not finite. */
 static bool cell_range(const check_state *w, int64_t cell, double *low, double *high)
 {
     grid_walk vertices = grid_walk_cell(w->g, cell);
@@ -179,7 +179,7 @@ static insitu_status check_inner(check_state *w, int64_t index)
 
 static insitu_status check_nodes(check_state *w)
 {
-    /* Stack of nodes to be visited: the right child of each pair on the current path. */
+    /* Stack of nodes still to be visited: the right children along the current path. */
     struct {
         int64_t index;
         int depth;
@@ -203,7 +203,7 @@ static insitu_status check_nodes(check_state *w)
     return INSITU_OK;
 }
 
-/* Checks that the traversal visited all nodes, entries and cells. */
+/* Returns an error if the traversal has not visited all nodes, entries and cells. */
 static insitu_status check_complete(const check_state *w)
 {
     if (w->next_pair != w->tree->node_count && w->tree->node_count) {

@@ -1,16 +1,16 @@
-/* The compact node takes 24 bytes, where the thesis's node takes 40.
+/* Defines the compact node layout: 24 bytes per node instead of the 40 bytes of the thesis's node.
  *
- * The tree has a grid of 2^20 steps per axis, whose size is a power of two. A box has one 32-bit word per axis: its
- * lower bound in whole steps, and in the higher bits its extent as a small floating-point number. The precision of a
- * box is therefore a millionth of the tree's size or 1/256 of its own, whichever is coarser, so that a cell much
- * smaller than the others keeps its shape:
+ * The tree has a grid of 2^20 steps per axis; a step is a power of two. A box has one 32-bit word per axis: its lower
+ * bound in whole steps in the low bits, and its extent as a small floating-point number in the high bits. The precision
+ * of a box is the coarser of a millionth of the tree's size and 1/256 of the box's own size, so that boxes of cells
+ * much smaller than others still have a useful shape:
  *
  *      31    28 27          20 19                     0
  *     | exponent | mantissa   | lower bound in steps   |     extent = 16 (1 + mantissa / 256) 2^exponent - 16
  *
  * Decoding all three axes takes one load and about ten operations on four floats, without a table and without
- * denormals. Products with steps are exact, because steps are powers of two; a fused multiply-add gives the same
- * result. */
+ * denormals. Products with steps are exact, because steps are powers of two; a fused multiply-add therefore gives the
+ * same result. */
 #ifndef MMBVH_COMPACT_H
 #define MMBVH_COMPACT_H
 
@@ -28,7 +28,7 @@ enum {
 
 typedef struct mmbvh_compact_node {
     uint32_t axis[3];
-    uint32_t link; /* number of cells in the 3 low bits, and reference in the others, both as in mmbvh_node */
+    uint32_t link; /* number of cells in the 3 low bits, reference in the other bits; both as in mmbvh_node */
     float range_low;
     float range_high;
 } mmbvh_compact_node;

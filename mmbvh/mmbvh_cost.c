@@ -1,5 +1,5 @@
-/* The surface area heuristic: a ray that hits a convex box hits a box inside it with a probability that is the ratio of
- * their surface areas. */
+/* Computes the cost of the surface area heuristic: a ray that hits a convex box also hits a box inside it with a
+ * probability equal to the ratio of their surface areas. */
 #include "mmbvh_cost.h"
 
 #include "mmbvh_sweep.h"
@@ -19,8 +19,8 @@ double cost_half_area(const float lower[3], const float upper[3])
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* Returns the sum over the nodes of half the surface area times the tests in the node: each cell of a leaf, or two
- * boxes. */
+/* Returns the sum over nodes [begin, end) of half the surface area of the box times the number of tests in the node:
+ * one for each cell of a leaf, or two for the children's boxes. */
 static double area_of_nodes(const mmbvh *tree, int64_t begin, int64_t end)
 {
     double sum = 0;
@@ -50,8 +50,7 @@ double cost_area_of_tree(const mmbvh *tree, int threads)
     return area;
 }
 
-/* A ray that hits the root hits a node with a probability that is the ratio of their surface areas. If the root's
- * surface area is 0, all nodes count as hit. */
+/* If the root's surface area is 0, every node is assumed to be hit. */
 double cost_of_area(const mmbvh *tree, double area)
 {
     if (!tree->node_count) return 0;

@@ -11,8 +11,8 @@
 
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
-/* The way in which the vertices of a cell are found: all cells are tets, all are hexes, all have the same other type,
- * each has its own type, or the cells form a lattice. */
+/* The way in which a cell's vertices are found: all cells are tets; all are hexes; all have the same other type; each
+ * cell has its own type; or the cells form a lattice. */
 typedef enum fetch_shape {
     FETCH_TETS,
     FETCH_HEXES,
@@ -51,15 +51,16 @@ MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_sha
     return grid_type_vertices(shape == FETCH_BY_CELL ? grid_cell_type(g, cell) : g->cell_type);
 }
 
-/* Returns the index of a cell's first entry in the connectivity; for a lattice, the cell's first vertex. */
-MMBVH_INLINE int64_t fetch_first(const grid *g, int64_t cell, int count, const fetch_shape shape)
+/* Returns the index of a cell's first entry in the connectivity; in a lattice, which has none, the index of its first
+ * vertex. */
+MMBVH_INLINE int64_t fetch_first_entry(const grid *g, int64_t cell, int count, const fetch_shape shape)
 {
     if (shape == FETCH_LATTICE) return grid_lattice_first(g->lattice, cell);
     return shape == FETCH_BY_CELL && g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
 }
 
-/* Returns vertex i of a cell, where `first` is fetch_first() of the cell. */
-MMBVH_INLINE int64_t fetch_corner(const grid *g, int64_t first, int i, const fetch_shape shape, const bool wide_index)
+/* Returns the index of the cell's vertex i. `first` is the result of fetch_first_entry() for the cell. */
+MMBVH_INLINE int64_t fetch_vertex(const grid *g, int64_t first, int i, const fetch_shape shape, const bool wide_index)
 {
     return shape == FETCH_LATTICE ? first + g->lattice->corner_offsets[i]
                                   : fetch_index(&g->connectivity, first + i, wide_index);
@@ -71,34 +72,33 @@ MMBVH_INLINE void prefetch_connectivity(const grid *g, int64_t first, const fetc
     if (shape != FETCH_LATTICE) __builtin_prefetch(g->connectivity.data + first * g->connectivity.stride);
 }
 
-/* Prefetches the connectivity of later cells, in a pass over the cells in the mesh's order. The hardware prefetcher
- * reacts too late, although the pass is regular. */
+/* Prefetches the connectivity of a later cell, in a pass over the cells in the mesh's order. The hardware prefetcher is
+ * too late, although the accesses are regular. */
 MMBVH_INLINE void prefetch_later_cell(const grid *g, int64_t cell, const fetch_shape shape)
 {
     enum { AHEAD = 512 }; /* prefetch distance in entries of the connectivity */
     if (shape == FETCH_LATTICE) return;
-    prefetch_connectivity(g, fetch_first(g, cell, fetch_vertex_count(g, cell, shape), shape) + AHEAD, shape);
+    prefetch_connectivity(g, fetch_first_entry(g, cell, fetch_vertex_count(g, cell, shape), shape) + AHEAD, shape);
 }
 
-/* Checks whether an array's numbers are contiguous. Code for such arrays uses the constant stride in its address
+/* Returns whether an array's numbers are contiguous, so that code can use a constant stride in its address
  * computations. */
-static inline bool fetch_is_packed(const grid_array *a)
+static inline bool fetch_is_contiguous(const grid_array *a)
 {
     return a->stride == (a->is_wide ? (int64_t)sizeof(double) : (int64_t)sizeof(float));
 }
 
-/* Finds the addresses of the values at a cell's vertices. The last address is repeated, so that there are always
- * eight. */
+/* Computes the addresses of the values at a cell's vertices. The last address is repeated until there are eight. */
 MMBVH_INLINE void fetch_values(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                const bool wide_index, const int64_t stride, const char *out[GRID_MAX_CELL_VERTICES])
 {
     const int count = fetch_vertex_count(g, cell, shape);
-    const int64_t first = fetch_first(g, cell, count, shape);
+    const int64_t first = fetch_first_entry(g, cell, count, shape);
     for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++)
-        out[i] = values->data + fetch_corner(g, first, i < count ? i : count - 1, shape, wide_index) * stride;
+        out[i] = values->data + fetch_vertex(g, first, i < count ? i : count - 1, shape, wide_index) * stride;
 }
 
-/* Reads a cell's values, which are floats; returns whether all are finite. */
+/* Reads a cell's values, which are floats. Returns whether all are finite. */
 MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                     const bool wide_index, const bool is_packed, vec4 out[2])
 {
@@ -112,14 +112,15 @@ MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int
     return vec4_all((ivec4)(nonfinite == vec4_set1(0)));
 }
 
-/* The range of the values of a cell or leaf, per lane. fetch_doubles_range() combines the lanes. */
-typedef struct fetch_doubles {
+/* Lane-wise minima and maxima of the values of a cell or leaf; fetch_combine_lanes() computes the range from them. */
+typedef struct fetch_lane_range {
     vec2 low, high;
-} fetch_doubles;
+} fetch_lane_range;
 
-/* Reads a cell's values, which are doubles, and computes their range per lane; returns whether all are finite. */
+/* Reads a cell's values, which are doubles, and computes their lane-wise minima and maxima. Returns whether all values
+ * are finite. */
 MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
-                                     const bool wide_index, const bool is_packed, fetch_doubles *out)
+                                     const bool wide_index, const bool is_packed, fetch_lane_range *out)
 {
     const char *at[GRID_MAX_CELL_VERTICES];
     double v[GRID_MAX_CELL_VERTICES];
@@ -127,7 +128,7 @@ MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, in
     for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++) v[i] = *(const double *)(const void *)at[i];
     const vec2 a = {v[0], v[1]}, b = {v[2], v[3]};
     vec2 nonfinite = (a - a) + (b - b); /* 0 if all values are finite, otherwise NaN */
-    *out = (fetch_doubles){vec2_min(a, b), vec2_max(a, b)};
+    *out = (fetch_lane_range){vec2_min(a, b), vec2_max(a, b)};
     if (shape != FETCH_TETS) {
         const vec2 c = {v[4], v[5]}, d = {v[6], v[7]};
         nonfinite += (c - c) + (d - d);
@@ -143,13 +144,13 @@ typedef struct fetch_range {
     bool is_finite;
 } fetch_range;
 
-MMBVH_INLINE fetch_range fetch_doubles_range(const fetch_doubles *v, bool is_finite)
+MMBVH_INLINE fetch_range fetch_combine_lanes(const fetch_lane_range *v, bool is_finite)
 {
     return (fetch_range){v->low[0] < v->low[1] ? v->low[0] : v->low[1],
                          v->high[0] > v->high[1] ? v->high[0] : v->high[1], is_finite};
 }
 
-/* Finds the range of a cell of any type, for any field. */
+/* Computes the range of the values of a cell of any type, for any field. */
 static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *field, int64_t cell)
 {
     fetch_range range = {INFINITY, -INFINITY, grid_has_own_value(field, cell)};
@@ -182,7 +183,7 @@ MMBVH_INLINE void fetch_box_empty(fetch_box *box)
     }
 }
 
-MMBVH_INLINE void fetch_box_unite(fetch_box *to, const fetch_box *box)
+MMBVH_INLINE void unite_boxes(fetch_box *to, const fetch_box *box)
 {
     for (int axis = 0; axis < 3; axis++) {
         to->lower[axis] = box->lower[axis] < to->lower[axis] ? box->lower[axis] : to->lower[axis];
@@ -200,7 +201,7 @@ static inline fetch_float_box fetch_float_box_empty(void)
     return (fetch_float_box){vec4_set1(INFINITY), vec4_set1(-INFINITY)};
 }
 
-static inline void fetch_float_box_unite(fetch_float_box *to, const fetch_float_box *float_box)
+static inline void unite_float_boxes(fetch_float_box *to, const fetch_float_box *float_box)
 {
     to->lower = vec4_min(float_box->lower, to->lower);
     to->upper = vec4_max(float_box->upper, to->upper);
@@ -217,15 +218,15 @@ static inline fetch_box fetch_float_box_widen(const fetch_float_box *float_box)
 }
 
 /* Extends the box by a cell whose coordinates are floats. */
-MMBVH_INLINE void fetch_float_box_cell(fetch_float_box *float_box, const grid *g, int64_t cell, const fetch_shape shape,
-                                       const bool wide_index, const bool is_packed)
+MMBVH_INLINE void extend_float_box(fetch_float_box *float_box, const grid *g, int64_t cell, const fetch_shape shape,
+                                   const bool wide_index, const bool is_packed)
 {
     const char *const x = g->coordinates[0].data, *const y = g->coordinates[1].data, *const z = g->coordinates[2].data;
     const int64_t stride = is_packed ? (int64_t)sizeof(float) : g->coordinates[0].stride;
     const int count = fetch_vertex_count(g, cell, shape);
-    const int64_t first = fetch_first(g, cell, count, shape);
+    const int64_t first = fetch_first_entry(g, cell, count, shape);
     for (int i = 0; i < count; i++) {
-        const int64_t at = fetch_corner(g, first, i, shape, wide_index) * stride;
+        const int64_t at = fetch_vertex(g, first, i, shape, wide_index) * stride;
         const vec4 p = {*(const float *)(const void *)(x + at), *(const float *)(const void *)(y + at),
                         *(const float *)(const void *)(z + at), 0};
         float_box->lower = vec4_min(p, float_box->lower);
@@ -234,13 +235,13 @@ MMBVH_INLINE void fetch_float_box_cell(fetch_float_box *float_box, const grid *g
 }
 
 /* Extends the box by a cell whose coordinates are doubles. */
-MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, const fetch_shape shape,
-                                 const bool wide_index)
+MMBVH_INLINE void extend_box(fetch_box *box, const grid *g, int64_t cell, const fetch_shape shape,
+                             const bool wide_index)
 {
     const int count = fetch_vertex_count(g, cell, shape);
-    const int64_t first = fetch_first(g, cell, count, shape);
+    const int64_t first = fetch_first_entry(g, cell, count, shape);
     for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_corner(g, first, i, shape, wide_index);
+        const int64_t vertex = fetch_vertex(g, first, i, shape, wide_index);
         const char *at = g->coordinates[0].data + vertex * g->coordinates[0].stride;
         for (int axis = 0; axis < 3; axis++) {
             const int64_t offset = g->coordinates[axis].data - g->coordinates[0].data;
@@ -251,32 +252,32 @@ MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, co
     }
 }
 
-/* Extends the box by cell_count cells. Floats are compared as floats, and only the result is converted to double. Two
- * boxes of floats are extended alternately, because each comparison depends on the previous one of the same box. */
-MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t *cells, int cell_count,
-                                  const fetch_shape shape, const bool wide_index, const bool wide_number)
+/* Extends the box by cell_count cells. Floats are compared as floats; only the result is converted to double. Two boxes
+ * of floats are extended alternately, because each comparison depends on the previous one with the same box. */
+MMBVH_INLINE void extend_box_by_cells(fetch_box *box, const grid *g, const uint32_t *cells, int cell_count,
+                                      const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
     if (wide_number) {
         fetch_box all = *box;
-        for (int k = 0; k < cell_count; k++) fetch_box_cell(&all, g, cells[k], shape, wide_index);
+        for (int k = 0; k < cell_count; k++) extend_box(&all, g, cells[k], shape, wide_index);
         *box = all;
         return;
     }
     fetch_float_box even = fetch_float_box_empty(), odd = even;
     for (int64_t k = 0; k < cell_count / 2; k++) {
-        fetch_float_box_cell(&even, g, cells[2 * k], shape, wide_index, false);
-        fetch_float_box_cell(&odd, g, cells[2 * k + 1], shape, wide_index, false);
+        extend_float_box(&even, g, cells[2 * k], shape, wide_index, false);
+        extend_float_box(&odd, g, cells[2 * k + 1], shape, wide_index, false);
     }
-    if (cell_count & 1) fetch_float_box_cell(&even, g, cells[cell_count - 1], shape, wide_index, false);
-    fetch_float_box_unite(&even, &odd);
+    if (cell_count & 1) extend_float_box(&even, g, cells[cell_count - 1], shape, wide_index, false);
+    unite_float_boxes(&even, &odd);
     const fetch_box floats = fetch_float_box_widen(&even);
-    fetch_box_unite(box, &floats);
+    unite_boxes(box, &floats);
 }
 
 /* Transforms a box to a node's coordinates and rounds it outward. Because rounding is monotonic, this gives the same
  * box as rounding each vertex. */
-MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], double scale, float *lower,
-                                  float *upper)
+MMBVH_INLINE void round_box_outward(const fetch_box *box, const double origin[3], double scale, float *lower,
+                                    float *upper)
 {
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = round_down((box->lower[axis] - origin[axis]) * scale);
@@ -284,18 +285,18 @@ MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], 
     }
 }
 
-/* Same as fetch_box_round(), to the same bits, for a box of floats. Lane 3 of the input is ignored. */
-MMBVH_INLINE void fetch_float_box_round(const fetch_float_box *float_box, const double origin[3], double scale,
-                                        vec4 *lower, vec4 *upper)
+/* As round_box_outward(), with the same bits, for a box of floats. Lane 3 of the input is ignored. */
+MMBVH_INLINE void round_float_box_outward(const fetch_float_box *float_box, const double origin[3], double scale,
+                                          vec4 *lower, vec4 *upper)
 {
     const double from[4] = {origin[0], origin[1], origin[2], 0};
     *lower = vec4_xyz(vec4_transform_down(float_box->lower, from, scale));
     *upper = vec4_xyz(0.0f - vec4_transform_down(float_box->upper, from, -scale));
 }
 
-/* Checks whether fetch_box_cells() can read the grid: the coordinates are all floats or all doubles with the same
- * stride, and no cell is a polyhedron. */
-static inline bool fetch_is_plain(const grid *g)
+/* Returns whether extend_box_by_cells() can read the grid: all coordinates are floats, or all are doubles, they have
+ * the same stride, and no cell is a polyhedron. */
+static inline bool fetch_can_read_boxes(const grid *g)
 {
     if (grid_has_faces(g) || g->coordinates[0].axis) return false;
     const grid_array *c = g->coordinates;
@@ -306,7 +307,7 @@ static inline bool fetch_is_plain(const grid *g)
 
 /* Extends the box by a cell of a uniform or rectilinear lattice, whose coordinates are finite. Comparisons take half as
  * long as fmin() and fmax(), which are calls. */
-static inline void fetch_box_axes(fetch_box *box, const grid_lattice *l, int64_t cell)
+static inline void extend_box_by_lattice_cell(fetch_box *box, const grid_lattice *l, int64_t cell)
 {
     for (int axis = 0; axis < 3; axis++) {
         const double *at = l->axes[axis].axis_coordinates + grid_index_along(&l->cell_numbering, axis, cell);
@@ -319,7 +320,7 @@ static inline void fetch_box_axes(fetch_box *box, const grid_lattice *l, int64_t
 static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cell)
 {
     if (g->coordinates[0].axis) {
-        fetch_box_axes(box, g->lattice, cell);
+        extend_box_by_lattice_cell(box, g->lattice, cell);
         return;
     }
     grid_walk walk = grid_walk_cell(g, cell);
@@ -364,7 +365,7 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
     }
 /* clang-format on */
 
-/* Same as FETCH_INSTANCES, for floats only; the table is indexed by [shape][wide_index]. */
+/* As FETCH_INSTANCES, for floats only; the table is indexed by [shape][wide_index]. */
 #define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
     FETCH_EACH_SHAPE(FETCH_FLOAT_SHAPE_INSTANCES, DEFINE, prefix)                                                      \
     DEFINE(prefix##_lattice_4, FETCH_LATTICE, false, false)

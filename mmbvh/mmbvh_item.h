@@ -24,7 +24,7 @@ typedef struct item_grid {
     double origin[3];
     double step;            /* length of a step; 0 if no axis has a finite extent */
     double inverse_step[3]; /* 1 / step for each axis, or 0 on an axis without a finite extent */
-    bool is_finest;         /* true if a finer grid would not separate more cells */
+    bool is_finest;         /* set if a finer grid would not distinguish more cells */
 } item_grid;
 
 /* The bounds of a set of items and of their centroids. */
@@ -44,7 +44,7 @@ static inline item item_of_index(uint32_t index)
     return (item){0, 0, 0, (int16_t)(uint16_t)(index & 0xffff), 0, 0, 0, (int16_t)(uint16_t)(index >> 16)};
 }
 
-/* Returns twice the centroid minus TOP in lanes 4 to 6, and the negative of that in lanes 0 to 2. */
+/* Returns (2 * centroid - TOP) in lanes 4 to 6, and its negative in lanes 0 to 2. */
 static inline lanes item_centroid(item i)
 {
     return (lanes)((ulanes)i - (ulanes)lanes_swap(i)); /* the lanes that hold the index may wrap around */

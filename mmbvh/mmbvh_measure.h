@@ -1,12 +1,13 @@
-/* Stores the boxes of nodes during a sweep of bounds, and accumulates the change of the tree's area. */
+/* Stores the boxes of nodes in a sweep that computes bounds, and accumulates the change of the tree's area
+ * (mmbvh.area). */
 #ifndef MMBVH_MEASURE_H
 #define MMBVH_MEASURE_H
 
 #include "mmbvh_store.h"
 #include "mmbvh_sweep.h"
 
-/* Returns half the surface area of a box, whose lane 3 must be 0, times the number of tests in the node: each cell of a
- * leaf, or both children's boxes. */
+/* Returns half the surface area of a box, whose lane 3 must be 0, times the number of tests in the node: one for each
+ * cell of a leaf, or two for the children's boxes. */
 static inline double node_area(const mmbvh *tree, int64_t node, vec4 lower, vec4 upper)
 {
     const vec4 d = upper - lower;

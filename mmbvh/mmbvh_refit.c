@@ -7,9 +7,9 @@
 #include "region.h"
 
 enum {
-    RUN_MAX = 4096,
+    TASK_NODES = 4096,
     PREFETCH_CELLS = 48,
-    /* prefetch distance of tets; it is longer, because a tet's connectivity takes half as many bytes as a hex's */
+    /* prefetch distance for tets, in cells; larger, because a tet's connectivity takes half as many bytes as a hex's */
     PREFETCH_TETS = 96
 };
 
@@ -36,34 +36,35 @@ static sweep_sum sweep_range_with_followers(const sweep *s, int64_t first, int64
     return s->follower ? sweep_range_with_followers(s->follower, first, end) : sum;
 }
 
-/* Returns the index of the first descendant of the pair's right node; `end` if that node is a leaf. */
+/* Returns the index of the first descendant of the right node of the pair at `first`; `end` if that node is a leaf. */
 static int64_t find_right_subtree(const sweep *s, int64_t first, int64_t end)
 {
     return mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
 }
 
-/* Sweeps a pair and its descendants, nodes[first .. end), in runs of at most s->range_max nodes. */
-static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
+/* Sweeps a pair and its descendants, which are nodes [first, end), on one thread, at most s->range_max nodes at a
+ * time. */
+static sweep_sum sweep_pair_serially(const sweep *s, int64_t first, int64_t end)
 {
     if (!s->range_max || end - first <= s->range_max) return sweep_range_with_followers(s, first, end);
     const int64_t right_first = find_right_subtree(s, first, end);
     sweep_sum left = {0}, right = {0};
-    if (sweep_visits(s, first + 1)) right = sweep_runs(s, right_first, end);
-    if (sweep_visits(s, first)) left = sweep_runs(s, first + 2, right_first);
+    if (sweep_visits(s, first + 1)) right = sweep_pair_serially(s, right_first, end);
+    if (sweep_visits(s, first)) left = sweep_pair_serially(s, first + 2, right_first);
     return sweep_add(sweep_add(left, right), sweep_range_with_followers(s, first, first + 2));
 }
 
-/* Sweeps the descendants of the pair in parallel tasks of at most RUN_MAX nodes each, and then the pair itself. */
-static sweep_sum sweep_below(const sweep *s, int64_t first, int64_t end)
+/* Sweeps a pair and its descendants, which are nodes [first, end), in parallel tasks of at most TASK_NODES nodes. */
+static sweep_sum sweep_pair_in_tasks(const sweep *s, int64_t first, int64_t end)
 {
-    if (end - first <= RUN_MAX) return sweep_runs(s, first, end);
+    if (end - first <= TASK_NODES) return sweep_pair_serially(s, first, end);
     const int64_t right_first = find_right_subtree(s, first, end);
     sweep_sum left = {0}, right = {0};
     if (sweep_visits(s, first)) {
 #pragma omp task default(none) firstprivate(s, first, right_first) shared(left)
-        left = sweep_below(s, first + 2, right_first);
+        left = sweep_pair_in_tasks(s, first + 2, right_first);
     }
-    if (sweep_visits(s, first + 1)) right = sweep_below(s, right_first, end);
+    if (sweep_visits(s, first + 1)) right = sweep_pair_in_tasks(s, right_first, end);
 #pragma omp taskwait
     return sweep_add(sweep_add(left, right), sweep_range_with_followers(s, first, first + 2));
 }
@@ -73,29 +74,29 @@ sweep_sum sweep_tree(const sweep *s, int threads)
     sweep_sum sum = {0};
     const int64_t node_count = s->tree->node_count;
     if (!node_count || !sweep_visits(s, 0)) return sum;
-    if (node_count <= RUN_MAX) {
-        sum = sweep_runs(s, 1, node_count);
+    if (node_count <= TASK_NODES) {
+        sum = sweep_pair_serially(s, 1, node_count);
     } else {
 #pragma omp parallel num_threads(threads)
         {
             region_enter();
 #pragma omp single
-            sum = sweep_below(s, 1, node_count);
+            sum = sweep_pair_in_tasks(s, 1, node_count);
             region_leave();
         }
     }
     return sweep_add(sum, sweep_range_with_followers(s, 0, 1)); /* the root is processed after its children */
 }
 
-/* Prefetches the connectivity of a leaf that is visited later; the sweep processes the cells in descending order. If a
- * cell's entries may straddle two cache lines, both are prefetched. */
+/* Prefetches the connectivity of the cell at a list position that the sweep reaches soon; cells are processed in
+ * descending order. Two cache lines are prefetched if a cell's entries may straddle them. */
 MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape shape, const bool wide_index)
 {
     const int64_t distance = shape == FETCH_TETS ? PREFETCH_TETS : PREFETCH_CELLS;
     if (shape == FETCH_LATTICE || entry < distance) return;
     const int64_t later = s->tree->cells[entry - distance];
     const int count = fetch_vertex_count(s->g, later, shape);
-    const int64_t first = fetch_first(s->g, later, count, shape);
+    const int64_t first = fetch_first_entry(s->g, later, count, shape);
     prefetch_connectivity(s->g, first, shape);
     if (shape != FETCH_TETS || wide_index) prefetch_connectivity(s->g, first + count - 1, shape);
 }
@@ -106,11 +107,12 @@ static inline range rounded_range(const fetch_range *r)
     return r->low <= r->high ? (range){round_down(r->low), round_up(r->high)} : range_empty();
 }
 
-/* Returns the range of a leaf whose values are doubles. Lanes accumulate whole cells, and are combined at the end. */
+/* Returns the range of a leaf whose values are doubles. Minima and maxima are accumulated per lane over the cells, and
+ * lanes are combined at the end. */
 MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
                                const bool wide_index, const bool is_packed, int64_t *unusable)
 {
-    fetch_doubles leaf = {vec2_set1((double)INFINITY), vec2_set1(-(double)INFINITY)}, cell;
+    fetch_lane_range leaf = {vec2_set1((double)INFINITY), vec2_set1(-(double)INFINITY)}, cell;
     for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
         prefetch_cell(s, entry, shape, wide_index);
         if (!fetch_cell_doubles(s->g, &s->values, s->tree->cells[entry], shape, wide_index, is_packed, &cell)) {
@@ -120,7 +122,7 @@ MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const
         leaf.low = vec2_min(cell.low, leaf.low);
         leaf.high = vec2_max(cell.high, leaf.high);
     }
-    const fetch_range r = fetch_doubles_range(&leaf, true);
+    const fetch_range r = fetch_combine_lanes(&leaf, true);
     return rounded_range(&r);
 }
 
@@ -160,8 +162,8 @@ MMBVH_INLINE sweep_sum run_ranges(const sweep *s, int64_t first, int64_t end, co
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
     static sweep_sum name(const sweep *s, int64_t first, int64_t end)                                                  \
     {                                                                                                                  \
-        return fetch_is_packed(&s->values) ? run_ranges(s, first, end, shape, wide_index, wide_number, true)           \
-                                           : run_ranges(s, first, end, shape, wide_index, wide_number, false);         \
+        return fetch_is_contiguous(&s->values) ? run_ranges(s, first, end, shape, wide_index, wide_number, true)       \
+                                               : run_ranges(s, first, end, shape, wide_index, wide_number, false);     \
     }
 FETCH_INSTANCES(DEFINE_RUN, run_ranges)
 
@@ -211,8 +213,8 @@ static sweep_sum run_box_ranges(const sweep *s, int64_t first, int64_t end)
     return (sweep_sum){0};
 }
 
-/* Checks whether the specialized functions can read the field. */
-static bool is_plain(const grid *g, const grid_field *field)
+/* Returns whether the specialized functions can read the field. */
+static bool can_use_specialized(const grid *g, const grid_field *field)
 {
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
     return is_float && !field->source_cells && !grid_has_faces(g);
@@ -220,13 +222,13 @@ static bool is_plain(const grid *g, const grid_field *field)
 
 bool sweep_reads_floats(const sweep *ranges)
 {
-    return ranges->field && is_plain(ranges->g, ranges->field) && !ranges->values.is_wide;
+    return ranges->field && can_use_specialized(ranges->g, ranges->field) && !ranges->values.is_wide;
 }
 
 static sweep_run choose_run(const grid *g, const grid_field *field)
 {
     if (!field) return run_infinite;
-    if (!is_plain(g, field)) return run_generic;
+    if (!can_use_specialized(g, field)) return run_generic;
     return run_ranges_table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
 }
 

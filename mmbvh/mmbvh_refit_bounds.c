@@ -8,8 +8,8 @@
 
 enum {
     PREFETCH_CELLS = 48,
-    VISIBLE_NODES = 16 /* nodes per run of a sweep that skips invisible nodes; in shorter runs the checks cost more than
-                          they save */
+    VISIBLE_NODES = 16 /* maximum number of nodes that are swept at once if invisible nodes are skipped; with fewer,
+                          checking visibility costs more than skipping saves */
 };
 
 static void store_cells(const sweep *s, int64_t index, int64_t first, int count, int64_t *outside_grid,
@@ -20,8 +20,8 @@ static void store_cells(const sweep *s, int64_t index, int64_t first, int count,
     float lower[3], upper[3];
     fetch_box_empty(&box);
     const uint32_t *cells = tree->cells + first; /* the sweep processes the cells in descending order */
-    s->source->unite(s->source, cells, count, first < PREFETCH_CELLS ? NULL : cells - PREFETCH_CELLS, &box);
-    fetch_box_round(&box, tree->origin, tree->scale, lower, upper);
+    s->source->extend(s->source, cells, count, first < PREFETCH_CELLS ? NULL : cells - PREFETCH_CELLS, &box);
+    round_box_outward(&box, tree->origin, tree->scale, lower, upper);
     store_measured(s, index, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0},
                    outside_grid, area_change);
 }
@@ -47,10 +47,10 @@ sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source)
     return s;
 }
 
-sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges)
+sweep sweep_of_bounds_and_ranges(const mmbvh *tree, const bounds_source *source, const sweep *ranges)
 {
     sweep both;
-    if (sweep_both_as_floats(ranges, source, &both)) return both;
+    if (sweep_bounds_and_ranges_as_floats(ranges, source, &both)) return both;
     both = sweep_of_bounds(tree, source);
     both.follower = ranges;
     return both;
@@ -70,37 +70,37 @@ static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, in
         for (int64_t begin = 0; begin < tree->cell_count; begin += BOUNDS_BLOCK) {
             const int64_t left = tree->cell_count - begin;
             const int count = (int)(left < BOUNDS_BLOCK ? left : BOUNDS_BLOCK);
-            source->unite(source, tree->cells + begin, count, NULL, &own);
+            source->extend(source, tree->cells + begin, count, NULL, &own);
         }
 #pragma omp critical(mmbvh_merge)
-        fetch_box_unite(&all, &own);
+        unite_boxes(&all, &own);
         region_leave();
     }
     return all;
 }
 
-/* Computes a new grid and new bounds for a mesh that has moved out of the tree's grid, with a margin of an eighth of
- * its size on each side. */
+/* Computes a new grid and new bounds for a mesh that has moved out of the tree's grid. The new grid has a margin of an
+ * eighth of the mesh's size on each side. */
 static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, int threads)
 {
     const fetch_box exact = exact_bounds(tree, source, threads);
     float lower[3], upper[3];
-    fetch_box_round(&exact, tree->origin, tree->scale, lower, upper);
+    round_box_outward(&exact, tree->origin, tree->scale, lower, upper);
     for (int axis = 0; axis < 3; axis++) {
         const float margin = 0.125f * (upper[axis] - lower[axis]);
         if (!(margin < INFINITY)) return INSITU_ERROR_MESH;
         lower[axis] -= margin;
         upper[axis] += margin;
     }
-    tree->grid = store_grid(lower, upper);
-    const sweep all =
-        sweep_of_bounds(tree, source); /* does not measure areas, because the nodes still have boxes of the old grid */
+    tree->grid = store_make_grid(lower, upper);
+    /* areas are not measured, because the nodes' boxes are still in steps of the old grid */
+    const sweep all = sweep_of_bounds(tree, source);
     if (sweep_tree(&all, threads).count) return INSITU_ERROR_MESH;
     tree->area = cost_area_of_tree(tree, threads);
     return INSITU_OK;
 }
 
-/* Checks whether the mesh has shrunk so much that it uses only a small part of its grid's steps. */
+/* Returns whether the mesh has shrunk so much that it uses only a small part of the grid's steps. */
 static bool is_grid_too_coarse(const mmbvh *tree)
 {
     const int few = COMPACT_LOWER_MAX / 8;

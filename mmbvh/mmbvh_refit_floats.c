@@ -1,13 +1,13 @@
-/* Computes bounds, and optionally ranges, for meshes whose coordinates and values are floats, which most are. A vertex
- * is one vector with its value in lane 3. The cells of a run are read in one pass, independent of the sizes of
- * leaves. */
+/* Computes bounds, and optionally ranges, if coordinates and values are floats, as they are in most meshes. A vertex is
+ * one vector: its position in lanes 0 to 2, its value in lane 3. The cells of up to PART_NODES nodes are read in one
+ * pass, whatever the sizes of their leaves. */
 #include "mmbvh_bounds.h"
 #include "mmbvh_measure.h"
 
 enum {
-    PART_NODES = 256, /* maximum number of nodes whose cells are read in one pass */
-    PART_CELLS =
-        (PART_NODES / 2 + 1) * MMBVH_MAX_LEAF, /* maximum number of cells: pairs have one leaf more than inner nodes */
+    PART_NODES = 256,                                   /* maximum number of nodes whose cells are read in one pass */
+    PART_CELLS = (PART_NODES / 2 + 1) * MMBVH_MAX_LEAF, /* maximum number of cells of these nodes; in a pair and its
+                                                           descendants leaves are half of the nodes, plus one */
     PREFETCH_CELLS = 64,
     PREFETCH_VERTICES = 24
 };
@@ -34,11 +34,11 @@ MMBVH_INLINE fetch_float_box read_cell(const sweep *s, int64_t cell, const pass_
     const int64_t value_stride = pass.is_packed ? 4 : s->values.stride;
     const char *const x = g->coordinates[0].data, *const y = g->coordinates[1].data, *const z = g->coordinates[2].data;
     const int count = fetch_vertex_count(g, cell, pass.shape);
-    const int64_t first = fetch_first(g, cell, count, pass.shape);
+    const int64_t first = fetch_first_entry(g, cell, count, pass.shape);
     fetch_float_box float_box = fetch_float_box_empty();
     vec4 nonfinite = {0};
     for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_corner(g, first, i, pass.shape, pass.wide_index);
+        const int64_t vertex = fetch_vertex(g, first, i, pass.shape, pass.wide_index);
         const vec4 p = {*(const float *)(const void *)(x + vertex * stride),
                         *(const float *)(const void *)(y + vertex * stride),
                         *(const float *)(const void *)(z + vertex * stride),
@@ -54,13 +54,13 @@ MMBVH_INLINE fetch_float_box read_cell(const sweep *s, int64_t cell, const pass_
     return float_box;
 }
 
-/* Prefetches one vertex of a cell whose connectivity was prefetched earlier; the other vertices are near it. Not needed
- * for tets: each vertex is shared by so many of them that it is usually in the cache already. */
+/* Prefetches one vertex of a hex whose connectivity was prefetched earlier; its other vertices are near it. Other cells
+ * are skipped: a vertex of tets is shared by so many of them that it usually is in the cache. */
 MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const pass_constants pass)
 {
     const grid *g = s->source->g;
     if (pass.shape != FETCH_HEXES) return;
-    const int64_t vertex = fetch_index(&g->connectivity, fetch_first(g, cell, 8, pass.shape), pass.wide_index);
+    const int64_t vertex = fetch_index(&g->connectivity, fetch_first_entry(g, cell, 8, pass.shape), pass.wide_index);
     for (int axis = 0; axis < 3; axis++) {
         __builtin_prefetch(g->coordinates[axis].data + vertex * (pass.is_packed ? 4 : g->coordinates[0].stride));
     }
@@ -75,7 +75,7 @@ MMBVH_INLINE void read_cells(const sweep *s, part *p, int64_t first, int64_t end
         const int64_t later =
             cells[i > PREFETCH_CELLS ? i - PREFETCH_CELLS : 0]; /* the sweep processes the cells in descending order */
         const int64_t entry =
-            fetch_first(s->source->g, later, fetch_vertex_count(s->source->g, later, pass.shape), pass.shape);
+            fetch_first_entry(s->source->g, later, fetch_vertex_count(s->source->g, later, pass.shape), pass.shape);
         prefetch_connectivity(s->source->g, entry, pass.shape);
         prefetch_vertex(s, cells[i > PREFETCH_VERTICES ? i - PREFETCH_VERTICES : 0], pass);
         p->float_boxes[i - first] = read_cell(s, cells[i], pass, &p->unusable);
@@ -87,9 +87,9 @@ MMBVH_INLINE void store_leaf(const sweep *s, part *p, int64_t node, int64_t firs
     const mmbvh *tree = s->tree;
     const fetch_float_box *float_boxes = p->float_boxes + (first - p->first);
     fetch_float_box all = float_boxes[0];
-    for (int i = 1; i < count; i++) fetch_float_box_unite(&all, &float_boxes[i]);
+    for (int i = 1; i < count; i++) unite_float_boxes(&all, &float_boxes[i]);
     vec4 lower, upper;
-    fetch_float_box_round(&all, tree->origin, tree->scale, &lower, &upper);
+    round_float_box_outward(&all, tree->origin, tree->scale, &lower, &upper);
     store_measured(s, node, lower, upper, &p->outside_grid, &p->area_change);
     /* adding 0 makes a negative zero positive, as the bounds of other meshes are */
     if (pass.with_values) set_range(s, node, (range){all.lower[3] + 0.0f, all.upper[3] + 0.0f});
@@ -109,7 +109,7 @@ MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t en
     }
 }
 
-/* Sweeps a pair, or the root, without its descendants. */
+/* Processes the nodes of a pair, or the root, but not their descendants. */
 MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end, const pass_constants pass)
 {
     for (int64_t i = first; i < end; i++) {
@@ -120,7 +120,8 @@ MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end,
     }
 }
 
-/* Return the first cell below a node, and the end of its cells. */
+/* first_cell() returns the list index of the first cell below a node, and end_of_cells() the index behind its last
+ * cell. */
 static int64_t first_cell(const mmbvh *tree, int64_t node)
 {
     while (!mmbvh_node_count(tree, node)) node = mmbvh_node_ref(tree, node);
@@ -150,7 +151,7 @@ MMBVH_INLINE sweep_sum run(const sweep *s, int64_t first, int64_t end, const pas
 #define DEFINE_RUN_BOUNDS(name, shape, wide_index, wide_number)                                                        \
     static sweep_sum name(const sweep *s, int64_t first, int64_t end)                                                  \
     {                                                                                                                  \
-        return fetch_is_packed(&s->source->g->coordinates[0])                                                          \
+        return fetch_is_contiguous(&s->source->g->coordinates[0])                                                      \
                    ? run(s, first, end, (pass_constants){shape, wide_index, false, true})                              \
                    : run(s, first, end, (pass_constants){shape, wide_index, false, false});                            \
     }
@@ -159,7 +160,7 @@ FETCH_FLOAT_INSTANCES(DEFINE_RUN_BOUNDS, run_bounds)
 #define DEFINE_RUN_BOTH(name, shape, wide_index, wide_number)                                                          \
     static sweep_sum name(const sweep *s, int64_t first, int64_t end)                                                  \
     {                                                                                                                  \
-        return fetch_is_packed(&s->source->g->coordinates[0]) && fetch_is_packed(&s->values)                           \
+        return fetch_is_contiguous(&s->source->g->coordinates[0]) && fetch_is_contiguous(&s->values)                   \
                    ? run(s, first, end, (pass_constants){shape, wide_index, true, true})                               \
                    : run(s, first, end, (pass_constants){shape, wide_index, true, false});                             \
     }
@@ -176,7 +177,7 @@ void sweep_bounds_as_floats(sweep *bounds)
     bounds->range_max = PART_NODES;
 }
 
-bool sweep_both_as_floats(const sweep *ranges, const bounds_source *source, sweep *both)
+bool sweep_bounds_and_ranges_as_floats(const sweep *ranges, const bounds_source *source, sweep *both)
 {
     if (!source->read_float_boxes || !sweep_reads_floats(ranges)) return false;
     *both = *ranges;

@@ -1,5 +1,5 @@
-/* Each row of cells lies between four rows of vertices, or two in two dimensions. First the range of these rows' values
- * is computed at each position; the range of a cell is then the union of those at its two ends. */
+/* Each row of cells lies between four rows of vertices (two in two dimensions). First the range over these rows' values
+ * is computed at each position along the row. The range of a cell is then the union of the ranges at its two ends. */
 #include "mmbvh_rows.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 
 #include "mmbvh_fetch.h"
 
-/* The range of the values of all rows at each position along a row of vertices. */
+/* The range over all rows' values, at each position along a row of vertices. */
 typedef struct row_doubles {
     double low[ROWS_CELLS + 1], high[ROWS_CELLS + 1], nonfinite[ROWS_CELLS + 1];
 } row_doubles;
@@ -26,7 +26,8 @@ bool rows_can_read(const grid *g, const grid_field *field)
 #define SMALLER(a, b) ((a) < (b) ? (a) : (b))
 #define LARGER(a, b) ((a) > (b) ? (a) : (b))
 
-/* Computes the range of four rows' values at each position. nonfinite is 0 if all values are finite, otherwise NaN. */
+/* Computes the range over four rows' values at each position. nonfinite stays 0 if all values are finite, and becomes
+ * NaN otherwise. */
 #define ROW_RANGES(number, to, rows, stride, count)                                                                    \
     for (int64_t n = 0; n < (count); n++) {                                                                            \
         const number a = *(const number *)(const void *)((rows)[0] + n * (stride));                                    \
@@ -105,8 +106,8 @@ bool rows_extent(const grid *g, const grid_field *field, float *low, float *high
                                  : float_extent(data, g->vertex_count, low, high);
 }
 
-/* Finds the first drawn cell with a number from `from` on, the number of its first vertex, and how many cells follow it
- * in its row. Returns false if there is none before `end`. */
+/* Finds the first drawn cell with a number from `from` to `end` - 1, the index of its first vertex, and the number of
+ * drawn cells from it to the end of its row. Returns false if there is none. */
 static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t end, rows_ranges *out, int64_t *vertex)
 {
     while (from < end) {
@@ -128,7 +129,7 @@ static bool next_cells(const grid_lattice *l, int along, int64_t from, int64_t e
             for (int axis = 0; axis < 3; axis++) *vertex += index[axis] * l->vertex_numbering.stride[axis];
             if (out->count > 0) return true;
         }
-        /* Continues with the next row, because the rest of this row contains no drawn cell. */
+        /* The rest of this row contains no drawn cell, so the search continues with the next row. */
         const double outer = l->cell_numbering.outer[along];
         if (outer == 0) return false;
         from = row + (int64_t)outer;

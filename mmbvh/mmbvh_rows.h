@@ -11,20 +11,20 @@ enum { ROWS_CELLS = 64 };
 typedef struct rows_ranges {
     int64_t first, count;
     float low[ROWS_CELLS], high[ROWS_CELLS]; /* range of each cell's values, rounded to float as a cast does */
-    unsigned char is_finite[ROWS_CELLS];     /* 1 if all values of the cell are finite; 0 behind count, up to the next
-                                                multiple of 8 */
+    unsigned char is_finite[ROWS_CELLS]; /* 1 if all values of the cell are finite, otherwise 0; entries from `count` to
+                                            the next multiple of 8 are 0 */
 } rows_ranges;
 
-/* Checks whether rows_read() can read the grid and field: consecutive cells lie along an axis of a lattice, and the
- * values at vertices are floats or doubles. */
+/* Returns whether rows_read() can read the grid and field: cells with consecutive numbers are neighbours along an axis
+ * of a lattice, and the values are floats or doubles at vertices. */
 bool rows_can_read(const grid *g, const grid_field *field);
 
 /* Computes the ranges of the next drawn cells of one row, whose numbers are at least `from` and less than `end`.
  * Padding and ghost layers are skipped, but ghost flags are not checked. Returns false if there are no such cells. */
 bool rows_read(const grid *g, const grid_field *field, int64_t from, int64_t end, rows_ranges *out);
 
-/* Finds the range of the values at all vertices, rounded to float as a cast does. Returns false if the values are not
- * contiguous in memory, or one of them is not finite. */
+/* Computes the range of the values at all vertices, rounded to float as a cast does. Returns false if the values are
+ * not contiguous in memory, or one of them is not finite. */
 bool rows_extent(const grid *g, const grid_field *field, float *low, float *high);
 
 #endif

@@ -1,9 +1,9 @@
-/* Selects the visible cells. In the thesis (section 4.2) nodes are culled whose range contains no isovalue; here cells
- * are culled before a tree is built.
+/* Selects the visible cells. In the thesis (section 4.2), nodes whose range contains no isovalue are skipped during
+ * traversal; here cells are skipped before a tree is built.
  *
- * One pass per query sets a bit for each cell found, and a final pass lists the cells whose bits are set. The first
- * passes are limited by the memory bandwidth of the connectivity and values; with two passes the list is allocated with
- * its exact size. */
+ * One pass per query sets a bit for each matching cell. Two more passes over the bits then count and list the cells, so
+ * that the list is allocated with its exact size. The passes per query are limited by the memory bandwidth of the
+ * connectivity and values. */
 #include <string.h>
 
 #include "memory.h"
@@ -17,21 +17,22 @@ enum { WORD_CELLS = 64, BLOCK_WORDS = 64 };
 
 typedef struct selector selector;
 
-/* Sets the bits of the cells found in [begin, end), whose length is a multiple of 64 except at the end of the grid;
- * returns the number of cells with non-finite values. */
+/* Sets the bits of the matching cells in [begin, end), whose length is a multiple of 64 except at the end of the grid.
+ * Returns the number of cells with non-finite values. */
 typedef int64_t (*selector_run)(const selector *s, int64_t begin, int64_t end);
 
 struct selector {
     selector_run run;
     const grid *g;
     const mmbvh_query *query;
-    grid_array values; /* array of the field's component */
+    grid_array values; /* values of the field's component, one per vertex or cell */
     uint64_t *bits;
 };
 
 /* The result for one cell: whether its values are finite, and whether their range intersects an interval. */
 typedef struct match_result {
-    bool is_finite, intersects; /* set if all values are finite; set if their range intersects an interval */
+    bool is_finite;  /* all values are finite */
+    bool intersects; /* the range of the values intersects an interval of the query */
 } match_result;
 
 MMBVH_INLINE match_result match_range(const selector *s, const fetch_range e)
@@ -62,9 +63,9 @@ MMBVH_INLINE match_result match_floats(const selector *s, int64_t cell, const fe
 MMBVH_INLINE match_result match_doubles(const selector *s, int64_t cell, const fetch_shape shape, const bool wide_index,
                                         const bool is_packed)
 {
-    fetch_doubles v;
+    fetch_lane_range v;
     const bool is_finite = fetch_cell_doubles(s->g, &s->values, cell, shape, wide_index, is_packed, &v);
-    return match_range(s, fetch_doubles_range(&v, is_finite));
+    return match_range(s, fetch_combine_lanes(&v, is_finite));
 }
 
 /* Returns the lanes' sign bits; bit i is that of lane i. */
@@ -96,7 +97,7 @@ MMBVH_INLINE uintptr_t value_address(const selector *s, int64_t cell, int at, co
     return data + (uintptr_t)(index * stride);
 }
 
-/* The value ranges of four cells, one per lane. nonfinite is 0 if all values of the cell are finite. */
+/* Value ranges of four cells, one per lane. nonfinite is 0 if all values of the cell are finite, and otherwise NaN. */
 typedef struct four_ranges {
     vec4 low, high, nonfinite;
 } four_ranges;
@@ -181,8 +182,9 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, matcher
     return unusable;
 }
 
-/* Same as mark(), four cells at a time, for cells that all have the same type. */
-MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, matcher match, const pass_constants pass)
+/* As mark(), four cells at a time. All cells must have the same type. */
+MMBVH_INLINE int64_t mark_four_at_once(const selector *s, int64_t begin, int64_t end, matcher match,
+                                       const pass_constants pass)
 {
     int64_t unusable = 0;
     for (int64_t first = begin; first < end; first += WORD_CELLS) {
@@ -220,12 +222,13 @@ MMBVH_INLINE int64_t mark_fours(const selector *s, int64_t begin, int64_t end, m
     static int64_t name(const selector *s, int64_t begin, int64_t end)                                                 \
     {                                                                                                                  \
         if (shape < FETCH_BY_CELL)                                                                                     \
-            return fetch_is_packed(&s->values) ? mark_fours(s, begin, end, name##_find,                                \
-                                                            (pass_constants){shape, wide_index, wide_number, true})    \
-                                               : mark_fours(s, begin, end, name##_find,                                \
-                                                            (pass_constants){shape, wide_index, wide_number, false});  \
-        return fetch_is_packed(&s->values) ? mark(s, begin, end, name##_find, true)                                    \
-                                           : mark(s, begin, end, name##_find, false);                                  \
+            return fetch_is_contiguous(&s->values)                                                                     \
+                       ? mark_four_at_once(s, begin, end, name##_find,                                                 \
+                                           (pass_constants){shape, wide_index, wide_number, true})                     \
+                       : mark_four_at_once(s, begin, end, name##_find,                                                 \
+                                           (pass_constants){shape, wide_index, wide_number, false});                   \
+        return fetch_is_contiguous(&s->values) ? mark(s, begin, end, name##_find, true)                                \
+                                               : mark(s, begin, end, name##_find, false);                              \
     }
 FETCH_INSTANCES(DEFINE_RUN, mark_vertices)
 
@@ -240,8 +243,8 @@ static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
     return mark(s, begin, end, match_any, false);
 }
 
-/* Packs bytes with values 0 or 1 into bits. The bytes up to the next multiple of 8 must be readable and 0 or 1. The
- * product collects the eight bits of a word in its highest byte. */
+/* Packs `count` bytes, each 0 or 1, into bits. The bytes up to the next multiple of 8 must be readable and also be 0 or
+ * 1. The multiplication moves the eight bits of a word into its highest byte. */
 static uint64_t packed_bits(const unsigned char *bytes, int64_t count)
 {
     uint64_t bits = 0, eight;
@@ -264,8 +267,8 @@ static uint64_t row_bits(const selector *s, const rows_ranges *r)
     return packed_bits(intersects, r->count);
 }
 
-/* Sets the bits of a lattice's cells, row by row. Both words that a row's bits may fall into belong to the block of the
- * same thread. */
+/* Sets the bits of a lattice's cells, row by row. A row's bits may fall into two words; both are in the block of this
+ * thread. */
 static int64_t mark_rows(const selector *s, int64_t begin, int64_t end)
 {
     const grid *g = s->g;
@@ -301,11 +304,11 @@ static selector make_selector(const grid *g, const mmbvh_query *query, uint64_t 
     return s;
 }
 
-/* Maximum number of cells for which the range of all values is computed first. Small lattices are read quickly, and
- * often contain no visible cell. */
+/* Maximum number of cells of a grid whose whole value range is computed first. Small lattices are read quickly, and
+ * often contain no matching cell. */
 enum { MOST_READ_TWICE = 1 << 16 };
 
-/* Checks whether the range of all values shows that a small lattice has no visible cell and no non-finite value. */
+/* Returns whether the range of all values shows that a small lattice has no matching cell and no non-finite value. */
 static bool has_no_visible_cell(const selector *s)
 {
     float low, high;

@@ -10,9 +10,9 @@ static double ceil_power_of_two(double x)
     return x > 0 ? ldexp(1, fraction > 0.5 ? exponent : exponent - 1) : 0;
 }
 
-/* The step of an axis is at least the distance of neighbouring floats at the box's far end, so that rounding never
- * loses a step. */
-mmbvh_grid store_grid(const float lower[3], const float upper[3])
+/* The step of an axis is at least the distance between neighbouring floats at the largest absolute coordinate of the
+ * box, so that rounding never loses a step. */
+mmbvh_grid store_make_grid(const float lower[3], const float upper[3])
 {
     enum { STEPS = (1 << COMPACT_LOWER_BITS) - (1 << (COMPACT_LOWER_BITS - COMPACT_MANTISSA_BITS)) };
     mmbvh_grid grid = {0};

@@ -15,10 +15,10 @@ static inline void store_link(const mmbvh *tree, int64_t index, int64_t ref, int
 }
 
 /* Returns the grid of the compact layout over a box, which must be finite. */
-mmbvh_grid store_grid(const float lower[3], const float upper[3]);
+mmbvh_grid store_make_grid(const float lower[3], const float upper[3]);
 
-/* Corrects a box that store_compact() rounded inward: extends it one step at a time. Returns false if the box is not
- * within the grid. */
+/* Corrects the node's stored box, which store_compact() has rounded inward: extends it one step at a time until it
+ * contains the given box. Returns false if the given box is not within the grid. */
 bool store_compact_slowly(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper);
 
 /* Stores the smallest box representable in the grid that contains lanes 0 to 2; lane 3 must be 0. Returns false if the

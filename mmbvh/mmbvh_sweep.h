@@ -18,7 +18,8 @@ typedef struct sweep_sum {
     double area_change; /* change of the tree's area (mmbvh.area), if the sweep measures it */
 } sweep_sum;
 
-/* Processes nodes end - 1 down to first: the root, a pair, or a pair and its descendants. The range may be empty. */
+/* Processes the nodes from end - 1 down to `first`: the root, a pair, or a pair and its descendants. The interval may
+ * be empty. */
 typedef sweep_sum (*sweep_run)(const sweep *s, int64_t first, int64_t end);
 
 struct sweep {
@@ -26,44 +27,45 @@ struct sweep {
     const mmbvh *tree;
     const grid *g;
     const grid_field *field;
-    grid_array values;           /* array of the field's component */
+    grid_array values;           /* values of the field's component, one per vertex or cell */
     const float *box_ranges;     /* ranges of the boxes of a parent tree: low and high for each box */
     const bounds_source *source; /* reads the cells' boxes in a sweep of bounds */
     mmbvh_ranges ranges;         /* receives the results of a sweep of ranges */
     int64_t range_max;           /* maximum number of nodes per run; 0: no limit other than the size of a task */
-    bool measures_area; /* for a sweep of bounds of nodes that have bounds already: the change of area is measured */
-    int visible_count;  /* 0: all nodes are swept; otherwise only the visible nodes and their children */
+    bool measures_area; /* set if the change of area is measured; only for a sweep of bounds of nodes that already have
+                           bounds */
+    int visible_count;  /* number of visible parts; if not 0, only their nodes and these nodes' children are swept */
     const mmbvh_visible *visible;
-    const sweep *follower; /* another sweep of the same tree, which is applied to each run after this sweep while the
-                          run is in the cache; may be NULL */
+    const sweep *follower; /* another sweep of the same tree, or NULL; it processes each group of nodes directly after
+                              this sweep, while they are in the cache */
 };
 
-/* Sweeps the whole tree. Returns the sum of the runs' results (those of the last sweep, if one follows another); its
- * rounding does not depend on the number of threads. */
+/* Sweeps the whole tree. Returns the sum of the results of all calls of `run` (of the last follower, if there are any).
+ * The rounding of the sum does not depend on the number of threads. */
 sweep_sum sweep_tree(const sweep *s, int threads);
 
 /* Returns a sweep that computes the ranges of the field; if field is NULL, they are infinite. */
 sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_ranges ranges);
 
-/* Same as sweep_of_ranges(), for a parent tree. `ranges` has a low and a high value per mesh. */
+/* As sweep_of_ranges(), for a parent tree. `ranges` has a low and a high value per mesh. */
 sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges);
 
 /* Returns a sweep that computes the bounds. */
 sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source);
 
-/* If the coordinates are floats, changes a sweep of bounds to read the cells of a whole run in one pass. */
+/* If the coordinates are floats, changes a sweep of bounds so that it reads the cells of many nodes in one pass. */
 void sweep_bounds_as_floats(sweep *bounds);
 
-/* Checks whether the values are floats at the vertices. */
+/* Returns whether the sweep reads values that are floats at vertices. */
 bool sweep_reads_floats(const sweep *ranges);
 
 /* Returns a sweep that computes both bounds and ranges of a grid's cells, so that a cell is read once. `ranges` must be
  * from sweep_of_ranges() for the same tree. If bounds or values cannot be read as floats, the two sweeps run one after
  * the other. */
-sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges);
+sweep sweep_of_bounds_and_ranges(const mmbvh *tree, const bounds_source *source, const sweep *ranges);
 
 /* Makes a sweep that computes bounds and ranges in one pass. Returns false if either cannot be read as floats. */
-bool sweep_both_as_floats(const sweep *ranges, const bounds_source *source, sweep *both);
+bool sweep_bounds_and_ranges_as_floats(const sweep *ranges, const bounds_source *source, sweep *both);
 
 /* Returns the number of threads that the options request, or the default of OpenMP. */
 int sweep_threads(const mmbvh_options *options);
@@ -73,7 +75,7 @@ static inline sweep_sum sweep_add(sweep_sum a, sweep_sum b)
     return (sweep_sum){a.count + b.count, a.area_change + b.area_change};
 }
 
-/* Checks whether the sweep visits the node's descendants. */
+/* Returns whether the sweep visits the node's descendants. */
 bool sweep_visits(const sweep *s, int64_t node);
 
 /* ---- ranges of nodes -------------------------------------------------------------------------------------------- */

@@ -114,8 +114,8 @@ static inline float round_down(double x)
     float f = (float)x;
     uint32_t bits;
     memcpy(&bits, &f, sizeof bits);
-    const uint32_t step =
-        bits >> 31 ? 1u : UINT32_MAX;  /* moves the result one float towards -inf: the bits of negative floats grow */
+    /* added to the bits, this moves the result one float towards -inf: the bits of negative floats grow towards -inf */
+    const uint32_t step = bits >> 31 ? 1u : UINT32_MAX;
     bits += (double)f > x ? step : 0u; /* f is never +0 if it exceeds x: a tiny negative x rounds to -0 */
     memcpy(&f, &bits, sizeof f);
     return f + 0.0f;

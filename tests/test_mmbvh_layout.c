@@ -48,7 +48,7 @@ static void compact_box_holds_and_is_tight(void **state)
             upper[axis] = fminf(fmaxf((float)(place + extent), lower[axis]), grid_upper[axis]);
             if (upper[axis] < lower[axis]) lower[axis] = upper[axis];
         }
-        tree.grid = store_grid(grid_lower, grid_upper);
+        tree.grid = store_make_grid(grid_lower, grid_upper);
         assert_true(store_box(&tree, 0, lower, upper));
         mmbvh_node_box(&tree, 0, low, high);
         for (int axis = 0; axis < 3; axis++) {
@@ -67,7 +67,7 @@ static void box_beyond_the_grid_is_refused(void **state)
     (void)state;
     mmbvh_compact_node node = {0};
     mmbvh tree = {.compact = &node, .node_count = 1};
-    tree.grid = store_grid((const float[3]){-1, 2, 0}, (const float[3]){1, 5, 0});
+    tree.grid = store_make_grid((const float[3]){-1, 2, 0}, (const float[3]){1, 5, 0});
     const vec4 lower = {-1, 2, 0, 0}, upper = {1, 5, 0, 0};
     assert_true(store_box(&tree, 0, lower, upper));
     for (int axis = 0; axis < 3; axis++) {

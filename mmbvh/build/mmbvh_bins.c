@@ -1,8 +1,9 @@
-/* The bins of the three axes are swept at the same time: lane k of a vector belongs to axis k. One transposition turns
- * the extents of three boxes into one sum of products that gives three surface areas. */
+/* Finds the split of lowest SAH cost. The bins of all three axes are swept at the same time: lane k of a vector belongs
+ * to axis k. The extents of the three axes' boxes are transposed, so that one sum of products of vectors gives three
+ * surface areas. */
 #include "mmbvh_bins.h"
 
-enum { RUN_MAX = INT16_MAX }; /* largest number of items that a 16-bit lane can count */
+enum { COUNT_MAX = INT16_MAX }; /* largest number of items that a 16-bit lane can count */
 
 /* Returns the mapping from centroids to bins. Few items get few bins, because the work per bin dominates the cost of
  * small nodes. */
@@ -15,7 +16,7 @@ bin_mapping bin_mapping_make(lanes centroids, int64_t item_count)
     /* If the quotient is below 2^15, its rounding error is too small to reach the next integer; larger quotients are
      * clamped. */
     const vec4 quotient = vec4_set1((float)(count * 65536)) / vec4_from_int(extent + 1);
-    /* the limit makes a bin at least as wide as a step of the grid */
+    /* the limit makes a bin at least as wide as a step of the item_grid */
     const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768)));
     return (bin_mapping){(ulanes)lanes_pack(least, least),
                          lanes_pack(factor - 32768, factor - 32768) ^ lanes_set1(INT16_MIN), count};
@@ -51,8 +52,8 @@ static inline ulanes find_lane_offsets(const bin_mapping *m, item a, item b)
     return places * (uint16_t)sizeof(bin);
 }
 
-/* Adds an item to its bin on each axis. Lane 3 of a box counts the items, so that one load and one store per bin
- * suffice. */
+/* Adds an item to its bin on each axis. Lane 3 of a bin's box counts the items, so that a bin needs only one load and
+ * one store. */
 static inline void add_item(bins *b, const uint16_t offsets[3], item i)
 {
     const lanes counted = i & (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
@@ -74,9 +75,9 @@ static void add_lane_counts(bins *b, int count)
     }
 }
 
-/* Adds `count` items, every stride-th one, in pairs: one from each half of the list. Neighbouring items often belong to
- * the same bin, and would then wait for each other's store. */
-static void bin_run(bins *b, const bin_mapping *mapping, const item *items, int64_t count, int64_t stride)
+/* Adds `count` items, every stride-th one, two at a time: one from each half of the list. Neighbouring items often
+ * belong to the same bin; if they were added together, the second load would wait for the first store. */
+static void bin_items(bins *b, const bin_mapping *mapping, const item *items, int64_t count, int64_t stride)
 {
     const int64_t half = count / 2;
     const item *halves = items + half * stride;
@@ -97,9 +98,9 @@ static void bin_run(bins *b, const bin_mapping *mapping, const item *items, int6
 void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, int64_t stride)
 {
     const int64_t samples = (count + stride - 1) / stride;
-    for (int64_t begin = 0; begin < samples; begin += RUN_MAX) {
-        const int64_t n = samples - begin < RUN_MAX ? samples - begin : RUN_MAX;
-        bin_run(b, m, items + begin * stride, n, stride);
+    for (int64_t begin = 0; begin < samples; begin += COUNT_MAX) {
+        const int64_t n = samples - begin < COUNT_MAX ? samples - begin : COUNT_MAX;
+        bin_items(b, m, items + begin * stride, n, stride);
         add_lane_counts(b, m->count);
     }
 }
@@ -163,8 +164,8 @@ bin_split bins_choose(const bins *b, const bin_mapping *m)
     return cheapest_axis(best, best_border);
 }
 
-/* The box of a side is at least as large as that of each of its items. So no plane costs less than the sum of the
- * items' areas. */
+/* Each item's box lies in the box of its side, so that no plane costs less than the sum of the surface areas of the
+ * items' boxes. */
 float bins_least_cost(const item *items, int64_t count)
 {
     vec4 terms = {0};
@@ -178,8 +179,8 @@ int64_t bins_partition(const bin_mapping *m, bin_split split, item *items, int64
 {
     enum { SIZE = sizeof(item), SIGN_TO_SIZE = 27 };
     const int factor = (uint16_t)m->factor[split.axis];
-    const int first = (int16_t)m->origin[split.axis] + (split.first_right_bin * 65536 + factor - 1) /
-                                                           factor; /* lowest value among the items of the right side */
+    /* lowest value of (2 * centroid - ITEM_TOP) on the axis that belongs to the right side */
+    const int first = (int16_t)m->origin[split.axis] + (split.first_right_bin * 65536 + factor - 1) / factor;
     const int16_t *lower = (const int16_t *)(const void *)items + split.axis, *upper = lower + 4;
     char *base = (char *)items;
     int64_t left = 0; /* size of the left side in bytes */

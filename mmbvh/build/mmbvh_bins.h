@@ -12,13 +12,13 @@
 
 enum {
     BINS_MAX = 16,
-    BINS_SAMPLED = 2048, /* nodes of at least this many items are sampled */
-    /* of a sampled node, one item in this many is binned; the resulting splits are as good as those of all items */
+    BINS_SAMPLED = 2048, /* minimum number of items of a node that is sampled */
+    /* sampling stride: one item in this many is binned; the resulting splits are as good as those of all items */
     BINS_STRIDE = 7
 };
 
-/* Maps twice the centroid minus ITEM_TOP to a bin on each axis. Lanes 4 to 6 repeat lanes 0 to 2, so that two items are
- * mapped at once. */
+/* Maps (2 * centroid - ITEM_TOP), which item_centroid() returns, to a bin on each axis. ITEM_TOP is the largest
+ * coordinate of an item (mmbvh_item.h). Lanes 4 to 6 repeat lanes 0 to 2, so that two items are mapped at once. */
 typedef struct bin_mapping {
     ulanes origin;
     lanes factor;
@@ -36,7 +36,7 @@ typedef struct bin_split {
     float cost;
 } bin_split;
 
-/* The bin of each of the three axes. It fills one cache line. */
+/* The bins with the same number on the three axes. The struct fills one cache line. */
 typedef struct bin {
     lanes boxes[3]; /* one box per axis; lanes 3 and 7 are scratch */
     uint32_t counts[4];
@@ -49,7 +49,7 @@ typedef struct bins {
 void bins_clear(bins *b, int count);
 void bins_merge(bins *b, const bins *other, int count);
 
-/* Returns the sampling stride for a node of this many items: one item in so many is binned. */
+/* Returns the sampling stride for a node with `count` items: one item in this many is binned. */
 static inline int64_t bins_stride(int64_t count)
 {
     return count < BINS_SAMPLED ? 1 : BINS_STRIDE;
@@ -58,21 +58,21 @@ static inline int64_t bins_stride(int64_t count)
 /* Fills the bins with every stride-th item, starting with the first. */
 void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, int64_t stride);
 
-/* Returns the plane of lowest SAH cost for the items in the bins; of equal planes, the first. */
+/* Returns the plane of lowest SAH cost for the items in the bins; of planes with equal costs, the first. */
 bin_split bins_choose(const bins *b, const bin_mapping *m);
 
 /* Returns a lower bound of the SAH cost of all planes that separate the items. */
 float bins_least_cost(const item *items, int64_t count);
 
-/* Checks whether a split at this cost is cheaper than a leaf. The split adds two box tests. Items that do not fit in a
- * leaf are always split. */
+/* Returns whether a node with this SAH cost of its best split should be split rather than become a leaf. A split costs
+ * two additional box tests. Returns true if the items do not fit in a leaf. */
 static inline bool bins_is_split_cheaper(float cost, int64_t count, lanes bounds)
 {
     return count > MMBVH_MAX_LEAF || cost < (float)(count - 2) * item_half_area(bounds);
 }
 
-/* Moves the items of the left side to the front; returns their number. The result depends only on the order of the
- * items. */
+/* Moves the items of the left side to the front and returns their number. The new order depends only on the order
+ * before. */
 int64_t bins_partition(const bin_mapping *m, bin_split split, item *items, int64_t count);
 
 #endif

@@ -17,7 +17,7 @@
 enum {
     CHUNK_MIN = 16384,
     CHUNKS_MAX = 64,
-    PARALLEL_MIN = 8 * CHUNK_MIN /* a node of fewer items is processed by one task */
+    PARALLEL_MIN = 8 * CHUNK_MIN /* minimum number of items of a node that is split by several tasks */
 };
 
 /* A node that has not been split yet. */
@@ -37,7 +37,7 @@ typedef struct node_split {
     int64_t left_count;              /* number of items that go to the left child */
     branch_node node;
     bin_mapping mapping;
-    int64_t stride; /* one item in this many is binned (bins_stride()) */
+    int64_t stride; /* sampling stride (bins_stride()) */
     bin_split split;
     bins all_bins;     /* bins of all chunks, merged */
     item_set sides[2]; /* bounds of the items of the left and of the right child */
@@ -101,10 +101,11 @@ static void partition_chunk(node_split *s, const branch_builder *builder, int ch
     for (int side = 0; side < 2; side++) item_set_merge(&s->sides[side], &sides[side]);
 }
 
-/* Iterates over the ranges of items on the wrong side of the border, in order. */
+/* Iterator over the ranges of items that are on the wrong side of the border, chunk by chunk in their order. */
 typedef struct misplaced_items {
     const node_split *s;
-    bool is_left; /* true: left items behind the border; false: right items in front of it */
+    bool is_left; /* set: iterates over items of the left child behind the border; otherwise over items of the right
+                     child in front of it */
     int chunk;
     int64_t next, end;
 } misplaced_items;

@@ -1,5 +1,5 @@
-/* Builds the top of a SAH tree. All threads together split nodes with many items, until each part is a subtree that one
- * thread builds (mmbvh_subtree.h). */
+/* Builds the top of a SAH tree. All threads split nodes together, until each remaining part is small enough to be built
+ * as a subtree by one thread (mmbvh_subtree.h). */
 #ifndef MMBVH_BRANCH_H
 #define MMBVH_BRANCH_H
 
@@ -8,7 +8,7 @@
 typedef struct branch_builder {
     topology_build *build;
     const bounds_source *source;
-    item *items; /* items, which are reordered to the order of the leaves */
+    item *items; /* items; the builder sorts them in the order of the leaves */
     int64_t count;
 } branch_builder;
 

@@ -1,8 +1,9 @@
-/* The cells of a lattice are already in spatial order: a box of indices is compact wherever the lattice is not folded.
- * Each node is halved along the axis on which its box is longest, estimated by the mean edge length of the cells.
- * Halves alone would end in leaves of 2 x 2 x 1 cells if sides are powers of two, with 4 of MMBVH_MAX_LEAF cells. So
- * small boxes are split where their leaves cost least, mostly into 3 x 2 x 1 cells: a third fewer nodes, of a tenth
- * less area. */
+/* The cells of a lattice are already in spatial order: a box of indices is also compact in space, unless the lattice is
+ * bent. Each node is split in two halves, across the axis along which its box is longest; lengths are estimated from
+ * the mean edge lengths of cells. If the numbers of cells per side are powers of two, halving alone would end in leaves
+ * of 2 x 2 x 1 cells, although a leaf may have MMBVH_MAX_LEAF = 7. Small boxes are therefore split so that the cost of
+ * their leaves is minimal, which mostly gives leaves of 3 x 2 x 1 cells: a third fewer nodes, with a tenth less surface
+ * area. */
 #include "mmbvh_bricks.h"
 
 #include <math.h>
@@ -15,9 +16,10 @@ typedef struct brick {
     int64_t first[3], count[3];
 } brick;
 
-/* Limits of small boxes, and the cost of a leaf in addition to that of its cells. A cell costs the sum of the sides of
- * its leaf, to which the probability that a surface meets the leaf is proportional. With a leaf's cost between 12 and
- * 126, leaves of 3 x 2 x 1 cells are cheaper for each cell than those of 2 x 2 x 1 and 7 x 1 x 1. */
+/* SMALL_SIDE and SMALL_CELLS limit the boxes whose splits are chosen by cost. The cost of a leaf is LEAF_COST plus, for
+ * each cell, the sum of the leaf's sides in cells, to which the probability that a surface crosses the leaf is
+ * proportional. If LEAF_COST is between 12 and 126, leaves of 3 x 2 x 1 cells cost less per cell than leaves of 2 x 2 x
+ * 1 or 7 x 1 x 1. */
 enum { SMALL_SIDE = 8, SMALL_CELLS = 64, LEAF_COST = 24 };
 
 typedef struct bricks {
@@ -25,7 +27,8 @@ typedef struct bricks {
     const grid_lattice *lattice;
     double edge[3]; /* mean lengths of the cells' edges along each axis, times the number of samples */
     uint32_t *cells;
-    int costs[SMALL_SIDE + 1][SMALL_SIDE + 1][SMALL_SIDE + 1]; /* least costs of small boxes, by their sides */
+    /* lowest cost of a small box, indexed by the numbers of cells along its sides */
+    int costs[SMALL_SIDE + 1][SMALL_SIDE + 1][SMALL_SIDE + 1];
 } bricks;
 
 static int64_t brick_cell_count(const brick *b)
@@ -76,7 +79,7 @@ static void measure_edges(const grid *g, double out[3])
     }
 }
 
-/* A plane that splits a box: the axis that it is perpendicular to, and the number of cells before it. */
+/* A plane that splits a box: the axis to which it is perpendicular, and the number of layers of cells before it. */
 typedef struct brick_split {
     int along;
     int64_t before;
@@ -98,7 +101,8 @@ static int cost_of_split(const bricks *s, const int64_t count[3], brick_split sp
     return s->costs[sides[0][0]][sides[0][1]][sides[0][2]] + s->costs[sides[1][0]][sides[1][1]][sides[1][2]];
 }
 
-/* Returns the cheapest split of a small box; `first` if no other one is cheaper. *cost is set to its cost. */
+/* Returns the split of lowest cost of a small box, and `first` if no other split costs less. *cost receives the
+ * cost. */
 static brick_split cheapest_split(const bricks *s, const int64_t count[3], brick_split first, int *cost)
 {
     brick_split best = first;
@@ -113,7 +117,7 @@ static brick_split cheapest_split(const bricks *s, const int64_t count[3], brick
     return best;
 }
 
-/* Computes the costs of small boxes, smaller ones first. */
+/* Computes the costs of all small boxes, smaller ones first, because a box's cost is the sum of its parts' costs. */
 static void compute_costs(bricks *s)
 {
     for (int64_t k = 1; k <= SMALL_SIDE; k++)
@@ -154,8 +158,8 @@ static void list_cells(const grid_lattice *l, const brick *b, uint32_t *out)
                 *out++ = (uint32_t)(i * stride[0] + j * stride[1] + k * stride[2]);
 }
 
-/* Builds the subtree of the box. `cells` is the subtree's cell list, and the box's cells begin at index `first`.
- * Returns the root's link. */
+/* Builds the subtree over the box and returns its root's link. `cells` is the list of the subtree's cells; the box's
+ * cells are stored in it from index `first`. */
 static topology_link build_subtree(const bricks *s, topology_scratch *scratch, const brick *b, uint32_t *cells,
                                    int64_t first)
 {

@@ -5,7 +5,7 @@
 #include "grid.h"
 #include "mmbvh_topology.h"
 
-/* Returns the number of cells of a tree over all drawn cells of the lattice, without regard to ghost flags. */
+/* Returns the number of cells of a tree over all drawn cells of the lattice. Ghost flags are ignored. */
 int64_t bricks_count(const grid_lattice *lattice);
 
 /* Builds the tree over the bricks_count() cells of the lattice of g, all of which must be drawn; `cells` receives their

@@ -28,7 +28,8 @@ typedef struct build {
     int64_t candidate_count; /* length of selected, or the number of all cells including ghosts */
     mmbvh_options options;
     int threads;
-    int64_t starts[FILL_CHUNKS + 1]; /* for each chunk, the position of its first cell among the cells that are used */
+    /* for each chunk of candidates, the number of the tree's cells in earlier chunks */
+    int64_t starts[FILL_CHUNKS + 1];
     int64_t count;
     item *items;
     uint64_t *keys, *other_keys;
@@ -59,7 +60,7 @@ static uint32_t candidate_cell(const build *b, int64_t i)
     return b->selected ? b->selected[i] : (uint32_t)i;
 }
 
-/* Checks whether the tree covers all cells of a lattice except ghost layers, so that mmbvh_bricks.h can build it. */
+/* Returns whether the tree covers all cells of a lattice except ghost layers, so that mmbvh_bricks.c can build it. */
 static bool uses_bricks(const build *b)
 {
     const grid *g = b->source.g;
@@ -113,7 +114,8 @@ static void fill_keys(const build *b, int chunk, fetch_box *exact)
     morton_make_keys(&b->source, b->coder, keys, count, exact);
 }
 
-/* Computes the items or keys of all cells, quantized by a grid over the box (in the tree's coordinates). */
+/* Computes the items or Morton keys of all cells, quantized by a grid over the box, which is in the tree's
+ * coordinates. */
 static void quantize_cells(build *b, const fetch_box *box)
 {
     b->grid = item_grid_make(box->lower, box->upper);
@@ -137,14 +139,14 @@ static void quantize_cells(build *b, const fetch_box *box)
 #pragma omp critical(mmbvh_merge)
         {
             item_set_merge(&b->set, &set);
-            fetch_box_unite(&b->exact, &exact);
+            unite_boxes(&b->exact, &exact);
         }
         region_leave();
     }
 }
 
-/* Checks whether the guess is much larger than the exact bounds. This happens if vertices of ghosts, or vertices that
- * no cell uses, are far away. */
+/* Returns whether the estimated bounds are more than twice as long as the exact bounds on some axis. This happens if
+ * vertices of ghost cells, or vertices that no cell uses, are far away. */
 static bool is_too_large(const fetch_box *guess, const fetch_box *exact)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -214,10 +216,10 @@ static topology *build_bricks(build *b, topology_build *t)
 #pragma omp for schedule(static) nowait
         for (int64_t first = 0; first < b->count; first += BOUNDS_BLOCK) {
             const int64_t count = b->count - first < BOUNDS_BLOCK ? b->count - first : BOUNDS_BLOCK;
-            b->source.unite(&b->source, cells + first, (int)count, NULL, &box);
+            b->source.extend(&b->source, cells + first, (int)count, NULL, &box);
         }
 #pragma omp critical(mmbvh_bricks)
-        fetch_box_unite(&b->exact, &box);
+        unite_boxes(&b->exact, &box);
         region_leave();
     }
     return root;
@@ -266,12 +268,12 @@ static bool allocate_nodes(build *b, int64_t node_count)
 {
     mmbvh *tree = &b->tree;
     float lower[3], upper[3];
-    fetch_box_round(&b->exact, tree->origin, tree->scale, lower, upper);
+    round_box_outward(&b->exact, tree->origin, tree->scale, lower, upper);
     bool is_compact =
         b->options.layout == MMBVH_COMPACT && b->count < 1 << COMPACT_REF_BITS && node_count < 1 << COMPACT_REF_BITS;
     for (int axis = 0; axis < 3; axis++) is_compact = is_compact && upper[axis] - lower[axis] < INFINITY;
     if (is_compact) {
-        tree->grid = store_grid(lower, upper);
+        tree->grid = store_make_grid(lower, upper);
         tree->compact = base_alloc((size_t)node_count * sizeof *tree->compact);
     } else {
         tree->nodes = base_alloc((size_t)node_count * sizeof *tree->nodes);
@@ -309,7 +311,7 @@ static insitu_status build_tree(build *b, base_error *error)
 
 static void finish_tree(build *b, const sweep *ranges, mmbvh *out)
 {
-    const sweep s = sweep_of_both(&b->tree, &b->source, ranges);
+    const sweep s = sweep_of_bounds_and_ranges(&b->tree, &b->source, ranges);
     b->tree.unusable_cells = sweep_tree(&s, b->threads).count;
     b->tree.area = b->tree.built_area = cost_area_of_tree(&b->tree, b->threads);
     b->tree.built_cost = cost_of_area(&b->tree, b->tree.area);

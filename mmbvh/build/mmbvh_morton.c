@@ -11,12 +11,12 @@
 
 enum {
     CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
-    DIGIT_BITS = 11, /* number of output streams whose ends fit in a core's cache */
+    DIGIT_BITS = 11, /* log2 of the number of output streams; their write positions fit in a core's cache */
     DIGITS = 1 << DIGIT_BITS,
     /* number of chunks per thread; there are several, so that other threads can take chunks of a delayed one */
     SORT_CHUNKS = 4,
     SORT_CHUNKS_MAX = 64,
-    SORT_LARGE = 16, /* parts above 1/SORT_LARGE of all keys are sorted by all threads together */
+    SORT_LARGE = 16, /* parts with more than 1/SORT_LARGE of all keys are sorted by all threads together */
     SORT_LARGE_MIN = 16384,
     SORT_INSERTED = 24, /* parts with at most this many keys are sorted by insertion */
     SORT_LEFT_BITS = 2  /* log2 of the number of keys per digit, if they are spread evenly */
@@ -96,10 +96,10 @@ static inline uint64_t morton_code(const bounds_source *source, const morton_cod
     return code_of_steps(coder, steps);
 }
 
-/* Maps the midpoint of a box of floats, in the source's coordinates, to steps of the code. */
+/* Maps the centre of a box of floats, in the source's coordinates, to steps of the Morton code. */
 typedef struct sum_mapping {
     vec4 origin, factor,
-        last_step; /* code step of a centre = (centre - origin) * factor, limited to last_step, along each axis */
+        last_step; /* step of a centre along each axis: (centre - origin) * factor, limited to last_step */
 } sum_mapping;
 
 static sum_mapping sum_mapping_make(const bounds_source *source, const morton_coder *coder)
@@ -142,7 +142,7 @@ static fetch_box make_float_box_keys(const bounds_source *source, const morton_c
         const int n = list_block_cells(coder, keys + begin, count - begin, cells);
         source->read_float_boxes(source, cells, n, float_boxes);
         for (int i = 0; i < n; i++) {
-            fetch_float_box_unite(&all, &float_boxes[i]);
+            unite_float_boxes(&all, &float_boxes[i]);
             keys[begin + i] = code_of_float_box(&m, coder, &float_boxes[i]) | cells[i];
         }
     }
@@ -160,7 +160,7 @@ static fetch_box make_box_keys(const bounds_source *source, const morton_coder *
         for (int i = 0; i < n; i++) {
             double centre[3];
             for (int axis = 0; axis < 3; axis++) centre[axis] = 0.5 * (boxes[i].lower[axis] + boxes[i].upper[axis]);
-            fetch_box_unite(&all, &boxes[i]);
+            unite_boxes(&all, &boxes[i]);
             keys[begin + i] = morton_code(source, coder, centre) | cells[i];
         }
     }
@@ -172,13 +172,14 @@ void morton_make_keys(const bounds_source *source, const morton_coder *coder, ui
 {
     const fetch_box all = source->read_float_boxes ? make_float_box_keys(source, coder, keys, count)
                                                    : make_box_keys(source, coder, keys, count);
-    fetch_box_unite(exact, &all);
+    unite_boxes(exact, &all);
 }
 
 /* ---- sorting ---------------------------------------------------------------------------------------------------- */
 
-/* Keys are sorted by their highest digit first. Neighbouring cells mostly have neighbouring indices, so consecutive
- * keys go to few output streams; the keys of one digit then fit in a core's cache, where they are sorted completely. */
+/* The numbers of keys by digit, for a radix sort that begins with the highest digit. Neighbouring cells mostly have
+ * neighbouring indices, so that consecutive keys are written to few output streams. The keys with the same digit then
+ * fit in a core's cache, in which they are sorted completely. */
 typedef struct digit_counts {
     int64_t chunk_digits[SORT_CHUNKS_MAX][DIGITS]; /* number of keys of each chunk with each value of the digit */
 } digit_counts;
@@ -186,7 +187,7 @@ typedef struct digit_counts {
 typedef struct sorting {
     int64_t large; /* parts with more keys than this are sorted by all threads together */
     int chunks, threads;
-    digit_counts *counts; /* for each digit, the number of keys with it */
+    digit_counts *counts; /* numbers of keys per chunk and digit */
 } sorting;
 
 static inline int extract_digit(uint64_t key, int shift)
@@ -210,7 +211,7 @@ static void count_digits(const sorting *s, const uint64_t *keys, int64_t count, 
     }
 }
 
-/* Converts the digits' counts to the first position of each digit, overall and for each chunk. */
+/* Converts the numbers of keys per digit to the index of the first key of each digit, overall and for each chunk. */
 static void sum_digits(const sorting *s, int64_t starts[DIGITS + 1])
 {
     int64_t sum = 0;
@@ -251,8 +252,8 @@ static void insertion_sort(uint64_t *keys, int64_t count)
     }
 }
 
-/* Sorts the keys in `from`, either in place or to `other`, on one thread. The digit is chosen so that each of its
- * values gets a few keys. All keys must be different. */
+/* Sorts the keys in `from` on one thread; the result is in `other` if to_other is set, and otherwise in `from`. The
+ * number of bits of a digit is chosen so that each digit gets a few keys. All keys must be different. */
 static void sort_serial(uint64_t *from, uint64_t *other, int64_t count, bool to_other)
 {
     if (count <= SORT_INSERTED) {
@@ -281,7 +282,7 @@ static void sort_serial(uint64_t *from, uint64_t *other, int64_t count, bool to_
     }
 }
 
-/* Same as sort_serial(), on all threads. Keys may differ only in their lowest `top` bits. */
+/* As sort_serial(), on all threads. All keys must be equal in their bits above the lowest `top` bits. */
 static void sort_parallel(const sorting *s, uint64_t *from, uint64_t *other, int64_t count, int top, bool to_other)
 {
     int64_t starts[DIGITS + 1];
@@ -323,8 +324,8 @@ bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int
 
 /* ---- the tree --------------------------------------------------------------------------------------------------- */
 
-/* Returns the number of keys in which the highest differing bit is 0. There must be at least two keys in ascending
- * order. */
+/* Returns the number of keys whose highest differing bit is 0. The keys must be in ascending order, and at least
+ * two. */
 static int64_t find_split(const uint64_t *keys, int64_t count)
 {
     const int bit = count_significant_bits(keys[0] ^ keys[count - 1]) - 1;

@@ -3,7 +3,9 @@
  * differ by orders of magnitude, the boxes are computed from the vertices again, in steps of a finer grid. */
 #include "mmbvh_subtree.h"
 
-enum { COARSE = 64 }; /* number of steps along the longest side at which rounding changes an area by 3 percent */
+/* Minimum number of grid steps along the longest side; with fewer, rounding changes surface areas by more than 3
+ * percent. */
+enum { COARSE = 64 };
 
 bool subtree_needs_finer_grid(lanes bounds, const item_grid *grid)
 {

@@ -6,7 +6,7 @@
 #include "mmbvh_bounds.h"
 #include "mmbvh_topology.h"
 
-/* Checks whether the grid is too coarse to separate items with these bounds. */
+/* Returns whether the grid is too coarse to distinguish items with these bounds. */
 bool subtree_needs_finer_grid(lanes bounds, const item_grid *grid);
 
 /* Returns a grid over the bounds, which are given in steps of `grid`. */

@@ -12,13 +12,13 @@
 
 enum {
     TOPOLOGY_SUBTREE_CELLS = 16384, /* maximum number of cells in a subtree: cells and nodes fit in a core's cache */
-    TOPOLOGY_MEDIAN_DEPTH =
-        MMBVH_MAX_DEPTH -
-        32 /* from this depth on nodes are halved by count, so that 2^32 cells stay within the maximum depth */
+    /* nodes at this depth and below are split into halves with equal numbers of cells, so that trees of 2^32 cells stay
+     * within the maximum depth */
+    TOPOLOGY_MEDIAN_DEPTH = MMBVH_MAX_DEPTH - 32
 };
 
 /* A node of a subtree. The 3 low bits are the number of cells in a leaf, or 0 for an inner node. The other bits are the
- * leaf's first cell, or the index of the inner node's left child, both counted from the subtree's begin. */
+ * leaf's first cell, or the index of the inner node's left child, both relative to the start of the subtree. */
 typedef uint32_t topology_link;
 
 static inline topology_link topology_leaf(int64_t first, int64_t count)
@@ -59,7 +59,7 @@ typedef struct topology_build {
     atomic_bool failed;        /* set to true after an allocation failed */
 } topology_build;
 
-/* Allocates the threads' buffers; returns false if memory ran out. topology_end() must be called in either case. */
+/* Allocates the threads' buffers. Returns false if memory ran out. The caller must call topology_end() even then. */
 bool topology_begin(topology_build *build, int64_t cells, int threads);
 void topology_end(topology_build *build);
 
@@ -71,8 +71,8 @@ void topology_copy_links(topology_build *build, topology *t, const topology_scra
 
 int64_t topology_node_count(const topology *t);
 
-/* Writes all nodes to the tree: root first, then depth first by pairs of siblings. Frees the links as they are
- * written. */
+/* Writes all nodes to the tree: the root first, then all pairs of siblings depth first. Each subtree's links are freed
+ * as soon as they are written. */
 void topology_write(topology *t, const mmbvh *tree, int threads);
 
 /* Frees the tree under construction. t may be NULL. */

@@ -227,7 +227,7 @@ MMBVH_INLINE bool read_points(const grid *g, int64_t first, int count, bool is_g
 {
     double poison = 0;
     for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_corner(g, first, i, shape, wide_index);
+        const int64_t vertex = fetch_vertex(g, first, i, shape, wide_index);
         if (vertex < 0 || vertex >= g->vertex_count) return false;
         for (int axis = 0; axis < 3; axis++) {
             points[i][axis] = fetch_number(&g->coordinates[axis], vertex, wide_number);
@@ -248,7 +248,8 @@ MMBVH_INLINE bool tally_one_cell(const session_mesh *mesh, int64_t cell, mesh_ta
     if (count == 0 || (shape == FETCH_BY_CELL && !offsets_are_good(mesh, cell, count))) return false;
     const bool is_ghost = grid_is_ghost(g, cell);
     double points[GRID_MAX_CELL_VERTICES][3];
-    if (!read_points(g, fetch_first(g, cell, count, shape), count, is_ghost, points, shape, wide_index, wide_number))
+    if (!read_points(g, fetch_first_entry(g, cell, count, shape), count, is_ghost, points, shape, wide_index,
+                     wide_number))
         return false;
     t->ghost_count += is_ghost;
     if (is_ghost) return true;
@@ -274,7 +275,7 @@ MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell,
     if (shape != FETCH_BY_CELL) return alike;
     int64_t next = cell;
     while (next < end && grid_cell_type(g, next) == type && offsets_are_good(mesh, next, count)) next++;
-    if (next > cell) alike.first_entry = fetch_first(g, cell, count, shape);
+    if (next > cell) alike.first_entry = fetch_first_entry(g, cell, count, shape);
     alike.count = next > cell ? next - cell : 1; /* a cell with wrong offsets is processed alone */
     return alike;
 }
@@ -412,7 +413,7 @@ static int64_t tally_lattice_cells(const session_mesh *mesh, int64_t begin, int6
         fetch_box box;
         double volume = 1;
         fetch_box_empty(&box);
-        fetch_box_axes(&box, g->lattice, cell);
+        extend_box_by_lattice_cell(&box, g->lattice, cell);
         tally_point(&t, box.lower);
         tally_point(&t, box.upper);
         for (int axis = 0; axis < 3; axis++) {
@@ -469,6 +470,6 @@ tally_run tally_choose(const session_mesh *mesh)
     static const tally_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(run);
     const grid *g = &mesh->cells;
     if (g->coordinates[0].axis) return tally_lattice_cells;
-    if (!fetch_is_plain(g) || (!g->cell_types && grid_is_shell_type(g->cell_type))) return NULL;
+    if (!fetch_can_read_boxes(g) || (!g->cell_types && grid_is_shell_type(g->cell_type))) return NULL;
     return table[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
 }
