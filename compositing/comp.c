@@ -1,9 +1,9 @@
-/* The three phases of compositing: fragments are sent to the owners of their pixels, owners merge them, and finished
- * pixels are sent to rank 0. Before these phases all ranks agree that every rank has the memory for them, and which
- * rank owns which block; after the phases they agree whether all succeeded. A rank that runs out of memory in between
- * takes part to the end without it, so that no rank waits, and then reports the error. Memory is released as soon as
- * its phase ends: at the peak a rank holds its own fragments and the received bytes of those of other ranks. A single
- * rank merges its list in place (or has none: comp_tiles.h). */
+/* Runs the three phases of compositing: ranks send fragments to the owners of their pixels, owners merge them, and
+ * owners send finished pixels to rank 0. Before the phases, all ranks agree whether every rank has the memory for them,
+ * and which rank owns which block; after the phases, they agree whether all ranks succeeded. A rank that runs out of
+ * memory during a phase takes part in the remaining communication, so that no rank waits, and reports the error at the
+ * end. Memory is released as soon as its phase ends: at the peak, a rank holds its own fragments and the packed
+ * fragments received from other ranks. A single rank merges its list in place, or has no list (comp_tiles.h). */
 #include "comp.h"
 
 #include <omp.h>
@@ -49,11 +49,12 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Expected number of bytes per fragment in a message. Most pictures take 10 for a hit and 11 for a volume interval. */
+/* Expected number of bytes per fragment in a message. In most pictures a hit takes 10 and a volume interval 11. */
 static const double expected_bytes = 11;
 
-/* Chooses the route; the result is the same on all ranks. fragments is the largest number on any rank. */
-static void choose_route(composition *c, int64_t fragments)
+/* Chooses the route on which messages are sent (comp_route.h). fragments is the maximum number over all ranks; the
+ * result is the same on all ranks. */
+static void choose_message_route(composition *c, int64_t fragments)
 {
     enum { DEFAULT_RADIX = 8 };
     const comp_group *g = c->group;
@@ -61,7 +62,7 @@ static void choose_route(composition *c, int64_t fragments)
     c->route = g->schedule == COMP_AUTOMATIC
                    ? comp_cheapest_route(c->route.ranks, g->nodes, &load, &comp_default_machine)
                    : comp_route_of(g->schedule, c->route.ranks, g->nodes, DEFAULT_RADIX);
-    if (g->longest_dense) c->route.longest_dense = g->longest_dense;
+    if (g->max_dense_ranks) c->route.max_dense_ranks = g->max_dense_ranks;
     c->statistics->schedule = c->route.schedule;
 }
 
@@ -69,13 +70,13 @@ static void choose_owners(composition *c)
 {
     comp_claim *const claims = c->group->claims->items;
     c->owners.count = c->route.owners;
-    comp_route_fold(&c->route, claims, c->grid.blocks);
+    comp_route_assign_places(&c->route, claims, c->grid.blocks);
     comp_claims_balance(claims, c->grid.blocks, c->loads, c->route.owners);
     for (uint32_t b = 0; b < c->grid.blocks; b++)
         c->owners.places[b] = claims[b].priority ? comp_priority_rank(claims[b].priority) : -1;
 }
 
-/* Claims each block in proportion to the number of this rank's fragments there. */
+/* Computes this rank's claim to each block (comp_claim_priority()) from the number of its fragments in the block. */
 static void claim_blocks(composition *c)
 {
     comp_claim *const claims = c->group->claims->items;
@@ -104,7 +105,8 @@ static insitu_status allocate_phases(composition *c, fragment_list *items, base_
     return status;
 }
 
-/* Merges the pixels of this rank: on rank 0 into the picture, on other ranks into *finished. */
+/* Merges the pixels that this rank owns. On rank 0 the results are stored in the picture, on other ranks in *finished.
+ * Fragments received from other ranks are in *held. */
 static insitu_status merge_owned(composition *c, const comp_messages *held, comp_messages *finished,
                                  insitu_status status, base_error *error)
 {
@@ -147,7 +149,7 @@ static insitu_status run_phases(composition *c, fragment_list *items, base_error
     return status;
 }
 
-/* Begins compositing. If it fails, the fragments are freed. */
+/* Begins compositing. If this fails, the fragments are freed. */
 static insitu_status begin_composite(composition *c, fragment_list *items, int threads, base_error *error)
 {
     int ranks = 1;
@@ -180,7 +182,7 @@ static insitu_status gather_deep(composition *c, insitu_status status, base_erro
     return status;
 }
 
-/* Composites. *has_overlaps becomes the same on all ranks: nonzero if any rank found overlaps. */
+/* Composites. *has_overlaps receives a nonzero value on all ranks if any rank found overlaps, and otherwise 0. */
 static insitu_status composite(composition *c, fragment_list *items, int64_t *has_overlaps, base_error *error)
 {
     comp_statistics *const statistics = c->statistics;
@@ -190,7 +192,7 @@ static insitu_status composite(composition *c, fragment_list *items, int64_t *ha
     insitu_status own = allocate_phases(c, items, error), status = own;
     if (c->route.ranks > 1) status = comp_agree_claims(comm, own, &most, c->group->claims, (int)c->grid.blocks, error);
     if (!status) {
-        if (c->route.ranks > 1) choose_route(c, most);
+        if (c->route.ranks > 1) choose_message_route(c, most);
         choose_owners(c);
         own = c->route.ranks > 1 ? run_phases(c, items, error) : merge_alone(c, error);
         *has_overlaps = c->merged.overlaps && pixel_set_count(c->merged.overlaps, pixel_count(c)) > 0;
@@ -219,7 +221,7 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
 
 /* ---- overlaps --------------------------------------------------------------------------------------------------- */
 
-/* Distributes to all ranks the set of pixels in which owners found overlaps. */
+/* Combines the sets of pixels in which owners found overlaps, and stores the result on all ranks. */
 static insitu_status share_overlaps(const composition *c, comp_overlaps *overlaps, base_error *error)
 {
     const int bytes = (int)pixel_set_bytes(pixel_count(c));

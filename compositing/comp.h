@@ -1,4 +1,4 @@
-/* Compositing: combines the fragments of many ranks into one image on rank 0. This room has no access to cells, trees
+/* Compositing: combines the fragments of many ranks into one image on rank 0. This module has no access to cells, trees
  * or the scene.
  *
  * Blocks of pixels are owned by ranks that have many fragments there (comp_grid.h). Every rank sends each owner its
@@ -8,11 +8,11 @@
  * threads.
  *
  * Sorting by t gives the correct picture if fragments do not overlap. Volume fragments that overlap, because cells
- * overlap, can be corrected only by the room that made them: comp_composite_overlaps() returns the pixels that contain
- * such fragments. Any number of volume fragments of length zero may have the same t: they are samples at the same
- * position, and each contributes to their common absorption in proportion to its own absorption, in any order. Volume
- * fragments that overlap over a length are mixed, each as a homogeneous medium: that is the correct picture if they are
- * short enough to be homogeneous. */
+ * overlap, can be corrected only by the renderer, which made them: comp_composite_overlaps() returns the pixels that
+ * contain such fragments. Volume fragments of length zero are samples. Any number of them may have the same t; each
+ * contributes to their common absorption in proportion to its own absorption, in any order. Volume fragments whose
+ * intervals overlap are mixed as homogeneous media, which is correct if the intervals are short enough for the media to
+ * be homogeneous. */
 #ifndef COMP_COMP_H
 #define COMP_COMP_H
 
@@ -26,34 +26,35 @@
 #include "image.h"
 #include "pixel_set.h"
 
-/* The communicator of the ranks that composite, and the settings that they share. */
+/* The communicator of the ranks that take part in compositing, and the settings that they share. */
 typedef struct comp_group {
     MPI_Comm comm; /* communicator that only compositing uses */
     comp_nodes nodes;
     comp_schedule schedule; /* schedule of messages; COMP_AUTOMATIC chooses the fastest one for each picture */
-    int longest_dense;      /* rounds with more ranks are sparse (comp_messages.h); 0: the default of comp_route.h */
-    comp_claims *claims;    /* buffer in which ranks agree, made by comp_claims_create() */
+    /* largest number of ranks in a dense round (comp_messages.h); 0: the default of comp_route.h */
+    int max_dense_ranks;
+    comp_claims *claims; /* buffer for the agreement on owners, created by comp_claims_create() */
 } comp_group;
 
 /* Blends one pixel's fragments in place: they are sorted by (t_in, surface before volume, then bits) and blended front
  * to back over background (linear premultiplied RGBA). out_rgba receives 4 floats, out_depth the nearest surface's t_in
- * or +infinity. Local. This function defines how fragments are merged. */
+ * or +infinity. Local. The result of this function defines the picture; faster code must give the same result. */
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth);
 
-/* Same as comp_merge_pixel(), for volume fragments that ranks have partly folded (fragment_fold.h): the function
- * completes the folding. */
+/* As comp_merge_pixel(), for volume fragments that ranks have partly folded. Folding combines all volume fragments of
+ * an interval of the ray into one (fragment_fold.h); this function completes it. */
 void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],
                              float *out_depth);
 
-/* Checks whether a pixel's fragments, as sorted by comp_merge_pixel(), overlap in front of the first opaque fragment.
- * Two volume fragments that contain the same t overlap. A volume fragment that contains a surface's t overlaps that
- * surface, unless it begins there, within the rounding of a face's depth. A fragment whose end precedes its begin,
- * because it is shorter than rounding, overlaps nothing; neither do single samples (fragment.h) of two volumes, or of
- * two cells at their common face. Local. */
+/* Returns whether a pixel's fragments, sorted as by comp_merge_pixel(), overlap in front of the first opaque fragment.
+ * Two volume fragments overlap if both contain some t. A volume fragment overlaps a surface if it contains the
+ * surface's t, unless it begins there, within the rounding error of a face's depth. A fragment whose end precedes its
+ * start, because its length is below rounding, overlaps nothing. Single samples (fragment.h) of two volumes, or of two
+ * cells at their common face, do not overlap. Local. */
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
-/* Same as comp_pixel_overlaps(), for fragments as sorted by comp_merge_folded_pixel(); fragments behind the position at
- * which that function stops do not count. Local. */
+/* As comp_pixel_overlaps(), for fragments sorted as by comp_merge_folded_pixel(). Fragments behind the position at
+ * which that function stops are ignored. Local. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {
@@ -66,7 +67,7 @@ typedef struct comp_statistics {
     bool has_failed; /* true if the error occurred on this rank */
 } comp_statistics;
 
-/* Composites an image. Takes two reductions over group->comm, and a barrier if a round is sparse (comp_messages.h).
+/* Composites an image. Performs two reductions over group->comm, and a barrier for each sparse round (comp_messages.h).
  * threads is the number of threads of this rank, or 0 for the default of OpenMP. statistics may be NULL. Collective.
  *
  * out->width and out->height must be set on all ranks. Rank 0 must allocate out->rgba and may allocate out->depth; both
@@ -83,11 +84,12 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
 /* The set of pixels whose fragments overlap. It is the same on every rank. */
 typedef struct comp_overlaps {
     int64_t count;
-    unsigned char *pixels; /* pixel_set.h, of the whole image; the caller must call base_free(). NULL if count is 0 */
+    /* set of pixels of the whole image (pixel_set.h); NULL if count is 0. The caller must free it with base_free(). */
+    unsigned char *pixels;
 } comp_overlaps;
 
-/* Same as comp_composite(), and also returns the overlaps on every rank. If there are overlaps, this takes another
- * reduction, of one bit per pixel. On an error overlaps is empty. */
+/* As comp_composite(), and also returns the pixels with overlaps, on every rank. If there are any, this performs
+ * another reduction, of one bit per pixel. On an error *overlaps is empty. */
 insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *items, const float background[4],
                                       int threads, image *out, comp_overlaps *overlaps, comp_statistics *statistics,
                                       base_error *error);

@@ -4,8 +4,8 @@
 
 const comp_machine comp_default_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11};
 
-/* The renderer makes fragments tile by tile, so the fragments of one tile, or of one block if blocks are smaller, go to
- * a single owner. */
+/* Number of pixels of the renderer's tiles. Fragments are made tile by tile, so that all fragments of a tile, or of a
+ * block if blocks are smaller than tiles, go to the same owner. */
 enum { TILE_PIXELS = 256 };
 
 /* Returns the number of partners to which a rank sends fragments in a round. */
@@ -47,8 +47,7 @@ comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *loa
         int radix;
     } tried[] = {{COMP_NODES, 0},  {COMP_RADIX, 4},  {COMP_RADIX, 8},
                  {COMP_RADIX, 16}, {COMP_RADIX, 32}, {COMP_BINARY, 2}};
-    if (nodes.ranks >= ranks)
-        nodes = (comp_nodes){1, false}; /* all ranks are on one node, and therefore equally near */
+    if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false}; /* all ranks are treated as one node */
     comp_route best = comp_route_of(COMP_DIRECT, ranks, nodes, 0);
     double least = comp_cost_of(&best, load, machine).seconds;
     for (unsigned i = 0; i < sizeof tried / sizeof *tried; i++) {

@@ -1,8 +1,8 @@
-/* Estimates the fastest schedule by the LogGP model (Alexandrov, Ionescu, Schauser, Scheiman, 1995): a message costs
- * its sender and its receiver an overhead each, the network a latency, and every byte a gap.
+/* Estimates the fastest schedule by the LogGP model (Alexandrov, Ionescu, Schauser, Scheiman, 1995): each message costs
+ * its sender and its receiver an overhead, the network a latency, and each byte a gap.
  *
- * In any schedule each fragment is packed once and unpacked once, so that only rounds are counted: the number of
- * messages that a rank sends, and the number of times its bytes are sent. In a dense round empty messages count too. */
+ * Every schedule packs and unpacks each fragment once. Schedules therefore differ only in their rounds: in the number
+ * of messages that a rank sends, and in how often its bytes are sent. In a dense round empty messages count too. */
 #ifndef COMP_COMP_COST_H
 #define COMP_COMP_COST_H
 
@@ -18,11 +18,11 @@ typedef struct comp_machine {
  * between nodes; half of these times within a node. */
 extern const comp_machine comp_default_machine;
 
-/* The load of the busiest rank. */
+/* The number of fragments of the busiest rank, and their size in messages. */
 typedef struct comp_load {
     int64_t fragments;
     double bytes;          /* average size of a fragment in a message, in bytes (comp_sheet.h) */
-    uint32_t block_pixels; /* number of pixels of a block, all of which have the same owner (comp_grid.h) */
+    uint32_t block_pixels; /* number of pixels of a block; all pixels of a block have the same owner (comp_grid.h) */
 } comp_load;
 
 /* The cost of a route for the busiest rank. */
@@ -34,11 +34,11 @@ typedef struct comp_cost {
 
 comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const comp_machine *machine);
 
-/* Returns the route that takes the least time. radix is the same as for comp_route_of(). */
+/* Returns the route with the lowest estimated time. */
 comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine);
 
-/* Returns the exact number of messages that the rank at a place sends in all rounds of a route, if all rounds are dense
- * and no message has to be divided. */
+/* Returns the number of messages that the rank at this place (comp_route.h) sends in all rounds of a route, if all
+ * rounds are dense and no message must be split. */
 int64_t comp_route_messages(const comp_route *route, int place);
 
 #endif

@@ -1,6 +1,6 @@
-/* Fragments are cut into samples by comp_merge_cut(), so that flat and deep pictures follow the same rule. Rank 0 first
- * receives from each owner the number of samples of each pixel, and then the samples, directly into their final
- * position. */
+/* Fragments are converted to samples by comp_merge_intervals(), so that deep pictures follow the same rule of blending
+ * as others. Rank 0 receives from each owner first the number of samples of each pixel, and then the samples, which it
+ * stores directly at their final position. */
 #include "comp_deep.h"
 
 #include <string.h>
@@ -25,7 +25,7 @@ static bool reserve_item(void **items, int64_t count, int64_t *capacity, size_t 
     return true;
 }
 
-/* Callback of comp_merge_cut(): adds a sample for the interval, unless the interval is invisible. */
+/* Callback of comp_merge_intervals(): adds a sample for the interval, unless it is invisible. */
 static void add_interval(void *state, const fragment *f)
 {
     comp_deep_list *list = state;
@@ -52,9 +52,9 @@ void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool i
     }
     list->pixels = items;
     if (is_folded)
-        comp_merge_folded_cut(sorted, count, add_interval, list);
+        comp_merge_folded_intervals(sorted, count, add_interval, list);
     else
-        comp_merge_cut(sorted, count, add_interval, list);
+        comp_merge_intervals(sorted, count, add_interval, list);
     list->pixels[list->pixel_count++] = (comp_deep_pixel){sorted->pixel, (uint32_t)(list->sample_count - first)};
 }
 
@@ -106,7 +106,7 @@ static int receive_items(MPI_Comm comm, int rank, int tag, void *items, int64_t 
     return code;
 }
 
-/* Stores the positions of the samples of these pixels. */
+/* Stores, for each of these pixels, where its samples are in out. */
 static void store_sample_offsets(deep_image *out, const comp_deep_pixel *pixels, int64_t count, int64_t at)
 {
     for (int64_t i = 0; i < count; i++) {
@@ -158,7 +158,8 @@ static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *err
     }
     in->pixels = base_alloc((size_t)pixels * sizeof *in->pixels);
     if (samples > out->capacity) {
-        /* a frame that is composited in turns (session_frame.c) adds samples in each turn, so that some are spare */
+        /* if a frame is composited in several turns (session_frame.c), each turn adds samples; the capacity includes
+         * space for them */
         const int64_t capacity = out->count ? samples + samples / 2 : samples;
         insitu_deep_sample *grown = base_realloc(out->samples, (size_t)capacity * sizeof *grown);
         if (grown) {

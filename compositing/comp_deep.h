@@ -1,7 +1,7 @@
-/* Deep images contain the samples of every pixel sorted by depth, in addition to the flat picture.
+/* Deep images contain all samples of every pixel, sorted by depth, in addition to the flat picture.
  *
- * The owner of a pixel converts its fragments to samples, which are sorted and cut so that they do not overlap, and
- * sends them to rank 0. Blending them front to back gives the picture without its background. */
+ * The owner of a pixel converts its fragments to samples, which are sorted and split so that they do not overlap, and
+ * sends them to rank 0. Blending the samples front to back gives the picture without its background. */
 #ifndef COMP_COMP_DEEP_H
 #define COMP_COMP_DEEP_H
 
@@ -15,19 +15,20 @@ typedef struct comp_deep_pixel {
     uint32_t pixel, count; /* pixel index and its number of samples */
 } comp_deep_pixel;
 
-/* The samples of a thread on one owner, pixel after pixel. A zeroed struct is empty. */
+/* The samples that one thread of an owner has made, pixel after pixel. A zeroed struct is empty. */
 typedef struct comp_deep_list {
     comp_deep_pixel *pixels;
     insitu_deep_sample *samples;
     int64_t pixel_count, pixel_capacity, sample_count, sample_capacity;
-    bool lacks_memory; /* true if samples are missing because memory ran out */
+    bool lacks_memory; /* set if samples are missing because memory ran out */
 } comp_deep_list;
 
-/* Adds one pixel's fragments as sorted by comp_merge_pixel(), or by comp_merge_folded_pixel() if is_folded. z and
- * z_back are set to t. If memory runs out, lacks_memory is set. Local. */
+/* Adds the samples of one pixel. Its fragments must be sorted as by comp_merge_pixel(), or as by
+ * comp_merge_folded_pixel() if is_folded is set. Each sample's z and z_back are set to t. If memory runs out,
+ * lacks_memory is set. Local. */
 void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded);
 
-/* The items may be NULL. */
+/* Frees the lists' samples. The pointers in a list may be NULL. */
 void comp_deep_free(comp_deep_list *lists, int count);
 
 /* Sends every rank's lists to out on rank 0, where they replace the earlier samples of these pixels. The lists are

@@ -5,12 +5,13 @@
 #include "memory.h"
 #include "region.h"
 
-/* Number of rows in one thread's chunk. A thread also marks pixels in the first row of the next chunk, which another
- * thread may process. */
+/* Number of rows in a chunk, which one thread processes. The thread also marks pixels in the first row of the next
+ * chunk, which another thread may process at the same time. */
 enum { ROWS = 32 };
 
-/* Compares two rows of pixels, and stores one byte per channel, nonzero if the channel differs. sRGB codes are nearly
- * the square root of the light, and |root a - root b| > c if (a - b)^2 > 2 c^2 (a + b), which needs no square root. */
+/* Compares two rows of pixels, and stores one byte per channel, nonzero if the channel differs. An sRGB code is nearly
+ * proportional to the square root of linear light. The test |sqrt(a) - sqrt(b)| > c is replaced by (a - b)^2 > 2 c^2 (a
+ * + b), which needs no square root. */
 static void compare_rows(const float *restrict a, const float *restrict b, int64_t pixels, unsigned char *restrict out)
 {
     const float limit = 0.0018f;
@@ -40,8 +41,8 @@ static void mark_pairs(const unsigned char *differ, int64_t pixels, unsigned cha
     }
 }
 
-/* Compares the row's pixels with their neighbours to the right and below (directly, to the left and to the right).
- * differ has 4 bytes per pixel. */
+/* Marks the pixels of row y that differ from a neighbour, and these neighbours: the pixel to the right, and the three
+ * pixels of the next row. `differ` is a buffer of 4 bytes per pixel. */
 static void mark_row(const image *picture, int64_t y, unsigned char *differ, unsigned char *marks)
 {
     const int64_t width = picture->width;

@@ -1,12 +1,13 @@
-/* A rank packs and sends the fragments of blocks that others own, and a finished pixel is sent to rank 0 from any
- * owner. The best owner of a block is therefore a rank that has many fragments in it, because these need not be sent.
- * If the owner were always the rank with the most fragments, a rank with slightly more fragments everywhere would own
- * all blocks. The owner is therefore drawn at random, with a probability in proportion to the fourth power of the
- * rank's number of fragments. A rank with three quarters of the fragments has a probability of 0.99 against one with a
- * quarter; among ranks with similar numbers, each owns about the same share.
+/* Chooses the owners of blocks. A rank must pack and send the fragments of blocks that other ranks own, while each
+ * finished pixel is sent to rank 0 whoever owns it. The best owner of a block is therefore a rank with many fragments
+ * in it, because these need not be sent. If the rank with the most fragments always became the owner, a rank with
+ * slightly more fragments everywhere would own all blocks. The owner is therefore chosen at random, with a probability
+ * proportional to the fourth power of the rank's number of fragments. A rank with three quarters of the fragments has a
+ * probability of 0.99 against a rank with one quarter; ranks with similar numbers own about the same number of blocks.
  *
- * The drawn rank is the one with the largest 4 ln n - ln -ln u, where u is a random number that depends on the block
- * and the rank (the Gumbel trick): the draw needs one maximum over all ranks. */
+ * The random choice takes one maximum over all ranks (the Gumbel trick): the owner is the rank with the largest 4 ln n
+ * - ln(-ln u), where n is its number of fragments, and u a random number between 0 and 1 that depends on the block and
+ * the rank. */
 #include "comp_grid.h"
 
 #include <math.h>
@@ -29,7 +30,7 @@ static void merge_blocks(comp_grid *g)
         g->shift_y++;
 }
 
-/* Makes blocks smaller: reverses merge_blocks(), or halves the rows of strips when a block is one strip. */
+/* Halves the blocks: reverses merge_blocks(), or halves the number of rows of a strip if a block is a single strip. */
 static void divide_blocks(comp_grid *g)
 {
     if (g->shift_x > g->shift_y)
@@ -40,9 +41,9 @@ static void divide_blocks(comp_grid *g)
         g->row_shift--;
 }
 
-/* Returns the grid. Its blocks are nearly square. They are as small as possible with at most COMP_TARGET_BLOCKS blocks;
- * for many ranks they are made smaller until every rank has enough. A block of one row of a strip is not divided
- * further. */
+/* Returns the grid. Blocks are nearly square, and as small as possible without exceeding COMP_TARGET_BLOCKS. If there
+ * are many ranks, blocks are divided further, until there are enough for every rank or a block is one row of a
+ * strip. */
 comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks)
 {
     comp_grid g = {.width = width, .height = height, .row_shift = 5, .threads = 1};
@@ -66,14 +67,16 @@ int32_t comp_claim_priority(uint32_t block, int rank, int64_t fragments)
 {
     if (fragments <= 0) return 0;
     const uint32_t drawn = hash_word(hash_word(block + 1) + (uint32_t)rank);
-    const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f; /* random number between 0 and 1; may be rounded to 1 */
+    /* random number between 0 and 1, which may be rounded to 1 */
+    const float u = ((float)(drawn >> 8) + 0.5f) * 0x1p-24f;
     const float chance = 4 * logf((float)fragments) - logf(-logf(u < 1 ? u : 0x1.fffffep-1f));
-    /* the chance, a logarithm, in steps of 1/16 from 0 to about 1800 */
+    /* the priority in steps of 1/16, from 0 to about 1800 */
     const int steps = (int)(16 * (chance + 3));
     return (int32_t)((uint32_t)(1 + (steps > 0 ? steps : 0)) << 20 | ((uint32_t)rank & 0xfffff));
 }
 
-/* Computes the number of fragments that each rank owns; returns the equal share per owner, rounded up. */
+/* Computes the number of fragments that each rank owns in `loads`. Returns the mean over the ranks that own blocks,
+ * rounded up. */
 static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks)
 {
     uint64_t owners = 0, all = 0;
@@ -89,10 +92,11 @@ static uint64_t find_share(const comp_claim *claims, uint32_t blocks, uint64_t *
 }
 
 /* The state of a pass that moves blocks to other owners. Blocks and the ranks that receive them are visited in the same
- * order, so that most blocks stay near their neighbours. A rank loses a block if its load is then closer to the equal
- * share, and receives one under the same condition. If no rank fulfils it, a rank may exceed the share by an eighth of
- * the block, then by two eighths, and so on; finally any rank below the share receives the block. Such a rank exists as
- * long as another is above the share. No rank loses its last block, so each owner appears among the blocks. */
+ * order, so that most blocks stay near their neighbours. A rank loses a block if that brings its load closer to the
+ * equal share, and a rank receives a block under the same condition. If no rank meets it, the receiving rank may exceed
+ * the share by another eighth of the block's fragments, and so on, until any rank below the share may receive the
+ * block. There is such a rank as long as another rank is above the share. No rank loses its last block, so that the
+ * ranks to consider are the owners in the list of blocks. */
 typedef struct owner_search {
     const comp_claim *claims;
     uint32_t blocks, next;   /* number of blocks, and index of the claim whose rank is considered next */

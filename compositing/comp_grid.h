@@ -1,6 +1,6 @@
-/* Divides the picture into strips of 16 × 32 pixels, row by row, and into blocks of strips. A strip is packed and
- * merged at once; a block has one owner. Many ranks need many blocks to share a picture evenly: strips then have fewer
- * rows. These functions are plain arithmetic without MPI and memory. */
+/* Divides the picture into strips of 16 × 32 pixels, row by row, and groups strips into blocks. A strip is the unit of
+ * packing and merging; a block is the unit of ownership. If there are many ranks, strips have fewer rows, so that there
+ * are enough blocks to share the picture evenly. The functions are plain arithmetic without MPI or allocation. */
 #ifndef COMP_COMP_GRID_H
 #define COMP_COMP_GRID_H
 
@@ -10,9 +10,9 @@ enum {
     COMP_LANES = 16,
     COMP_ROWS = 32, /* maximum number of rows of a strip */
     COMP_STRIP_PIXELS = COMP_LANES * COMP_ROWS,
-    COMP_TARGET_BLOCKS = 2048,    /* target number of blocks, so that a message of all claims is small */
-    COMP_BLOCKS_PER_RANK = 60,    /* minimum number of blocks per rank, on average, if there are many ranks */
-    COMP_COUNTED_RANKS_MAX = 1024 /* beyond this number of ranks the number of blocks does not increase */
+    COMP_TARGET_BLOCKS = 2048,    /* target number of blocks; it keeps the message with all claims small */
+    COMP_BLOCKS_PER_RANK = 60,    /* minimum mean number of blocks per rank */
+    COMP_COUNTED_RANKS_MAX = 1024 /* maximum number of ranks to which the number of blocks is adapted */
 };
 
 typedef struct comp_grid {
@@ -26,8 +26,8 @@ typedef struct comp_grid {
     int threads;
 } comp_grid;
 
-/* Returns the grid of a picture that this number of ranks share. width × height must be at least 1 and at most
- * UINT32_MAX. threads is set to 1. */
+/* Returns the grid of a picture for this number of ranks. width × height must be at least 1 and at most UINT32_MAX. The
+ * grid's number of threads is set to 1. */
 comp_grid comp_grid_of(uint32_t width, uint32_t height, int ranks);
 
 /* Returns the maximum number of blocks of a picture for this number of ranks. */
@@ -38,7 +38,7 @@ static inline uint32_t comp_max_blocks(int ranks)
     return 2 * counted * COMP_BLOCKS_PER_RANK > few ? 2 * counted * COMP_BLOCKS_PER_RANK : few;
 }
 
-/* Returns the number of pixels of a block that the picture's border does not cut. */
+/* Returns the number of pixels of a block that lies entirely in the picture. */
 static inline uint32_t comp_grid_block_pixels(const comp_grid *grid)
 {
     return (uint32_t)COMP_LANES << (grid->shift_x + grid->shift_y + grid->row_shift);
@@ -90,10 +90,11 @@ static inline uint32_t comp_grid_pixel(const comp_grid *grid, uint32_t strip, ui
 
 /* ---- who owns a block ------------------------------------------------------------------------------------------- */
 
-/* A rank's claim to a block. The combined claim of all ranks has the largest priority and the sum of the fragments. */
+/* A rank's claim to own a block. The combination of all ranks' claims has the largest priority and the sum of the
+ * fragments. */
 typedef struct comp_claim {
     int32_t priority;   /* the rank with the largest priority is the owner; 0: the block has no fragments */
-    uint32_t fragments; /* number of fragments in the block; UINT32_MAX if there are more */
+    uint32_t fragments; /* number of fragments in the block, at most UINT32_MAX */
 } comp_claim;
 
 /* Returns a rank's priority to own a block in which it has this number of fragments. */
@@ -119,11 +120,11 @@ static inline void comp_claim_add(const comp_claim *claim, comp_claim *sum)
     sum->priority = sum->priority > claim->priority ? sum->priority : claim->priority;
 }
 
-/* Balances the number of fragments per rank: moves blocks from ranks with more than their share to other owners, until
- * no rank exceeds the mean of the owners by more than the fragments of the fullest block. claims must be those of all
- * ranks; they are the same on all ranks before and after. loads has one entry per rank and receives the number of
- * fragments that the rank owns. Ranks without blocks do not get any, so that if one rank has nearly all fragments, most
- * of them need not be sent. */
+/* Balances the number of fragments per owner: moves blocks from ranks with more than the mean to other owners, until no
+ * rank exceeds the mean by more than the number of fragments in the fullest block. The claims must be the combined
+ * claims of all ranks; they are the same on all ranks before and after. loads has one entry per rank and receives the
+ * number of fragments that the rank owns. A rank without blocks does not receive any: if one rank has nearly all
+ * fragments, it keeps them, so that most of them need not be sent. */
 void comp_claims_balance(comp_claim *claims, uint32_t blocks, uint64_t *loads, int ranks);
 
 #endif

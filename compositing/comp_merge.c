@@ -9,14 +9,15 @@
  * than the sum of their separate absorptions, and each contributes in proportion to its own. This is computed in
  * double, so that the contributions are as exact as the samples.
  *
- * Intervals that overlap are mixed in the common part. The ray is cut at every begin and end of an interval; between
- * cuts each interval counts as a homogeneous medium, and their optical depths and light are added:
+ * Where intervals overlap, their media are mixed. The ray is cut at the start and at the end of every interval. Between
+ * two neighbouring cuts, each interval that spans both is treated as a homogeneous medium, and the optical depths and
+ * the light of these media are added:
  *
- *     |-- a ------------|            -ln T  = sum of the shares of -ln Ta, -ln Tb ... in the cut
- *            |-- b -------------|    colour = (1 - T) times the mean of theirs, weighed by these
+ *     |-- a ------------|            -ln T  = sum of the shares of -ln Ta, -ln Tb ... between the cuts
+ *            |-- b -------------|    colour = (1 - T) times the mean of their colours, weighted by these shares
  *     |  a   |  a and b |   b   |
  *
- * The renderer makes them short enough for this (render/volume/kernel_segments.h). */
+ * The renderer makes intervals short enough for this approximation (render/volume/kernel_segments.h). */
 #include "comp_merge.h"
 
 #include "comp.h"
@@ -49,8 +50,8 @@ static void sift_down(fragment *items, int64_t root, int64_t count)
     items[root] = moving;
 }
 
-/* Sorts by heap sort, which needs no memory and no recursion, and has no bad case if a partition produces thousands of
- * fragments in a pixel. */
+/* Sorts by heap sort, which needs no memory and no recursion, and takes O(n log n) in the worst case too: some
+ * partitions give thousands of fragments in a pixel. */
 static void heap_sort(fragment *items, int64_t count)
 {
     if (count <= insertion_limit) {
@@ -78,7 +79,7 @@ static bool is_sample(const fragment *f)
     return f->kind < FRAGMENT_SURFACE && f->t_in == f->t_out;
 }
 
-/* Counts the samples at the position of the first; returns 1 if the first is not a sample. */
+/* Returns the number of leading samples that have the same position; 1 if the first fragment is not a sample. */
 static int64_t count_coincident_samples(const fragment *sorted, int64_t count)
 {
     int64_t n = 1;
@@ -86,12 +87,12 @@ static int64_t count_coincident_samples(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* The state of a pass through the sorted samples at one position, which determines the samples that count. If a volume
- * has one sample at its cell's end and another at its cell's begin, the cells are neighbours, and rounding has given
- * their common face two positions: one of the two samples is left out. */
+/* The state of a pass over the sorted samples at one position, which determines the samples to blend. If a volume has
+ * one sample at the end of a cell and another at the start of a cell, the cells are neighbours whose common face was
+ * rounded to two positions: one of the two samples is left out. */
 typedef struct sample_pass {
     uint32_t layer; /* the volume whose samples are counted */
-    /* number of samples at their cell's begin that no sample at a cell's end has matched yet */
+    /* number of samples at the start of their cell that no sample at a cell's end has matched yet */
     int64_t unmatched_begins;
     int64_t counted; /* number of samples counted so far */
 } sample_pass;
@@ -109,7 +110,7 @@ static bool is_counted(sample_pass *pass, const fragment *sample)
     return true;
 }
 
-/* Checks whether two of the samples belong to the same volume. */
+/* Returns whether two of the samples belong to the same volume. */
 static bool are_of_one_volume(const fragment *samples, int64_t count)
 {
     sample_pass pass = {0};
@@ -118,12 +119,13 @@ static bool are_of_one_volume(const fragment *samples, int64_t count)
     return false;
 }
 
-/* Two cells with a common face compute its depth within this tolerance, relative to the depth or to 1 if 1 is larger.
- * The value is RENDER_FACE_ERROR of render/rays/render_face_error.h, which compositing may not include. */
+/* Relative tolerance between the depths that two cells compute for their common face; it is relative to the depth or to
+ * 1, whichever is larger. The value is RENDER_FACE_ERROR of render/rays/render_face_error.h, which compositing may not
+ * include. */
 static const float face_error = 4e-6f;
 
-/* Advances *next to the first fragment that begins within rounding of t or behind it; returns the largest end of the
- * volumes in front of it. */
+/* Advances *next to the first fragment that does not begin in front of t by more than rounding. Returns the largest end
+ * of the volume fragments before it, and `reach` if that is larger. */
 static float furthest_end_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
     const float begin = t - face_error * fmaxf(fabsf(t), 1);
@@ -183,11 +185,11 @@ static bool has_length(const fragment *f)
     return f->kind < FRAGMENT_SURFACE && f->t_out > f->t_in;
 }
 
-/* The optical depth that represents an opaque medium. */
+/* Optical depth that stands for that of an opaque medium, which is infinite. */
 static const double opaque_depth = 1e6;
 
-/* Blends the intervals between the depths from and to; all of them must span that range. */
-static void blend_mixed(blend *b, const fragment *items, int64_t count, float from, float to)
+/* Blends the mixture of the intervals between the depths `from` and `to`. All intervals must span these depths. */
+static void blend_mixture(blend *b, const fragment *items, int64_t count, float from, float to)
 {
     double colour[3] = {0, 0, 0}, depth = 0;
     for (int64_t i = 0; i < count; i++) {
@@ -196,7 +198,8 @@ static void blend_mixed(blend *b, const fragment *items, int64_t count, float fr
         const double share = ((double)to - (double)from) / ((double)f->t_out - (double)f->t_in);
         const double own = share * (absorbed < 1 ? -log((double)f->transmittance) : opaque_depth);
         const double emitted =
-            absorbed > 0 ? own / absorbed : share; /* used when transmittances are so close to 1 that they round to 1 */
+            /* the limit of own / absorbed, if transmittances are so close to 1 that absorbed is 0 */
+            absorbed > 0 ? own / absorbed : share;
         for (int c = 0; c < 3; c++) colour[c] += (double)f->colour[c] * emitted;
         depth += own;
     }
@@ -212,7 +215,7 @@ static void swap_fragments(fragment *items, int64_t a, int64_t b)
     items[b] = kept;
 }
 
-/* Moves the intervals that extend behind the depth to the front, in their order; returns their number. */
+/* Moves the intervals that extend behind the depth to the front and keeps their order. Returns their number. */
 static int64_t move_open_to_front(fragment *items, int64_t count, float depth)
 {
     int64_t open = 0;
@@ -229,13 +232,13 @@ static float next_end(const fragment *items, int64_t count)
     return to;
 }
 
-/* Checks whether a fragment begins before the first one ends. */
+/* Returns whether the second fragment begins before the first one ends. */
 static bool is_overlapped(const fragment *sorted, int64_t count)
 {
     return count > 1 && has_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
 }
 
-/* The callback that receives the blended intervals, and its state. callback is NULL if there is none. */
+/* The callback that receives the blended intervals, and its state. callback may be NULL. */
 typedef struct interval_sink {
     comp_interval_callback *callback;
     void *state;
@@ -251,21 +254,23 @@ static void emit_interval(const interval_sink *sink, const blend *b, const fragm
     sink->callback(sink->state, &interval);
 }
 
-/* Same as blend_mixed(), and also passes the mixture to the sink. */
-static void blend_cut(blend *b, const fragment *items, int64_t count, float from, float to, const interval_sink *sink)
+/* As blend_mixture(), and also passes the mixture to the sink. */
+static void blend_interval(blend *b, const fragment *items, int64_t count, float from, float to,
+                           const interval_sink *sink)
 {
     blend own = {{0, 0, 0}, 1};
     if (sink->callback) {
-        blend_mixed(&own, items, count, from, to);
+        blend_mixture(&own, items, count, from, to);
         emit_interval(sink, &own, items, from, to);
     }
-    blend_mixed(b, items, count, from, to);
+    blend_mixture(b, items, count, from, to);
 }
 
-/* Blends fragments from the first one until no interval is open; returns their number. Open intervals are kept at the
- * front, so that a cut costs only the intervals that are mixed in it: a thousand short intervals in a row beside a long
- * one make a thousand cuts of two. At the end the fragments are in their original order. */
-static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const interval_sink *sink)
+/* Blends fragments from the first one on until no interval is open; returns their number. An interval is open at a
+ * depth if it begins there or in front, and ends behind. Open intervals are kept at the front of the list, so that the
+ * cost between two cuts depends only on the number of intervals mixed there: a long interval beside a thousand
+ * consecutive short ones costs a thousand mixtures of two. At the end the fragments are in their original order. */
+static int64_t blend_overlapping(blend *b, fragment *sorted, int64_t count, const interval_sink *sink)
 {
     float at = sorted[0].t_in;
     int64_t open = 0, end = 0;
@@ -282,14 +287,14 @@ static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const interv
         if (open == 0 || b->transmittance == 0) break;
         float to = next_end(sorted, open);
         if (end < count && sorted[end].t_in < to) to = sorted[end].t_in;
-        blend_cut(b, sorted, open, at, to, sink);
+        blend_interval(b, sorted, open, at, to, sink);
         at = to;
     }
     heap_sort(sorted, end);
     return end;
 }
 
-/* Same as blend_sorted(), for a pixel of one fragment, which is the most frequent case. */
+/* As blend_sorted(), for a pixel with one fragment, which is the most frequent case. */
 static void blend_single(const fragment *f, const float background[4], float out_rgba[4], float *out_depth)
 {
     for (int c = 0; c < 3; c++) out_rgba[c] = 0 + f->colour[c] + f->transmittance * background[c];
@@ -301,14 +306,14 @@ static void blend_single(const fragment *f, const float background[4], float out
 static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t count, const float background[4],
                                                    float out_rgba[4], float *out_depth)
 {
-    static const interval_sink nobody = {NULL, NULL};
+    static const interval_sink no_sink = {NULL, NULL};
     heap_sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
         if (is_overlapped(items + i, count - i)) {
             blend run = {{0, 0, 0}, 1};
-            n = blend_run(&run, items + i, count - i, &nobody);
+            n = blend_overlapping(&run, items + i, count - i, &no_sink);
             for (int c = 0; c < 3; c++) colour[c] += transmittance * (float)run.colour[c];
             transmittance *= (float)run.transmittance;
             continue;
@@ -323,7 +328,8 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
     *out_depth = nearest_surface(items, count);
 }
 
-/* Counts the leading fragments that a fold combines into one: those of volumes in the same interval. */
+/* Returns the number of leading fragments that are folded into one (fragment_fold.h): volume fragments in the same
+ * interval of the ray. */
 static int64_t count_folded(const fragment *sorted, int64_t count)
 {
     const int32_t interval = fragment_interval_number(sorted[0].t_in);
@@ -333,9 +339,10 @@ static int64_t count_folded(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* Checks whether no light is left for next. If next is in a later interval than before, FRAGMENT_DARK counts as no
- * light, because ranks may have omitted fragments there. */
-static bool is_dark(float transmittance, const fragment *before, const fragment *next)
+/* Returns whether `next` is invisible behind the fragments blended so far, of which `before` is the last. If `next` is
+ * in a later interval than `before`, a transmittance of at most FRAGMENT_DARK counts as 0, because ranks may have
+ * omitted fragments of later intervals (fragment_fold.h). */
+static bool is_hidden_behind(float transmittance, const fragment *before, const fragment *next)
 {
     return transmittance == 0 || (transmittance <= FRAGMENT_DARK &&
                                   fragment_interval_number(before->t_in) != fragment_interval_number(next->t_in));
@@ -347,7 +354,7 @@ void comp_merge_folded_pixel(fragment *items, int64_t count, const float backgro
     heap_sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
-    for (int64_t i = 0, n; i < count && !(i > 0 && is_dark(transmittance, &items[i - 1], &items[i])); i += n) {
+    for (int64_t i = 0, n; i < count && !(i > 0 && is_hidden_behind(transmittance, &items[i - 1], &items[i])); i += n) {
         n = count_folded(items + i, count - i);
         const fragment f = fragment_fold(items + i, n);
         for (int c = 0; c < 3; c++) colour[c] += transmittance * f.colour[c];
@@ -366,14 +373,14 @@ void comp_merge_pixel(fragment *items, int64_t count, const float background[4],
         blend_sorted(items, count, background, out_rgba, out_depth);
 }
 
-void comp_merge_cut(fragment *sorted, int64_t count, comp_interval_callback *callback, void *state)
+void comp_merge_intervals(fragment *sorted, int64_t count, comp_interval_callback *callback, void *state)
 {
     const interval_sink sink = {callback, state};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
         if (is_overlapped(sorted + i, count - i)) {
             blend run = {{0, 0, 0}, 1};
-            n = blend_run(&run, sorted + i, count - i, &sink);
+            n = blend_overlapping(&run, sorted + i, count - i, &sink);
             transmittance *= (float)run.transmittance;
             continue;
         }
@@ -384,10 +391,11 @@ void comp_merge_cut(fragment *sorted, int64_t count, comp_interval_callback *cal
     }
 }
 
-void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_interval_callback *callback, void *state)
+void comp_merge_folded_intervals(const fragment *sorted, int64_t count, comp_interval_callback *callback, void *state)
 {
     float transmittance = 1;
-    for (int64_t i = 0, n; i < count && !(i > 0 && is_dark(transmittance, &sorted[i - 1], &sorted[i])); i += n) {
+    for (int64_t i = 0, n; i < count && !(i > 0 && is_hidden_behind(transmittance, &sorted[i - 1], &sorted[i]));
+         i += n) {
         n = count_folded(sorted + i, count - i);
         const fragment f = fragment_fold(sorted + i, n);
         callback(state, &f);
@@ -395,14 +403,16 @@ void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_interval_
     }
 }
 
-/* Fragments in darkness are not tested, because only some partitions produce them. */
+/* Invisible fragments are not tested, because only some partitions produce them. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count)
 {
     float transmittance = 1;
-    int64_t lit = 0;
-    for (int64_t n; lit < count && !(lit > 0 && is_dark(transmittance, &sorted[lit - 1], &sorted[lit])); lit += n) {
-        n = count_folded(sorted + lit, count - lit);
-        transmittance *= fragment_fold(sorted + lit, n).transmittance;
+    int64_t visible = 0;
+    for (int64_t n;
+         visible < count && !(visible > 0 && is_hidden_behind(transmittance, &sorted[visible - 1], &sorted[visible]));
+         visible += n) {
+        n = count_folded(sorted + visible, count - visible);
+        transmittance *= fragment_fold(sorted + visible, n).transmittance;
     }
-    return comp_pixel_overlaps(sorted, lit);
+    return comp_pixel_overlaps(sorted, visible);
 }

@@ -1,4 +1,5 @@
-/* Merges as comp_merge.c does, but returns the intervals of a pixel instead of its colour. */
+/* Merges a pixel's fragments by the rules of comp_merge.c, but passes the resulting intervals to a callback instead of
+ * computing a colour. */
 #ifndef COMP_COMP_MERGE_H
 #define COMP_COMP_MERGE_H
 
@@ -6,12 +7,14 @@
 
 typedef void comp_interval_callback(void *state, const fragment *stretch);
 
-/* Passes to the callback the intervals that comp_merge_pixel() blends, front to back: for overlapping intervals their
- * mixtures between cuts, for samples at one position their sum, and nothing behind an opaque interval. sorted are a
- * pixel's fragments as sorted by comp_merge_pixel(); their order is the same afterwards. Local. */
-void comp_merge_cut(fragment *sorted, int64_t count, comp_interval_callback *callback, void *state);
+/* Calls the callback for each interval that comp_merge_pixel() blends, front to back. Overlapping intervals are split
+ * at the starts and ends of all of them, and each piece is passed as the mixture of the intervals that span it. Samples
+ * at the same position are passed as one sample. Nothing behind an opaque interval is passed. sorted: the pixel's
+ * fragments in the order of comp_merge_pixel(); the order is the same on return. Local. */
+void comp_merge_intervals(fragment *sorted, int64_t count, comp_interval_callback *callback, void *state);
 
-/* Same as comp_merge_cut(), for comp_merge_folded_pixel(), which blends one fragment per folded interval. */
-void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_interval_callback *callback, void *state);
+/* As comp_merge_intervals(), for the fragments that comp_merge_folded_pixel() blends: one per interval of the ray, into
+ * which the interval's fragments are folded (fragment_fold.h). */
+void comp_merge_folded_intervals(const fragment *sorted, int64_t count, comp_interval_callback *callback, void *state);
 
 #endif

@@ -1,9 +1,10 @@
-/* Most pixels have one fragment, or hits of opaque surfaces, of which only the nearest is visible. A strip's fragments
- * are therefore joined in a sheet, 16 pixels at a time, and blended there. The remaining fragments, which have to be
- * blended with another one in their pixel, are listed and merged pixel by pixel by comp_merge_pixel().
+/* Merges the fragments of the strips that a rank owns. Most pixels have one fragment, or only hits of opaque surfaces,
+ * of which the nearest is visible. A strip's fragments are therefore joined in a sheet (comp_sheet.h), 16 pixels at a
+ * time, and blended there. Pixels in which several fragments must be blended are called mixed: their fragments are
+ * listed and merged by comp_merge_pixel().
  *
- * Fragments behind an opaque surface are dropped, although volumes in front of the surface may arrive later: merging
- * never uses a fragment behind an opaque surface. */
+ * Fragments behind an opaque surface are dropped, even if volumes in front of the surface arrive later, because merging
+ * never uses them. */
 #include "comp_owned.h"
 
 #include <string.h>
@@ -14,11 +15,13 @@
 
 /* Working memory of a thread; its lists are kept from strip to strip. */
 typedef struct merge_scratch {
-    comp_sheet joined, other,
-        pixels; /* sheet with all fragments merged so far, the sheet that is merged next, and the finished pixels */
-    fragment_list remaining,
-        listed;                /* fragments that do not fit in the sheet; their .pixel is the index in the strip */
-    uint16_t mixed[COMP_ROWS]; /* bit mask per row: pixels that have fragments in the list `remaining` */
+    comp_sheet joined; /* the fragments joined so far, one per pixel */
+    comp_sheet other;  /* the sheet that is joined next */
+    comp_sheet pixels; /* the finished pixels */
+    /* the fragments of mixed pixels except the one in `joined`, and all fragments of mixed pixels; their .pixel is the
+     * index in the strip */
+    fragment_list remaining, listed;
+    uint16_t mixed[COMP_ROWS]; /* bit mask per row: the mixed pixels */
     /* number of fragments of each mixed pixel, and the index in `listed` at which they end */
     uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS];
     comp_writer writer;
@@ -37,7 +40,7 @@ static bool reserve_fragments(fragment_list *list, int64_t count)
 
 /* ---- joined ----------------------------------------------------------------------------------------------------- */
 
-/* Marks a pixel in the sheet as one that is blended from a list of fragments, and counts its fragment in the sheet. */
+/* Marks the pixel as mixed, and counts its fragment in the sheet. */
 static void mark_mixed(merge_scratch *m, uint32_t at)
 {
     const unsigned bit = 1u << at % COMP_LANES;
@@ -57,7 +60,7 @@ static bool add_remaining(merge_scratch *m, const fragment *item, uint32_t at)
     return true;
 }
 
-/* Joins a fragment in a pixel that already has another. */
+/* Joins a fragment with the one that the sheet already has in its pixel. */
 static bool join_second(merge_scratch *m, const fragment *item, uint32_t at)
 {
     const fragment other = comp_sheet_get(&m->joined, at, item->pixel);
@@ -115,7 +118,7 @@ static bool join_all(const comp_owned *owned, uint32_t strip, merge_scratch *m)
 
 /* ---- listed ----------------------------------------------------------------------------------------------------- */
 
-/* Returns the next mixed pixel, starting with index from, or COMP_STRIP_PIXELS if there is none. */
+/* Returns the first mixed pixel with at least the index `from`; COMP_STRIP_PIXELS if there is none. */
 static uint32_t next_mixed_pixel(const merge_scratch *m, uint32_t from)
 {
     for (uint32_t r = from / COMP_LANES; r < COMP_ROWS; r++) {
@@ -125,9 +128,9 @@ static uint32_t next_mixed_pixel(const merge_scratch *m, uint32_t from)
     return COMP_STRIP_PIXELS;
 }
 
-/* Lists the remaining fragments together with those that they are blended with; the fragments of pixel k then begin at
- * ends[k]. */
-static bool list_pixels(merge_scratch *m)
+/* Lists all fragments of mixed pixels by pixel; those of pixel k begin at ends[k] on return. Returns false if memory
+ * ran out. */
+static bool list_mixed_pixels(merge_scratch *m)
 {
     uint32_t sum = 0;
     for (uint32_t k = next_mixed_pixel(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed_pixel(m, k + 1)) {
@@ -168,8 +171,8 @@ static void blend_listed(const comp_grid *grid, const comp_merge_output *merged,
 
 /* ---- strips ----------------------------------------------------------------------------------------------------- */
 
-/* Writes the pixels of a strip. Strips without pixels are sent too, in a few bytes, so that rank 0 fills them with the
- * background. */
+/* Writes the finished pixels of a strip into a message. Strips without pixels are written too, in a few bytes, so that
+ * rank 0 fills them with the background. */
 static bool write_pixels(const comp_owned *owned, merge_scratch *m)
 {
     const int count = comp_sheet_count(&m->pixels);
@@ -185,7 +188,7 @@ static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merg
     if (!join_all(owned, strip, m)) return false;
     comp_sheet_finish(&m->joined, merged->background, &m->pixels);
     if (merged->deep) mark_all_mixed(m);
-    if (!list_pixels(m)) return false;
+    if (!list_mixed_pixels(m)) return false;
     blend_listed(owned->traced_strips->grid, merged, m);
     if (!merged->out) return write_pixels(owned, m);
     comp_sheet_store(&m->pixels, owned->traced_strips->grid, merged->background, merged->out);
@@ -193,7 +196,8 @@ static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merg
 }
 
 /* Stores the background in a strip without fragments. */
-static void clear_strip(const comp_grid *grid, uint32_t strip, const comp_merge_output *merged, merge_scratch *m)
+static void fill_with_background(const comp_grid *grid, uint32_t strip, const comp_merge_output *merged,
+                                 merge_scratch *m)
 {
     comp_sheet_begin(&m->pixels, strip);
     comp_sheet_store(&m->pixels, grid, merged->background, merged->out);
@@ -208,7 +212,7 @@ static bool merge_strips(const comp_owned *owned, const comp_merge_output *merge
         if (is_ok && place == owned->place)
             is_ok = merge_strip(owned, s, merged, m);
         else if (is_ok && place < 0 && merged->out)
-            clear_strip(owned->traced_strips->grid, s, merged, m);
+            fill_with_background(owned->traced_strips->grid, s, merged, m);
     }
     return is_ok;
 }

@@ -9,15 +9,15 @@
 
 /* The input of one rank's merge: all fragments in the strips that it owns. */
 typedef struct comp_owned {
-    const comp_strips *traced_strips; /* fragments that this rank traced */
+    const comp_strips *traced_strips; /* fragments that this rank has traced, by strip */
     comp_received arrivals;           /* fragments received from other ranks for these strips */
     const comp_owners *owners;
     int place;
 } comp_owned;
 
-/* Merges all fragments of the strips. If merged->out is given, it receives their pixels, and the background in pixels
- * without fragments; otherwise *finished receives messages for the rank of the parent. Local; on an error *finished is
- * empty, and out may have some of the pixels. */
+/* Merges all fragments of the strips. If merged->out is not NULL, it receives the pixels, and the background in pixels
+ * without fragments. Otherwise *finished receives messages with the pixels for rank `parent`. Local. On an error
+ * *finished is empty, and out may contain some of the pixels. */
 insitu_status comp_owned_merge(const comp_owned *owned, const comp_merge_output *merged, int parent,
                                comp_messages *finished, base_error *error);
 

@@ -12,19 +12,18 @@ typedef struct comp_pixel {
     float rgba[4];
 } comp_pixel;
 
-/* Returns an error if the image has no pixels, or more pixels than a fragment's 32-bit pixel index can address.
- * Local. */
+/* Returns an error if the image has no pixels, or more than a fragment's 32-bit pixel index can address. Local. */
 insitu_status comp_check_size(const image *out, base_error *error);
 
 /* Adds the pixel to the set. Other threads may add pixels at the same time. */
 void comp_add_overlap(unsigned char *overlaps, uint32_t pixel);
 
-/* Settings of a merge, and where its results go. */
+/* Settings of a merge, and the destinations of its results. */
 typedef struct comp_merge_output {
     const float *background; /* colour of the background: linear premultiplied RGBA */
     bool is_folded;          /* pixels are merged by comp_merge_folded_pixel() */
     image *out;              /* picture that receives the pixels on rank 0; NULL on other ranks */
-    /* set of pixels (pixel_set.h) that receives the pixels whose fragments overlap; NULL: not requested */
+    /* set (pixel_set.h) to which pixels with overlapping fragments are added; NULL: overlaps are not searched */
     unsigned char *overlaps;
     comp_deep_list *deep; /* lists that receive the samples, one per thread; NULL if deep samples are not requested */
 } comp_merge_output;

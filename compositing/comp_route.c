@@ -40,7 +40,8 @@ static void add_rounds(comp_route *route, int number, int most)
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix)
 {
     const bool is_by_nodes = schedule == COMP_NODES || schedule == COMP_RADIX;
-    comp_route route = {.schedule = schedule, .ranks = ranks, .nodes = {1, false}, .longest_dense = COMP_LONGEST_DENSE};
+    comp_route route = {
+        .schedule = schedule, .ranks = ranks, .nodes = {1, false}, .max_dense_ranks = COMP_MAX_DENSE_RANKS};
     if (is_by_nodes) route.nodes = nodes;
     int groups = ranks / route.nodes.ranks;
     if (schedule == COMP_RADIX || schedule == COMP_BINARY) {
@@ -77,7 +78,7 @@ int comp_route_stride(const comp_route *route, int round)
     return stride;
 }
 
-void comp_route_fold(const comp_route *route, comp_claim *claims, uint32_t blocks)
+void comp_route_assign_places(const comp_route *route, comp_claim *claims, uint32_t blocks)
 {
     for (uint32_t b = 0; b < blocks; b++) {
         if (!claims[b].priority) continue;

@@ -21,7 +21,7 @@
 
 #include "comp_grid.h"
 
-enum { COMP_MOST_ROUNDS = 32, COMP_LONGEST_DENSE = 64 };
+enum { COMP_MOST_ROUNDS = 32, COMP_MAX_DENSE_RANKS = 64 };
 
 typedef enum comp_schedule {
     COMP_AUTOMATIC,
@@ -32,8 +32,8 @@ typedef enum comp_schedule {
     COMP_SCHEDULE_COUNT
 } comp_schedule;
 
-/* The distribution of ranks over nodes: every node has the same number, either in succession or cyclically. ranks is 1
- * if neither is the case. */
+/* The distribution of ranks over nodes: every node has the same number of ranks, which are numbered either
+ * consecutively or cyclically over the nodes. In any other distribution `ranks` is 1. */
 typedef struct comp_nodes {
     int ranks; /* number of ranks per node */
     bool is_cyclic;
@@ -45,7 +45,8 @@ typedef struct comp_route {
     comp_nodes nodes;
     int round_count;
     int radix[COMP_MOST_ROUNDS];
-    int longest_dense; /* at most COMP_LONGEST_DENSE, the value that comp_route_of() sets */
+    /* largest number of ranks in a dense round; at most COMP_MAX_DENSE_RANKS, which comp_route_of() sets */
+    int max_dense_ranks;
 } comp_route;
 
 /* Returns the route of a schedule other than COMP_AUTOMATIC. radix is the maximum number of ranks that exchange in a
@@ -64,22 +65,22 @@ static inline int comp_route_digit(const comp_route *route, int round, int strid
     return place / stride % route->radix[round];
 }
 
-/* Returns the place of the partner with the digit. */
+/* Returns the place of the partner whose digit in the round is `digit`. */
 static inline int comp_route_partner(const comp_route *route, int round, int stride, int place, int digit)
 {
     return place + (digit - comp_route_digit(route, round, stride, place)) * stride;
 }
 
-/* Checks whether the round is dense, which means that every partner sends to every other. In a sparse round only
- * partners that have fragments send. */
+/* Returns whether the round is dense: every partner sends to every other. In a sparse round only partners that have
+ * fragments send. */
 static inline bool comp_route_is_dense(const comp_route *route, int round)
 {
-    return route->radix[round] <= route->longest_dense;
+    return route->radix[round] <= route->max_dense_ranks;
 }
 
-/* Converts the owners in the claims from ranks to places. A rank beyond the route's owners owns nothing; its blocks are
- * owned by its partner. */
-void comp_route_fold(const comp_route *route, comp_claim *claims, uint32_t blocks);
+/* Converts the owners in the claims from ranks to places. Ranks beyond the route's owners cannot own blocks; the blocks
+ * of such a rank go to its partner. */
+void comp_route_assign_places(const comp_route *route, comp_claim *claims, uint32_t blocks);
 
 /* Returns "direct", "nodes", "radix" or "binary". */
 const char *comp_schedule_name(comp_schedule schedule);

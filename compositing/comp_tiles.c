@@ -1,10 +1,11 @@
-/* A single rank owns all pixels, and the thread that traces a tile has all fragments of the tile in cache. Fragments
- * are therefore not collected: the pixels of the tile are blended and stored immediately, with the background in empty
- * pixels, and the fragments are discarded. The image is written once, there is no list of fragments, and no thread
- * waits for the last tile.
+/* If there is a single rank, it owns all pixels, and the thread that has traced a tile has all fragments of the tile in
+ * its cache. Fragments are therefore not collected. The thread blends and stores the pixels of the tile immediately,
+ * with the background in empty pixels, and discards the fragments. The image is written once, there is no list of
+ * fragments, and no thread waits for the last tile.
  *
- * A pixel's fragments need not be consecutive. They are counted and numbered pixel by pixel. A pixel of one fragment,
- * the most frequent case, is blended in place; the fragments of other pixels are copied to a pile first. */
+ * The fragments of a pixel need not be consecutive. Their indices are sorted by pixel (counting sort). A pixel with one
+ * fragment, the most frequent case, is blended from the fragment in place; the fragments of other pixels are copied to
+ * a buffer first. */
 #include "comp_tiles.h"
 
 #include <assert.h>
@@ -28,7 +29,8 @@ typedef struct buffer {
 } buffer;
 
 struct comp_tile_scratch {
-    buffer starts;          /* int64_t, one per pixel of a tile and one more: first index of each pixel in order */
+    /* array of int64_t with one entry per pixel and one more: the index in `order` of each pixel's first fragment */
+    buffer starts;
     buffer order;           /* array of int64_t: indices of fragments, sorted by pixel */
     buffer pixel_fragments; /* copies of one pixel's fragments, which are sorted there */
     int64_t fragments;
@@ -106,8 +108,8 @@ static void clear_tile(const comp_tiles *tiles, const pixel_area *area)
         }
 }
 
-/* Fills a tile without fragments. The stores bypass the caches, which then neither read the overwritten lines nor evict
- * lines that later tiles need. */
+/* Fills a tile that has no fragments with the background. The stores bypass the caches, so that they neither load the
+ * overwritten cache lines nor evict lines that later tiles need. */
 static void clear_empty_tile(const comp_tiles *tiles, const pixel_area *area)
 {
 #if defined(__SSE2__)
@@ -128,8 +130,8 @@ static void clear_empty_tile(const comp_tiles *tiles, const pixel_area *area)
     clear_tile(tiles, area);
 }
 
-/* Returns the pixel's index in the area, row by row. The division gives the correct integer, because adding half a
- * pixel keeps the quotient far from the next integer. */
+/* Returns the pixel's index in the area, row by row. The truncated quotient is exact: half a pixel is added, so that
+ * the quotient is far from integers compared with its rounding error. */
 static uint32_t index_in_area(const comp_tiles *tiles, const pixel_area *area, uint32_t pixel)
 {
     const uint32_t width = (uint32_t)tiles->out->width;
@@ -139,8 +141,8 @@ static uint32_t index_in_area(const comp_tiles *tiles, const pixel_area *area, u
     return row * (uint32_t)area->width + (from - row * width);
 }
 
-/* Sorts the indices of fragments by pixel: the fragments of the k-th pixel are order[starts[k]] .. order[starts[k +
- * 1]]. */
+/* Sorts the indices of fragments by pixel: those of pixel k of the area are order[starts[k]] .. order[starts[k + 1] -
+ * 1]. */
 static void sort_by_pixel(const comp_tiles *tiles, const pixel_area *area, const fragment *items, int64_t count,
                           int64_t *starts, int64_t *order)
 {
@@ -152,7 +154,8 @@ static void sort_by_pixel(const comp_tiles *tiles, const pixel_area *area, const
     starts[pixels] = count;
 }
 
-/* Copies one pixel's fragments to the pile; returns NULL if memory ran out. */
+/* Copies one pixel's fragments to the thread's buffer; a single fragment is returned in place. Returns NULL if memory
+ * ran out. */
 static fragment *copy_pixel(comp_tile_scratch *own, fragment *items, const int64_t *order, int64_t count)
 {
     if (count == 1) return &items[*order];
@@ -171,8 +174,8 @@ static void blend_pixel(const comp_tiles *tiles, int64_t pixel, fragment *items,
         comp_add_overlap(tiles->overlaps, (uint32_t)pixel);
 }
 
-/* Stores a tile whose pixels have one fragment each. Returns false if a pixel has two; then the whole tile must be
- * stored again. */
+/* Blends and stores a tile whose pixels have at most one fragment each. Returns false if a pixel has two; then the
+ * whole tile must be stored again. */
 static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragment *items, int64_t count)
 {
     const int64_t pixels = (int64_t)area->width * area->height;
@@ -211,7 +214,7 @@ static bool blend_tile(const comp_tiles *tiles, comp_tile_scratch *own, const pi
     return true;
 }
 
-bool comp_tiles_take(void *state, int thread, const pixel_area *area, fragment *items, int64_t count)
+bool comp_tiles_blend(void *state, int thread, const pixel_area *area, fragment *items, int64_t count)
 {
     comp_tiles *tiles = state;
     comp_tile_scratch *own = &tiles->scratch[thread];

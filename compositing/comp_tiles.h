@@ -9,20 +9,22 @@ typedef struct comp_tile_scratch comp_tile_scratch;
 typedef struct comp_tiles {
     const float *background;
     image *out;
-    unsigned char *overlaps; /* set of pixels (pixel_set.h) whose fragments overlap; NULL if not requested */
+    /* set of the pixels (pixel_set.h) whose fragments overlap; NULL: overlaps are not searched */
+    unsigned char *overlaps;
     double inverse_width;
     int threads;
     comp_tile_scratch *scratch; /* scratch memory, one per thread */
 } comp_tiles;
 
-/* Begins tiles for at most this number of threads. out is the same as for comp_composite(). If finds_overlaps, pixels
- * whose fragments overlap are recorded. Local; after an error there is nothing to end. */
+/* Begins tiles for at most this number of threads. out is the same as for comp_composite(). If finds_overlaps is set,
+ * pixels whose fragments overlap are recorded. Local; after an error there is nothing to end. */
 insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int threads, bool finds_overlaps,
                                image *out, base_error *error);
 
-/* A fragment_callback (fragment.h) with tiles as its state: the tile's pixels in out become bitwise equal to the result
- * of comp_composite() for these fragments. Tiles must lie within out and not overlap. */
-bool comp_tiles_take(void *tiles, int thread, const pixel_area *area, fragment *items, int64_t count);
+/* A fragment_callback (fragment.h), whose state is `tiles`: blends the fragments of a tile and stores its pixels in
+ * out. The result is bitwise equal to that of comp_composite() for these fragments. Tiles must lie within out and not
+ * overlap. */
+bool comp_tiles_blend(void *tiles, int thread, const pixel_area *area, fragment *items, int64_t count);
 
 /* Ends the tiles. statistics receives the number of fragments taken and the time of the slowest thread; overlaps, which
  * may be NULL, receives the pixels whose fragments overlap. */

@@ -498,7 +498,7 @@ static void check_folded(const comp_route *route)
     claim_shape(&grid, interval_of_disc);
     for (uint32_t b = 0; b < grid.blocks; b++)
         claims[b].priority = comp_claim_priority(b, (int)(next_random() % (uint32_t)route->ranks), claims[b].fragments);
-    comp_route_fold(route, claims, grid.blocks);
+    comp_route_assign_places(route, claims, grid.blocks);
     for (uint32_t b = 0; b < grid.blocks; b++) assert_true(comp_priority_rank(claims[b].priority) < route->owners);
     assert_true(check_levels(grid.blocks, route->owners) <= 1.1);
 }
@@ -959,7 +959,7 @@ static void tiles_are_merged_to_the_bit(void **context)
             fragment given[LARGEST_TILE * LARGEST_TILE * 31];
             const int64_t count = t.starts[i + 1] - t.starts[i];
             if (count) memcpy(given, t.items + t.starts[i], (size_t)count * sizeof *given);
-            if (!comp_tiles_take(&tiles, omp_get_thread_num(), &t.areas[i], given, count)) abort();
+            if (!comp_tiles_blend(&tiles, omp_get_thread_num(), &t.areas[i], given, count)) abort();
         }
         comp_tiles_end(&tiles, &overlaps, &statistics);
         assert_int_equal(statistics.sent_fragments, t.starts[t.tile_count]);
@@ -978,7 +978,7 @@ static insitu_status merge_tiles(tiled *t, comp_overlaps *overlaps)
     insitu_status status = comp_tiles_begin(&tiles, blue, 1, true, &t->picture, &error);
     if (status != INSITU_OK) return status;
     for (int i = 0; i < t->tile_count && status == INSITU_OK; i++)
-        if (!comp_tiles_take(&tiles, 0, &t->areas[i], t->items + t->starts[i], t->starts[i + 1] - t->starts[i]))
+        if (!comp_tiles_blend(&tiles, 0, &t->areas[i], t->items + t->starts[i], t->starts[i + 1] - t->starts[i]))
             status = INSITU_ERROR_MEMORY;
     comp_tiles_end(&tiles, overlaps, &statistics);
     return status;

@@ -174,7 +174,7 @@ static void set_schedule(uint32_t turn)
 {
     group.schedule = (comp_schedule)(COMP_DIRECT + turn % (COMP_SCHEDULE_COUNT - 1));
     group.nodes = (comp_nodes){1, false};
-    group.longest_dense = turn / 4 % 2; /* 1: all rounds are sparse */
+    group.max_dense_ranks = turn / 4 % 2; /* 1: all rounds are sparse */
     for (int n = 2; n < rank_count && turn / 8 % 2; n++)
         if (rank_count % n == 0) group.nodes = (comp_nodes){n, turn / 16 % 2};
 }
@@ -328,7 +328,7 @@ static void messages_are_as_counted(void **context)
     for (uint32_t turn = 0; turn < 32; turn++) {
         comp_statistics statistics;
         set_schedule(turn);
-        if (group.longest_dense) continue;
+        if (group.max_dense_ranks) continue;
         setting s = make_setting(16, 16, 0, distribute_random, 1);
         assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK,
                           "all is well");

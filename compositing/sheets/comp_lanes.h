@@ -1,5 +1,5 @@
-/* A row of a strip as a vector of 16 32-bit numbers. The compiler splits it into registers of the instruction set's
- * width. */
+/* Defines the vector of a strip's row: 16 numbers of 32 bits. The compiler splits it into registers of the instruction
+ * set's width. */
 #ifndef COMP_COMP_LANES_H
 #define COMP_COMP_LANES_H
 

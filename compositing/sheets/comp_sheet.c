@@ -16,8 +16,8 @@ const comp_sheet_loops *comp_sheet_loops_of(cpu_isa isa)
     return &comp_sheet_plain;
 }
 
-/* Plans a compacted sheet: count values stored one after the other in rows of 16. Sheets with many gaps are compacted
- * before packing, because a vector with few values takes as long as a full one. */
+/* Plans a compacted sheet: `count` values stored one after the other in rows of 16. Sheets with many gaps are compacted
+ * before packing, because a row with few values takes as long to pack as a full one. */
 static void plan_compact(int count, sheet_plan *plan)
 {
     plan->rows = (count + COMP_LANES - 1) / COMP_LANES;
@@ -78,7 +78,7 @@ unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int wor
     return at;
 }
 
-/* Reads the row masks that follow the head; returns the position of the first word. */
+/* Reads the row masks that follow the header; returns the position of the first word. */
 static const unsigned char *read_masks(const unsigned char *in, const comp_sheet_head *head, uint16_t masks[COMP_ROWS])
 {
     in += COMP_SHEET_HEAD;

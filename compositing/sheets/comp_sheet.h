@@ -1,15 +1,16 @@
-/* A sheet holds at most one fragment, or one finished pixel, per pixel of a strip. This file also declares its lossless
- * compression.
+/* Defines sheets and their lossless compression. A sheet holds at most one fragment, or one finished pixel, for each
+ * pixel of a strip (comp_grid.h).
  *
  * Values of a picture vary smoothly from row to row. Each value is therefore predicted, either as equal to the value
- * above it or by linear extrapolation from the two values above it. The prediction uses integers modulo 2^32: no float
- * is rounded, and NaN keeps its bits. A row is a vector, so that 16 pixels are packed or unpacked at once. All
- * residuals of a row are stored with the same number of nibbles (half bytes), which is that of the largest one:
+ * above it or by linear extrapolation from the two values above it, and the residual is stored. Residuals are
+ * differences of integers modulo 2^32, so that nothing is rounded and NaN keeps its bits. A row is a vector, so that 16
+ * pixels are packed or unpacked at once. All residuals of a row are stored with the same number of nibbles (half
+ * bytes), which is what the largest residual needs:
  *
- *     head | masks of rows with gaps | word 1: first value, nibble counts of rows, residuals | word 2 ...
+ *     header | masks of rows with gaps | word 1: first value, nibble counts of rows, residuals | word 2 ...
  *
  * A word with the same value in all pixels is stored once. A word that equals the preceding word in all pixels is not
- * stored; examples are t_out of hits and the channels of a grey pixel. */
+ * stored; examples are t_out of hits, which equals t_in, and the channels of a grey pixel. */
 #ifndef COMP_COMP_SHEET_H
 #define COMP_COMP_SHEET_H
 
@@ -25,14 +26,14 @@
 
 enum { COMP_WORDS = 7, COMP_PIXEL_WORDS = 5, COMP_SHEET_HEAD = 20, COMP_SHEET_SLACK = 128 };
 
-/* The words of a fragment are its members except the pixel, in their order (fragment.h). The words of a finished pixel
- * are its depth and RGBA. */
+/* A sheet stores words: the members of a fragment except its pixel index, in their order (fragment.h), or the depth and
+ * RGBA of a finished pixel. */
 typedef struct comp_sheet {
     uint32_t words[COMP_WORDS][COMP_STRIP_PIXELS]; /* indexed by comp_grid_at(); words of absent pixels are undefined */
-    uint16_t masks[COMP_ROWS];                     /* bit mask per row: the pixels that are present */
+    uint16_t masks[COMP_ROWS];                     /* bit mask per row: the pixels that have a fragment */
     uint32_t strip;
-    bool is_opaque; /* all fragments are hits of opaque surfaces, so that only the nearest one is visible when sheets
-                       are merged */
+    /* set if all fragments are hits of opaque surfaces, so that only the nearest one is visible if sheets are joined */
+    bool is_opaque;
 } comp_sheet;
 
 /* Makes the sheet empty. */
@@ -55,8 +56,8 @@ static inline bool comp_is_opaque(const fragment *item)
     return transmittance == 0 && item->kind >= FRAGMENT_SURFACE;
 }
 
-/* Stores a fragment in the sheet and replaces an earlier one of the same pixel. Assigning the words one by one is
- * faster than memcpy(). */
+/* Stores a fragment in the sheet; replaces an earlier one of the same pixel. Assigning the words one by one is faster
+ * than memcpy(). */
 static inline void comp_sheet_put(comp_sheet *sheet, uint32_t at, const fragment *item)
 {
     const unsigned char *const words = (const unsigned char *)item + sizeof item->pixel;
@@ -65,7 +66,7 @@ static inline void comp_sheet_put(comp_sheet *sheet, uint32_t at, const fragment
     sheet->is_opaque = sheet->is_opaque && comp_is_opaque(item);
 }
 
-/* Returns the fragment stored at the index, with this pixel of the picture. */
+/* Returns the fragment stored at the index. `pixel` is the pixel index to set in it. */
 static inline fragment comp_sheet_get(const comp_sheet *sheet, uint32_t at, uint32_t pixel)
 {
     uint32_t record[1 + COMP_WORDS] = {pixel};
@@ -78,13 +79,13 @@ static inline fragment comp_sheet_get(const comp_sheet *sheet, uint32_t at, uint
 /* The header of a packed sheet, as stored in messages. */
 typedef struct comp_sheet_head {
     uint32_t strip;
-    uint16_t bytes, count; /* size of the packed sheet in bytes, and number of its pixels */
+    uint16_t bytes, count; /* size of the packed sheet in bytes; number of its pixels */
     uint32_t rows, full;   /* bit masks of rows: those with any pixel, and those with all 16 pixels */
     uint32_t kinds;        /* kind of each word (word_kind), in two bits each */
 } comp_sheet_head;
 
-/* Returns an upper bound of the bytes that comp_sheet_write() writes for this number of pixels and words. It includes
- * the slack that may be written behind the end. */
+/* Returns an upper bound of the number of bytes that comp_sheet_write() writes for this number of pixels and words,
+ * including those that it may write behind the end. */
 size_t comp_sheet_max_bytes(int pixels, int words);
 
 int comp_sheet_count(const comp_sheet *sheet);
@@ -106,8 +107,8 @@ unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int wor
 const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, int words, comp_sheet *sheet);
 
 /* Adds the fragments of `other` to `all`. In pixels that both contain, the nearer fragment is kept if all fragments of
- * both are opaque hits; otherwise `all` keeps its fragment, and left[] receives the mask of the pixels whose fragment
- * of `other` was not added. */
+ * both sheets are opaque hits. Otherwise `all` keeps its fragment, and left[] receives per row the mask of the pixels
+ * whose fragment of `other` was not added. */
 void comp_sheet_join(comp_sheet *all, const comp_sheet *other, uint16_t left[COMP_ROWS]);
 
 /* Blends each fragment over the background. The result equals that of comp_merge_pixel() for a pixel whose only visible

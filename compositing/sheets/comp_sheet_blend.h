@@ -12,13 +12,14 @@
 #include "comp_sheet_loops.h"
 #include "fragment_order.h"
 
-/* Indices of words: first in a fragment, then in a finished pixel. */
+/* Indices of words (comp_sheet.words): WORD_T_IN to WORD_KIND in a fragment, WORD_DEPTH and WORD_RGBA in a finished
+ * pixel. */
 enum { WORD_T_IN = 0, WORD_COLOUR = 2, WORD_TRANSMITTANCE = 5, WORD_KIND = 6, WORD_DEPTH = 0, WORD_RGBA = 1 };
 
 /* ---- joining ---------------------------------------------------------------------------------------------------- */
 
-/* Returns the lanes in `both` where the fragment of `other` is in front of that of `all`. Equal depths and NaN are
- * resolved by fragment_compare(). */
+/* Returns the lanes in the mask `both` whose fragment of `other` is in front of that of `all`. Equal depths and NaN are
+ * compared by fragment_compare(). */
 ROWS_INLINE lanes nearer_lanes(const comp_sheet *all, const comp_sheet *other, int at, unsigned both)
 {
     const float_lanes old = (float_lanes)load_lanes(&all->words[WORD_T_IN][at]);
@@ -100,8 +101,8 @@ ROWS_INLINE void store_quad(float *to, quad value, bool is_aligned)
     memcpy(to, &value, sizeof value);
 }
 
-/* Transposes four pixels from one vector per channel to RGBA, and stores them. If is_aligned, the stores bypass the
- * caches, because the picture is larger than the caches. */
+/* Transposes four pixels from one vector per channel to RGBA, and stores them. If is_aligned is set, the stores bypass
+ * the caches, since the picture is larger than these. */
 ROWS_INLINE void store_four(const quad in[4], float *rgba, bool is_aligned)
 {
     const quad a = __builtin_shufflevector(in[0], in[1], 0, 4, 1, 5),

@@ -6,13 +6,13 @@
 #include "comp_sheet.h"
 
 /* The rows of a sheet that contain pixels, and how their values are predicted. A compacted sheet holds the pixels of a
- * sheet with many gaps one after the other, row by row. A fresh lane has a pixel but none in the rows above, and is
- * predicted from another lane. */
+ * sheet with many gaps one after the other, row by row. A fresh lane is one that has a pixel in this row but none in
+ * the rows above; it is predicted from another lane. */
 typedef struct sheet_plan {
     int rows, count;
     bool is_sparse; /* the sheet is compacted before packing; fresh and source are then not set */
-    uint8_t row[COMP_ROWS],
-        number[COMP_ROWS]; /* for each row that contains pixels: its index in the strip, and its number of pixels */
+    /* for each row that contains pixels: its index in the strip, and its number of pixels */
+    uint8_t row[COMP_ROWS], number[COMP_ROWS];
     uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
     uint8_t source[COMP_ROWS][COMP_LANES]; /* for each fresh lane: the lane whose last value predicts it */
 } sheet_plan;

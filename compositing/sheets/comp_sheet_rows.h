@@ -16,7 +16,8 @@ static uint8_t nearest_lane(unsigned known, int lane)
     return (uint8_t)(left ? 31 - __builtin_clz(left) : __builtin_ctz(known));
 }
 
-/* Sets plan->fresh to the lanes that have no pixel above them, and plan->source to the lanes that predict these. */
+/* Sets plan->fresh to the lanes that have no pixel in the rows above, and plan->source to the lanes that predict
+ * them. */
 static void find_fresh_lanes(sheet_plan *plan)
 {
     unsigned known = plan->mask[0];
@@ -46,7 +47,7 @@ static void make_plan(const uint16_t masks[COMP_ROWS], sheet_plan *plan)
     if (plan->rows && !plan->is_sparse) find_fresh_lanes(plan);
 }
 
-/* The state of the prediction: the last value of each lane, and its difference from the one before. */
+/* The state of the prediction: for each lane its last value, and the difference of that from the value before. */
 typedef struct prediction {
     lanes last, slope;
 } prediction;
@@ -97,9 +98,9 @@ static inline unsigned nibble_count(uint32_t greatest)
     return greatest ? (35 - (unsigned)__builtin_clz(greatest)) / 4 : 0;
 }
 
-/* Returns the number of bytes of `count` residuals with `nibbles` nibbles each. The nibbles of a residual are stored in
- * planes of two bytes, one byte and half a byte, as in the binary digits of `nibbles`. In the plane of half bytes, lane
- * i and lane i + 8 share a byte. */
+/* Returns the number of bytes of `count` residuals with `nibbles` nibbles each. A residual is stored in up to three
+ * arrays: its 2-byte part, its 1-byte part and its half-byte part, of which those exist whose bit is set in `nibbles`.
+ * Residuals of 8 nibbles are stored as they are. In the array of half bytes, lanes i and i + 8 share a byte. */
 static inline size_t packed_bytes(unsigned nibbles, int count)
 {
     const int pairs = count < COMP_LANES / 2 ? count : COMP_LANES / 2;
@@ -157,7 +158,7 @@ ROWS_INLINE const unsigned char *unpack(const unsigned char *in, unsigned nibble
     return in + (nibbles & 1) * (size_t)pairs;
 }
 
-/* Moves the lanes in the mask to the front (compress); the other lanes become 0. */
+/* Moves the lanes in the mask to the front (compress), and sets the other lanes to 0. */
 ROWS_INLINE lanes compress_lanes(lanes from, unsigned mask)
 {
 #if defined(__AVX512F__)
@@ -180,7 +181,7 @@ ROWS_INLINE lanes expand_lanes(lanes from, unsigned mask)
     return load_lanes(gapped);
 }
 
-/* Compress and expand a row in memory. They may read and write all 16 values of `to` or `from`. */
+/* Compress and expand a row in memory. All 16 values of `from` may be read, and all 16 values of `to` written. */
 ROWS_INLINE void compress_row(const uint32_t *row, unsigned mask, uint32_t *to)
 {
 #if defined(__AVX512F__)

@@ -1,6 +1,6 @@
-/* The numeric order of statuses has no meaning, but any deterministic choice among several failures is sufficient. The
- * largest status, from the lowest rank that has it, is encoded in one number, so that a single reduction by maximum
- * finds both and can carry a second number. */
+/* Agreement on one of several failures needs any deterministic choice; the largest status is used, although the order
+ * of statuses has no meaning. This status and the lowest rank that has it are encoded in one number, so that a single
+ * reduction by maximum finds both and can carry a second number. */
 #include "comp_agree.h"
 
 #include "memory.h"

@@ -17,17 +17,17 @@ typedef struct comp_claims {
     comp_claim items[]; /* one claim per block; two more carry the status and the maximum */
 } comp_claims;
 
-/* Allocates a buffer that is large enough for the claims of any picture that this number of ranks share; returns NULL
- * if memory ran out. Local. comp_claims_free() may be called after MPI_Finalize(). */
+/* Allocates a buffer that is large enough for the claims to any picture shared by this number of ranks. Returns NULL if
+ * memory ran out. Local. comp_claims_free() may be called after MPI_Finalize(). */
 comp_claims *comp_claims_create(int ranks);
 void comp_claims_free(comp_claims *claims);
 
 /* Returns the largest status of all ranks. Ranks whose own status differs get a message that names the failed rank.
- * *maximum, unless NULL, becomes its maximum over all ranks. Collective: one reduction. */
+ * *maximum is replaced by its maximum over all ranks; maximum may be NULL. Collective: one reduction. */
 insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *maximum, base_error *error);
 
-/* Same as comp_agree(), and also adds up the first `count` claims over all ranks in the same reduction. *maximum is
- * limited to INT32_MAX. With more than 2^20 ranks the message may name a wrong rank. */
+/* As comp_agree(), and also adds up the first `count` claims over all ranks in the same reduction. *maximum is limited
+ * to INT32_MAX. With more than 2^20 ranks the error message may name a wrong rank. */
 insitu_status comp_agree_claims(MPI_Comm comm, insitu_status own, int64_t *maximum, comp_claims *claims, int count,
                                 base_error *error);
 

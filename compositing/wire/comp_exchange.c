@@ -1,8 +1,9 @@
-/* Ranks forward parcels without unpacking them. The owner merges the fragments of a pixel only when it has all of them:
- * blending rounds, so merging on the way would make the picture depend on the schedule.
+/* Ranks forward parcels (comp_messages.h) without unpacking them. The owner merges the fragments of a pixel only after
+ * it has received all of them: blending rounds, so that merging at intermediate ranks would make the picture depend on
+ * the schedule.
  *
- * A rank on which an error occurs continues in the rounds without sending fragments, so that no rank waits for it, and
- * returns its error at the end. */
+ * A rank on which an error occurs takes part in the remaining rounds without sending fragments, so that no rank waits
+ * for it, and returns its error at the end. */
 #include "comp_exchange.h"
 
 #include "comp_pack.h"
@@ -27,7 +28,8 @@ insitu_status comp_exchange(comp_transport *transport, const comp_route *route, 
     comp_messages out = {NULL, NULL};
     *held = (comp_messages){NULL, NULL};
     if (!status) status = comp_pack(strips, owners, route, transport->rank, &out, held, error);
-    status = comp_messages_fold(transport, route, is_owner ? &(comp_messages){NULL, NULL} : &out, held, status, error);
+    status =
+        comp_messages_to_owners(transport, route, is_owner ? &(comp_messages){NULL, NULL} : &out, held, status, error);
     status = run_rounds(transport, route, &out, held, status, error);
     if (status) comp_messages_free(held);
     return status;

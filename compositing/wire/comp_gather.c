@@ -1,8 +1,8 @@
 /* Finished pixels are sent in sheets (comp_sheet.h), as fragments are. Owners send all strips of their blocks; a strip
  * without fragments takes only a header. A block without fragments has no owner, and rank 0 fills it with the
- * background. A rank with children forwards their messages as they arrive, through a buffer allocated beforehand, and
- * finally sends a message that marks the end. Rank 0 therefore needs no counts and receives only from its own children,
- * and its memory does not grow with the image or the number of ranks. */
+ * background. A rank with children in the gather tree forwards their messages as they arrive, through a buffer
+ * allocated beforehand, and finally sends a message that marks the end. Rank 0 therefore needs no counts and receives
+ * only from its own children, and its memory does not grow with the image or the number of ranks. */
 #include "comp_gather.h"
 
 #include <string.h>
@@ -44,14 +44,14 @@ static void send_to_parent(parent_link *link, const unsigned char *message, int 
     link->transport->sent_messages++;
 }
 
-/* Sends this rank's finished pixels, in batches of COMP_LONGEST_DENSE messages because the request buffer has no more
+/* Sends this rank's finished pixels, in batches of COMP_MAX_DENSE_RANKS messages because the request buffer has no more
  * entries. */
 static void send_own_pixels(parent_link *link, const comp_messages *finished)
 {
     MPI_Request *const requests = link->transport->reserved_requests;
     for (comp_message *m = finished->first; m && link->code == MPI_SUCCESS;) {
         int count = 0;
-        for (; m && count < COMP_LONGEST_DENSE && link->code == MPI_SUCCESS; m = m->next) {
+        for (; m && count < COMP_MAX_DENSE_RANKS && link->code == MPI_SUCCESS; m = m->next) {
             m->data[0] = 1;
             link->code = MPI_Isend(m->data, m->bytes, MPI_BYTE, link->parent, TAG_PIXELS, link->transport->comm,
                                    &requests[count]);

@@ -6,8 +6,9 @@
 #include "comp_messages.h"
 #include "image.h"
 
-/* Owners send up a tree of places. Within a node every place sends to the node's first place; these form a heap with
- * COMP_GATHER_FAN children per node. Without information about nodes each rank counts as a node. */
+/* Maximum number of children per node of the gather tree. Owners send along a tree of places (comp_route.h): within a
+ * compute node every place sends to the node's first place; the first places form a heap with up to COMP_GATHER_FAN
+ * children each. Without information about compute nodes each rank is treated as one. */
 enum { COMP_GATHER_FAN = 64 };
 
 /* Return the place to which a place >= 1 sends, and the number of places that send to a place. */
@@ -21,9 +22,10 @@ typedef struct comp_canvas {
     image *out;
 } comp_canvas;
 
-/* Rank 0 stores the pixels received from other ranks in the canvas, which contains its own pixels already. `finished`
- * are this rank's messages to its parent; they are freed. `status` is this rank's status before the call; if it is an
- * error, the rank sends no pixels of its own. Allocates nothing. Returns this rank's own status. Collective. */
+/* Rank 0 stores the pixels received from other ranks in the canvas, in which its own pixels are stored already.
+ * `finished` are this rank's messages to its parent; they are freed. `status` is this rank's status before the call; if
+ * it is an error, the rank sends no pixels of its own. Allocates nothing. Returns this rank's own status.
+ * Collective. */
 insitu_status comp_gather(comp_transport *transport, const comp_route *route, const comp_canvas *canvas,
                           comp_messages *finished, insitu_status status, base_error *error);
 

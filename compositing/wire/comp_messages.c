@@ -103,7 +103,7 @@ insitu_status comp_transport_open(MPI_Comm comm, comp_transport *out, base_error
     *out = (comp_transport){.comm = comm};
     MPI_Comm_rank(comm, &out->rank);
     out->receive_buffer = base_alloc(COMP_MESSAGE_BYTES + COMP_SHEET_SLACK);
-    out->reserved_requests = base_alloc(COMP_LONGEST_DENSE * sizeof(MPI_Request));
+    out->reserved_requests = base_alloc(COMP_MAX_DENSE_RANKS * sizeof(MPI_Request));
     out->sheet = base_alloc(sizeof *out->sheet);
     if (out->receive_buffer && out->reserved_requests && out->sheet) return INSITU_OK;
     comp_transport_close(out);
@@ -151,8 +151,8 @@ static void send_data(round *r, const unsigned char *data, int bytes, int rank)
     r->transport->sent_messages++;
 }
 
-/* Allocates a request for each message. If memory runs out, the preallocated requests are used and the fragments are
- * dropped: these requests suffice for the empty messages that every partner must receive. */
+/* Allocates an MPI request for each message. If memory runs out, the requests allocated beforehand are used and the
+ * fragments are dropped; these requests suffice for the empty messages that every partner must receive. */
 static void make_requests(round *r, comp_messages *out, int partners)
 {
     int count = r->is_sparse ? 0 : partners;
@@ -218,7 +218,7 @@ static void receive_sparse(round *r)
     check_mpi(r, code);
 }
 
-/* Marks the last message to a rank with the flag that no more follow. Returns false if there is no message to the
+/* Marks the last message to a rank as the one after which no more follow. Returns false if there is no message to the
  * rank. */
 static bool mark_last(const comp_messages *out, int rank)
 {
@@ -265,8 +265,8 @@ insitu_status comp_messages_round(comp_transport *transport, const comp_route *r
     return run_round(&r, out);
 }
 
-insitu_status comp_messages_fold(comp_transport *transport, const comp_route *route, comp_messages *out,
-                                 comp_messages *in, insitu_status status, base_error *error)
+insitu_status comp_messages_to_owners(comp_transport *transport, const comp_route *route, comp_messages *out,
+                                      comp_messages *in, insitu_status status, base_error *error)
 {
     const int place = comp_route_place(route, transport->rank);
     const bool sends_all = place >= route->owners, receives_all = place + route->owners < route->ranks;

@@ -42,7 +42,7 @@ typedef struct comp_parcel {
  * the first parcel. Returns false if there are no more parcels. */
 bool comp_next_parcel(const comp_message *message, size_t *offset, comp_parcel *out);
 
-/* Collects the messages to one rank. */
+/* Writes the messages to one rank. */
 typedef struct comp_writer {
     comp_messages messages;
     int rank;
@@ -50,19 +50,20 @@ typedef struct comp_writer {
     size_t parcel;   /* offset of the last parcel in the last message; 0 if there is none */
 } comp_writer;
 
-/* Returns space for this number of bytes in a parcel for the owner, or NULL if memory ran out. `expected` estimates how
- * many bytes will be written in total; it determines the size of a new message. */
+/* Returns space for `bytes` bytes in a parcel for the owner, or NULL if memory ran out. `expected` is an estimate of
+ * all bytes that are still to be written; it determines the size of a new message. */
 unsigned char *comp_writer_reserve(comp_writer *writer, uint32_t owner, size_t bytes, size_t expected);
 
-/* Completes the data that was written up to `end`, which contains this number of records. */
+/* Adds the data between the reserved space's start and `end`, which contains `records` records, to the parcel. */
 void comp_writer_commit(comp_writer *writer, unsigned char *end, uint32_t records);
 
 /* Buffers allocated before the rounds, so that a rank can take part in them even if it runs out of memory later. */
 typedef struct comp_transport {
     MPI_Comm comm;
     int rank;
-    unsigned char *receive_buffer; /* COMP_MESSAGE_BYTES long: receives forwarded messages, and those for which there is
-                                      no memory */
+    /* buffer of COMP_MESSAGE_BYTES bytes for messages that are forwarded, and for messages that are discarded for lack
+     * of memory */
+    unsigned char *receive_buffer;
     MPI_Request *reserved_requests; /* one MPI request per partner of the longest dense round */
     comp_sheet *sheet;              /* scratch sheet in which rank 0 unpacks pixels */
     int64_t sent_bytes, sent_messages;
@@ -77,8 +78,9 @@ void comp_transport_close(comp_transport *transport);
 insitu_status comp_messages_round(comp_transport *transport, const comp_route *route, int round, comp_messages *out,
                                   comp_messages *in, insitu_status status, base_error *error);
 
-/* Runs before the first round: ranks beyond the owners send all their fragments to their partners. */
-insitu_status comp_messages_fold(comp_transport *transport, const comp_route *route, comp_messages *out,
-                                 comp_messages *in, insitu_status status, base_error *error);
+/* Sends, before the first round, all fragments of ranks beyond the owners to these ranks' partners, which are
+ * owners. */
+insitu_status comp_messages_to_owners(comp_transport *transport, const comp_route *route, comp_messages *out,
+                                      comp_messages *in, insitu_status status, base_error *error);
 
 #endif

@@ -5,7 +5,8 @@
 #include "memory.h"
 #include "region.h"
 
-/* Estimated bytes per fragment, which determine the size of a new message. Fragments of most pictures take fewer. */
+/* Estimated number of bytes per fragment, which determines the size of a new message. Fragments of most pictures take
+ * fewer. */
 enum { EXPECTED_BYTES = 16 };
 
 static insitu_status fail_for_memory(base_error *error, const char *what)
@@ -19,7 +20,7 @@ static insitu_status fail_for_memory(base_error *error, const char *what)
 typedef struct owner_strips {
     const comp_strips *strips;
     uint32_t *order;  /* indices of strips, sorted by owner */
-    uint32_t *starts; /* for each owner its first index in order, and the total at the end */
+    uint32_t *starts; /* for each owner, the index in `order` of its first strip; then the total */
 } owner_strips;
 
 static bool sort_strips(const comp_owners *owners, owner_strips *c)
@@ -58,7 +59,7 @@ static bool pack_sheet(void *state, const comp_sheet *sheet, int count)
     return true;
 }
 
-/* Packs one thread's share of the fragments for an owner; returns false if memory ran out. */
+/* Packs share number `share` of `shares` of the strips with fragments for an owner. Returns false if memory ran out. */
 static bool pack_owner(const owner_strips *c, uint32_t owner, int share, int shares, comp_layers *layers,
                        comp_writer *writer)
 {
@@ -133,8 +134,8 @@ insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, co
 
 /* ---- forwarding ------------------------------------------------------------------------------------------------- */
 
-/* Forwards the parcels for owners whose place has this digit in the round's position. In the digits of earlier rounds
- * the places of these owners equal this rank's place, because parcels for other places were sent in those rounds. */
+/* Forwards the parcels for owners whose place has this digit at the round's position. In the digits of earlier rounds
+ * the places of these owners equal this rank's place; parcels for other places were sent in those rounds. */
 static bool forward_to(const comp_messages *in, const comp_route *route, int round, int place, int digit,
                        comp_writer *writer)
 {
@@ -173,8 +174,8 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
 
 /* ---- unpacking -------------------------------------------------------------------------------------------------- */
 
-/* If sheets is NULL, counts the sheets of each strip in starts. Otherwise stores the address of each sheet in the
- * counting sort's position of its strip. */
+/* If sheets is NULL, adds the number of each strip's sheets to starts. Otherwise stores the address of each sheet at
+ * the position that counting sort gives it in `sheets`. */
 static void visit_sheets(const comp_messages *in, int owner, uint32_t *starts, const unsigned char **sheets)
 {
     for (const comp_message *m = in->first; m; m = m->next) {

@@ -9,7 +9,7 @@
 /* The owners of the blocks of a picture. */
 typedef struct comp_owners {
     int32_t *places; /* place of each block's owner; -1 if no rank has a fragment in the block */
-    int count;       /* number of places that may own blocks of the picture */
+    int count;       /* number of places that can own blocks */
 } comp_owners;
 
 /* Packs this rank's fragments for other owners into messages. *out receives the messages to the partners of the first
@@ -25,7 +25,7 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
 /* The received sheets of an owner, sorted by strip. They point into the messages. */
 typedef struct comp_received {
     const unsigned char **sheets;
-    uint32_t *starts; /* for each strip its first index in sheets, and the total at the end */
+    uint32_t *starts; /* for each strip, the index in `sheets` of its first sheet; then the total */
 } comp_received;
 
 /* Finds the sheets in `in` that are for this owner. Local; after an error *out is empty. */

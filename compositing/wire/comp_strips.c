@@ -1,5 +1,5 @@
-/* The renderer makes fragments tile by tile, so the fragments of a strip form few contiguous ranges of the list. The
- * fragments are not moved; instead these ranges are sorted by strip. Each thread finds the ranges of a part of the
+/* The renderer makes fragments tile by tile, so that the fragments of a strip form few contiguous ranges of the list.
+ * Only these ranges are sorted by strip; fragments are not moved. Each thread finds the ranges of a part of the
  * list. */
 #include "comp_strips.h"
 
@@ -146,7 +146,7 @@ static bool fill_single(const comp_strips *s, uint32_t strip, comp_sheet *sheet)
     return true;
 }
 
-/* Sorts a pixel's fragments front to back unless they are too many. The n-th fragments of neighbouring pixels then
+/* Sorts a pixel's fragments front to back, unless they are very many. The n-th fragments of neighbouring pixels then
  * mostly belong to the same surface, and compress well. */
 static void sort_pixel(const fragment **order, uint32_t count)
 {
@@ -159,7 +159,8 @@ static void sort_pixel(const fragment **order, uint32_t count)
     }
 }
 
-/* Lists the strip's fragments sorted by pixel: those of pixel k begin at ends[k]. Returns false if memory ran out. */
+/* Lists the strip's fragments sorted by pixel; those of pixel k begin at ends[k] on return. Returns false if memory ran
+ * out. */
 static bool list_pixels(const comp_strips *s, uint32_t strip, comp_layers *layers)
 {
     const int64_t count = comp_strips_count(s, strip);

@@ -18,7 +18,7 @@ typedef struct comp_strips {
     const comp_grid *grid;
     const fragment *items; /* fragments, borrowed from the fragment list */
     comp_range *ranges;    /* ranges of fragments, sorted by strip */
-    uint32_t *starts;      /* for each strip its first index in ranges, and the total at the end */
+    uint32_t *starts;      /* for each strip, the index in `ranges` of its first range; then the total */
 } comp_strips;
 
 /* Finds the ranges of each strip's fragments. The list and the grid must outlive *out. A fragment whose pixel is not in
@@ -30,10 +30,10 @@ void comp_strips_free(comp_strips *strips);
 /* Returns the number of the strip's fragments. */
 int64_t comp_strips_count(const comp_strips *strips, uint32_t strip);
 
-/* Work space of one thread for comp_strips_sheets(). A zeroed struct is empty. */
+/* Buffers of one thread for comp_strips_sheets(). A zeroed struct is empty. */
 typedef struct comp_layers {
     comp_sheet sheet;
-    uint32_t ends[COMP_STRIP_PIXELS + 1]; /* end of each pixel's fragments in order, cumulative over the pixels */
+    uint32_t ends[COMP_STRIP_PIXELS + 1]; /* end of each pixel's fragments in `order` */
     const fragment **order;
     int64_t capacity;
 } comp_layers;

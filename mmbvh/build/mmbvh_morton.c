@@ -98,8 +98,8 @@ static inline uint64_t morton_code(const bounds_source *source, const morton_cod
 
 /* Maps the centre of a box of floats, in the source's coordinates, to steps of the Morton code. */
 typedef struct sum_mapping {
-    vec4 origin, factor,
-        last_step; /* step of a centre along each axis: (centre - origin) * factor, limited to last_step */
+    /* step of a centre along each axis: (centre - origin) * factor, limited to last_step */
+    vec4 origin, factor, last_step;
 } sum_mapping;
 
 static sum_mapping sum_mapping_make(const bounds_source *source, const morton_coder *coder)

@@ -39,7 +39,7 @@ static insitu_status draw_alone(const session_frame_target *t, const render_job 
     comp_tiles tiles;
     if (!error->status &&
         comp_tiles_begin(&tiles, t->background, job->threads, overlaps != NULL, out, error) == INSITU_OK) {
-        render_frame_tiles(job, comp_tiles_take, &tiles, &rendered, error);
+        render_frame_tiles(job, comp_tiles_blend, &tiles, &rendered, error);
         comp_tiles_end(&tiles, overlaps, &composited);
     }
     add_to_frame(frame, &rendered, composited.sent_fragments, composited.merge_ms);
