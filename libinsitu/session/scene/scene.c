@@ -1,8 +1,8 @@
-/* Reads a scene. The document is checked against the schema and read into the structs of the scene file; these are
- * converted into a struct scene, in which every default is filled in and every colour is linear.
+/* Reads a scene. The document is checked against the schema and stored in the schema's structs (scene_schema.h). These
+ * are converted into a struct scene, in which all defaults are filled in and all colours are linear.
  *
- * strtod() reads numbers according to the locale. A simulation may run in a locale with a decimal comma, so that the
- * thread is switched to the C locale while a scene is read, and switched back afterwards. */
+ * strtod() reads numbers according to the locale, and a simulation may run in a locale with a decimal comma. Therefore
+ * the thread is switched to the C locale while a scene is read, and back afterwards. */
 #include "scene.h"
 
 #include <stdio.h>
@@ -38,16 +38,16 @@ static void convert_background(const scene_file_image *in, float background[4])
     background[3] = alpha;
 }
 
-/* Returns whether the scene leaves the sampling of volumes unspecified. Any key other than method and max_error
- * specifies it, even a key that only applies to samples. */
+/* Returns whether the scene does not specify how volumes are sampled. Every key except method and max_error specifies
+ * it, even a key that applies only to samples. */
 static bool is_sampling_unspecified(const scene_file_sampling *in)
 {
     return !in->method && !in->max_error && !in->step && !in->step_cells && !in->jitter && !in->frames;
 }
 
-/* Chooses the default method for volumes. A single volume is integrated to an error bound, because samples are cheaper,
- * but leave noise of unknown size. Several volumes are sampled, because their segments would have to be mixed pixel by
- * pixel. */
+/* Chooses the default method for volumes. A single volume is integrated with an error bound, because samples are
+ * cheaper but leave noise of unknown size. Several volumes are sampled, because their segments would have to be mixed
+ * pixel by pixel. */
 static void choose_method(const scene_file_sampling *in, scene_image *out)
 {
     static const double default_error = 0.01;
@@ -121,7 +121,8 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     return status;
 }
 
-/* Converts the variants of an image that differ in their layers, each by its first view. */
+/* Converts those variants of an image that differ in their layers (field, isovalue or plane), each with its first view
+ * only. */
 static insitu_status convert_layers_in_turn(const scene_document *d, const scene_file *in, int source, scene *out)
 {
     char path[32];
@@ -138,8 +139,8 @@ static insitu_status convert_layers_in_turn(const scene_document *d, const scene
     return status;
 }
 
-/* Inserts the views of orbits after the first views. The loop begins with the last image, because there is free space
- * only behind it. */
+/* Inserts the other views of orbits after the first view of each image. The loop starts at the last image, because
+ * there is free space only behind it. */
 static void add_views(scene *s, int picture_count)
 {
     int end = picture_count;
@@ -216,7 +217,8 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
     return field->mesh_count == 0;
 }
 
-/* Returns whether an entry's name selects the mesh, and is longer than the name of the entry found before, if any. */
+/* Returns whether the name of an entry selects the mesh, and is longer than `found`, the name of the best entry so far,
+ * if there is one. */
 static bool is_nearer(const char *name, const char *found, const char *mesh)
 {
     return scene_name_stands_for(name, mesh) && (!found || strlen(name) > strlen(found));
@@ -261,12 +263,12 @@ static insitu_status parse_in_c_locale(const char *text, size_t size, const char
 insitu_status scene_parse(const char *text, size_t size, const char *file_name, scene_attachments *attachments,
                           scene *out, base_error *error)
 {
-    base_error unheard = {.status = INSITU_OK};
+    base_error ignored = {.status = INSITU_OK};
     *out = (scene){0};
     c_locale numbers;
     if (!c_locale_enter(&numbers))
         return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", file_name);
-    const insitu_status status = parse_in_c_locale(text, size, file_name, attachments, out, error ? error : &unheard);
+    const insitu_status status = parse_in_c_locale(text, size, file_name, attachments, out, error ? error : &ignored);
     c_locale_leave(&numbers);
     if (status != INSITU_OK) scene_free(out);
     return status;
@@ -291,7 +293,8 @@ static void free_colour_map(scene_colour_map *map)
 
 static void free_image(scene_image *image)
 {
-    if (image->variant.view > 0) return; /* only the variant with view 0 owns these arrays */
+    /* the variants of an image that differ only in their view share these arrays; the one with view 0 owns them */
+    if (image->variant.view > 0) return;
     for (int i = 0; i < image->isosurface_count; i++) {
         scene_isosurface *surface = &image->isosurfaces[i];
         scene_free_field(&surface->field);

@@ -14,33 +14,33 @@
 typedef enum scene_sampling_method { SCENE_SAMPLES, SCENE_SEGMENTS } scene_sampling_method;
 typedef enum scene_interpolation { SCENE_BY_CELL, SCENE_BY_VERTEX } scene_interpolation;
 
-/* The scalar that is taken from a field: its magnitude, or its component n. SCENE_COMPONENT_DEFAULT is component 0 if
- * the field has one component, else the magnitude. SCENE_COMPONENT_ONLY is component 0 of a field that must have no
- * other component. */
+/* The scalar that is computed from a field: its magnitude, or its component n. SCENE_COMPONENT_DEFAULT is component 0
+ * if the field has one component, and otherwise the magnitude. SCENE_COMPONENT_ONLY is component 0 of a field that must
+ * not have other components. */
 enum { SCENE_COMPONENT_ONLY = -3, SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
 
 /* A field that a layer shows, with the meshes on which it is shown. */
 typedef struct scene_field {
     char *name;
-    int component; /* number of the component, from 0, or one of the constants SCENE_COMPONENT_... */
+    int component; /* number of the component, from 0, or one of the constants SCENE_COMPONENT_* */
     /* set if cell values are averaged to the vertices; otherwise they are drawn as constants per cell */
     bool at_vertices;
-    bool joins_corners; /* set if different values at the same vertex of several cells are replaced by their mean */
+    bool joins_corners; /* set if different values that cells have at a common vertex are replaced by their mean */
     bool is_as_given;   /* set if hanging vertices keep the values that the caller gave */
     int line;           /* line in the scene file, for messages about the field */
     int mesh_count;     /* number of names in `meshes`; 0: the field is shown on all meshes that have it */
-    char **meshes;      /* names of meshes; a name also stands for the meshes below it: "a" for "a/0" */
+    char **meshes;      /* names of meshes; "a" also selects the meshes whose names begin with "a/" */
     int meshes_line;    /* line of `meshes` in the scene file, for messages */
     /* hash of the set of meshes over which values are averaged at vertices; set by the session (session_joints.h) */
     uint64_t joint_name;
 } scene_field;
 
-/* Returns whether the layer's list of meshes allows a mesh of this name. The mesh may still lack the field. */
+/* Returns whether the layer's list of meshes includes a mesh of this name, which may still lack the field. */
 bool scene_field_is_on(const scene_field *field, const char *mesh);
-/* Returns whether a name in a scene selects the mesh: it is the mesh's name, or a part of it up to a slash. */
+/* Returns whether a name in a scene selects the mesh: it is the mesh's name, or the beginning of it before a slash. */
 bool scene_name_stands_for(const char *name, const char *mesh);
 
-/* The kind of a derived field. All kinds after the expression are computed from gradients at vertices. */
+/* The kind of a derived field. All kinds except SCENE_EXPRESSION are computed from gradients at vertices. */
 typedef enum scene_derivation {
     SCENE_EXPRESSION,
     SCENE_GRADIENT_OF,
@@ -58,24 +58,24 @@ typedef struct scene_derived {
     char *name;
     int line; /* line in the scene file, for messages */
     scene_derivation kind;
-    /* key that gives the kind in the scene file, for messages; "" for an expression without a key */
+    /* key of the scene file that gives the kind, for messages; "" for an expression without a key */
     const char *key;
     /* component of a gradient or vorticity; SCENE_COMPONENT_DEFAULT: all three components */
     int component;
     scene_expression expression; /* program of an expression; its inputs are `inputs` below */
     int input_count;
-    /* fields from which the field is computed: the inputs of an expression; for a gradient a scalar; for other kinds a
+    /* fields from which the field is computed: for an expression its inputs; for a gradient a scalar; for other kinds a
      * vector field, or its two or three components */
     scene_field *inputs;
-    int *derived_indices; /* for each input, the index of the derived field that it is, or -1 */
+    int *derived_indices; /* for each input, its index among the derived fields; -1 if it is not derived */
     /* hash of the set of meshes over which gradients are averaged; set by the session (session_joints.h) */
     uint64_t joint_name;
 } scene_derived;
 
-/* The computation of a range that is not fixed. Each uses the values on all ranks at each step that draws. */
+/* How a range that is not fixed is computed, in each step that draws, from the values on all ranks. */
 typedef enum scene_range_source {
     SCENE_RANGE_DATA, /* the minimum and the maximum of the values */
-    /* the minimum and the maximum over all steps drawn so far, which are kept in a file across restarts
+    /* the minimum and the maximum over all steps drawn so far; they are kept in a file across restarts
      * (session_run_ranges.h) */
     SCENE_RANGE_RUN,
     SCENE_RANGE_SYMMETRIC,  /* from -m to m, where m is the largest absolute value */
@@ -83,13 +83,13 @@ typedef enum scene_range_source {
 } scene_range_source;
 
 typedef struct scene_range {
-    bool is_fixed; /* whether low and high are values of the field given by the scene */
+    bool is_fixed; /* set if the scene gives low and high as values of the field */
     double low, high;
     scene_range_source source; /* how the range is computed; used unless is_fixed is set */
 } scene_range;
 
-/* The scale by which values are spaced along a colour map: linear; logarithmic; or, for values of both signs, linear up
- * to a threshold and logarithmic beyond it (see render_scaled() in render.h, which uses the same terms). */
+/* The scale by which values are mapped to positions in a colour map: linear; logarithmic; or, for values of both signs,
+ * linear up to a threshold and logarithmic beyond it (render_scaled() in render.h). */
 typedef enum scene_scale { SCENE_LINEAR, SCENE_LOG, SCENE_SYMLOG } scene_scale;
 
 /* A colour map converts a value into a colour, for all kinds of layers. The position of a value is (s(value) - s(low))
@@ -99,20 +99,20 @@ typedef enum scene_scale { SCENE_LINEAR, SCENE_LOG, SCENE_SYMLOG } scene_scale;
 typedef struct scene_colour_map {
     char *name; /* name of a built-in map, or path of a file with a map; "" for a list of colours */
     int count;  /* number of colours: at least 2, or at least 1 for bands */
-    /* table of colours: count × 3 numbers in linear light, evenly spaced over the positions from 0 to 1. It is already
-     * reversed if the scene requests that. */
+    /* table of colours: count × 3 numbers in linear light, evenly spaced over the positions from 0 to 1, in reversed
+     * order already if the scene requests that */
     float *colours;
-    bool is_banded; /* set if colours belong to bands of equal width and are not interpolated */
+    bool is_banded; /* set if each colour belongs to a band and colours are not interpolated; bands have equal widths */
     scene_scale scale;
-    double threshold; /* end of the linear part of SCENE_SYMLOG, which reaches from -threshold to threshold; > 0 */
+    double threshold; /* SCENE_SYMLOG is linear from -threshold to threshold; > 0 */
     bool has_below, has_above;
-    /* colours of values below and above the range (by default those of the map's ends), and of NaN */
+    /* colours of values below the range, of values above it (by default the colours of the map's ends), and of NaN */
     float outside_colours[3][3];
     bool has_nan;
     scene_range range;
 } scene_colour_map;
 
-/* A file that the scene names, with the path by which it is opened. */
+/* A file that the scene names, and its content. */
 typedef struct scene_attachment {
     char *path, *text; /* path of the file, and its `size` bytes of text, without a terminating NUL */
     int64_t size;
@@ -121,8 +121,8 @@ typedef struct scene_attachment {
 /* Files that a scene names. One rank reads these files while it parses the scene, and sends them to the other ranks
  * together with the scene. */
 typedef struct scene_attachments {
-    /* Callback that reads a whole file into *text, allocated with base_alloc(). NULL: only the files in `items` are
-     * available. */
+    /* callback that reads a whole file into *text, allocated by base_alloc(); NULL: only the files in `items` are
+     * available */
     insitu_status (*read)(const char *path, char **text, int64_t *size, base_error *error);
     int count;
     scene_attachment *items;
@@ -132,8 +132,9 @@ enum { SCENE_MAX_ATTACHMENTS = 64 };
 void scene_attachments_free(scene_attachments *attachments);
 
 typedef struct scene_opacity_point {
-    double position; /* position in the range, 0 .. 1, in ascending order; two equal positions make a step */
-    float opacity;   /* opacity at this position, 0 .. 1, per unit_distance */
+    /* position in the range, 0 .. 1, in ascending order; the opacity jumps where two positions are equal */
+    double position;
+    float opacity; /* opacity at this position, 0 .. 1, of a layer of thickness unit_distance */
 } scene_opacity_point;
 
 typedef struct scene_material {
@@ -146,15 +147,15 @@ enum { SCENE_MAX_LINES = 64 };
 typedef struct scene_lines {
     bool is_given; /* set if the layer has contour lines */
     scene_field field;
-    /* set if the lines are contours of the field that colours the layer, and not of a field of their own */
+    /* set if the lines are contours of the field that colours the layer; otherwise of another field */
     bool is_of_colours;
-    /* set if the scene gives the values of lines; otherwise lines divide a range into parts of equal width */
+    /* set if the scene gives the values of the lines; otherwise the lines divide a range into parts of equal width */
     bool has_values;
     int count;                          /* number of lines, 1 .. SCENE_MAX_LINES */
     double values[SCENE_MAX_LINES];     /* value of each line, in increasing order */
     float width;                        /* width of the lines in pixels */
     float colours[3 * SCENE_MAX_LINES]; /* colour of each line, linear RGB */
-    /* Set if only the lines of the surface are drawn. If a field colours the surface, the lines get its colours. */
+    /* set if only the lines are drawn and not the surface; if a field colours the surface, the lines get its colours */
     bool is_alone;
 } scene_lines;
 
@@ -167,8 +168,8 @@ typedef struct scene_isosurface {
     scene_field field;
     int value_count; /* number of isovalues, 1 .. 64 */
     double *values;
-    /* one colour per isovalue, value_count × 3 numbers, linear: the given colours, of which the last is repeated, or
-     * colours of the default cycle */
+    /* one colour per isovalue, value_count × 3 numbers, linear RGB: the colours that the scene gives, the last of which
+     * is repeated, or colours of the default cycle */
     float *colours;
     bool has_colour_by;
     scene_field colour_by;
@@ -177,7 +178,7 @@ typedef struct scene_isosurface {
     float opacity;
     scene_material material;
     scene_normal normals;
-    double difference; /* distance between the samples of differences, in cell sizes, > 0; 1 by default */
+    double difference; /* distance between samples of central differences, in cell sizes, > 0; 1 by default */
     uint32_t clips;    /* set of clips that cut the layer: one bit per clip of the image */
     int number;        /* index of the layer in the image's list */
 } scene_isosurface;
@@ -187,12 +188,12 @@ typedef struct scene_volume {
     scene_colour_map colour_map;
     int opacity_count; /* number of opacity points, 1 .. 32 */
     scene_opacity_point *opacity;
-    /* length to which opacities refer, in scene units, > 0; 0: a twentieth of the diagonal of the bounds */
+    /* thickness for which opacities are given, in scene units, > 0; 0: a twentieth of the diagonal of the bounds */
     double unit_distance;
     uint32_t clips; /* set of clips, one bit per clip of the image; it is the same for all volumes of the image */
 } scene_volume;
 
-/* Selects the cells in which the values of a field lie from low to high. */
+/* Selects the cells whose values of a field lie between low and high. */
 typedef struct scene_threshold {
     bool is_given; /* set if there is a threshold; otherwise all cells are drawn */
     scene_field field;
@@ -200,9 +201,9 @@ typedef struct scene_threshold {
 } scene_threshold;
 
 typedef struct scene_surface {
-    /* names of the meshes whose outer surface is drawn; the struct contains no field, so that its name is NULL */
+    /* only the names of meshes are used: those whose outer surface is drawn; the field's name is NULL */
     scene_field meshes_field;
-    /* set for a layer that the session adds for meshes of shells alone; a scene file cannot set it */
+    /* set if the session has added the layer for meshes that consist only of shells; a scene file cannot set it */
     bool is_of_shells;
     float colour[3];  /* colour of the edges, linear RGB */
     float edge_width; /* width of the edges in pixels; 0: no edges are drawn */
@@ -225,8 +226,8 @@ typedef struct scene_plane {
     bool has_point;
     double point[3];
     double offset; /* distance from the point to the plane, along the normal */
-    /* used without a point: additional displacement along the normal, as a share of half the data's extent in this
-     * direction; -1 .. 1 */
+    /* if has_point is not set: additional displacement along the normal, as a fraction of half the extent of the data
+     * in this direction; -1 .. 1 */
     double extent_fraction;
 } scene_plane;
 
@@ -237,12 +238,12 @@ typedef enum scene_keep { SCENE_KEEP_INSIDE, SCENE_KEEP_OUTSIDE } scene_keep;
 
 enum { SCENE_MAX_CLIPS = 32 };
 
-/* SCENE_MAX_SURFACES: maximum number of isovalues, planes and outer surfaces of an image together. SCENE_MAX_VOLUMES:
- * maximum number of its volumes. */
+/* SCENE_MAX_SURFACES: maximum number of isovalues, planes and outer surfaces of an image, all together.
+ * SCENE_MAX_VOLUMES: maximum number of volumes of an image. */
 enum { SCENE_MAX_SURFACES = 64, SCENE_MAX_VOLUMES = 4 };
 
-/* A half space, box or sphere by which layers are clipped: what lies outside is cut away or, with is_outside, what lies
- * inside. */
+/* A half space, box or sphere by which layers are clipped: what lies outside of it is cut away or, if is_outside is
+ * set, what lies inside. */
 typedef struct scene_clip {
     scene_clip_kind kind;
     bool is_outside;
@@ -253,12 +254,12 @@ typedef struct scene_clip {
 
 typedef struct scene_slice {
     scene_field field;
-    int plane_count; /* number of planes, 1 .. 64 */
+    int plane_count; /* number of planes of the slice, 1 .. 64 */
     scene_plane *planes;
     scene_colour_map colour_map;
     scene_lines lines;
     float opacity;
-    scene_material material; /* unlit by default, so that colours are exactly those of the map */
+    scene_material material; /* unlit by default, so that colours equal those of the map */
     uint32_t clips;          /* set of clips that cut the layer: one bit per clip of the image */
     int number;              /* index of the layer in the image's list */
 } scene_slice;
@@ -278,7 +279,7 @@ enum { SCENE_MAX_ELEVATIONS = 32 };
 typedef struct scene_orbit {
     int view_count;   /* number of views on each circle; 0: there is no orbit */
     double axis[3];   /* unit vector along the axis of the orbit */
-    double start;     /* angle phi of the first view of each circle, in degrees */
+    double start;     /* angle phi (scene_camera) of the first view on each circle, in degrees */
     int circle_count; /* number of circles, 1 .. SCENE_MAX_ELEVATIONS */
     /* elevation of each circle above the plane perpendicular to the axis, in degrees */
     double elevations[SCENE_MAX_ELEVATIONS];
@@ -291,9 +292,9 @@ typedef struct scene_camera_point {
 } scene_camera_point;
 
 typedef struct scene_camera {
-    /* set if eye and focal point are computed from the global bounds; the camera then looks along -direction */
+    /* set if eye and focal point are computed from the bounds of all data, with the camera looking along -direction */
     bool is_automatic;
-    /* set for each key that the scene gives; if the data is flat, the other keys are chosen from the data
+    /* set for each of these keys that the scene gives; if the data is flat, the others are chosen from the data
      * (session_camera.h) */
     bool has_direction, has_up, has_fit, has_projection;
     bool has_bounds; /* automatic camera: set if the bounds below replace those of the data */
@@ -303,24 +304,23 @@ typedef struct scene_camera {
     double up[3];
     double angle; /* vertical angle of view in degrees; 40 by default */
     double zoom;  /* automatic camera: 1 fits the bounds into the picture; larger values are closer */
-    /* automatic camera: set if the box of the bounds fills the frame; otherwise the sphere around the box does */
+    /* automatic camera: set if the box of the bounds must fill the frame; otherwise the sphere around the box */
     bool fits_box;
     bool is_orthographic;
-    /* orthographic camera: height of the visible region in scene units; 0: the same height as with a perspective
-     * camera */
+    /* orthographic camera: height of the visible region in scene units; 0: as with a perspective camera */
     double height;
     scene_orbit orbit;
     /* angles of an orbit's view in degrees: phi around the axis, theta above the plane perpendicular to it */
     double phi, theta;
-    bool is_by_cycle;           /* set if the points of a moving camera are at cycles; otherwise they are at times */
+    bool is_by_cycle;           /* set if the points of a moving camera are given by cycle; otherwise by time */
     int point_count;            /* number of points of a moving camera; 0: the camera does not move */
     scene_camera_point *points; /* points of a moving camera, in increasing order of cycle or time */
 } scene_camera;
 
-/* Returns the camera to use at a step: the position of a moving camera is interpolated between its points. */
+/* Returns the camera of a step. The position of a moving camera is interpolated between its points. */
 scene_camera scene_camera_at(const scene_camera *camera, int64_t cycle, double time);
 
-/* Positions in the picture; the values are the same as those of insitu_anchor (image_output.h). */
+/* Anchors in the picture; the values are those of insitu_anchor (image_output.h). */
 typedef enum scene_anchor {
     SCENE_TOP_LEFT,
     SCENE_TOP,
@@ -338,21 +338,21 @@ typedef struct scene_words {
     scene_anchor anchor; /* edge or corner of the picture at which the text stands */
 } scene_words;
 
-/* Titles, colour bars and lines that are drawn in addition to the data. */
-/* The data that boxes are drawn around: all data, each mesh, or the data of each rank. */
+/* The boxes that are outlined: one around all data, one per mesh, or one around the data of each rank. */
 typedef enum scene_boxes { SCENE_NO_BOX, SCENE_BOX_OF_DATA, SCENE_BOXES_OF_MESHES, SCENE_BOXES_OF_RANKS } scene_boxes;
 
-/* The format of numbers at colour bars: the shortest that distinguishes neighbours, or fixed-point (0.25), or with an
- * exponent (2.5e-1). */
+/* The format of numbers at colour bars: the shortest that distinguishes neighbouring ticks, fixed-point (0.25), or with
+ * an exponent (2.5e-1). */
 typedef enum scene_notation { SCENE_SHORTEST, SCENE_FIXED, SCENE_SCIENTIFIC } scene_notation;
 
 typedef struct scene_number_form {
     scene_notation notation;
-    /* set if the scene gives the number of digits; otherwise numbers have as many as distinguish neighbours */
+    /* set if the scene gives the number of digits; otherwise there are as many as distinguish neighbouring ticks */
     bool has_digits;
-    int digits; /* number of digits behind the decimal point, 0 .. 12 */
+    int digits; /* number of digits after the decimal point, 0 .. 12 */
 } scene_number_form;
 
+/* Titles, colour bars and lines that are drawn in addition to the data. */
 typedef struct scene_decorations {
     bool is_given; /* set if the scene has decorations; otherwise none are drawn */
     char *title;   /* title of the picture; NULL: none */
@@ -372,8 +372,8 @@ typedef struct scene_decorations {
     char *scale_unit; /* unit of length of the scale bar; NULL: none */
     scene_anchor scale_bar_anchor;
     bool has_colour;
-    /* colour of text and lines, linear RGB. Without has_colour it is light on a dark background and dark on a light
-     * one. */
+    /* colour of text and lines, linear RGB; if has_colour is not set, it is light on a dark background and dark on a
+     * light one */
     float colour[3];
     double size; /* height of text, as a share of the picture's height */
 } scene_decorations;
@@ -383,21 +383,25 @@ typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
 typedef struct scene_output {
     /* path of the file, with placeholders (scene_expand()), relative to rank 0's working directory */
     char *path;
-    /* format by the file name's ending; `bits: 16` selects SCENE_PNG16. EXR files contain float colours and depth. */
+    /* format, chosen by the file name's ending; the key `bits: 16` selects SCENE_PNG16. EXR files contain float colours
+     * and depth. */
     scene_format format;
     bool has_decorations; /* set if the image's decorations, if it has any, are drawn into this file */
     bool has_data;        /* set if an EXR file also contains the nearest surface's normal, value and numbers */
     bool is_deep;         /* set for an EXR file with all samples of each pixel, in order of depth */
-    int database;         /* index of the scene's database whose table lists the picture; -1: none */
-    /* number of bytes of `path` that are the database's folder and its slash; 0 without a database */
+    int database;         /* index of the scene's database that lists the picture in its table; -1: none */
+    /* number of leading bytes of `path` that are the database's folder and its slash; 0 if there is no database */
     int folder_bytes;
-    /* numbers of pictures side by side in one file; 0: the picture is an inset or has a file of its own */
+    /* number of columns and rows of pictures in one file; 0: the picture is an inset or has its own file */
     int columns, rows;
-    bool shares_bars;    /* set if colour bars that all these pictures have in common are drawn once, beside them */
+    /* set if colour bars are drawn once beside the pictures, provided that all pictures of the file have the same
+     * bars */
+    bool shares_bars;
     bool is_inset;       /* set if the picture is laid over the panels of a montage */
-    scene_anchor corner; /* of an inset */
+    scene_anchor corner; /* corner of an inset */
     int montage;         /* index of the scene's montage that contains the picture; -1: none */
-    int first_panel;     /* number of the panel that shows the first view; for an inset behind that of the last panel */
+    /* index of the panel that shows the first view; for an inset, an index after that of the last panel */
+    int first_panel;
 } scene_output;
 
 /* A rectangle of a file in pixels: (x, y) is its upper left corner. */
@@ -405,32 +409,33 @@ typedef struct scene_rectangle {
     int x, y, width, height;
 } scene_rectangle;
 
-/* A file that contains several pictures side by side, and pictures over their corners. */
+/* A file that contains several pictures (panels) side by side, and insets over their corners. */
 typedef struct scene_montage {
-    char *name; /* identifies the pictures that belong together: their path, expanded for one cycle and time */
+    char *name; /* their common path, expanded for one cycle and time, which identifies the pictures of the file */
     int columns, rows;
     int width, height; /* size of each picture in pixels */
     scene_format format;
     int panel_count;    /* number of pictures in a step, at most columns × rows */
-    bool shares_bars;   /* set if colour bars that all pictures share are drawn once, beside them */
-    int bar_width;      /* width in pixels of the strip for these bars; 0 without shares_bars */
+    bool shares_bars;   /* set if colour bars that all pictures have in common are drawn once, beside the pictures */
+    int bar_width;      /* width in pixels of the strip for shared bars; 0 if shares_bars is not set */
     bool are_bars_left; /* set if the strip is left of the pictures, otherwise it is right of them */
     int frame_width;    /* width in pixels of the frames of insets */
     int inset_margin;   /* distance in pixels of insets from the edges of the panels, including their frames */
-    /* the inset at each corner (scene_anchor) without its frame; width 0: there is none. No two overlap. */
+    /* the inset at each corner (scene_anchor), without its frame; width 0: none. No two insets overlap. */
     scene_rectangle insets[SCENE_ANCHORS];
 } scene_montage;
 
 /* A Cinema database by Spec D: a folder of pictures, and a table that describes them. */
 typedef struct scene_database {
-    char *path;      /* the folder, relative to rank 0's working directory, without a slash at its end */
-    int first_image; /* index, in the file, of the first image that writes to the database */
-    bool has_images, has_orbits, has_isovalues, has_planes, has_fields; /* which columns the table has */
+    char *path;      /* path of the folder, relative to rank 0's working directory, without a slash at its end */
+    int first_image; /* index in the scene file of the first image that writes to the database */
+    /* set for each of these columns that the table has */
+    bool has_images, has_orbits, has_isovalues, has_planes, has_fields;
 } scene_database;
 
 typedef enum scene_statistic { SCENE_MINIMUM, SCENE_MAXIMUM, SCENE_MEAN } scene_statistic;
 
-/* A condition on a statistic of a field: it must lie above one bound and below another. */
+/* A condition on a statistic of a field: the statistic must be greater than `above` and less than `below`. */
 typedef struct scene_condition {
     bool is_given; /* set if there is a condition; otherwise it always holds */
     scene_field field;
@@ -444,18 +449,19 @@ typedef struct scene_statistics {
     char *path;         /* path of the file, relative to rank 0's working directory */
     int cycle_interval; /* the statistics are written at cycles that are multiples of this */
     int bin_count;      /* number of the histogram's bins; 0: there is no histogram */
-    double low, high; /* range of values that the bins divide; if low > high, the range of the step's values is used */
+    double low, high;   /* range of values that the bins divide; low > high: the range of the step's values */
 } scene_statistics;
 
-/* Identifies one of the pictures that an image of the file makes: there is one for each field, isovalue and plane of
- * its sweep and each view of its orbit, in this order, so that views change fastest. Each is a scene_image. */
+/* Identifies one of the pictures that an image of the scene file makes. There is one picture for each combination of a
+ * field, an isovalue and a plane of its sweep and a view of its orbit, in this order, so that views change fastest.
+ * Each is a scene_image. */
 typedef struct scene_variant {
     int source; /* index of the image in the file */
-    /* number of the combination of field, isovalue and plane among those of the image; 0 without a sweep */
+    /* index of the combination of field, isovalue and plane; 0 without a sweep */
     int layers;
     int field, isovalue, plane; /* indices in the sweep's lists; 0 if the sweep has no such list */
-    /* Index of the view. Pictures of the same image and layers differ only in this and the camera. Those with a view
-     * above 0 share the data that view 0 owns. */
+    /* index of the view. Pictures with the same image and layers differ only in their view and camera; those with a
+     * view above 0 share the data that view 0 owns. */
     int view;
 } scene_variant;
 
@@ -486,36 +492,35 @@ typedef struct scene_image {
     /* number of lights, 1 .. 8; if the scene gives none, there are a default key light and fill light */
     int light_count;
     scene_light *lights;
-    uint32_t shadows; /* the lights that cast shadows, one bit per light; 0 by default */
+    uint32_t shadows; /* set of the lights that cast shadows, one bit per light; empty by default */
     /* number of rays for ambient occlusion per hit, 1 .. 64; 0 (default): no ambient occlusion */
     int occlusion_samples;
-    double occlusion_radius; /* length of these rays in scene units; 0: chosen by the data's bounds */
-    /* method of volumes; by default one volume is integrated by segments, several are sampled */
+    double occlusion_radius; /* length of these rays in scene units; 0: chosen from the data's bounds */
+    /* method for volumes; by default segments for one volume, samples for several */
     scene_sampling_method method;
-    /* Error bound of segments, in a linear colour channel. 0: no bound; the step determines the error. The default for
-     * one volume is 0.01. */
+    /* error bound of segments in a colour channel, in linear light; 0: none, so that `step` determines the error. The
+     * default for one volume is 0.01. */
     double max_error;
     bool has_default_samples; /* set if several volumes are sampled because the scene does not specify the method */
-    double step;              /* distance between samples in scene units; 0: step_cells decides */
+    double step;              /* distance between samples in scene units; 0: step_cells is used */
     /* distance between samples in mean cell sizes, where the size of a cell is the cube root of its volume */
     double step_cells;
     bool jitter;          /* whether samples are offset randomly per pixel; true by default */
     bool is_reproducible; /* whether volumes must be the same to the last bit on any partition */
     int frames;           /* number of frames that are averaged, 1 .. 4096, a multiple of antialias; 1 by default */
-    /* Number of positions in a pixel that successive frames use in turn: 1 (default), 2, 4, 8 or 16. Without volumes,
-     * only pixels at edges get more than one frame. */
+    /* number of sample positions in a pixel, which successive frames use in turn: 1 (default), 2, 4, 8 or 16. Without
+     * volumes, only pixels at edges get more than one frame. */
     int antialias;
     double max_seconds; /* upper bound of the estimated time for samples, in seconds; 3600 by default */
     int output_count;   /* number of output files; 0: the picture is only passed to the caller in memory */
     scene_output *outputs;
     int cycle_interval;        /* the image is drawn at cycles that are multiples of this; 1 by default */
     double time_interval;      /* if > 0, the image is instead drawn whenever the time passes a multiple of this */
-    scene_condition condition; /* condition on a statistic without which the image is not drawn */
-    bool is_drawn_once;        /* whether the image is drawn only in the first step in which it is due */
+    scene_condition condition; /* the image is drawn only if this condition holds */
+    bool is_drawn_once;        /* set if the image is drawn only in the first step in which it is due */
 } scene_image;
 
-/* Iterator over the fields that an image's layers use: for each kind of layer, first the fields that are shown, then
- * those that colour the layers. */
+/* The kinds of layers. */
 typedef enum scene_layer_kind { SCENE_ISOSURFACE, SCENE_VOLUME, SCENE_SLICE, SCENE_SURFACE } scene_layer_kind;
 
 typedef enum scene_field_role {
@@ -525,19 +530,21 @@ typedef enum scene_field_role {
     SCENE_THRESHOLD /* a field that selects cells */
 } scene_field_role;
 
+/* Iterator over the fields that an image's layers use: layer by layer, in the order of scene_layer_kind; for each layer
+ * in the order of scene_field_role. */
 typedef struct scene_field_walk {
     const scene_image *image;
-    int position; /* position of the next field among all that layers can have */
+    int position; /* position of the next field; used by scene_next_field() alone */
     scene_layer_kind kind;
     scene_field_role role; /* role of the field that was returned last */
 } scene_field_walk;
 
 /* Returns the next field, or NULL after the last one. Only `image` must be set when an iteration begins. */
 scene_field *scene_next_field(scene_field_walk *walk);
-/* Returns the name of a kind of layer for messages. */
+/* Returns the word for a kind of layer, for messages. */
 const char *scene_layer_word(scene_layer_kind kind);
 
-/* Returns whether the image is the first of its variants; results that all variants share are stored with it. */
+/* Returns whether the image is the first variant; results that all variants share are stored with it. */
 static inline bool scene_is_first_variant(const scene_image *image)
 {
     return image->variant.layers == 0 && image->variant.view == 0;
@@ -554,7 +561,8 @@ static inline bool scene_has_words(const scene_image *image)
            (d->title || d->words_count || d->has_bars || d->has_rulers || d->has_axes || d->has_scale_bar);
 }
 
-/* The cells over which trees are built: all cells, those that images can show, or whichever costs less. */
+/* The cells over which trees are built: all cells, only those that images can show, or whichever of these costs
+ * less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
 /* The order in which ranks exchange fragments for blending; the constants are those of comp_schedule. */
@@ -566,10 +574,10 @@ typedef enum scene_schedule {
     SCENE_SCHEDULE_BINARY
 } scene_schedule;
 
-/* The time at which pictures are written: by a thread while the simulation continues, or before the step ends. */
+/* When pictures are written: by a thread while the simulation continues, or before the step ends. */
 typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_writing;
 
-/* Default of scene.finer_memory. */
+/* Default of scene.finer_memory, in MiB. */
 enum { SCENE_FINER_MEMORY = 4096 };
 
 /* Maximum number of images of a scene file (session_events.h has one bit for each), and of pictures that they make in a
@@ -582,7 +590,7 @@ typedef struct scene_parameter {
     double value;
 } scene_parameter;
 
-/* A mesh whose vertices are drawn at x + scale * u, where u is the value of a field at the vertex. */
+/* Draws the vertices of meshes at x + scale * u, where u is the value of a field at the vertex. */
 typedef struct scene_warp {
     /* name of a mesh, or the common beginning of several meshes' names, as in a layer's list of meshes
      * (scene_name_stands_for()) */
@@ -592,23 +600,23 @@ typedef struct scene_warp {
     int line, field_line; /* lines of the mesh's name and of the field in the scene file */
 } scene_warp;
 
-/* A mesh that is drawn together with its mirror images. */
+/* Draws meshes together with their mirror images. */
 typedef struct scene_mirror {
     /* name of a mesh, or the common beginning of several meshes' names, as in a layer's list of meshes */
     char *mesh;
-    int axes;         /* bit i is set if the mesh is mirrored along axis i; at least one is */
-    double planes[3]; /* coordinate of the mirror plane of each of these axes */
+    int axes;         /* bit i is set if the mesh is mirrored along axis i; at least one bit is set */
+    double planes[3]; /* position of the mirror plane on each of these axes */
     int line;         /* line of the mesh's name in the scene file */
 } scene_mirror;
 
 typedef struct scene {
     int derived_count;      /* number of derived fields, 0 .. SCENE_MAX_DERIVED */
-    scene_derived *derived; /* derived fields; each comes after the fields from which it is derived */
-    int threads;            /* number of threads per rank; 0: the cores of the node, shared among its ranks */
+    scene_derived *derived; /* derived fields; each comes after those from which it is derived */
+    int threads;            /* number of threads per rank; 0: the node's cores divided by its number of ranks */
     /* number of pieces along an edge between two nodes of a cell of higher order, 1 .. 8; 0: surface_error decides */
     int finer_pieces;
     double surface_error; /* bound of the error of these pieces in pixels, > 0; used if finer_pieces is 0 */
-    double finer_memory;  /* memory that finer pieces may take on all ranks together, in MiB, > 0 */
+    double finer_memory;  /* maximum memory of finer pieces on all ranks together, in MiB, > 0 */
     scene_tree tree;
     scene_schedule schedule;
     scene_writing writing;
@@ -628,9 +636,9 @@ typedef struct scene {
     scene_mirror *mirrors;
 } scene;
 
-/* Parses a text of `size` bytes. file_name is used in messages, and paths in the scene are relative to its folder.
- * attachments is NULL if the scene may name no file; files that are read are added to it. On an error *out is zeroed
- * and the message has the form "file:line: key: what is wrong, what was expected". */
+/* Parses a scene text of `size` bytes. file_name is used in messages; paths in the scene are relative to its folder.
+ * Files that the scene names are read and added to *attachments; NULL: the scene may not name files. On an error *out
+ * is zeroed, and the message has the form "file:line: key: what is wrong, what was expected". */
 insitu_status scene_parse(const char *text, size_t size, const char *file_name, scene_attachments *attachments,
                           scene *out, base_error *error);
 
@@ -638,18 +646,18 @@ void scene_free(scene *s);
 
 /* Returns the parameter of this name, or NULL if the scene has none. */
 const scene_parameter *scene_find_parameter(const scene *s, const char *name);
-/* Writes the end of a message about an unknown parameter: the name that was probably meant, and a list of all
+/* Writes the end of a message about an unknown parameter: the name that was probably meant, and the names of all
  * parameters. */
 void scene_list_parameters(const scene *s, const char *name, char *words, size_t size);
 
-/* Returns the index of a field among the scene's derived fields; -1 if it is not one of them. */
+/* Returns the index of the field among the scene's derived fields; -1 if it is not derived. */
 int scene_find_derived(const scene *s, const char *name);
 
-/* Returns the warp of the mesh of this name, or NULL if the mesh is drawn without one. If several entries select the
- * mesh, the one with the longest name is returned. */
+/* Returns the warp of the mesh of this name, or NULL if it has none. If several entries select the mesh, the one with
+ * the longest name is used. */
 const scene_warp *scene_find_warp(const scene *s, const char *mesh);
-/* Returns the mirror of the mesh of this name, or NULL if there is none. If several entries select the mesh, the one
- * with the longest name is returned. */
+/* Returns the mirror of the mesh of this name, or NULL if it has none. If several entries select the mesh, the one with
+ * the longest name is used. */
 const scene_mirror *scene_find_mirror(const scene *s, const char *mesh);
 
 /* The values by which placeholders are replaced. */
@@ -659,14 +667,14 @@ typedef struct scene_placeholder_values {
     double time;
     int view, plane;
     double isovalue;
-    const char *field; /* field that the sweep selects; NULL if there is no sweep */
+    const char *field; /* name of the field that the sweep selects; NULL if there is no sweep of fields */
 } scene_placeholder_values;
 
 scene_placeholder_values scene_placeholder_values_of(const scene_image *image, int64_t cycle, double time);
 
-/* Returns the pattern with its placeholders replaced: {cycle} or {cycle:0N}, likewise {view} and {plane}; {time} or
- * {time:.Nf} (or e, or g), likewise {isovalue}; {name} and {field}. Numbers have a decimal point in any locale. The
- * result is from base_alloc(); NULL if memory ran out. */
+/* Returns the pattern with its placeholders replaced. {cycle}, {view} and {plane} may have a format as in {cycle:0N},
+ * {time} and {isovalue} one as in {time:.Nf} (or e or g instead of f); {name} and {field} have none. Numbers have a
+ * decimal point in any locale. The result is allocated by base_alloc(); NULL if memory ran out. */
 char *scene_expand(const char *pattern, const scene_placeholder_values *moment);
 
 #endif

@@ -6,12 +6,13 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-/* Adds the clip to the set, and to the image's list if it is not there yet. */
+/* Adds the clip to a set of clips, and to the image's list of clips if it is not there yet. */
 static insitu_status add_clip(const scene_document *d, const char *path, const scene_clip *clip, scene_image *image,
                               uint32_t *set)
 {
     int at = 0;
-    /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): duplicates that are missed are only applied twice */
+    /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): a duplicate that is not found is applied twice, which does
+     * no harm */
     while (at < image->clip_count && memcmp(&image->clips[at], clip, sizeof *clip) != 0) at++;
     if (at == SCENE_MAX_CLIPS)
         return scene_fail_at_key(d, path, "",

@@ -1,6 +1,6 @@
-/* Reads the keys that describe how values become colours; all layers use the same description. A map is stored as a
- * table, which is already reversed and cut into bands if the scene requests that, so that no other code distinguishes
- * built-in maps, files and lists. */
+/* Reads the keys that describe how values are mapped to colours; all kinds of layers use the same keys. A colour map is
+ * stored as a table, which is reversed and divided into bands here if the scene requests it, so that other code need
+ * not distinguish built-in maps, files and lists of colours. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -19,7 +19,7 @@ __attribute__((format(printf, 2, 3))) static void format_path(char path[path_siz
     va_end(arguments);
 }
 
-/* Maximum ratio of the ends of a logarithmic range, limited by the exponents of float32. */
+/* Maximum ratio of the ends of a logarithmic range; the exponents of float32 limit it. */
 static const double widest_log_range = 1e30;
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
@@ -104,7 +104,7 @@ static insitu_status use_list(const scene_document *d, const char *path, scene_c
 
 /* ---- files ----------------------------------------------------------------------------------------------------- */
 
-/* Returns the path under which a file is opened: paths in a scene are relative to the scene's folder. */
+/* Returns the path by which a file is opened. Paths in a scene are relative to the scene's folder. */
 static char *path_from_scene(const char *scene_path, const char *name)
 {
     const char *slash = strrchr(scene_path, '/');
@@ -123,7 +123,7 @@ static const scene_attachment *find_attachment(const scene_attachments *all, con
     return NULL;
 }
 
-/* Reads a file as an attachment of the scene. It takes ownership of the path. */
+/* Reads a file as an attachment of the scene. Takes ownership of the path. */
 static insitu_status read_attachment(const scene_document *d, const char *key, char *path)
 {
     scene_attachments *all = d->attachments;
@@ -221,8 +221,8 @@ static void reverse_map(scene_colour_map *map)
     }
 }
 
-/* Replaces the table by its colours at evenly spaced positions, including both ends; a single band gets the middle
- * colour. */
+/* Replaces the table by its colours at `bands` evenly spaced positions, including both ends. A single band gets the
+ * colour of the middle. */
 static insitu_status cut_into_bands(const scene_document *d, int bands, scene_colour_map *map)
 {
     float *colours = base_alloc((size_t)bands * 3 * sizeof *colours);

@@ -1,7 +1,7 @@
-/* Reads colour maps in files as ParaView exports them: a JSON list of mappings, or one mapping. Each mapping has
- * RGBPoints (value, red, green and blue in turn) and a ColorSpace, or IndexedColors (for bands), and a Name. libyaml
- * can read JSON, which is a subset of YAML. Only the relative positions of the values matter: the first value is the
- * low end of a layer's range, and the last value the high end. */
+/* Reads colour maps from files that ParaView has exported: a JSON list of mappings, or a single mapping. Each mapping
+ * has a Name, and either RGBPoints (value, red, green and blue, repeated) and a ColorSpace, or IndexedColors (for
+ * bands). libyaml can read JSON, which is a subset of YAML. Only the relative positions of the values are used: the
+ * first value becomes the low end of a layer's range, and the last value the high end. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -109,7 +109,7 @@ static insitu_status read_space(const colour_file *f, const yaml_node_t *node, c
     return fail_at_node(f, node, "ColorSpace: expected one of RGB, HSV, Lab, CIELAB, Diverging and Step");
 }
 
-/* Reads the colours of bands: the red, green and blue numbers of one band after the other. */
+/* Reads the colours of bands: red, green and blue of each band in turn. */
 static insitu_status read_bands(const colour_file *f, const yaml_node_t *list, scene_colour_points *out)
 {
     const int numbers = list->type == YAML_SEQUENCE_NODE ? count_items(list) : 0;

@@ -1,4 +1,5 @@
-/* Converts the schema's structs into struct scene: fills in defaults, and checks what the schema cannot express. */
+/* Converts the schema's structs (scene_schema.h) into a struct scene: fills in defaults, and checks what the schema
+ * cannot express. */
 #ifndef SCENE_SCENE_CONVERT_H
 #define SCENE_SCENE_CONVERT_H
 
@@ -8,7 +9,7 @@
 
 enum { SCENE_PATH_SIZE = 128 };
 
-/* The points between which a colour map is interpolated. */
+/* The points between which the colours of a map are interpolated. */
 typedef struct scene_colour_points {
     int count;
     colour_point *items;
@@ -21,44 +22,46 @@ bool scene_normalize(double v[3]);
 /* Returns whether two unit vectors are parallel within a millionth of a radian. */
 bool scene_is_parallel(const double a[3], const double b[3]);
 
-/* The numbers whose product is the number of pictures that an image makes in a step. */
+/* The numbers of fields, isovalues, planes and views of an image. Their product is the number of pictures that the
+ * image makes in a step. */
 typedef struct scene_series {
-    int fields, isovalues, planes, views; /* number of fields, isovalues, planes and views; each is at least 1 */
+    int fields, isovalues, planes, views; /* each is at least 1 */
 } scene_series;
 
-/* Checks the image's sweep and counts its pictures by factor. path: the path of the image in the file. */
+/* Checks the image's sweep, and counts the fields, isovalues, planes and views over which it makes pictures. path: path
+ * of the image in the file. */
 insitu_status scene_find_series(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_series *out);
 /* Counts the pictures of all images together; more than SCENE_MAX_PICTURES are an error. */
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
-/* Removes, from the image's layers as given in the file, all that its variant does not show. */
+/* Removes from the image's layers, as the file gives them, everything that its variant does not show. */
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_image *out);
 
-/* Converts those parts of a camera that make several views: its orbit, or its path. path: the path of the camera in the
+/* Converts the parts of a camera that give it several positions: its orbit or its path. path: path of the camera in the
  * file. */
 insitu_status scene_convert_orbit(const scene_document *d, const char *path, const scene_file_camera *in,
                                   scene_camera *out);
 insitu_status scene_convert_path(const scene_document *d, const char *path, const scene_file_camera *in,
                                  scene_camera *out);
 int scene_count_views(const scene_document *d, const char *path, const scene_file_camera *in);
-/* Sets the direction of a camera with an orbit to that of one of its views. */
+/* Sets the direction of a camera with an orbit to that of the view with this index. */
 void scene_place_view(scene_camera *camera, int view);
 
 /* Converts the path of an output that belongs to a database. */
 insitu_status scene_convert_cinema(const scene_document *d, const char *path, const scene_file_output *in,
                                    const scene_image *image, scene_output *out);
-/* Lists the montages of all images, and numbers their cells. It must be called before views are added. */
+/* Lists the montages of all images, and numbers their panels. Must be called before views are added to the scene. */
 insitu_status scene_find_montages(const scene_document *d, scene *s);
-/* Lists the databases of all images. It must be called before views are added. */
+/* Lists the databases of all images. Must be called before views are added to the scene. */
 insitu_status scene_find_databases(const scene_document *d, scene *s);
 
-/* Each function converts one part of an image; path is the path of this part in the file, for messages. */
+/* The functions below convert one part of an image each. path: path of this part in the file, for messages. */
 insitu_status scene_convert_camera(const scene_document *d, const char *path, const scene_file_camera *in,
                                    scene_camera *out);
 insitu_status scene_convert_lights(const scene_document *d, const char *path, const scene_file_image *in,
                                    scene_image *out);
-/* Converts shadows and ambient occlusion. It must be called after scene_convert_lights(). */
+/* Converts shadows and ambient occlusion. Must be called after scene_convert_lights(). */
 insitu_status scene_convert_shadows(const scene_document *d, const char *path, const scene_file_image *in,
                                     scene_image *out);
 insitu_status scene_convert_layers(const scene_document *d, const char *path, const scene_file_image *in,
@@ -70,32 +73,32 @@ insitu_status scene_convert_decorations(const scene_document *d, const char *pat
                                         scene_decorations *out);
 void scene_free_decorations(scene_decorations *decorations);
 void scene_free_field(scene_field *field);
-/* Rejects unknown placeholders, and those for values that the image does not have. key is the key of the text; path is
- * the path of the mapping below the image that holds this key. */
+/* Returns an error if the text has an unknown placeholder, or one for a value that the image does not have. key: key of
+ * the text; path: path of the mapping with this key. */
 insitu_status scene_check_placeholders(const scene_document *d, const char *path, const char *key, const char *text);
 
-/* Converts the keys of the mapping at path that describe how values become colours. */
+/* Converts the keys, of the mapping at the path, that describe how values are mapped to colours. */
 insitu_status scene_convert_colour_map(const scene_document *d, const char *path, const scene_file_colour_map *in,
                                        scene_colour_map *out);
 
-/* Reads the colours of a map in a file of ParaView's format, as increasing points (allocated with base_alloc()).
- * file_name is for messages; name selects one of the file's maps, or is NULL for its only map. */
+/* Reads a colour map from a file in ParaView's format as points with increasing positions (allocated by base_alloc()).
+ * file_name: for messages; name: selects one of the file's maps, or NULL for its only map. */
 insitu_status scene_read_colour_file(const scene_attachment *file, const char *file_name, const char *name,
                                      scene_colour_points *out, base_error *error);
 
-/* Copies the texts of a list into a new array of the same length, which the caller frees, after an error too. If path
+/* Copies the texts of a list into a new array of the same length. The caller must free it even after an error. If path
  * is NULL, the array is empty. */
 insitu_status scene_copy_texts(const scene_document *d, const char *path, char ***out, int *out_count);
 
-/* Converts the list of mesh names of a layer; layer is the layer's path in the file. */
+/* Converts the list of mesh names of a layer. layer: path of the layer in the file. */
 insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out);
 
-/* Converts the word for a component: magnitude, x, y, z or a number; NULL means SCENE_COMPONENT_DEFAULT. path is the
+/* Converts the text that selects a component: magnitude, x, y, z or a number; NULL means SCENE_COMPONENT_DEFAULT. path:
  * path of the mapping with the key `component`. */
 insitu_status scene_convert_component(const scene_document *d, const char *path, const char *text, int *component);
 
-/* Converts a field of a layer. layer is the path of the layer, which gives the meshes; path is the path of the mapping
- * that names the field. */
+/* Converts a field of a layer. layer: path of the layer, which selects the meshes; path: path of the mapping that names
+ * the field. */
 insitu_status scene_convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
                                   const char *component, scene_field *out);
 
@@ -103,33 +106,33 @@ insitu_status scene_convert_field(const scene_document *d, const char *layer, co
 insitu_status scene_convert_colour_by(const scene_document *d, const char *path, const scene_file_colour_by *in,
                                       scene_field *out, scene_colour_map *map);
 
-/* Converts the contour lines of a layer. layer: the path of the layer in the file; in: NULL if there are no lines;
- * colours: the field that colours the layer, or NULL; height: height of the picture in pixels. */
+/* Converts the contour lines of a layer. layer: path of the layer in the file; in: NULL if there are no lines; colours:
+ * the field that colours the layer, or NULL; height: height of the picture in pixels. */
 insitu_status scene_convert_lines(const scene_document *d, const char *layer, const scene_file_lines *in,
                                   const scene_field *colours, int height, scene_lines *out);
 
-/* Converts a material; NULL gives the default one, which is slightly glossy. */
+/* Converts a material. If in is NULL, the result is the default material, which is slightly glossy. */
 scene_material scene_convert_material(const scene_file_material *in);
 
-/* Adds the clips at a path to the image's list, and to the set, which has one bit per entry of that list. in: NULL if
+/* Adds the clips at the path to the image's list, and to the set, which has one bit per entry of the list. in: NULL if
  * there are none. */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
-/* Makes the set of clips that cut a layer: those of all layers, and the layer's own. */
+/* Computes the set of clips that cut a layer: those of all layers, and the layer's own. */
 insitu_status scene_convert_layer_clip(const scene_document *d, const char *layer, const scene_file_clip *in,
                                        scene_image *image, uint32_t *set);
-/* Converts the plane with this index in the list `planes` of the mapping at path. */
+/* Converts the plane with this index in the list `planes` of the mapping at the path. */
 insitu_status scene_convert_plane(const scene_document *d, const char *path, int index, const scene_file_plane *in,
                                   scene_plane *out);
 /* Converts an outer surface. height: height of the picture in pixels, for the default width of lines. */
 insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in, int height,
                                     scene_surface *out);
-/* Counts the planes of all entries of the slice's list. */
+/* Returns the number of planes of all entries of the slice's list together. */
 int scene_count_planes(const scene_file_slice *in);
 insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in, int height,
                                   scene_slice *out);
 
-/* Converts the condition of an image. in: NULL if there is no condition; image: the path of the image in the file. */
+/* Converts the condition of an image. in: NULL if there is none; image: path of the image in the file. */
 insitu_status scene_convert_condition(const scene_document *d, const char *image, const scene_file_condition *in,
                                       scene_condition *out);
 insitu_status scene_convert_statistics(const scene_document *d, const scene_file *in, scene *out);
@@ -142,7 +145,7 @@ insitu_status scene_convert_parameters(const scene_document *d, scene *out);
 insitu_status scene_convert_meshes_drawn(const scene_document *d, const scene_file *in, scene *out);
 void scene_free_meshes(scene *s);
 
-/* Rejects two outputs that would be written to the same file. */
+/* Returns an error if two outputs would be written to the same file. */
 insitu_status scene_check_outputs(const scene_document *d, const scene *s);
 
 #endif

@@ -1,4 +1,5 @@
-/* Reads the part of an image that describes what is written and drawn beside the data. */
+/* Reads the keys of an image's decorations: titles, colour bars, rulers and other texts and lines drawn in addition to
+ * the data. */
 #include <stdio.h>
 #include <string.h>
 

@@ -1,4 +1,4 @@
-/* Reads derived fields, which the session derives from other fields. Each has a name, and may depend on other derived
+/* Reads derived fields, which the session computes from other fields. Each has a name, and may depend on other derived
  * fields, but not on itself. */
 #include <stdio.h>
 #include <string.h>
@@ -46,7 +46,7 @@ static insitu_status store_expression(const scene_document *d, const char *path,
     return status;
 }
 
-/* Reads a field's name, which may be followed by a component; a whole expression is an error. */
+/* Reads the name of a field, which may be followed by a component. Any other expression is an error. */
 static insitu_status add_reference(const scene_document *d, const char *path, const char *text, scene_derived *out)
 {
     scene_expression one;
@@ -67,7 +67,7 @@ static insitu_status add_reference(const scene_document *d, const char *path, co
     return status;
 }
 
-/* Reads the field or fields at the path: a single field, or the components of a vector, each of which is a scalar. */
+/* Reads the input at the path: a single field, or a list of the components of a vector, each of which is a scalar. */
 static insitu_status read_references(const scene_document *d, const char *path, scene_derived *out)
 {
     const char *texts[SPACE];
@@ -86,8 +86,8 @@ static insitu_status read_references(const scene_document *d, const char *path, 
     return status;
 }
 
-/* Reads a scalar of a field for the keys `field` and `magnitude`, and stores it as an expression of this field
- * alone. */
+/* Reads the field of the keys `field` and `magnitude`, and stores its scalar as an expression that consists of this
+ * field alone. */
 static insitu_status read_scalar(const scene_document *d, const char *path, int component, scene_derived *out)
 {
     const char *text = NULL;
@@ -108,7 +108,8 @@ static insitu_status read_scalar(const scene_document *d, const char *path, int 
 
 /* ---- one field -------------------------------------------------------------------------------------------------- */
 
-/* Finds the single key that gives the kind of the field. *found: its index in `keys`, or -1 for an expression. */
+/* Finds the single key that gives the kind of the derived field. *found receives its index in `keys`, or -1 for an
+ * expression. */
 static insitu_status find_key(const scene_document *d, const char *path, const scene_file_derived *in, int *found)
 {
     const char *first = in->expression ? "expression" : NULL;
@@ -178,11 +179,12 @@ int scene_find_derived(const scene *s, const char *name)
     return -1;
 }
 
-/* A depth-first search, from a field to the fields on which it depends. */
+/* A depth-first search from a derived field to those on which it depends, which sorts the fields. */
 typedef struct search {
     const scene_document *d;
     scene *s;
-    /* fields on the path of the search, beginning with the field that is being sorted */
+    /* path of the search: the field that is being sorted, and the chain of its dependencies down to the current
+     * field */
     int path[SCENE_MAX_DERIVED], length;
     int order[SCENE_MAX_DERIVED], count; /* indices of the sorted fields, and their number */
     bool is_done[SCENE_MAX_DERIVED];

@@ -1,7 +1,7 @@
-/* A scene file is read twice: first as events, to reject dangerous input before memory is allocated for it (deep
- * nesting, and aliases, by which a few lines can expand to billions of nodes), and then as a tree. The tree is compared
- * with the schema in this file, because only here are a value, its key and its line available together for a useful
- * message; the same traversal stores correct values in the schema's structs. */
+/* Reads a scene file twice: first as events, to reject dangerous input before memory is allocated for it (deep nesting,
+ * and aliases, by which a few lines can expand to billions of nodes), and then as a tree. The tree is checked against
+ * the schema in this file, because only here a value, its key and its line are available together for a useful message.
+ * The same traversal stores correct values in the schema's structs. */
 #include "scene_document.h"
 
 #include <ctype.h>
@@ -19,7 +19,7 @@
 
 enum { path_size = 256, quote_size = 48, question_size = 96, list_size = 64, most_words = 64, most_plain = 60 };
 
-/* A block of memory for the schema's structs; the memory behind the header is aligned for any type. */
+/* Header of a block of memory for the schema's structs. The memory behind it is aligned for any type. */
 struct scene_block {
     scene_block *next;
     max_align_t memory[];
@@ -163,7 +163,7 @@ static const char *node_text(const yaml_node_t *scalar)
     return (const char *)scalar->data.scalar.value;
 }
 
-/* Writes the node's text in quotes, shortened to a length that suits a message. */
+/* Writes the node's text in quotes, shortened for a message. */
 static void quote_node(const yaml_node_t *node, char quoted[quote_size])
 {
     if (node->type == YAML_SEQUENCE_NODE) {
@@ -195,7 +195,7 @@ bool scene_is_plain_name(const char *name)
     return *name && strlen(name) <= most_plain && !name[strcspn(name, ".[")];
 }
 
-/* Returns the entry of a list whose key `name` has this text, or NULL if there is none. */
+/* Returns the entry of a list whose key `name` has this value, or NULL if there is none. */
 static const yaml_node_t *find_named(const scene_document *d, const yaml_node_t *list, const char *name, size_t length)
 {
     for (int i = 0; i < count_items(list); i++) {
@@ -209,8 +209,8 @@ static const yaml_node_t *find_named(const scene_document *d, const yaml_node_t 
     return NULL;
 }
 
-/* Returns the node at a path, or NULL if there is none. *line is the line of the node, or of the last node of the path
- * that exists. */
+/* Returns the node at a path, or NULL if there is none. *line receives the line of the node, or of the last node on the
+ * path that exists. */
 static const yaml_node_t *find_node(const scene_document *d, const char *path, int *line)
 {
     const yaml_node_t *node = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
@@ -328,7 +328,8 @@ static void suggest_candidate(const yaml_node_t *word, const char *const *candid
     if (meant) snprintf(question, question_size, " (did you mean %.64s?)", meant);
 }
 
-/* Lists the words that a value may have, in all its forms. Returns their number, at most `most`. */
+/* Lists the words that the schema allows as a value, in all forms of the value. Returns their number, at most
+ * `most`. */
 static int list_choices(const cyaml_schema_value_t *value, const scene_key *key, const char **words, int most)
 {
     int count = 0;
@@ -372,8 +373,8 @@ static bool read_number(const char *text, double *number)
     return end != text && !*end && isfinite(*number);
 }
 
-/* Writes a question that suggests why a value is empty: an unquoted #ff0000 is read as a comment, and keys below it may
- * lack their indentation. */
+/* Writes a question that suggests why a value is empty: an unquoted #ff0000 is a comment, or keys below it lack their
+ * indentation. */
 static void suggest_for_empty_value(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                                     char question[question_size])
 {
@@ -392,7 +393,8 @@ static bool mapping_has_key(const cyaml_schema_value_t *mapping, const char *key
     return f->key != NULL;
 }
 
-/* Writes a question for a word where a mapping is expected: the word may be one of its keys, or the name of a field. */
+/* Writes a question about a word in place of a mapping: the word may be one of the mapping's keys, or the name of a
+ * field. */
 static void suggest_mapping(const char *word, const cyaml_schema_value_t *mapping, const char *begin, const char *end,
                             char question[question_size])
 {
@@ -405,8 +407,8 @@ static void suggest_mapping(const char *word, const cyaml_schema_value_t *mappin
         snprintf(question, question_size, " (did you mean %sfield: %.32s%s?)", begin, word, end);
 }
 
-/* Writes a question for a mapping where a list of mappings is expected: the entries stand under their names, or a "- "
- * is missing. */
+/* Writes a question about a mapping in place of a list of mappings: entries may be given under their names, or a "- "
+ * may be missing. */
 static void suggest_list_of_mappings(const scene_document *d, const yaml_node_t *node,
                                      const cyaml_schema_value_t *entry, char question[question_size])
 {
@@ -419,7 +421,8 @@ static void suggest_list_of_mappings(const scene_document *d, const yaml_node_t 
         snprintf(question, question_size, " (is a \"- \" missing before its first key?)");
 }
 
-/* Writes "did you mean ...?" if the value would be valid in quotes, as a list, or as an entry of a list. */
+/* Writes a question that suggests another form in which the value would be valid: in quotes, as a list, or as an entry
+ * of a list. */
 static void suggest_form(const scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                          const scene_key *key, char question[question_size])
 {
@@ -471,7 +474,7 @@ static insitu_status fail_for_value(const scene_document *d, const char *path, c
     return scene_fail_at_key(d, path, "", "%s is not allowed%s, expected %s", quoted, question, expected);
 }
 
-/* Reads a decimal whole number. 010 is rejected, because it could mean 10 or 8. */
+/* Reads a decimal whole number. A leading zero is rejected, because 010 could mean 10 or 8. */
 static bool read_whole_number(const char *text, double *number)
 {
     const char *digits = text + (*text == '-' || *text == '+');
@@ -502,7 +505,7 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
     if (node->type != YAML_SCALAR_NODE) return false;
     const char *text = node_text(node);
     const size_t length = strlen(text);
-    if (length != node->data.scalar.length) return false; /* lengths differ if the text contains a NUL */
+    if (length != node->data.scalar.length) return false; /* rejects texts that contain a NUL */
     double number;
     switch (value->type) {
     case CYAML_INT: return read_whole_number(text, &number) && is_in_range(number, key);
@@ -515,7 +518,7 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
 }
 
 /* Allocates memory for `count` values at *to or, if the schema has a pointer there, at the memory that it points to. If
- * *to is NULL, the value is not stored, but read from the document later. */
+ * *to is NULL, nothing is stored: the value is read from the document later. */
 static bool allocate_values(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
 {
     if (!*to || !(value->flags & CYAML_FLAG_POINTER)) return true;
@@ -529,7 +532,7 @@ static bool allocate_values(scene_document *d, const cyaml_schema_value_t *value
     return true;
 }
 
-/* Stores a scalar that has passed the checks. Texts are owned by the document. */
+/* Stores a scalar that has been checked. Texts remain owned by the document. */
 static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
                                   void *to)
 {
@@ -549,7 +552,7 @@ static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, co
 static insitu_status check_value(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key, void *to);
 
-/* Writes the path of an entry of a list, by the entry's name if it has one. */
+/* Writes the path of an entry of a list, which contains the entry's name if it has one, and otherwise its index. */
 static void write_item_path(const scene_document *d, const char *path, const yaml_node_t *list, const scene_key *key,
                             int index, char out[path_size])
 {
@@ -618,7 +621,7 @@ static bool accepts_node(const cyaml_schema_value_t *value, const yaml_node_t *n
     }
 }
 
-/* Checks the node against the first of the allowed forms whose type matches. */
+/* Checks the node against the first form of the value that accepts the node's type. */
 static insitu_status check_forms(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
@@ -631,8 +634,8 @@ static insitu_status check_forms(scene_document *d, const char *path, const yaml
     return fail_for_value(d, path, node, value, key);
 }
 
-/* Returns whether a name chosen by the scene is allowed; such names appear in paths of messages and in calls by
- * simulations. */
+/* Returns whether a name that the scene defines is allowed. Such names are part of paths in messages, and arguments of
+ * calls by simulations. */
 static bool is_own_name(const yaml_node_t *name)
 {
     static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_", digits[] = "0123456789-";
@@ -643,7 +646,7 @@ static bool is_own_name(const yaml_node_t *name)
     return i > 0;
 }
 
-/* Checks a mapping whose keys are names that the scene gives. */
+/* Checks a mapping whose keys are names that the scene defines. */
 static insitu_status check_named(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
@@ -672,7 +675,7 @@ static insitu_status check_named(scene_document *d, const char *path, const yaml
     return status;
 }
 
-/* Writes the question whether an unknown key belongs elsewhere: at the top of the file, or in the only mapping below
+/* Writes a question that suggests where an unknown key belongs: at the top of the file, or in the only mapping below
  * this one that has such a key. */
 static void suggest_place(const yaml_node_t *name, const scene_mapping *mapping, char question[question_size])
 {
@@ -709,14 +712,14 @@ static insitu_status fail_for_key(scene_document *d, const char *path, const yam
                      node_line(name), path, *path ? ": " : "", quoted, fault, question, expected);
 }
 
-/* Returns the reason why a key of earlier versions was removed, or NULL if there never was such a key. */
+/* Returns the reason why a key of earlier versions was removed; NULL if there never was such a key. */
 static const char *find_removal_reason(const char *key)
 {
-    static const char *const gone[][2] = {{"roots", "gone (no crossing in a cell is missed any more)"},
-                                          {"root_steps", "gone (roots are polished until they stay)"},
-                                          {"group", "gone (it never changed an image)"}};
-    for (size_t i = 0; i < sizeof gone / sizeof gone[0]; i++)
-        if (strcmp(key, gone[i][0]) == 0) return gone[i][1];
+    static const char *const removed[][2] = {{"roots", "gone (no crossing in a cell is missed any more)"},
+                                             {"root_steps", "gone (roots are polished until they stay)"},
+                                             {"group", "gone (it never changed an image)"}};
+    for (size_t i = 0; i < sizeof removed / sizeof removed[0]; i++)
+        if (strcmp(key, removed[i][0]) == 0) return removed[i][1];
     return NULL;
 }
 

@@ -1,4 +1,4 @@
-/* A scene file as a tree of YAML nodes with their lines. The functions here find errors, compose the messages about
+/* Defines a scene file as a tree of YAML nodes with their lines. The functions find errors, compose messages about
  * them, and store correct values in the schema's structs. */
 #ifndef SCENE_SCENE_DOCUMENT_H
 #define SCENE_SCENE_DOCUMENT_H
@@ -21,33 +21,31 @@ typedef struct scene_document {
     scene_block *blocks; /* memory blocks that hold the schema's structs */
 } scene_document;
 
-/* Reads text, which is borrowed, into *d: one YAML document of bounded size and depth, without anchors, aliases and
- * tags. After an error there is nothing to close. From here on, numbers are read in the thread's locale, which must
- * have a decimal point.
- */
+/* Reads a text, which is borrowed, into *d. It must be one YAML document of bounded size and depth, without anchors,
+ * aliases and tags. After an error there is nothing to close. From this call until the document is closed, the thread's
+ * locale must have a decimal point, because numbers are read in it. */
 insitu_status scene_document_open(scene_document *d, const char *text, size_t size, const char *file_name,
                                   base_error *error);
 
 void scene_document_close(scene_document *d);
 
-/* Checks the document against the schema (keys are known, unique, and none is missing; types, counts and ranges are
- * correct) and stores it in *file. *file belongs to the document and is valid until the document is closed; it is
- * undefined on an error. */
+/* Checks the document against the schema (keys are known and unique, and none is missing; types, counts and ranges are
+ * correct) and stores it in *file. *file is owned by the document and valid until the document is closed; after an
+ * error it is undefined. */
 insitu_status scene_document_read(scene_document *d, scene_file **file);
 
 /* Returns the line (from 1) of a path such as "images[0].size[1]", or of the last node of the path that exists. In a
- * list whose entries have the key `name`, the name may replace the index, as in "fields.speed", if it is plain: short,
- * without . and [. */
+ * list whose entries have the key `name`, a name that is short and contains no . and [ may replace the index, as in
+ * "fields.speed". */
 int scene_document_line(const scene_document *d, const char *path);
 
 bool scene_is_plain_name(const char *name);
 
-/* Returns the texts at a path, which is a single text or a list; the texts are borrowed from the document. The result
- * is the number of texts, of which at most `most` are stored; 0 if there is no node at the path. */
+/* Stores the texts at a path, which is a single text or a list of texts, borrowed from the document. At most `most` are
+ * stored. Returns their full number; 0 if there is no node at the path. */
 int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most);
 
-/* Returns the keys of a mapping at a path if these are names that the scene gives; the arguments are those of
- * scene_document_texts(). */
+/* As scene_document_texts(), for the keys of the mapping at the path, which must be names that the scene defines. */
 int scene_document_names(const scene_document *d, const char *path, const char **names, int most);
 
 /* The kind of the node at a path, and its value if it is a number. After the checks, the node has the type that the

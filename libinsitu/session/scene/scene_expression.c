@@ -36,8 +36,8 @@ enum { FUNCTIONS = sizeof functions / sizeof *functions };
 typedef struct parser {
     const char *text, *cursor;
     scene_expression *expression;
-    int nesting_depth; /* number of open brackets and signs, which is limited */
-    int stack_count;   /* number of stack entries in use at this point of the program */
+    int nesting_depth; /* nesting depth: number of open brackets and signs, which is limited */
+    int stack_count;   /* number of stack entries in use after the instructions emitted so far */
     scene_parse_result result;
     char *fault;
 } parser;
@@ -92,7 +92,7 @@ static bool accept_character(parser *p, char c)
     return true;
 }
 
-/* Returns the length of the next word, for a message: a name, a number or a sign. */
+/* Returns the length of the next name, number or sign, for a message. */
 static int word_length(const char *at)
 {
     int length = 0;
@@ -137,7 +137,7 @@ static bool add_binary(parser *p, scene_operation operation)
     return add_instruction(p, operation, 0, 0);
 }
 
-/* Emits the instruction for a power. A small whole exponent gets an instruction that needs no logarithm. */
+/* Emits the instruction for a power. If the exponent is a small whole number, the instruction needs no logarithm. */
 static bool add_power(parser *p)
 {
     const scene_instruction *last = &p->expression->instructions[p->expression->count - 1];
@@ -399,7 +399,7 @@ static void apply_function(scene_operation operation, double *restrict a, int co
     }
 }
 
-/* Applies the operator to `count` pairs of numbers: a = a op b. The minimum or maximum of NaN and another number is
+/* Applies the operator to `count` pairs of numbers: a = a op b. If one number is NaN, the minimum and the maximum are
  * NaN. */
 static void apply_operator(scene_operation operation, double *restrict a, const double *restrict b, int count)
 {
@@ -422,7 +422,7 @@ static bool is_operator(scene_operation operation)
 
 void scene_evaluate(const scene_expression *expression, const double *const *inputs, int count, double *stack)
 {
-    double *top = stack - SCENE_BLOCK; /* entry at the top of the stack */
+    double *top = stack - SCENE_BLOCK; /* top entry of the stack; an entry is a block of SCENE_BLOCK numbers */
     for (int k = 0; k < expression->count; k++) {
         const scene_instruction *at = &expression->instructions[k];
         if (at->operation == SCENE_OP_PUSH_NUMBER) {

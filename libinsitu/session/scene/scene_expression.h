@@ -1,5 +1,5 @@
-/* Expressions of fields, such as "sqrt(u.x^2 + u.y^2) / a". A text is compiled into a program for a stack machine,
- * which evaluates a block of points at a time. */
+/* Defines expressions of fields, such as "sqrt(u.x^2 + u.y^2) / a". A text is compiled into a program for a stack
+ * machine, which evaluates a block of points at a time. */
 #ifndef SCENE_SCENE_EXPRESSION_H
 #define SCENE_SCENE_EXPRESSION_H
 
@@ -22,7 +22,7 @@ typedef enum scene_operation {
     SCENE_OP_MULTIPLY,
     SCENE_OP_DIVIDE,
     SCENE_OP_POWER,
-    SCENE_OP_WHOLE_POWER, /* raises to a whole power; `number` is the exponent */
+    SCENE_OP_WHOLE_POWER, /* raises to a whole power; the instruction's `number` is the exponent */
     SCENE_OP_SQRT,
     SCENE_OP_ABS,
     SCENE_OP_EXP,
@@ -57,14 +57,14 @@ typedef struct scene_expression {
 
 typedef enum scene_parse_result { SCENE_PARSED, SCENE_FAULTY, SCENE_NO_MEMORY } scene_parse_result;
 
-/* Parses a text in the C locale, in which numbers have a decimal point. If the text is faulty, fault describes what was
- * found and what was expected. *out must be freed only after SCENE_PARSED. */
+/* Parses a text; the locale must be C, in which numbers have a decimal point. If the text is faulty, `fault` receives
+ * what was found and what was expected. *out must be freed only if the result is SCENE_PARSED. */
 scene_parse_result scene_parse_expression(const char *text, scene_expression *out, char fault[SCENE_FAULT_SIZE]);
 
 void scene_expression_free(scene_expression *expression);
 
-/* Runs the program for count points, at most SCENE_BLOCK. inputs holds count values of each input. stack has space for
- * depth × SCENE_BLOCK numbers; the first count numbers are the results. */
+/* Runs the program for `count` points, at most SCENE_BLOCK. inputs: `count` values of each input. stack: space for
+ * depth × SCENE_BLOCK numbers, whose first `count` numbers receive the results. */
 void scene_evaluate(const scene_expression *expression, const double *const *inputs, int count, double *stack);
 
 #endif

@@ -9,8 +9,8 @@
 
 enum { cycle_length = 16 };
 
-/* The default cycle of colours. Neighbours differ in both hue and lightness, and the first colours also differ for
- * viewers who cannot distinguish red from green. */
+/* The default cycle of colours. Consecutive colours differ in both hue and lightness. The first ones can also be
+ * distinguished by viewers who do not see the difference of red and green. */
 static const float cycle[cycle_length][3] = {
     {0.25F, 0.55F, 0.85F}, {0.95F, 0.65F, 0.20F}, {0.20F, 0.65F, 0.50F}, {0.85F, 0.35F, 0.25F},
     {0.95F, 0.88F, 0.35F}, {0.60F, 0.45F, 0.80F}, {0.55F, 0.80F, 0.95F}, {0.88F, 0.55F, 0.75F},
@@ -35,8 +35,8 @@ static insitu_status convert_values(const scene_document *d, const char *path, c
     return INSITU_OK;
 }
 
-/* Converts the colours of an isosurface. first: number of isovalues of earlier layers, from which the default colours
- * continue, so that layers differ. */
+/* Converts the colours of an isosurface layer. first: number of isovalues of earlier layers; default colours continue
+ * the cycle from there, so that layers differ. */
 static insitu_status convert_colours(const scene_document *d, const char *path, const scene_file_isosurface *in,
                                      int first, scene_isosurface *out)
 {
@@ -121,7 +121,7 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
 
 typedef struct layer_counts {
     int isosurfaces, volumes, slices, surfaces;
-    int values; /* number of isovalues, planes and outer surfaces together */
+    int values; /* number of isovalues, planes and outer surfaces, all together */
 } layer_counts;
 
 static insitu_status count_layer(const scene_document *d, const char *path, const char *key,
@@ -166,7 +166,7 @@ static const char *layer_word(const scene_file_layer *layer)
     return layer->volume ? "volume" : layer->slice ? "slice" : layer->surface ? "surface" : "isosurface";
 }
 
-/* Converts the clips of a layer, which must be the last layer of its kind that was converted. */
+/* Converts the clips of a layer, which must be the last converted layer of its kind. */
 static insitu_status convert_layer_clip(const scene_document *d, const char *path, const scene_file_layer *in,
                                         scene_image *out)
 {
@@ -184,7 +184,7 @@ static insitu_status convert_layer_clip(const scene_document *d, const char *pat
                              "the first volume is clipped differently, expected one clip for all volumes of an image");
 }
 
-/* Stores the index of a layer, which must be the last layer of its kind that was converted. */
+/* Stores the index of a layer, which must be the last converted layer of its kind. */
 static void set_layer_number(const scene_file_layer *in, int number, scene_image *out)
 {
     if (in->isosurface) out->isosurfaces[out->isosurface_count - 1].number = number;
@@ -217,7 +217,7 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
     if (!out->isosurfaces || !out->volumes || !out->slices || !out->surfaces) return scene_fail_for_memory(d);
     for (int i = 0; i < in->layers_count && status == INSITU_OK; i++) {
         const scene_file_layer *layer = &in->layers[i];
-        /* shorter than SCENE_PATH_SIZE, to leave space for the keys below the layer */
+        /* shorter than SCENE_PATH_SIZE, so that keys of the layer can be appended */
         char layer_path[SCENE_PATH_SIZE - 16];
         snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, layer_word(layer));
         status = convert_layer(d, layer_path, layer, values, out);

@@ -7,7 +7,8 @@
 
 static const char *const axis_names[3] = {"x", "y", "z"};
 
-/* Writes the path of an entry of the mapping, which contains the entry's name if that is plain. */
+/* Writes the path of an entry of the mapping: by the entry's name if this contains no special characters, and otherwise
+ * by its index. */
 static void write_path(const char *name, int index, char path[SCENE_PATH_SIZE])
 {
     if (scene_is_plain_name(name))
@@ -29,7 +30,7 @@ static insitu_status convert_warp(const scene_document *d, const char *path, con
     return warp->mesh && warp->field ? INSITU_OK : scene_fail_for_memory(d);
 }
 
-/* Reads the axes along which a mesh is mirrored, if the mirror planes are at 0. */
+/* Reads the axes along which a mesh is mirrored if the scene gives only axes, so that the mirror planes are at 0. */
 static insitu_status read_axes(const scene_document *d, const char *path, scene_mirror *out)
 {
     const char *texts[3];
@@ -86,7 +87,8 @@ insitu_status scene_convert_meshes_drawn(const scene_document *d, const scene_fi
 {
     insitu_status status = INSITU_OK;
     if (in->meshes_count == 0) return INSITU_OK;
-    /* Displacements and mirrored coordinates are those of nodes, not of the finer lattices between them. */
+    /* Displacements and mirrored coordinates are computed at nodes only, not at the points of finer lattices between
+     * them. */
     if (in->finer_pieces && *in->finer_pieces > 1)
         return scene_fail_at_key(d, "finer_pieces", "",
                                  "is %d and meshes are warped or mirrored, expected 1 with these", *in->finer_pieces);

@@ -22,15 +22,15 @@ typedef enum placeholder_kind {
 
 typedef struct placeholder {
     placeholder_kind kind;
-    /* minimum number of digits of a whole number, or number of digits of another number; -1: as few as needed */
+    /* for a whole number its minimum number of digits, for another number its number of digits; -1: as few as needed */
     int digits;
-    char conversion; /* format of a number that is not whole: 'f', 'e' or 'g' */
-    size_t length;   /* number of bytes in the pattern */
+    char conversion; /* format of a number that is not whole: 'f', 'e' or 'g'; 't' for a text; 0 for a whole number */
+    size_t length;   /* number of bytes of the placeholder in the pattern */
 } placeholder;
 
 static const placeholder no_placeholder = {PLACEHOLDER_NONE, 0, 0, 1};
 
-/* Parses "{WORD:0N}"; text[at] is its ":". */
+/* Parses the format of "{WORD:0N}", whose colon is text[at]. */
 static placeholder parse_integer_format(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '0') return no_placeholder;
@@ -40,7 +40,7 @@ static placeholder parse_integer_format(const char *text, size_t at, placeholder
     return (placeholder){kind, (int)digits, 0, at + 2 + count + 1};
 }
 
-/* Parses "{WORD:.Nf}", or the same with e or g; text[at] is its ":". */
+/* Parses the format of "{WORD:.Nf}" (or e or g instead of f), whose colon is text[at]. */
 static placeholder parse_real_format(const char *text, size_t at, placeholder_kind kind)
 {
     if (text[at + 1] != '.') return no_placeholder;
@@ -75,7 +75,7 @@ static placeholder parse_placeholder(const char *text)
     return no_placeholder;
 }
 
-/* Writes a number and returns its length. fewest: minimum number of digits if the placeholder gives no format. */
+/* Writes a number and returns its length. fewest: number of significant digits if the placeholder gives none. */
 static int write_number(const placeholder *p, double value, int fewest, char *out, size_t size)
 {
     if (p->conversion == 'f') return snprintf(out, size, "%.*f", p->digits, value);
@@ -83,8 +83,8 @@ static int write_number(const placeholder *p, double value, int fewest, char *ou
     return snprintf(out, size, "%.*g", p->digits < 0 ? fewest : p->digits, value);
 }
 
-/* Writes the placeholder's value to out and returns its length. size: bytes at out; with NULL and 0 only the length is
- * computed. */
+/* Writes the placeholder's value to out, which has space for `size` bytes, and returns its length. If out is NULL and
+ * size 0, only computes the length. */
 static int write_value(const placeholder *p, const scene_placeholder_values *moment, char *out, size_t size)
 {
     switch (p->kind) {
@@ -98,8 +98,8 @@ static int write_value(const placeholder *p, const scene_placeholder_values *mom
     }
 }
 
-/* Writes the expanded text to out and returns its length. size: bytes at out; with NULL and 0 only the length is
- * computed. */
+/* Writes the expanded text to out, which has space for `size` bytes, and returns its length. If out is NULL and size 0,
+ * only computes the length. */
 static size_t expand_pattern(const char *pattern, const scene_placeholder_values *moment, char *out, size_t size)
 {
     size_t length = 0;
@@ -129,8 +129,8 @@ char *scene_expand(const char *pattern, const scene_placeholder_values *moment)
     return text;
 }
 
-/* Returns the key that gives the placeholder its value, if the image lacks this key; otherwise NULL. image: the path of
- * the image in the file. */
+/* Returns a description of the key that the placeholder needs if the image lacks this key; otherwise NULL. image: path
+ * of the image in the file. */
 static const char *find_missing_key(const scene_document *d, const char *image, placeholder_kind kind)
 {
     static const struct {
@@ -261,8 +261,8 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
 
 /* ---- no two outputs may be the same file ------------------------------------------------------------------------- */
 
-/* A cycle with many digits, for which names are expanded and compared, so that {cycle} and {cycle:03} count as
- * equal. */
+/* Cycle for which paths are expanded and compared. It has so many digits that {cycle} and {cycle:03} give equal
+ * paths. */
 static const long long sample_cycle = 123456789012345678;
 static const double sample_time = 0.5;
 
@@ -286,7 +286,7 @@ static int compare_files(const void *a, const void *b)
     return order ? order : first->output_index - second->output_index;
 }
 
-/* Returns a placeholder whose use would give two pictures of one image different names. */
+/* Returns the name of a placeholder by which the paths of two pictures of one image would differ. */
 static const char *missing_placeholder(const scene_variant *a, const scene_variant *b)
 {
     if (a->view != b->view) return "view";
@@ -314,7 +314,7 @@ static const scene_output *find_output(const scene *s, const written_file *file)
     return &s->images[file->image].outputs[file->output];
 }
 
-/* Finds the first output that has the same file as an earlier one. This is an error unless both are panels of one
+/* Returns an error for the first output that has the same file as an earlier one, unless both are pictures of one
  * montage. files: sorted by path. */
 static insitu_status check_files(const scene_document *d, const scene *s, const written_file *files, int count)
 {

@@ -1,5 +1,5 @@
-/* The scene file's schema: the structs that the file is read into, and the values and meaning of each key. The schema
- * uses the types and macros of libcyaml's header; no function of that library is called.
+/* Defines the scene file's schema: the structs into which the file is read, and the values and the meaning of each key.
+ * The schema uses the types and macros of libcyaml's header, but no function of that library is called.
  *
  * Every optional value is a pointer, which is NULL if the file does not give the value; scene.c fills in the
  * defaults. */
@@ -219,7 +219,7 @@ typedef struct scene_file_output {
     char *path, *cinema;
     int *grid; /* numbers of columns and rows of a montage */
     bool *shared_bars;
-    int *inset; /* corner at which the picture is laid over others (scene_anchor) */
+    int *inset; /* corner of the montage at which the picture is an inset (scene_anchor) */
     int *bits;  /* bits per channel of a PNG file: 8 or 16 */
     bool *decorations, *data, *deep;
 } scene_file_output;
@@ -283,12 +283,12 @@ typedef struct scene_file_mesh {
 
 typedef struct scene_file {
     int *threads;          /* number of threads per rank */
-    int *tree;             /* whether trees are built over all cells or over candidates alone (scene_tree) */
+    int *tree;             /* cells over which trees are built (scene_tree) */
     int *schedule;         /* schedule of compositing (scene_schedule) */
-    int *writing;          /* when pictures are written: during the step or behind it (scene_writing) */
-    int *finer_pieces;     /* pieces between two nodes of a cell of higher order */
-    double *surface_error; /* bound by which the number of these pieces is chosen */
-    double *finer_memory;  /* limit of their memory */
+    int *writing;          /* when pictures are written: during the step or after it (scene_writing) */
+    int *finer_pieces;     /* number of pieces between two nodes of a cell of higher order */
+    double *surface_error; /* bound of the error in pixels, by which the number of pieces is chosen */
+    double *finer_memory;  /* maximum memory of these pieces on all ranks, in MiB */
     scene_file_image *images;
     int images_count;
     scene_file_statistics *statistics;
@@ -301,20 +301,20 @@ typedef struct scene_file {
 
 struct scene_mapping;
 
-/* Describes the meaning and the range of a key, in addition to its field in libcyaml's schema. */
+/* The meaning and the range of a key, in addition to its field in libcyaml's schema. */
 typedef struct scene_key {
     const char *help;
     const char *default_text; /* default value as the reference shows it; NULL: the key is required */
-    double low, high;         /* range of a number, or of each number in a list; both 0: any finite number is allowed */
+    double low, high; /* range of a number, or of each number of a list; any finite number is allowed if both are 0 */
     bool is_low_excluded;
     bool is_high_excluded;
-    bool is_named;                     /* for a list: set if paths identify its entries by their key `name` */
-    const struct scene_mapping *child; /* keys of a mapping, or of each mapping in a list */
-    /* list of forms, one for each type that the value may have; NULL: the key has a single type */
+    bool is_named; /* for a list: set if paths contain the name of an entry (its key `name`) instead of its index */
+    const struct scene_mapping *child; /* keys of the mapping, or of each mapping in the list */
+    /* forms of the value, one for each type that it may have; NULL: there is a single type */
     const struct scene_form *forms;
     int form_count;
     const struct scene_form
-        *named; /* for a mapping whose keys are names chosen by the scene: the form of its values; otherwise NULL */
+        *named; /* for a mapping whose keys are names that the scene defines: the form of its values; otherwise NULL */
 } scene_key;
 
 /* One of the forms of a value that may have several types. */
@@ -331,12 +331,13 @@ typedef struct scene_mapping {
 
 enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 
-/* libcyaml has no type for "a name or a list of names", for values of several forms, or for mappings with keys that the
- * scene chooses. CYAML_IGNORE marks these here, and they are read from the document (scene_document_texts(),
- * scene_document_kind(), scene_document_names()). Keys that the scene chooses have at most SCENE_KEY_BYTES bytes. */
+/* Limits of names. libcyaml has no type for "a name or a list of names", for values of several forms, or for mappings
+ * whose keys the scene defines. In the schema these are marked by CYAML_IGNORE, and are read from the document
+ * (scene_document_texts(), scene_document_kind(), scene_document_names()). Keys that the scene defines have at most
+ * SCENE_KEY_BYTES bytes. */
 enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64, SCENE_KEY_BYTES = 63 };
 
-/* The top-level mapping of a file, which is read into a scene_file; and the same mapping as a value. */
+/* The top-level mapping of a file, which is read into a scene_file, and the same mapping as a value of the schema. */
 extern const scene_mapping scene_top;
 extern const cyaml_schema_value_t scene_top_value;
 

@@ -43,7 +43,7 @@ static const scene_form path_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER,
 static const scene_form name_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char *, 1, 255)}, {0}}};
 typedef struct no_members {
     char unused;
-} no_members; /* an empty struct for mappings that are one of several forms, because those are read from the document */
+} no_members; /* empty struct for mappings that are one of several forms of a value, and are read from the document */
 
 #define MAP_KEYS(X)                                                                                                    \
     X(CYAML_FIELD_IGNORE("colours", OPTIONAL),                                                                         \
@@ -85,7 +85,7 @@ static const scene_form range_forms[] = {
     {{CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, range_words, CYAML_ARRAY_LEN(range_words))}, {0}},
     {{CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, no_members, range_fields)}, {.child = &range_mapping}}};
 
-/* The keys that describe how values become colours, for any mapping with a member `colours` of type
+/* The keys that describe how values are mapped to colours, for a mapping with a member `colours` of type
  * scene_file_colour_map. */
 #define COLOUR_MAP_KEYS(X, type)                                                                                       \
     X(FORMS("map"), .help = "Colour map: a built-in one, a list of colours, or one from a file.",                      \

@@ -1,6 +1,6 @@
-/* Rewrites short forms. A short form is recognised by its key and the kind of its value, wherever the key appears: no
- * key of the schema has two meanings that could use the same short form. Nodes are identified by their numbers, because
- * adding a node may move all nodes in memory. */
+/* Rewrites short forms of values. A short form is recognised by its key and the type of its value, wherever the key
+ * appears: no key of the schema has two meanings that could have the same short form. Nodes are identified by their
+ * numbers, because adding a node may move all nodes in memory. */
 #include "scene_shorthand.h"
 
 #include <ctype.h>
@@ -13,7 +13,7 @@
 /* A document while its short forms are expanded. */
 typedef struct rewrite {
     yaml_document_t *document;
-    yaml_mark_t mark; /* position in the file of the value that is being rewritten */
+    yaml_mark_t mark; /* position in the file of the value that is being rewritten; new nodes get it */
     bool has_memory;
 } rewrite;
 
@@ -92,7 +92,7 @@ static int compare_name(const void *name, const void *entry)
     return strcmp(name, ((const scene_colour_name *)entry)->name);
 }
 
-/* Reads "#rrggbb" or the name of a colour. */
+/* Reads a colour given as "#rrggbb" or by name. */
 static bool read_colour(const char *text, double colour[3])
 {
     unsigned long rgb;
@@ -177,7 +177,8 @@ static void expand_outputs(rewrite *r, int *value)
     }
 }
 
-/* Expands true to an empty mapping, which means all defaults. For false the pair is removed: *value becomes 0. */
+/* Expands `true` to an empty mapping, which means that all its keys have default values. If the value is `false`,
+ * *value becomes 0, which removes the pair of key and value. */
 static void expand_switch(rewrite *r, int *value)
 {
     const char *text = node_text(r, *value);
@@ -208,7 +209,7 @@ static void expand_mappings(rewrite *r, int *value)
     if (find_node_by_index(r, *value)->type == YAML_MAPPING_NODE) *value = make_list_of(r, *value);
 }
 
-/* Adds a plane perpendicular to z to a slice that gives no planes. */
+/* Adds a plane perpendicular to z to a slice that has no key `planes`. */
 static void expand_slice(rewrite *r, int *value)
 {
     static const double z[3] = {0, 0, 1};
@@ -223,8 +224,9 @@ static void expand_slice(rewrite *r, int *value)
     append_pair(r, *value, "planes", make_list_of(r, plane));
 }
 
-/* Expands a mapping from names to a list of mappings with the key `name`. A value that is no mapping becomes one, in
- * which it has the key text_key; if that is NULL, it remains as it is, which the schema refuses. */
+/* Expands a mapping with names as keys to a list of mappings with the key `name`. A value that is not a mapping is
+ * first expanded to a mapping with the single key text_key. If text_key is NULL, such a value remains unchanged, and
+ * the schema refuses it. */
 static void expand_named(rewrite *r, const char *text_key, int *value)
 {
     if (find_node_by_index(r, *value)->type != YAML_MAPPING_NODE) return;
@@ -260,7 +262,7 @@ static const char axis_words[] = "x, y or z, or -x, -y or -z", switch_words[] = 
 static const struct {
     const char *key;
     void (*expand)(rewrite *r, int *value);
-    const char *words; /* description of the short form; NULL if the schema's words already include it */
+    const char *words; /* description of the short form; NULL if the schema's description already includes it */
 } rules[] = {
     {"colour", expand_colour, NULL},
     {"background", expand_colour, NULL},
@@ -297,21 +299,21 @@ const char *scene_shorthand_words(const char *key, size_t length)
     return NULL;
 }
 
-/* Replaces the first word `from` in a text by the word `to`, which is at least as long. Words of the text are separated
- * by _. */
+/* Replaces the first word `from` of a text by the word `to`, which must be at least as long. Words of the text are
+ * separated by underscores. */
 static void replace_word(char *text, size_t size, const char *from, const char *to)
 {
     char *at = strstr(text, from);
     if (!at || strlen(text) + strlen(to) >= size) return;
-    /* a plural such as colors is replaced as well */
+    /* a plural, such as colors, is replaced as well */
     const char *behind = at + strlen(from) + (at[strlen(from)] == 's');
     if ((at > text && at[-1] != '_') || (*behind && *behind != '_')) return;
     memmove(at + strlen(to), at + strlen(from), strlen(at + strlen(from)) + 1);
-    /* copies without the NUL, because the text behind it is already terminated */
+    /* does not copy the NUL, because text may follow */
     for (size_t i = 0; to[i]; i++) at[i] = to[i];
 }
 
-/* Expands American spellings: color becomes colour, and center becomes centre. */
+/* Replaces American spellings in a key: color becomes colour, and center becomes centre. */
 static void expand_key(rewrite *r, int *key)
 {
     char text[64];
@@ -347,7 +349,8 @@ static void expand_mapping(rewrite *r, int number)
     if (r->has_memory) find_node_by_index(r, number)->data.mapping.pairs.top = kept;
 }
 
-/* Returns the node of a mapping whose keys are chosen by the scene, or 0 if there is none. */
+/* Returns the node of the mapping with this key, whose own keys are names that the scene defines; 0 if there is
+ * none. */
 static int find_named_mapping(const rewrite *r, const char *name)
 {
     const yaml_node_t *root = find_node_by_index(r, 1);
@@ -363,7 +366,7 @@ bool scene_expand_shorthand(yaml_document_t *document)
 {
     rewrite r = {.document = document, .has_memory = true};
     const int count = (int)(document->nodes.top - document->nodes.start);
-    /* the keys of these mappings are names chosen by the scene, which have no short forms */
+    /* the keys of these mappings are names that the scene defines, and have no short forms */
     const int parameters = find_named_mapping(&r, "parameters"), fields = find_named_mapping(&r, "fields");
     const int meshes = find_named_mapping(&r, "meshes");
     for (int number = 1; number <= count && r.has_memory; number++)
@@ -407,7 +410,7 @@ static bool is_same_word(const char *a, const char *b)
     return !*a && !*b;
 }
 
-/* Words of other programs, each with the corresponding word of the schema. */
+/* Words that other programs use, each with the corresponding word of the schema. */
 static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"width", "size"},
                                           {"height", "size"},
@@ -504,7 +507,7 @@ static const char *const synonyms[][2] = {{"resolution", "size"},
                                           {"frequency", "every"},
                                           {"interval", "every"}};
 
-/* Returns the first candidate that corresponds to a word of another program, or NULL if there is none. */
+/* Returns the first candidate that corresponds to the given word of another program, or NULL if there is none. */
 static const char *find_synonym(const char *word, const char *const *candidates, int count)
 {
     for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)

@@ -8,8 +8,8 @@
 
 static const scene_material no_light = {.ambient = 1, .shininess = 1};
 
-/* Scales a vector to unit length. It is divided by its largest number first, because the squares of very large or very
- * small numbers may be infinite or 0. */
+/* Scales a vector to unit length. It is first divided by its largest component, because the squares of very large or
+ * very small numbers may overflow or underflow. */
 static bool normalize_vector(const double in[3], double out[3])
 {
     const double largest = fmax(fabs(in[0]), fmax(fabs(in[1]), fabs(in[2])));
@@ -59,7 +59,7 @@ static insitu_status check_positions(const scene_document *d, const char *path, 
     return INSITU_OK;
 }
 
-/* Adds the planes of one entry of the list of planes; an entry may describe several. */
+/* Adds the planes that one entry of the slice's list describes; an entry may describe several. */
 static insitu_status add_planes(const scene_document *d, const char *path, int index, const scene_file_plane *in,
                                 scene_slice *out)
 {

@@ -1,7 +1,7 @@
 /* Finds the mistake in a text that is not valid YAML. libyaml reports the position at which it could not continue,
- * which is often lines behind the mistake, in the terms of the grammar. So its report is only used to choose the lines
- * to examine: from the begin of the structure that could not be completed to the position of the report. These lines
- * are searched for common mistakes, the most certain ones first; any other mistake is reported in libyaml's own
+ * which is often several lines behind the mistake, and in terms of the grammar. Its report is therefore only used to
+ * select the lines to examine: from the start of the structure that could not be completed to the reported position.
+ * These lines are searched for common mistakes, the most certain ones first; any other mistake is reported in libyaml's
  * words. */
 #include "scene_syntax.h"
 
@@ -17,7 +17,7 @@ enum { longest_quote = 40 };
 typedef struct text_line {
     const char *start;
     size_t length;
-    size_t indent; /* number of leading blanks and tabs; the length of the line if there is nothing else */
+    size_t indent; /* number of leading blanks and tabs; equal to the length of the line if it has nothing else */
     size_t number; /* number of the line, from 0 */
 } text_line;
 
@@ -59,8 +59,7 @@ static bool has_content(text_line l)
     return l.indent < l.length && l.start[l.indent] != '#';
 }
 
-/* Stores the message and the line of the error. It always returns true, which a rule that has found an error
- * returns. */
+/* Stores the message and the line of the error. Always returns true, which a rule returns if it has found an error. */
 __attribute__((format(printf, 3, 4))) static bool set_fault(const fault *f, size_t line, const char *format, ...)
 {
     va_list arguments;
@@ -78,7 +77,7 @@ static int quoted_length(size_t length)
 
 /* ---- rules: each writes a message about one kind of mistake and returns true, or returns false ------------------- */
 
-static bool is_tab_indent(const fault *f, text_line l)
+static bool report_tab_indent(const fault *f, text_line l)
 {
     const char *tab = memchr(l.start, '\t', l.indent);
     if (!tab || !has_content(l)) return false;
@@ -86,8 +85,8 @@ static bool is_tab_indent(const fault *f, text_line l)
                      quoted_length(l.length - l.indent), l.start + l.indent);
 }
 
-/* Returns whether p is within quotes or is a quote itself. *quote: the quote that was open at the previous character;
- * it is updated. */
+/* Returns whether the character at p is within quotes or is a quotation mark that begins or ends a text. *quote is the
+ * quotation mark that is open before p, or 0, and is updated. */
 static bool is_in_quotes(text_line l, const char *p, char *quote)
 {
     const bool begins = p == l.start || strchr(" \t[{,:", p[-1]);
@@ -116,7 +115,7 @@ const char *scene_syntax_comment(const char *text, size_t size, size_t line, siz
     return find_colour_comment(find_line(text, size, line - 1), length);
 }
 
-static bool is_colour_comment(const fault *f, text_line l)
+static bool report_colour_comment(const fault *f, text_line l)
 {
     size_t length;
     const char *colour = find_colour_comment(l, &length);
@@ -135,7 +134,7 @@ static size_t placeholder_length(const char *at, const char *end)
     return is_one ? (size_t)(p - at) + 1 : 0;
 }
 
-/* Returns the length of a text of placeholders and other characters, up to a blank, comma or bracket. */
+/* Returns the length of a word: placeholders and other characters up to a blank, comma, bracket or quotation mark. */
 static size_t word_length(const char *at, const char *end)
 {
     const char *p = at;
@@ -147,8 +146,8 @@ static size_t word_length(const char *at, const char *end)
     return (size_t)(p - at);
 }
 
-/* Returns the length of a text that begins with a word. The text ends at the end of the line, or after the word if a
- * comma, # or another key follows. */
+/* Returns the length of a text whose first word has the length `word`. The text ends after the word if a comma, a # or
+ * another key follows on the line, and otherwise at the end of the line. */
 static size_t text_length(const char *at, size_t word, const char *end)
 {
     while (end > at && (end[-1] == ' ' || end[-1] == '\t')) end--;
@@ -157,8 +156,8 @@ static size_t text_length(const char *at, size_t word, const char *end)
     return (size_t)(end - at);
 }
 
-/* Finds a text with a placeholder outside of quotes, such as path: {name}.png. */
-static bool is_bare_placeholder(const fault *f, text_line l)
+/* Reports a text with a placeholder that is not in quotes, such as path: {name}.png. */
+static bool report_bare_placeholder(const fault *f, text_line l)
 {
     const char *end = l.start + l.length;
     char quote = '\0';
@@ -169,7 +168,7 @@ static bool is_bare_placeholder(const fault *f, text_line l)
         if (!begins && !is_placeholder) continue;
         const size_t length = word_length(p, end);
         if (!memchr(p, '{', length)) continue;
-        /* a text {name} could also be a mapping */
+        /* a text {name} alone could also be a mapping */
         if (is_placeholder && length == placeholder_length(p, end) && f->is_flow) continue;
         return set_fault(f, l.number, "a text with { } needs quotes, expected \"%.*s\"",
                          (int)(f->is_flow ? length : text_length(p, length, end)), p);
@@ -177,7 +176,7 @@ static bool is_bare_placeholder(const fault *f, text_line l)
     return false;
 }
 
-static bool is_unended_quote(const fault *f, text_line l)
+static bool report_unclosed_quote(const fault *f, text_line l)
 {
     const char *context = f->parser->context ? f->parser->context : "";
     if (!strstr(context, "quoted scalar")) return false;
@@ -192,8 +191,8 @@ static bool is_unended_quote(const fault *f, text_line l)
                      l.start + column, column < l.length ? l.start[column] : '"');
 }
 
-/* Finds a quotation mark in an earlier line that only the quotation mark in this line closes. */
-static bool is_unended_before(const fault *f, text_line l)
+/* Reports a quotation mark in an earlier line that is closed only by the quotation mark in this line. */
+static bool report_unclosed_quote_above(const fault *f, text_line l)
 {
     const char *quote = NULL; /* the quotation mark that is open */
     text_line opened = l;
@@ -209,24 +208,24 @@ static bool is_unended_before(const fault *f, text_line l)
                      quoted_length((size_t)(opened.start + opened.length - quote)), quote);
 }
 
-/* Finds an earlier line that ends with an opening bracket that is never closed. */
-static bool is_left_open(const fault *f)
+/* Reports the last earlier line that ends with an opening bracket, which is never closed. */
+static bool report_open_brackets(const fault *f)
 {
-    bool is_told = false;
+    bool is_reported = false;
     for (text_line l = find_line(f->text, f->size, 0); l.number < f->last_line;
          l = find_next_line(l, f->text + f->size)) {
         const char last = has_content(l) ? l.start[l.length - 1] : ' ';
         if (last == '[' || last == '{')
-            is_told =
+            is_reported =
                 set_fault(f, l.number, "the %c of this line is not closed, expected %c", last, last == '[' ? ']' : '}');
     }
-    return is_told;
+    return is_reported;
 }
 
-static bool is_unended_bracket(const fault *f, text_line l)
+static bool report_unclosed_bracket(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
-    if (f->is_flow && strstr(problem, "node content")) return is_left_open(f);
+    if (f->is_flow && strstr(problem, "node content")) return report_open_brackets(f);
     if (!f->is_flow || !strstr(problem, "expected ','")) return false;
     const char open = strchr(problem, '}') ? '{' : '[', close = open == '{' ? '}' : ']';
     const text_line stop = find_line(f->text, f->size, f->last_line);
@@ -254,9 +253,10 @@ static bool is_list_item(text_line l)
     return l.indent + 1 < l.length && l.start[l.indent] == '-' && l.start[l.indent + 1] == ' ';
 }
 
-/* Returns the earlier line whose item or key has the indentation nearest to this line's; items of a list may be
- * indented by 2 more. *expected: the indentation that this line should have. */
-static text_line nearest_indent(const fault *f, text_line l, size_t *expected)
+/* Returns the earlier line with a key or list item whose indentation is nearest to that of this line. A key may also be
+ * at the indentation of the keys in a list item, which is 2 more than the item's. *expected receives the indentation
+ * that this line should have. */
+static text_line find_nearest_indent(const fault *f, text_line l, size_t *expected)
 {
     text_line nearest = l;
     size_t least = (size_t)-1;
@@ -273,8 +273,8 @@ static text_line nearest_indent(const fault *f, text_line l, size_t *expected)
     return nearest;
 }
 
-/* Finds an earlier line to which nothing can be added, because it lacks a colon, or a blank after its hyphen. */
-static bool is_bad_line_above(const fault *f, text_line l)
+/* Reports the line above if this line cannot continue it, because it lacks a colon, or a blank after its hyphen. */
+static bool report_incomplete_line(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
     if (!strstr(problem, "not allowed") && !strstr(problem, "did not find expected")) return false;
@@ -295,7 +295,7 @@ static const char *plural_ending(size_t count)
     return count == 1 ? "" : "s";
 }
 
-static bool is_bad_indent(const fault *f, text_line l)
+static bool report_bad_indent(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
     const bool is_deeper = strstr(problem, "mapping values are not allowed") != NULL;
@@ -304,20 +304,20 @@ static bool is_bad_indent(const fault *f, text_line l)
     if (is_deeper ? column > l.indent + key_length : column != l.indent) return false;
     if (!is_deeper && !strstr(problem, "did not find expected")) return false;
     size_t expected = l.indent;
-    const text_line other = nearest_indent(f, l, &expected);
+    const text_line other = find_nearest_indent(f, l, &expected);
     if (expected == l.indent) return false;
     return set_fault(f, l.number, "wrong indentation: %zu blank%s before \"%.*s\", expected %zu, as in line %zu",
                      l.indent, plural_ending(l.indent), quoted_length(key_length), l.start + l.indent, expected,
                      other.number + 1);
 }
 
-/* Finds text behind a complete value, as in title: "a" b, or a text with a colon, as in title: a: b. */
-static bool is_bare_text(const fault *f, text_line l)
+/* Reports text after a complete value, as in title: "a" b, or an unquoted text with a colon, as in title: a: b. */
+static bool report_bare_text(const fault *f, text_line l)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
     const bool has_colon = strstr(problem, "mapping values are not allowed") != NULL;
     if (!has_colon && !strstr(problem, "did not find expected")) return false;
-    if (!has_colon && is_unended_before(f, l)) return true;
+    if (!has_colon && report_unclosed_quote_above(f, l)) return true;
     const char *colon = memchr(l.start + l.indent, ':', l.length - l.indent);
     if (!colon) return false;
     const char *value = colon + 1;
@@ -331,7 +331,7 @@ static bool is_bare_text(const fault *f, text_line l)
                      quoted_length(length), value);
 }
 
-static bool is_key_without_colon(const fault *f)
+static bool report_key_without_colon(const fault *f)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
     if (!strstr(problem, "could not find expected ':'")) return false;
@@ -347,7 +347,7 @@ static bool is_key_without_colon(const fault *f)
                      l.start + column);
 }
 
-static bool is_bad_start(const fault *f)
+static bool report_bad_start(const fault *f)
 {
     const char *problem = f->parser->problem ? f->parser->problem : "";
     const text_line l = find_line(f->text, f->size, f->parser->problem_mark.line);
@@ -362,7 +362,7 @@ static bool is_bad_start(const fault *f)
 
 /* ---- the search ------------------------------------------------------------------------------------------------- */
 
-static bool is_in_lines(const fault *f, bool (*rule)(const fault *f, text_line l))
+static bool report_in_lines(const fault *f, bool (*rule)(const fault *f, text_line l))
 {
     for (text_line l = find_line(f->text, f->size, f->first_line); l.number <= f->last_line;
          l = find_next_line(l, f->text + f->size))
@@ -380,10 +380,14 @@ void scene_syntax_words(const yaml_parser_t *parser, const char *text, size_t si
     const bool is_before = (f.is_flow || strstr(context, "scan")) && parser->context_mark.line < f.last_line;
     f.first_line = is_before ? parser->context_mark.line : f.last_line;
     const text_line begin = find_line(text, size, f.first_line), stop = find_line(text, size, f.last_line);
-    if (is_in_lines(&f, is_tab_indent) || is_in_lines(&f, is_colour_comment) || is_in_lines(&f, is_bare_placeholder))
+    if (report_in_lines(&f, report_tab_indent) || report_in_lines(&f, report_colour_comment) ||
+        report_in_lines(&f, report_bare_placeholder))
         return;
-    if (is_unended_quote(&f, begin) || is_unended_bracket(&f, begin) || is_bad_line_above(&f, stop)) return;
-    if (is_bad_indent(&f, stop) || is_key_without_colon(&f) || is_bad_start(&f) || is_bare_text(&f, stop)) return;
+    if (report_unclosed_quote(&f, begin) || report_unclosed_bracket(&f, begin) || report_incomplete_line(&f, stop))
+        return;
+    if (report_bad_indent(&f, stop) || report_key_without_colon(&f) || report_bad_start(&f) ||
+        report_bare_text(&f, stop))
+        return;
     set_fault(&f, f.last_line, "not valid YAML: %.100s%s%.100s", parser->problem ? parser->problem : "unreadable",
               *context ? " " : "", context);
 }
