@@ -1,5 +1,6 @@
-/* The public calls except insitu_step(): they create and destroy a session, and store the caller's input. Phases of the
- * creation that may fail on one rank alone end in agreement, so that a session is created on all ranks or on none. */
+/* Defines the public calls except insitu_step(): they create and destroy a session, and store the caller's input. Each
+ * phase of the creation that may fail on one rank alone ends with an agreement of all ranks, so that a session is
+ * created on all ranks or on none. */
 #include "session.h"
 
 #include "comp.h"
@@ -9,13 +10,14 @@
 #include "session_field_input.h"
 #include "session_mesh_input.h"
 
-/* The message that insitu_error(NULL) returns: after a failed insitu_create() there is no session. */
+/* The message that insitu_error(NULL) returns after a failed insitu_create(), which leaves no session. */
 static _Thread_local base_error thread_error;
 
-/* Returned while a fill function runs, when the step's report is incomplete. */
+/* Report that is returned while a fill function runs, since the step's report is incomplete then. */
 static const insitu_report no_report = {.schedule = "", .copied_why = "", .left_out = "", .warnings = "", .pieces = ""};
 
-/* Refuses a call made from inside a fill function. Casts const away to record the refusal, which is the only change. */
+/* Returns whether a fill function is running, in which the call is not allowed; the error is then recorded. That is the
+ * only change of the session, for which const is cast away. */
 static bool is_in_fill(const insitu_session *session, const char *call)
 {
     return session_refuse_in_fill(&((insitu_session *)(uintptr_t)session)->meshes, call);
@@ -59,7 +61,7 @@ static bool is_mpi_running(void)
 
 static void free_session(insitu_session *session)
 {
-    session_writer_end(&session->writer); /* the writer uses the scene, so that it must end before the scene is freed */
+    session_writer_end(&session->writer); /* the writer uses the scene, and must end before the scene is freed */
     session_meshes_free(&session->meshes);
     session_catalogue_free(&session->catalogue);
     session_trees_free(&session->trees);
@@ -144,8 +146,8 @@ insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_tex
     return is_text ? insitu_create_from_text(of_c, scene, out) : insitu_create(of_c, scene, out);
 }
 
-/* Stores the error of a failed call. A successful call keeps the message of the last failed one; the next step clears
- * it. */
+/* Stores the error of a failed call, and returns its status. A successful call keeps the message of the last failed
+ * one; the next step clears it. */
 static insitu_status store_error(insitu_session *session, const base_error *error)
 {
     if (error->status) session->error = *error;

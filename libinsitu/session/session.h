@@ -1,6 +1,6 @@
-/* The parts of a session. The code of each part only uses those parts whose headers it includes, and a function's
- * parameters are the parts that it may access; only the public calls, the step and its first reduction access the whole
- * session. */
+/* Defines the parts of a session. The code of each part uses only those parts whose headers it includes, and a function
+ * gets as parameters only the parts that it may access. The public calls, the step and its first reduction alone access
+ * the whole session. */
 #ifndef SESSION_SESSION_H
 #define SESSION_SESSION_H
 
@@ -37,7 +37,7 @@ struct insitu_session {
     session_kept_pictures kept_pictures;
     session_run_ranges run_ranges;
     session_cinema cinema;     /* databases of pictures; used on rank 0 only */
-    session_montages montages; /* pictures put side by side in one file; used on rank 0 only */
+    session_montages montages; /* files with several pictures side by side; used on rank 0 only */
     session_news news;         /* messages for programs that watch the run; used on rank 0 only */
     session_overwrites overwrites;
     session_events events;

@@ -1,9 +1,15 @@
-/* The reduction is a maximum over a few integers. From it every rank determines whether all are at the same cycle
- * (maximum and minimum), the lowest rank with an error, whether cells, coordinates, levels of refinement or names
- * changed anywhere, whether all tables of names are equal, whether any rank lacks threads, the lowest of the
- * instruction sets, whether any field has a fill function, and the lowest rank that has a warning for all. From rank 0
- * it has the time, whether the scene file was edited, whether pictures could not be written, and whether they are
- * written in the step. After it, all ranks make the same decisions without further messages. */
+/* Finds out by one reduction what has changed on any rank. The reduction is a maximum over a few integers. From it
+ * every rank determines:
+ *
+ *     - whether all ranks are at the same cycle (maximum and minimum), and the lowest rank with an error
+ *     - whether cells, coordinates, levels of refinement or names have changed on any rank
+ *     - whether all tables of names are equal
+ *     - whether any rank needs more threads, and the lowest instruction set
+ *     - whether any field has a fill function, and the lowest rank that has a warning for all ranks
+ *     - from rank 0: the time, whether the scene file was edited, whether pictures could not be written, and whether
+ *       pictures are written during the step
+ *
+ * Afterwards all ranks make the same decisions without further messages. */
 #include "session_changes.h"
 
 #include <string.h>
@@ -14,7 +20,7 @@
 
 enum change_word {
     CYCLE_HIGH,
-    CYCLE_LOW, /* lowest cycle, negated, because the reduction is a maximum; all entries called low are negated */
+    CYCLE_LOW, /* lowest cycle, negated (as are all entries named _LOW), because the reduction is a maximum */
     FAILED,    /* number of ranks minus the lowest failing rank; 0: no rank has failed */
     CELLS_CHANGED,
     LEVELS_CHANGED,
@@ -26,15 +32,15 @@ enum change_word {
     UNWRITTEN,
     FILLED,
     WRITES_AT_ONCE,
-    ISA_LOW, /* lowest instruction set, and the lowest rank that has it, in one word */
+    ISA_LOW, /* lowest instruction set and the lowest rank that has it, packed into one word and negated */
     ISA_HIGH,
-    TELLING,   /* lowest rank with warnings for all ranks (session_reporting_word()) */
-    ROOT_TIME, /* the bits of the time on rank 0 */
+    REPORTING_RANK, /* lowest rank with warnings for all ranks (session_reporting_word()) */
+    ROOT_TIME,      /* bit pattern of the time on rank 0 */
     CHANGE_WORDS
 };
 
-/* An upper bound of the number of ranks, by which a rank and another number are packed into one word. */
-static const int64_t more_ranks = (int64_t)1 << 32;
+/* Exceeds every rank; used to pack a rank and another number into one word. */
+static const int64_t rank_limit = (int64_t)1 << 32;
 
 static int64_t bits_from_double(double value)
 {
@@ -78,9 +84,9 @@ static void pack_changes(const insitu_session *session, int64_t cycle, double ti
     words[UNWRITTEN] = session->writer.failure_count;
     words[FILLED] = has_filled_field(meshes);
     words[WRITES_AT_ONCE] = team->rank == 0 && !session_writer_is_behind(&session->writer, &file->scene);
-    words[ISA_LOW] = -(render_isa_level() * more_ranks + team->rank);
+    words[ISA_LOW] = -(render_isa_level() * rank_limit + team->rank);
     words[ISA_HIGH] = render_isa_level();
-    words[TELLING] = session_reporting_word(&session->report, team);
+    words[REPORTING_RANK] = session_reporting_word(&session->report, team);
     words[ROOT_TIME] = team->rank == 0 ? bits_from_double(time) : INT64_MIN;
 }
 
@@ -101,22 +107,22 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
                              .are_levels_changed = all[LEVELS_CHANGED],
                              .are_names_changed = all[NAMES_CHANGED],
                              .are_names_shared = all[NAMES_HIGH] == ~all[NAMES_LOW],
-                             .are_threads_lacking = all[THREADS_LACKING],
-                             .are_unwritten = all[UNWRITTEN],
+                             .needs_more_threads = all[THREADS_LACKING],
+                             .has_unwritten_pictures = all[UNWRITTEN],
                              .is_filled = all[FILLED],
                              .writes_behind = !all[WRITES_AT_ONCE] && !all[SCENE_CHANGED],
-                             .isa_level = (int)(-all[ISA_LOW] / more_ranks),
-                             .isa_rank = (int)(-all[ISA_LOW] % more_ranks),
+                             .isa_level = (int)(-all[ISA_LOW] / rank_limit),
+                             .isa_rank = (int)(-all[ISA_LOW] % rank_limit),
                              .isa_best = (int)all[ISA_HIGH],
-                             .reporting_rank = session_reporting_rank((int)all[TELLING], &session->team)};
+                             .reporting_rank = session_reporting_rank((int)all[REPORTING_RANK], &session->team)};
     return INSITU_OK;
 }
 
-static void report_pending_error(int root, const session_meshes *meshes, const session_team *team, base_error *told)
+static void report_pending_error(int root, const session_meshes *meshes, const session_team *team, base_error *shared)
 {
     const base_error *mine = session_pending_error(meshes);
-    if (team->rank == root && mine) base_fail(told, mine->status, "rank %d: %.900s", root, mine->message);
-    session_share_error(team->comm, root, told);
+    if (team->rank == root && mine) base_fail(shared, mine->status, "rank %d: %.900s", root, mine->message);
+    session_share_error(team->comm, root, shared);
 }
 
 insitu_status session_check_input(const session_changes *changes, const session_meshes *meshes,

@@ -9,28 +9,29 @@ typedef struct session_changes {
     /* highest and lowest cycle of all ranks; they are equal if all ranks are at the same cycle */
     int64_t cycle, lowest_cycle;
     double time;     /* time of the step on rank 0 */
-    int failed_rank; /* lowest rank with an error of a set call; -1: there is none */
+    int failed_rank; /* lowest rank on which an insitu_set_*() call has failed; -1: none */
     /* each is set if it holds on some rank: the scene file was edited; cells or coordinates have changed; names of
      * meshes or fields have changed */
     bool is_scene_changed, are_cells_changed, are_names_changed;
-    bool are_levels_changed;  /* set if blocks with levels of refinement have changed on some rank */
-    bool are_names_shared;    /* set if all ranks have the same tables of names */
-    bool are_threads_lacking; /* set if some rank must start more threads than it has */
-    bool are_unwritten;       /* set if pictures of earlier steps could not be written */
-    bool is_filled;           /* set if some field has a fill function, which may call MPI */
-    bool writes_behind;       /* set if this step's pictures are written after the step is over */
-    int isa_level;            /* lowest of the ranks' instruction sets (render_isa.h) */
-    int isa_rank;             /* lowest rank that has that instruction set */
-    int isa_best;             /* highest of the ranks' instruction sets */
-    int reporting_rank;       /* lowest rank that has warnings for all ranks; -1: there is none */
+    bool are_levels_changed;     /* set if blocks with levels of refinement have changed on some rank */
+    bool are_names_shared;       /* set if all ranks have the same tables of names */
+    bool needs_more_threads;     /* set if some rank has too few threads and must start more */
+    bool has_unwritten_pictures; /* set if pictures of earlier steps could not be written */
+    bool is_filled;              /* set if some field has a fill function, which may call MPI */
+    bool writes_behind;          /* set if this step's pictures are written after the step is over */
+    int isa_level;               /* lowest instruction set of any rank (render_isa.h) */
+    int isa_rank;                /* lowest rank that has the instruction set isa_level */
+    int isa_best;                /* highest instruction set of any rank */
+    int reporting_rank;          /* lowest rank that has warnings for all ranks; -1: none */
 } session_changes;
 
 /* Determines what has changed on any rank, by one small reduction. Collective. */
 insitu_status session_find_changes(const insitu_session *session, int64_t cycle, double time, session_changes *out,
                                    base_error *error);
 
-/* Sends an error of a set call from one rank to every rank, in *refused. The step continues, because images that need
- * neither the mesh nor the field can still be drawn. Returns an error if ranks are at different cycles. Collective. */
+/* Sends the error of a failed insitu_set_*() call from the lowest failed rank to all ranks, in *refused. The step
+ * continues, because images that need neither the mesh nor the field can still be drawn. Returns an error if ranks are
+ * at different cycles. Collective. */
 insitu_status session_check_input(const session_changes *changes, const session_meshes *meshes,
                                   const session_team *team, base_error *refused, base_error *error);
 

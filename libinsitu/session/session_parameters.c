@@ -9,28 +9,28 @@ static uint64_t hash_name(const char *name)
     return key;
 }
 
-static bool is_requested(const session_requested_names *asked, const char *name)
+static bool is_requested(const session_requested_names *requested, const char *name)
 {
     const uint64_t key = hash_name(name);
-    for (int i = 0; i < asked->count && i < SESSION_MOST_REQUESTED; i++)
-        if (asked->names[i] == key) return true;
-    return asked->count > SESSION_MOST_REQUESTED;
+    for (int i = 0; i < requested->count && i < SESSION_MOST_REQUESTED; i++)
+        if (requested->names[i] == key) return true;
+    return requested->count > SESSION_MOST_REQUESTED;
 }
 
-static void record_request(session_requested_names *asked, const char *name)
+static void record_request(session_requested_names *requested, const char *name)
 {
-    if (is_requested(asked, name)) return;
-    if (asked->count < SESSION_MOST_REQUESTED) asked->names[asked->count] = hash_name(name);
-    asked->count++;
+    if (is_requested(requested, name)) return;
+    if (requested->count < SESSION_MOST_REQUESTED) requested->names[requested->count] = hash_name(name);
+    requested->count++;
 }
 
-insitu_status session_read_parameter(const session_scene_file *file, session_requested_names *asked, const char *name,
-                                     double *value, base_error *error)
+insitu_status session_read_parameter(const session_scene_file *file, session_requested_names *requested,
+                                     const char *name, double *value, base_error *error)
 {
     char others[512];
     if (!name || !value)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_parameter: %s is NULL", name ? "value" : "name");
-    record_request(asked, name);
+    record_request(requested, name);
     const scene_parameter *found = scene_find_parameter(&file->scene, name);
     if (found) {
         *value = found->value;
@@ -41,12 +41,12 @@ insitu_status session_read_parameter(const session_scene_file *file, session_req
                      file->path, others);
 }
 
-void session_warn_of_parameters(const scene *scene, const session_requested_names *asked, session_report *report)
+void session_warn_of_parameters(const scene *scene, const session_requested_names *requested, session_report *report)
 {
     for (int i = 0; i < scene->parameter_count; i++) {
         const char *name = scene->parameters[i].name;
-        session_warn_locally(report, &(session_warning){WARNING_PARAMETER, name, NULL, 0}, !is_requested(asked, name),
-                             "parameter \"%s\" of the scene changes nothing: the code has not asked for it on rank 0",
-                             name);
+        session_warn_locally(
+            report, &(session_warning){WARNING_PARAMETER, name, NULL, 0}, !is_requested(requested, name),
+            "parameter \"%s\" of the scene changes nothing: the code has not asked for it on rank 0", name);
     }
 }

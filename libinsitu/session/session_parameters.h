@@ -9,17 +9,17 @@ enum { SESSION_MOST_REQUESTED = 256 };
 
 /* The names of parameters that the simulation has requested on this rank. */
 typedef struct session_requested_names {
-    /* number of names that were requested; names after the first SESSION_MOST_REQUESTED are not recorded, and then no
-     * parameter is reported as unused */
+    /* number of names that were requested; only the first SESSION_MOST_REQUESTED are recorded, and if there are more,
+     * no parameter is reported as unused */
     int count;
     uint64_t names[SESSION_MOST_REQUESTED]; /* hashes of the recorded names */
 } session_requested_names;
 
 /* Finds a parameter by its name, and records that it was requested. On an error *value is unchanged. Local. */
-insitu_status session_read_parameter(const session_scene_file *file, session_requested_names *asked, const char *name,
-                                     double *value, base_error *error);
+insitu_status session_read_parameter(const session_scene_file *file, session_requested_names *requested,
+                                     const char *name, double *value, base_error *error);
 
 /* Warns of parameters that were never requested on this rank. Local. */
-void session_warn_of_parameters(const scene *scene, const session_requested_names *asked, session_report *report);
+void session_warn_of_parameters(const scene *scene, const session_requested_names *requested, session_report *report);
 
 #endif

@@ -1,6 +1,6 @@
-/* The scene: rank 0 reads its file, or is given its text, and all ranks parse the same text, so that all have the same
- * scene without exchanging its structure. A file that is edited while the simulation runs is read again by the next
- * step; an edit that does not parse leaves the old scene in place, with a warning in the reports until it is
+/* Reads the scene. Rank 0 reads the file, or is given its text, and all ranks parse the same text, so that all have the
+ * same scene without exchanging its structs. If the file is edited while the simulation runs, the next step reads it
+ * again. If the edited text cannot be parsed, the old scene is kept, and reports contain a warning until the file is
  * corrected. */
 #include "session_scene_file.h"
 
@@ -82,8 +82,8 @@ static insitu_status broadcast_attachments(const session_team *team, scene_attac
     return status;
 }
 
-/* Parses the scene. Rank 0 parses first, and reads the files that the scene names; all others parse the text that it
- * has read. */
+/* Parses the scene on all ranks. Rank 0 parses first and reads the files that the scene names; the other ranks parse
+ * the same text and files, which rank 0 sends to them. */
 static insitu_status parse_on_all_ranks(const char *path, const session_team *team, scene_file_text *text, scene *out,
                                         base_error *error)
 {
@@ -110,8 +110,8 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
            a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
 }
 
-/* Copies the caller's text as if it had been read from a file. A text longer than a scene may be is cut here, and is
- * then refused when it is parsed. */
+/* Copies the caller's text as if it had been read from a file. A text that is longer than the limit for scenes is
+ * truncated here; parsing then refuses it. */
 static insitu_status copy_text(const char *given, scene_file_text *text, base_error *error)
 {
     text->size = (int64_t)strnlen(given, MAX_SCENE_BYTES);
@@ -121,8 +121,8 @@ static insitu_status copy_text(const char *given, scene_file_text *text, base_er
     return INSITU_OK;
 }
 
-/* Reads, shares and parses the scene. If memory runs out, the file counts as unread, and the next step tries again.
- * given: the scene's text; NULL if it is in the file. */
+/* Reads the scene, sends it to all ranks and parses it. given: the scene's text, or NULL to read the file. If memory
+ * runs out, the file is treated as not read, so that the next step tries again. */
 static insitu_status read_scene(session_scene_file *file, const session_team *team, const char *given, scene *out,
                                 base_error *error)
 {
@@ -172,7 +172,7 @@ insitu_status session_load_scene(session_scene_file *file, const session_team *t
 bool session_is_scene_edited(const session_scene_file *file, int rank)
 {
     struct stat now;
-    /* an editor may have removed the file for a moment; a later step then reads it */
+    /* an editor may have removed the file for a moment; then a later step reads it */
     if (rank != 0 || file->is_text || stat(file->path, &now) != 0) return false;
     return !file->has_stamp || !is_same_file(&now, &file->stamp);
 }

@@ -1,4 +1,5 @@
-/* Holds the scene of a session: it is read from a file, and again if the file is edited, or it is given as text. */
+/* Holds the scene of a session. The scene is read from a file, and read again if the file is edited, or is given as
+ * text. */
 #ifndef SESSION_SCENE_FILE_H
 #define SESSION_SCENE_FILE_H
 
@@ -11,12 +12,12 @@ typedef struct session_scene_file {
     char *path;        /* path of the file, the same on every rank; SESSION_SCENE_TEXT if the scene was given as text */
     bool is_text;      /* set on rank 0 if the scene was given as text, so that no file can be edited */
     scene scene;       /* the parsed scene, the same on every rank */
-    char *warning;     /* reason why the last edit of the file was refused; NULL if it was not */
-    bool has_stamp;    /* set on rank 0 if the file's time of modification is known */
-    struct stat stamp; /* state of the file when it was last read; valid if has_stamp */
+    char *warning;     /* reason why the last edit of the file was refused; NULL if it was accepted */
+    bool has_stamp;    /* set on rank 0 if `stamp` is valid */
+    struct stat stamp; /* state of the file (stat()) when it was last read; valid if has_stamp is set */
 } session_scene_file;
 
-/* Replaces a file's path in messages if the scene was given as text. */
+/* Stands for the file's path in messages if the scene was given as text. */
 #define SESSION_SCENE_TEXT "scene text"
 
 /* The source of a scene; only rank 0's is used. */
@@ -30,8 +31,8 @@ typedef struct session_scene_source {
 insitu_status session_load_scene(session_scene_file *file, const session_team *team, const session_scene_source *source,
                                  base_error *error);
 
-/* Returns whether the file was edited since it was read. It returns false on ranks other than 0, and if there is no
- * file. Local. */
+/* Returns whether the file was edited since it was last read. Always returns false on ranks other than 0, and if there
+ * is no file. Local. */
 bool session_is_scene_edited(const session_scene_file *file, int rank);
 
 /* Reads the file again. Returns false if the old scene is kept; file->warning then has the reason. Collective. */

@@ -1,8 +1,8 @@
 /* Performs a step by calling its phases in order; each phase has its own file.
  *
- * A phase gets the parts of the session that it may access. It is collective, and returns one status on all ranks
- * (session_agree.h), so that all of them leave the step after the same phase. The first phase is one small reduction;
- * nothing else is exchanged if no image is due and nothing has failed. */
+ * A phase gets only the parts of the session that it may access. It is collective, and returns the same status on all
+ * ranks (session_agree.h), so that all ranks leave the step after the same phase. The first phase is one small
+ * reduction; if no image is due and nothing has failed, nothing else is exchanged. */
 #include "cpu.h"
 #include "memory.h"
 #include "render.h"
@@ -41,13 +41,13 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* Reads the edited scene, and drops everything that was created for images of the old one. Cells count as changed if
- * they are split otherwise. */
+/* Reads the edited scene, and frees everything that was created for images of the old one. If the new scene divides
+ * cells into pieces in another way, cells are marked as changed. */
 static void reload_scene(insitu_session *s, session_changes *changes)
 {
     const scene old = s->scene_file.scene;
+    /* waits until all pictures are written, so that the writing thread no longer uses the old scene */
     session_writer_drain(&s->writer);
-    /* waits for pictures that are being written, so that the old scene is no longer used */
     session_writer_collect(&s->writer, &s->report);
     if (!session_reload_scene(&s->scene_file, &s->team)) return;
     session_writer_drop_memory(&s->writer);
@@ -66,15 +66,15 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     }
     const scene *now = &s->scene_file.scene;
     const bool are_same_pieces = now->finer_pieces == old.finer_pieces && now->finer_memory == old.finer_memory;
-    /* statistics need all cells to be refined (views/session_wishes.c) */
+    /* if there are statistics, all cells are refined (views/session_wishes.c) */
     if (are_same_pieces && now->statistics_count == old.statistics_count) return;
     session_end_finer(&s->meshes);
     s->meshes.are_cells_changed = s->meshes.are_names_changed = true;
     changes->are_cells_changed = changes->are_names_changed = true;
 }
 
-/* Selects the lowest of the ranks' instruction sets for all ranks. Instruction sets round differently, so that volumes
- * of ranks with different ones would overlap or leave gaps at a face between cells of two ranks. */
+/* Makes all ranks use the lowest of their instruction sets. Instruction sets round differently, so that volumes of
+ * ranks with different ones would overlap or leave gaps at a face between cells of two ranks. */
 static void use_common_kernels(const session_changes *changes, session_report *report)
 {
     render_isa_limit(changes->isa_level);
@@ -96,7 +96,8 @@ static session_derive_basis derive_basis(insitu_session *s)
     return (session_derive_basis){&s->scene_file.scene, &s->catalogue, &s->meshes, &s->team, &s->space.extent};
 }
 
-/* Computes the derived fields that statistics and conditions of the step use. Collective, agreed. */
+/* Computes the derived fields that the step's statistics and conditions use. Collective; all ranks return the same
+ * status. */
 static insitu_status derive_for_events(insitu_session *s, const session_moment *moment, bool images, base_error *error)
 {
     const scene *scene = &s->scene_file.scene;
@@ -112,8 +113,8 @@ static insitu_status derive_for_events(insitu_session *s, const session_moment *
     return status ? status : session_derive(&basis, needed, error);
 }
 
-/* Computes the statistics that are due, and the images whose conditions hold. An error here does not prevent the
- * others, or images, from being computed and drawn; it is returned afterwards. Collective. */
+/* Computes the statistics that are due, and determines the images whose conditions hold. If one of them fails, the
+ * others are still computed and images are still drawn; the error is returned afterwards. Collective. */
 static void update_events(insitu_session *s, session_plan_basis *basis, base_error *error)
 {
     const session_moment *moment = basis->moment;
@@ -122,12 +123,12 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
     s->events.held_conditions = 0;
     if (session_has_events(basis->scene, moment->cycle, images)) {
         base_error own = {.status = INSITU_OK};
-        const session_sound_events sound = session_check_event_fields(basis, images, error);
+        const session_valid_events valid = session_check_event_fields(basis, images, error);
         if (derive_for_events(s, moment, images, &own) == INSITU_OK)
-            session_update_events(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now, &sound, &own);
+            session_update_events(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now, &valid, &own);
         if (!error->status) *error = own;
     }
-    basis->allowed_images = session_let_images(&s->events, basis->scene);
+    basis->allowed_images = session_drawable_images(&s->events, basis->scene);
 }
 
 static insitu_status name_derived(insitu_session *s, base_error *error)
@@ -135,8 +136,9 @@ static insitu_status name_derived(insitu_session *s, base_error *error)
     return session_name_derived(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team, error);
 }
 
-/* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and finds the
- * joints of meshes. An error in finding joints is stored only in *error. Collective. */
+/* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields, and finds the groups
+ * of meshes over which values at vertices are averaged (session_joints.h). An error in the last is only stored in
+ * *error. Collective. */
 static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_shared, base_error *error)
 {
     insitu_status status = INSITU_OK;
@@ -146,8 +148,8 @@ static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_
     return status;
 }
 
-/* Warps and mirrors the meshes for which the scene requests it. *are_cells_changed is set if that changes cells or
- * coordinates on any rank. Collective. */
+/* Warps and mirrors the meshes for which the scene requests it. *are_cells_changed is set to true if this changes cells
+ * or coordinates on any rank. Collective. */
 static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed, base_error *error)
 {
     const scene *scene = &s->scene_file.scene;
@@ -187,8 +189,8 @@ static insitu_status refine_cells(insitu_session *s, const session_moment *momen
     return session_check_meshes(&s->meshes, &s->team, error);
 }
 
-/* Checks the changed contents of meshes, and updates the catalogue. Meshes and fields with faults are put aside:
- * *refused is the first fault. Collective. */
+/* Checks the changed contents of meshes, and updates the catalogue. Meshes and fields with faults are excluded from the
+ * step; *refused receives the first fault. Collective. */
 static insitu_status update_meshes(insitu_session *s, const session_changes *changes, const session_moment *moment,
                                    base_error *refused, base_error *error)
 {
@@ -229,8 +231,9 @@ static insitu_status make_plan(insitu_session *s, const session_plan_basis *basi
     return status;
 }
 
-/* Performs the phases of a step in which something is due. Only data that the plan uses is computed. refused: an error
- * of a set call. Images that do not use a faulty mesh or field are drawn, and the error is returned afterwards. */
+/* Performs the phases of a step in which something is due. Only data that the plan uses is computed. refused: the error
+ * of a failed insitu_set_*() call. Images that do not use a faulty mesh or field are drawn, and the error is returned
+ * afterwards. */
 static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, const session_moment *moment,
                                      base_error *refused, base_error *error)
 {
@@ -274,7 +277,8 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);
     if (!status && plan.surface_count) status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, error);
     s->report.public_report.prepare_ms = milliseconds_since(start);
-    if (!status) { /* errors of all these phases are passed to all ranks by the next reduction */
+    /* errors of all phases above that are only in *error are passed to all ranks by the next reduction */
+    if (!status) {
         if (!error->status)
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.public_report,
                                  error);
@@ -311,12 +315,12 @@ static insitu_status run_phases(insitu_session *s, session_changes *changes, con
     }
     use_common_kernels(changes, &s->report);
     status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
-                                   changes->are_threads_lacking || changes->is_scene_changed, guard, &s->report, error);
+                                   changes->needs_more_threads || changes->is_scene_changed, guard, &s->report, error);
     if (status) return status;
     return draw_due_images(s, changes, &moment, &refused, error);
 }
 
-/* Returns the error of earlier steps' pictures that could not be written, unless this step has another error.
+/* Returns the error of earlier steps' pictures that could not be written, unless this step has an error of its own.
  * Collective. */
 static insitu_status report_unwritten(insitu_session *s, base_error *error)
 {
@@ -327,8 +331,8 @@ static insitu_status report_unwritten(insitu_session *s, base_error *error)
     return error->status;
 }
 
-/* Passes the step's report.json, for the databases, to the writer. Used on rank 0; an error is returned by the next
- * step. */
+/* Passes the text of report.json (session_news.h) to the writer. Called on rank 0 only; the next step returns the error
+ * if this fails. */
 static void queue_news(insitu_session *s)
 {
     const session_scene_file *file = &s->scene_file;
@@ -370,7 +374,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     if (!status) {
         status = run_phases(session, &changes, &guard, &session->error);
         session_drop_pending(&session->meshes);
-        if (!status && changes.are_unwritten) status = report_unwritten(session, &session->error);
+        if (!status && changes.has_unwritten_pictures) status = report_unwritten(session, &session->error);
     }
     queue_news(session);
     session_summarize(&session->meshes, &session->trees.parent, &session->writer, session->scene_file.warning,

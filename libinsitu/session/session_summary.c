@@ -1,4 +1,4 @@
-/* Adds up bytes and counts for the report at the end of a step, instead of tracking them while it runs. */
+/* Computes the bytes and counts of the report at the end of a step, instead of tracking them during the step. */
 #include "session_summary.h"
 
 #include <stdarg.h>
@@ -49,7 +49,8 @@ static int64_t patch_bytes(const insitu_field *field)
     return bytes;
 }
 
-/* Bytes that were copied of a mesh, by the reason for the copy. The bytes of its blocks are added up. */
+/* Maximum number of reasons for which a mesh's data is copied, and maximum size of a reason's text. The bytes of a
+ * mesh's blocks are added up per reason. */
 enum { MOST_REASONS = 24, REASON_SIZE = 512 };
 
 typedef struct copied_reasons {
@@ -69,7 +70,7 @@ __attribute__((format(printf, 3, 4))) static void add_copied(copied_reasons *rea
     vsnprintf(words, sizeof words, format, arguments);
     va_end(arguments);
     while (at < reasons->count && strcmp(reasons->texts[at], words) != 0) at++;
-    if (at == MOST_REASONS) at--; /* bytes copied for further reasons are added to the last reason */
+    if (at == MOST_REASONS) at--; /* further reasons are added to the last one */
     if (at == reasons->count) {
         memcpy(reasons->texts[at], words, sizeof words);
         reasons->bytes[at] = 0;
@@ -211,14 +212,14 @@ static bool is_shown(const session_mesh *mesh)
     return is_any;
 }
 
-/* Returns how many of the caller's cells the mesh's tree contains. */
+/* Returns the number of the caller's cells that the mesh's tree contains. */
 static int64_t count_tree_cells(const session_mesh *mesh)
 {
     return mesh->topology.is_split ? session_count_parents_of(mesh, mesh->tree.cells, mesh->tree.cell_count)
                                    : mesh->tree.cell_count;
 }
 
-/* Reports the fields that no image uses. Blocks of a mesh have the same fields, so that each field is reported once. */
+/* Reports the fields that no image uses. All blocks of a mesh have the same fields, and each field is reported once. */
 static void report_left_out(session_report *out, const session_parts *parts)
 {
     const session_mesh *first = parts->items[0];

@@ -1,22 +1,22 @@
-/* Constants of vectorized code for cells: the corners from which a cell's volume is computed, and the first
- * approximation of its cube root, which is the cell's size. */
+/* Defines constants for the vectorized code for cells: the corners from which a cell's volume is computed, and the
+ * first approximation of the cube root of the volume, which is the cell's size. */
 #ifndef SESSION_CORNERS_H
 #define SESSION_CORNERS_H
 
 #include "grid.h"
 
-/* The corners of a type of cell, each with its three neighbours in right-handed order. The cell's volume is the sum,
- * over the corners, of six times the volume of the tet that a corner forms with its neighbours, divided by
- * volume_factor. It is exact if opposite edges are parallel, and otherwise a mean. */
+/* The corners of a type of cell, each with its three neighbours in right-handed order. The volume of a cell is computed
+ * as follows: for each listed corner, take six times the volume of the tet that it forms with its neighbours, add these
+ * up, and divide by volume_factor. The result is exact if opposite edges are parallel, and otherwise a mean. */
 typedef struct cell_corners {
     const signed char (*corners)[4];
-    int count;            /* number of corners that are listed */
+    int count;            /* number of listed corners */
     double volume_factor; /* value of the sum for a cell of volume 1 */
 } cell_corners;
 
-/* Constants of the first approximation of the cube root. It is a third of the upper bits of the double plus an offset,
- * with a relative error of 0.033, since a double's bits are its logarithm to within 0.09. A step of Halley's method
- * cubes the error: after two steps it is 2.1e-5 cubed, which is below rounding. The offset is two thirds of the bits of
+/* Constants of the first approximation of the cube root: a third of the upper bits of the double, plus an offset. Its
+ * relative error is at most 0.033, because a double's bits are its logarithm to within 0.09. A step of Halley's method
+ * cubes the error; after two steps it is 2.1e-5 cubed, which is below rounding. The offset is two thirds of the bits of
  * 1.0, less a correction for the mantissa. */
 enum { CUBE_ROOT_THIRD = 0x55555556, CUBE_ROOT_OFFSET = 0x2a9f7893, CUBE_ROOT_STEPS = 2 };
 

@@ -1,11 +1,11 @@
-/* The loops for one instruction set, in the table SESSION_LANES_TABLE. This file is compiled once per instruction set
- * (CMakeLists.txt).
+/* Defines the loops for one instruction set, in the table SESSION_LANES_TABLE. This file is compiled once per
+ * instruction set (CMakeLists.txt).
  *
- * A block of cells is processed in two passes. The first pass reads vertices and computes bounds and volumes, the
- * second computes sizes from volumes. In a single pass a tet takes 5.8 ns instead of 4.0, as each root depends on its
- * volume, and a core does not look far enough ahead to overlap other cells. Volumes are kept as sums over corners and
- * sizes as the cube roots of these, so that one division suffices for a block. Numbers are loaded one by one, since
- * gather instructions take 1.6 times as long. */
+ * A block of cells is processed in two passes. The first reads vertices and computes bounds and volumes, the second
+ * computes sizes from the volumes. In a single pass a tet would take 5.8 ns instead of 4.0, because each cube root
+ * depends on a volume, and a core does not look far enough ahead to overlap the work on other cells. Volumes are kept
+ * as sums over corners and sizes as the cube roots of these sums, so that the results are divided only once, at the
+ * end. Numbers are loaded one by one, since gather instructions take 1.6 times as long. */
 #include <stdbool.h>
 
 #include "session_corners.h"
@@ -13,25 +13,26 @@
 #include "session_lanes.h"
 
 enum {
-    BLOCK_CELLS = 512, /* cells of a block; their volumes fit into the first-level cache */
+    BLOCK_CELLS = 512, /* number of cells of a block, whose volumes fit into the first-level cache */
     PARTS = LANES / LANE_WIDTH,
-    AHEAD = 512 /* prefetch distance in entries of the connectivity; the hardware's own prefetches come too late */
+    AHEAD = 512 /* prefetch distance in entries of the connectivity; hardware prefetching is too late */
 };
 
 /* Addresses and strides of the mesh's arrays. They are constant during a run of cells. */
 typedef struct lane_source {
     const char *connectivity, *ghosts;
-    /* for each axis, the address of the coordinate with index 0; if indices begin with 1, it is outside of the array */
+    /* for each axis, the address of the coordinate with index 0, which is outside of the array if indices begin at 1 */
     uintptr_t axis_data[3];
     int64_t connectivity_stride, ghosts_stride, stride;
-    int64_t least_index, greatest_index; /* smallest and largest valid index */
+    int64_t least_index, greatest_index; /* smallest and largest valid vertex index in the connectivity */
     int type, count;                     /* type of the cells, and their number of vertices */
     int ghosts_bytes;                    /* size of a ghost flag in bytes */
-    bool wide_index, wide_number;        /* set if indices, or coordinates, have 8 bytes instead of 4 */
+    /* wide_index: indices have 8 bytes instead of 4; wide_number: coordinates have 8 bytes instead of 4 */
+    bool wide_index, wide_number;
 } lane_source;
 
-/* Positions of the vertices of LANE_WIDTH cells. They are in `narrow` if coordinates are float, and in `wide` if they
- * are double. */
+/* Positions of the vertices of LANE_WIDTH cells: in `narrow` if coordinates are floats, in `wide` if they are
+ * doubles. */
 typedef struct lane_points {
     floats narrow[GRID_MAX_CELL_VERTICES][3];
     doubles wide[GRID_MAX_CELL_VERTICES][3];
@@ -43,11 +44,11 @@ typedef struct lane_bounds {
     doubles lower[3], upper[3];
 } lane_bounds;
 
-/* Sums of the sizes of a block's cells. */
+/* Sums over the cells, per lane. */
 typedef struct lane_sizes {
     doubles sums[PARTS];
-    doubles least;         /* smallest absolute volume, times the volume factor of the type */
-    words inverted_counts; /* minus the number of cells with a negative volume */
+    doubles least;         /* smallest absolute volume times the type's volume factor (cell_corners.volume_factor) */
+    words inverted_counts; /* negated number of cells with a negative volume */
 } lane_sizes;
 
 LANE_INLINE lane_bounds bounds_empty(void)
@@ -97,17 +98,17 @@ static __attribute__((noinline)) void pack_indices(const char *from, int64_t str
     for (int i = 0; i < count; i++) memcpy(out + i * size, from + i * stride, (size_t)size);
 }
 
-/* Returns a pointer to the contiguous indices of LANES cells. They are read in place if possible, and otherwise copied
- * to `room`. */
-LANE_INLINE const char *load_indices(const lane_source *s, int64_t cell, int64_t room[LANES * GRID_MAX_CELL_VERTICES])
+/* Returns a pointer to the indices of LANES cells, without gaps. It points into the connectivity if they are contiguous
+ * there, and otherwise to `buffer`, into which they are copied. */
+LANE_INLINE const char *load_indices(const lane_source *s, int64_t cell, int64_t buffer[LANES * GRID_MAX_CELL_VERTICES])
 {
     const char *from = s->connectivity + cell * s->count * s->connectivity_stride;
     const int64_t size = s->wide_index ? (int64_t)sizeof(int64_t) : (int64_t)sizeof(int32_t);
     for (int64_t at = 0; at < LANES * s->count * s->connectivity_stride; at += 64)
         __builtin_prefetch(from + AHEAD * s->connectivity_stride + at);
     if (s->connectivity_stride == size) return from;
-    pack_indices(from, s->connectivity_stride, LANES * s->count, size, (char *)room);
-    return (const char *)room;
+    pack_indices(from, s->connectivity_stride, LANES * s->count, size, (char *)buffer);
+    return (const char *)buffer;
 }
 
 LANE_INLINE int64_t read_index(const lane_source *s, const char *indices, int i)
@@ -195,8 +196,8 @@ LANE_INLINE doubles coordinate(const lane_source *s, const lane_points *points, 
     return s->wide_number ? points->wide[vertex][axis] : doubles_from_floats(points->narrow[vertex][axis]);
 }
 
-/* Returns the sum over the corners of the cells, which is the volume multiplied by cell_corners.volume_factor. */
-LANE_INLINE doubles sum_of_corners(const lane_source *s, const lane_points *points)
+/* Returns, per lane, the cell's volume multiplied by cell_corners.volume_factor, as a sum over its corners. */
+LANE_INLINE doubles sum_corner_volumes(const lane_source *s, const lane_points *points)
 {
     const cell_corners of = find_cell_corners(s->type);
     doubles sum = doubles_set(0);
@@ -228,22 +229,23 @@ LANE_INLINE void widen_bounds(const lane_source *s, const lane_points *points, l
         }
 }
 
-/* Computes the volumes of cells begin .. end - 1. Stops before a group of cells that contains a ghost or an invalid
- * index, or if less than LANES cells are left. Returns the cell at which it stopped. */
+/* Computes the volumes (times cell_corners.volume_factor) and the bounds of cells [begin, end), LANES at a time. Stops
+ * before the first LANES cells among which is a ghost or an invalid index, and if fewer than LANES cells are left.
+ * Returns the cell at which it stopped. */
 LANE_INLINE int64_t compute_volumes(const lane_source *s, int64_t begin, int64_t end, lane_bounds *bounds,
                                     double *volumes)
 {
     lane_bounds b = *bounds;
     int64_t cell = begin;
     for (; cell + LANES <= end; cell += LANES) {
-        int64_t room[LANES * GRID_MAX_CELL_VERTICES];
-        const char *const indices = load_indices(s, cell, room);
+        int64_t buffer[LANES * GRID_MAX_CELL_VERTICES];
+        const char *const indices = load_indices(s, cell, buffer);
         if (!are_valid_indices(s, indices) || (s->ghosts && has_ghost(s, cell))) break;
 #pragma GCC unroll 2
         for (int part = 0; part < PARTS; part++) {
             lane_points points;
             gather_points(s, indices, part * LANE_WIDTH, &points);
-            doubles_store(volumes, sum_of_corners(s, &points));
+            doubles_store(volumes, sum_corner_volumes(s, &points));
             widen_bounds(s, &points, &b);
             volumes += LANE_WIDTH;
         }
@@ -264,8 +266,8 @@ LANE_INLINE doubles cube_root(doubles x)
     return y;
 }
 
-/* Computes the sizes from `count` volumes, a multiple of LANES, and adds them to the sums. Returns false, and leaves
- * the sums unchanged, if a volume is zero, too small, too large or NaN. */
+/* Computes the sizes of cells from `count` volumes, and adds them to the sums; count must be a multiple of LANES. If a
+ * volume is 0, too small, too large or NaN, returns false and leaves the sums unchanged. */
 LANE_INLINE bool add_sizes(const double *volumes, int64_t count, lane_sizes *sizes)
 {
     lane_sizes s = *sizes;
@@ -315,7 +317,7 @@ LANE_INLINE void store_sizes(const lane_sizes *s, double shares, double root_of_
     out->size_sum = sum / root_of_shares;
 }
 
-LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t *alone, const int type,
+LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t *scalar_count, const int type,
                               const bool wide_index, const bool wide_number)
 {
     _Alignas(64) double volumes[BLOCK_CELLS];
@@ -324,17 +326,17 @@ LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t 
     lane_bounds bounds = bounds_empty();
     lane_sizes sizes = sizes_empty();
     int64_t cell = 0;
-    *alone = 0;
-    while (cell < cells->count && !*alone) {
+    *scalar_count = 0;
+    while (cell < cells->count && !*scalar_count) {
         const int64_t end = cell + BLOCK_CELLS < cells->count ? cell + BLOCK_CELLS : cells->count;
         const int64_t next = compute_volumes(&s, cell, end, &bounds, volumes);
         if (!add_sizes(volumes, next - cell, &sizes)) {
             for (const double *good = volumes; add_sizes(good, LANES, &sizes); good += LANES) cell += LANES;
-            *alone = LANES;
+            *scalar_count = LANES;
             break;
         }
         cell = next;
-        if (cell < end) *alone = end - cell < LANES ? end - cell : LANES;
+        if (cell < end) *scalar_count = end - cell < LANES ? end - cell : LANES;
     }
     store_bounds(&bounds, sums);
     store_sizes(&sizes, shares, cbrt(shares), sums);
@@ -342,9 +344,9 @@ LANE_INLINE int64_t sum_cells(const lane_cells *cells, lane_sums *sums, int64_t 
 }
 
 #define DEFINE_RUN(name, type, wide_index, wide_number)                                                                \
-    static int64_t name(const lane_cells *cells, lane_sums *sums, int64_t *alone)                                      \
+    static int64_t name(const lane_cells *cells, lane_sums *sums, int64_t *scalar_count)                               \
     {                                                                                                                  \
-        return sum_cells(cells, sums, alone, type, wide_index, wide_number);                                           \
+        return sum_cells(cells, sums, scalar_count, type, wide_index, wide_number);                                    \
     }
 
 #define DEFINE_RUNS(name, type)                                                                                        \

@@ -1,8 +1,8 @@
-/* Processes cells of one type with vector instructions, eight at once, when a mesh is checked: tests whether their
- * indices are in range, and computes their bounds, volumes and sizes. It depends only on grids.
+/* Processes cells of one type with vector instructions, eight at a time, when a mesh is checked: tests whether their
+ * indices are in range, and computes their bounds, volumes and sizes. This module depends only on grids.
  *
- * The loops (session_lane_loops.c) are compiled once per instruction set. Sums have the same bits for all of them: each
- * of the eight lanes has its own sum, and fused multiply-add instructions are not used. */
+ * The loops (session_lane_loops.c) are compiled once per instruction set. Sums have the same bits for all instruction
+ * sets: there is one sum for each of the eight lanes, and fused multiply-add instructions are not used. */
 #ifndef SESSION_LANES_H
 #define SESSION_LANES_H
 
@@ -11,9 +11,9 @@
 
 enum { LANES = 8 };
 
-/* A run of consecutive cells whose vertices are contiguous in the connectivity. */
+/* Cells with consecutive indices, whose vertices are contiguous in the connectivity. */
 typedef struct lane_cells {
-    const grid *g;        /* the grid; its coordinates are all floats or all doubles, with one stride */
+    const grid *g;        /* the grid; its coordinates are all floats or all doubles, and have one stride */
     int type;             /* type of the cells: tet, hex, wedge or pyramid */
     int64_t first, count; /* index of the first cell, and number of cells */
     int64_t first_entry;  /* index of the first cell's first entry in the connectivity */
@@ -26,14 +26,15 @@ typedef struct lane_sums {
     int64_t inverted_count;    /* number of cells with a negative volume */
 } lane_sums;
 
-/* Adds the first cells of the run to the sums; their number, which is returned, is a multiple of eight. *alone is set
- * to the number of following cells that must be checked one by one, because one of them has an index out of range, is a
- * ghost, or has a volume whose root cannot be computed in this way (also if a coordinate is not finite, as each is a
- * factor of the volume), or because fewer than eight cells are left. The bounds may then include vertices of those
- * cells, unless they are ghosts. */
-typedef int64_t lane_run(const lane_cells *cells, lane_sums *sums, int64_t *alone);
+/* Processes cells from the first one on and stores their sums. Returns the number of processed cells, a multiple of
+ * eight. *scalar_count receives the number of cells after these that the caller must check one by one: one of them has
+ * an index out of range, is a ghost, or has a volume whose cube root cannot be computed here (also if a coordinate is
+ * not finite), or fewer than eight cells are left. The stored bounds may include vertices of these cells, unless they
+ * are ghosts. */
+typedef int64_t lane_run(const lane_cells *cells, lane_sums *sums, int64_t *scalar_count);
 
-/* Returns the function for the type of cells and the grid's layout. Returns NULL if the cells are of another type. */
+/* Returns the function for cells of this type and the layout of the grid's arrays; NULL if there is none for the
+ * type. */
 lane_run *session_lanes_of(cpu_isa isa, const grid *g, int type);
 
 /* ---- for session_lanes.c ------------------------------------------------------------------------------------- */

@@ -310,15 +310,15 @@ static bool has_cells_or_faults(const session_plan_basis *basis)
     return basis->extent->cell_count > 0 || basis->catalogue->has_faults;
 }
 
-session_sound_events session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error)
+session_valid_events session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error)
 {
     const scene *scene = basis->scene;
-    session_sound_events sound = {UINT64_MAX, UINT64_MAX};
-    if (!has_cells_or_faults(basis)) return sound;
+    session_valid_events valid = {UINT64_MAX, UINT64_MAX};
+    if (!has_cells_or_faults(basis)) return valid;
     for (int i = 0; i < scene->statistics_count; i++) {
         base_error own = {.status = INSITU_OK};
         if (!session_is_statistics_due(&scene->statistics[i], basis->moment->cycle)) continue;
-        if (check_layer_field(basis, &scene->statistics[i].field, &own)) sound.statistics &= ~(UINT64_C(1) << i);
+        if (check_layer_field(basis, &scene->statistics[i].field, &own)) valid.statistics &= ~(UINT64_C(1) << i);
         if (!error->status) *error = own;
     }
     for (int i = 0; i < scene->image_count && images; i++) {
@@ -326,10 +326,10 @@ session_sound_events session_check_event_fields(const session_plan_basis *basis,
         base_error own = {.status = INSITU_OK};
         if (!image->condition.is_given || !scene_is_first_variant(image)) continue;
         if (check_layer_field(basis, &image->condition.field, &own))
-            sound.images &= ~(UINT64_C(1) << image->variant.source);
+            valid.images &= ~(UINT64_C(1) << image->variant.source);
         if (!error->status) *error = own;
     }
-    return sound;
+    return valid;
 }
 
 int session_count_due(const scene *scene, const session_moment *moment)

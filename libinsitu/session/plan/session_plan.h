@@ -56,7 +56,7 @@ int session_count_due(const scene *scene, const session_moment *moment);
 
 /* Finds the statistics that are due and, if images is set, the conditions, and keeps those whose fields exist. The
  * first fault is stored in *error. Local, the same on every rank. */
-session_sound_events session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
+session_valid_events session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
 
 /* Determines which of the due images can be drawn, marks on this rank's meshes and scalars the data that they need, and
  * copies values that have an index. An image that cannot be drawn is not an error of this call, but invalid values are;

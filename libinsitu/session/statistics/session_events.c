@@ -20,40 +20,41 @@ bool session_has_events(const scene *scene, int64_t cycle, bool images)
     return false;
 }
 
-/* The statistics that are computed in a step: those that are due, followed by those of images' conditions. */
+/* The requests for statistics in a step: those of the scene's statistics that are due, followed by those of images'
+ * conditions. */
 typedef struct event_work {
     int count;
-    session_statistics_wish *wishes;
+    session_statistics_request *requests;
     session_statistics *results;
-    /* index of the statistics in the scene; for the condition of an image, the image's index plus the number of
-     * statistics */
-    int *wish_origins;
+    /* source of each request: the index of the statistics in the scene or, for the condition of an image, the number of
+     * the scene's statistics plus the image's index */
+    int *request_origins;
 } event_work;
 
 static void work_free(event_work *w)
 {
-    base_free(w->wishes);
+    base_free(w->requests);
     base_free(w->results);
-    base_free(w->wish_origins);
+    base_free(w->request_origins);
 }
 
-static bool work_create(const scene *scene, int64_t cycle, const session_sound_events *sound, event_work *w)
+static bool work_create(const scene *scene, int64_t cycle, const session_valid_events *valid, event_work *w)
 {
     const size_t most = (size_t)scene->statistics_count + (size_t)scene->image_count;
-    *w = (event_work){0, base_calloc(most, sizeof *w->wishes), base_calloc(most, sizeof *w->results),
-                      base_calloc(most, sizeof *w->wish_origins)};
-    if (!w->wishes || !w->results || !w->wish_origins) return false;
+    *w = (event_work){0, base_calloc(most, sizeof *w->requests), base_calloc(most, sizeof *w->results),
+                      base_calloc(most, sizeof *w->request_origins)};
+    if (!w->requests || !w->results || !w->request_origins) return false;
     for (int i = 0; i < scene->statistics_count; i++) {
         const scene_statistics *s = &scene->statistics[i];
-        if (!session_is_statistics_due(s, cycle) || !(sound->statistics >> i & 1)) continue;
-        w->wishes[w->count] = (session_statistics_wish){&s->field, s->bin_count, s->low, s->high};
-        w->wish_origins[w->count++] = i;
+        if (!session_is_statistics_due(s, cycle) || !(valid->statistics >> i & 1)) continue;
+        w->requests[w->count] = (session_statistics_request){&s->field, s->bin_count, s->low, s->high};
+        w->request_origins[w->count++] = i;
     }
     for (int i = 0; i < scene->image_count; i++) {
         if (!scene->images[i].condition.is_given || !scene_is_first_variant(&scene->images[i])) continue;
-        if (!(sound->images >> scene->images[i].variant.source & 1)) continue;
-        w->wishes[w->count] = (session_statistics_wish){&scene->images[i].condition.field, 0, 0, -1};
-        w->wish_origins[w->count++] = scene->statistics_count + i;
+        if (!(valid->images >> scene->images[i].variant.source & 1)) continue;
+        w->requests[w->count] = (session_statistics_request){&scene->images[i].condition.field, 0, 0, -1};
+        w->request_origins[w->count++] = scene->statistics_count + i;
     }
     return true;
 }
@@ -70,7 +71,7 @@ static void write_due_statistics(session_events *events, const scene *scene, con
                                  const session_event_time *now, base_error *error)
 {
     for (int i = 0; i < w->count; i++) {
-        const int at = w->wish_origins[i];
+        const int at = w->request_origins[i];
         base_error own = {.status = INSITU_OK};
         if (at >= scene->statistics_count || w->results[i].cell_count == 0) continue;
         session_write_statistics(scene->statistics[at].path, !(events->begun_files >> at & 1), now->cycle, now->time,
@@ -84,7 +85,7 @@ static void store_conditions(session_events *events, const scene *scene, const e
 {
     events->held_conditions = 0;
     for (int i = 0; i < w->count; i++) {
-        const int image = w->wish_origins[i] - scene->statistics_count;
+        const int image = w->request_origins[i] - scene->statistics_count;
         if (image >= 0 && condition_holds(&scene->images[image].condition, &w->results[i]))
             events->held_conditions |= (uint64_t)1 << scene->images[image].variant.source;
     }
@@ -92,17 +93,17 @@ static void store_conditions(session_events *events, const scene *scene, const e
 
 insitu_status session_update_events(session_events *events, const scene *scene, session_meshes *meshes,
                                     const session_catalogue *catalogue, const session_team *team,
-                                    const session_event_time *now, const session_sound_events *sound, base_error *error)
+                                    const session_event_time *now, const session_valid_events *valid, base_error *error)
 {
     event_work work;
-    if (!work_create(scene, now->cycle, sound, &work)) session_fail_for_memory(error, 1 << 12, "statistics of fields");
-    for (int i = 0; i < work.count; i++) session_want_field(meshes, work.wishes[i].field);
-    /* ranks agree on errors before fill functions are called, because these may be collective */
+    if (!work_create(scene, now->cycle, valid, &work)) session_fail_for_memory(error, 1 << 12, "statistics of fields");
+    for (int i = 0; i < work.count; i++) session_want_field(meshes, work.requests[i].field);
+    /* ranks agree on errors before fill functions are called, because fill functions may be collective */
     insitu_status status = session_agree(team->comm, error);
     if (!status) session_fill_fields(meshes, catalogue, false, error);
     if (!error->status) session_copy_wanted(meshes, team->threads, error);
     status = session_agree(team->comm, error);
-    if (!status) status = session_find_statistics(meshes, team, work.wishes, work.count, work.results, error);
+    if (!status) status = session_find_statistics(meshes, team, work.requests, work.count, work.results, error);
     if (!status) {
         store_conditions(events, scene, &work);
         if (team->rank == 0) write_due_statistics(events, scene, &work, now, error);
@@ -112,13 +113,13 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
     return status;
 }
 
-uint64_t session_let_images(const session_events *events, const scene *scene)
+uint64_t session_drawable_images(const session_events *events, const scene *scene)
 {
-    uint64_t let = 0;
+    uint64_t drawable = 0;
     for (int i = 0; i < scene->image_count; i++) {
         const uint64_t bit = (uint64_t)1 << scene->images[i].variant.source;
-        const bool is_let = !scene->images[i].condition.is_given || events->held_conditions & bit;
-        if (is_let && !(scene->images[i].is_drawn_once && events->drawn_images & bit)) let |= bit;
+        const bool is_drawable = !scene->images[i].condition.is_given || events->held_conditions & bit;
+        if (is_drawable && !(scene->images[i].is_drawn_once && events->drawn_images & bit)) drawable |= bit;
     }
-    return let;
+    return drawable;
 }

@@ -1,5 +1,5 @@
-/* Computes what depends on values in a step: the statistics that are due, and the conditions of images that are drawn
- * when a field crosses a bound. */
+/* Computes the statistics of a step that are written to files, and the conditions of images that are drawn only if a
+ * statistic is within bounds. */
 #ifndef SESSION_EVENTS_H
 #define SESSION_EVENTS_H
 
@@ -20,25 +20,25 @@ typedef struct session_events {
 } session_events;
 
 /* The statistics and images of the scene that can be computed in a step without an error, with one bit for each. */
-typedef struct session_sound_events {
+typedef struct session_valid_events {
     uint64_t statistics, images;
-} session_sound_events;
+} session_valid_events;
 
-/* Returns whether the step needs statistics. images states whether the step may draw images if their conditions hold.
+/* Returns whether the step needs statistics. images: set if the step may draw images, whose conditions then matter.
  * Local. */
 bool session_has_events(const scene *scene, int64_t cycle, bool images);
 bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle);
 
 /* Computes the statistics that are due and those of images' conditions, writes the former, and stores which conditions
- * hold. Only those in `sound`, which is the same on all ranks, are computed. An error is returned after all of them
- * have been processed. Collective. */
+ * hold. Only the events in `valid` are processed, which must be the same on all ranks. If one fails, the others are
+ * still processed, and the error is returned afterwards. Collective. */
 insitu_status session_update_events(session_events *events, const scene *scene, session_meshes *meshes,
                                     const session_catalogue *catalogue, const session_team *team,
-                                    const session_event_time *now, const session_sound_events *sound,
+                                    const session_event_time *now, const session_valid_events *valid,
                                     base_error *error);
 
-/* Returns the images that may be drawn, one bit for each: their condition holds, and if they have `once` set they have
- * not been drawn before. */
-uint64_t session_let_images(const session_events *events, const scene *scene);
+/* Returns the images that may be drawn, one bit for each: their condition holds, and they have not been drawn before if
+ * they are drawn only once. */
+uint64_t session_drawable_images(const session_events *events, const scene *scene);
 
 #endif

@@ -1,7 +1,7 @@
-/* Sums are computed with integers, so that they are the same for any order of summation. A term is the volume as a
- * fraction (0 to 1) of that of the largest cell, times 2^52. For shells, if no cell has a volume, areas are used
- * instead of volumes. A sum consists of two words, the multiples of 2^28 and the rest, so that 2^34 cells can be added.
- * The error of each cell is at most 2^-53 of the largest one. */
+/* Computes statistics with integer sums, which are the same for any order of summation. A term is the cell's volume as
+ * a fraction (0 to 1) of the volume of the largest cell, times 2^52. If there are shells and no cell has a volume,
+ * areas are used instead of volumes. A sum consists of two words, the multiples of 2^28 and the remainder, so that the
+ * terms of 2^34 cells can be added. The error of a term is at most 2^-53 of the volume of the largest cell. */
 #include "session_statistics.h"
 
 #include <math.h>
@@ -17,19 +17,20 @@
 /* ---- one cell ------------------------------------------------------------------------------------------------ */
 
 typedef struct cell_value {
-    bool is_counted, is_shell;     /* set if the cell is drawn and all its values are finite; set if it is a shell */
-    double minimum, maximum, mean; /* of the value of the cell, or of the values at its vertices */
+    /* is_counted: the cell is drawn and all its values are finite; is_shell: it is a shell */
+    bool is_counted, is_shell;
+    double minimum, maximum, mean; /* of the cell's value, or of the values at its vertices */
     double volume;                 /* volume, or area of a shell */
 } cell_value;
 
-static cell_value read_cell_value(const grid *g, const grid_field *field, int64_t cell, volume_buffer *room)
+static cell_value read_cell_value(const grid *g, const grid_field *field, int64_t cell, volume_buffer *buffer)
 {
     cell_value out = {grid_is_seen(g, cell), grid_is_shell(g, cell), INFINITY, -INFINITY, 0, 0};
     if (!out.is_counted) return out;
-    out.volume = session_cell_volume(g, cell, room);
-    const int count = field->is_cell_centred ? 1 : room->vertex_count;
+    out.volume = session_cell_volume(g, cell, buffer);
+    const int count = field->is_cell_centred ? 1 : buffer->vertex_count;
     for (int i = 0; i < count; i++) {
-        const double value = grid_field_value(field, field->is_cell_centred ? cell : room->vertices[i]);
+        const double value = grid_field_value(field, field->is_cell_centred ? cell : buffer->vertices[i]);
         out.is_counted = out.is_counted && isfinite(value);
         out.minimum = fmin(out.minimum, value);
         out.maximum = fmax(out.maximum, value);
@@ -56,7 +57,7 @@ static double sum_from_fixed_point(const int64_t sum[2])
     return ((double)sum[0] * (1 << LOW_BITS) + (double)sum[1]) * 0x1p-52;
 }
 
-/* Results of earlier passes over the cells that a pass uses. */
+/* Results of earlier passes over the cells, which a pass uses. */
 typedef struct sum_basis {
     const session_statistics *first_pass;
     double largest;          /* volume of the largest cell */
@@ -102,7 +103,7 @@ typedef struct statistics_pass {
     volume_buffer *buffers; /* one per thread, for computing the volumes of cells */
 } statistics_pass;
 
-/* Adds one of the caller's cells, or all of its pieces; it counts as one cell. */
+/* Adds one of the caller's cells, all of whose pieces together count as one cell. */
 static void add_whole_cell(const statistics_pass *p, const sum_basis *b, int64_t cell, int64_t *sums)
 {
     const int64_t end = session_first_piece(p->mesh, cell + 1);
@@ -128,8 +129,8 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
     }
 }
 
-/* Entries of the reduction by minimum: minimum, negated maximum, negated largest volume; first for cells with a volume,
- * then for shells. */
+/* Layout of the array that is reduced by minimum: minimum of the values, negated maximum, negated largest volume (ENDS
+ * entries); first for cells with a volume, then for shells (KINDS). */
 enum { ENDS = 3, KINDS = 2 };
 
 static void find_cell_extremes(const statistics_pass *p, int64_t cell, double ends[KINDS * ENDS])
@@ -162,24 +163,23 @@ static void find_extremes(const statistics_pass *p, double ends[KINDS * ENDS])
 typedef struct statistics_work {
     const session_meshes *meshes;
     const session_team *team;
-    const session_statistics_wish *wishes;
+    const session_statistics_request *requests;
     int count;
-    /* KINDS * ENDS entries for each requested statistics, then one entry that is -1 if memory ran out on a rank, and
-     * otherwise 0 */
+    /* KINDS * ENDS entries per request, then one entry that is -1 if memory ran out on a rank, and otherwise 0 */
     double *extremes;
-    int64_t *sums; /* MAX_SUMS entries for each requested statistics, then two more */
+    int64_t *sums; /* MAX_SUMS entries per request */
     /* one buffer per thread; they are large enough after the first pass, since each thread always processes the same
      * cells */
     volume_buffer *buffers;
 } statistics_work;
 
-/* Sets up a pass over the field of the requested statistics on a mesh of this rank. Returns false if the mesh does not
- * have the field. */
-static bool set_up_pass(const statistics_work *w, int wish, int mesh, statistics_pass *pass)
+/* Sets up a pass over the field of the request on a mesh of this rank. Returns false if the mesh does not have the
+ * field. */
+static bool set_up_pass(const statistics_work *w, int request, int mesh, statistics_pass *pass)
 {
     const session_mesh *of = w->meshes->items[mesh];
     *pass = (statistics_pass){.mesh = of, .g = &of->cells, .team = w->team, .buffers = w->buffers};
-    return of->is_given && !of->source && session_find_values(of, w->wishes[wish].field, &pass->field);
+    return of->is_given && !of->source && session_find_values(of, w->requests[request].field, &pass->field);
 }
 
 /* Stores an error if a thread's buffer could not be allocated on any rank. */
@@ -193,15 +193,15 @@ static insitu_status check_buffers(const statistics_work *w, base_error *error)
 }
 
 /* Returns whether only shells are counted, which is the case if there are shells and no cell has a volume. */
-static bool is_of_shells(const statistics_work *w, int wish)
+static bool is_of_shells(const statistics_work *w, int request)
 {
-    const double *ends = w->extremes + KINDS * ENDS * wish;
+    const double *ends = w->extremes + KINDS * ENDS * request;
     return !(ends[0] <= -ends[1]) && ends[ENDS] <= -ends[ENDS + 1];
 }
 
-static const double *find_wish_ends(const statistics_work *w, int wish)
+static const double *find_request_extremes(const statistics_work *w, int request)
 {
-    return w->extremes + KINDS * ENDS * wish + (is_of_shells(w, wish) ? ENDS : 0);
+    return w->extremes + KINDS * ENDS * request + (is_of_shells(w, request) ? ENDS : 0);
 }
 
 static insitu_status reduce_ends(const statistics_work *w, base_error *error)
@@ -232,7 +232,7 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
         const double range = known[i].maximum - known[i].minimum;
         const double about =
             is_second && range > 0 ? share_of_range(known[i].mean, known[i].minimum, known[i].maximum) : 0;
-        const sum_basis basis = {&known[i], -find_wish_ends(w, i)[2], about, is_second, known[i].is_of_shells};
+        const sum_basis basis = {&known[i], -find_request_extremes(w, i)[2], about, is_second, known[i].is_of_shells};
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
             if (set_up_pass(w, i, m, &pass)) add_cells(&pass, &basis, w->sums + size * i, size);
@@ -243,21 +243,21 @@ static insitu_status reduce_sums(const statistics_work *w, const session_statist
                              "MPI_Allreduce");
 }
 
-static void begin_statistics(const statistics_work *w, int wish, session_statistics *out)
+static void begin_statistics(const statistics_work *w, int request, session_statistics *out)
 {
-    const session_statistics_wish *of = &w->wishes[wish];
-    const double *ends = find_wish_ends(w, wish);
+    const session_statistics_request *of = &w->requests[request];
+    const double *ends = find_request_extremes(w, request);
     const bool has_range = of->low <= of->high;
     *out = (session_statistics){
-        .is_of_shells = is_of_shells(w, wish), .minimum = ends[0], .maximum = -ends[1], .bin_count = of->bin_count};
+        .is_of_shells = is_of_shells(w, request), .minimum = ends[0], .maximum = -ends[1], .bin_count = of->bin_count};
     out->low = has_range ? of->low : out->minimum;
     out->high = has_range ? of->high : out->maximum;
 }
 
-static void convert_sums(const statistics_work *w, int wish, session_statistics *out)
+static void convert_sums(const statistics_work *w, int request, session_statistics *out)
 {
-    const int64_t *sums = w->sums + MAX_SUMS * wish;
-    const double largest = -find_wish_ends(w, wish)[2], volume = sum_from_fixed_point(sums + VOLUME);
+    const int64_t *sums = w->sums + MAX_SUMS * request;
+    const double largest = -find_request_extremes(w, request)[2], volume = sum_from_fixed_point(sums + VOLUME);
     const double place = volume > 0 ? sum_from_fixed_point(sums + MOMENT) / volume : 0;
     out->cell_count = sums[0];
     out->volume = volume * largest;
@@ -274,17 +274,17 @@ static insitu_status find_all_statistics(const statistics_work *w, session_stati
     for (int i = 0; i < w->count && !status; i++) convert_sums(w, i, &out[i]);
     if (!status) status = reduce_sums(w, out, true, error);
     for (int i = 0; i < w->count && !status; i++) {
-        const double volume = out[i].volume / -find_wish_ends(w, i)[2], range = out[i].maximum - out[i].minimum;
+        const double volume = out[i].volume / -find_request_extremes(w, i)[2], range = out[i].maximum - out[i].minimum;
         out[i].deviation = volume > 0 ? range * sqrt(sum_from_fixed_point(w->sums + 2 * i) / volume) : 0;
     }
     return status;
 }
 
 insitu_status session_find_statistics(const session_meshes *meshes, const session_team *team,
-                                      const session_statistics_wish *wishes, int count, session_statistics *out,
+                                      const session_statistics_request *requests, int count, session_statistics *out,
                                       base_error *error)
 {
-    statistics_work work = {.meshes = meshes, .team = team, .wishes = wishes, .count = count};
+    statistics_work work = {.meshes = meshes, .team = team, .requests = requests, .count = count};
     if (count == 0) return INSITU_OK;
     work.extremes = base_alloc(((size_t)count * KINDS * ENDS + 1) * sizeof *work.extremes);
     work.sums = base_alloc((size_t)count * MAX_SUMS * sizeof *work.sums);

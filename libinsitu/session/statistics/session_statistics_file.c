@@ -8,7 +8,7 @@
 #include "session_agree.h"
 #include "text_file.h"
 
-enum { MOST_BYTES = 1 << 28 }; /* maximum size of a file that is continued; about two million lines */
+enum { MOST_BYTES = 1 << 28 }; /* maximum size of an existing file to which lines are added; about two million lines */
 
 /* Returns the line of column names without its newline, allocated by base_alloc(); NULL if memory runs out. */
 static char *make_header(int bin_count, bool is_of_shells)
@@ -35,7 +35,7 @@ typedef struct new_lines {
     const session_statistics *values;
 } new_lines;
 
-/* Returns the number of significant digits with which nine digits of the range's width are resolved, however far it is
+/* Returns the number of significant digits that resolve the width of the range to nine digits, however far the range is
  * from 0. It is at most the number of digits of a double. */
 static int count_needed_digits(double low, double high)
 {

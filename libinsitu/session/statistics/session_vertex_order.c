@@ -1,7 +1,7 @@
-/* If a cell's vertices are read in another order than the one in which they are stored, the cell is inverted at some
- * corners: the volumes at its corners have both signs, while those of a correct or mirrored cell all have the same
- * sign. Their sum may have any sign, or be 0. So cells with both signs are counted, and for each value of vertex_order
- * also the cells that would have a single sign if they were read in that order. */
+/* Finds meshes whose vertices are stored in another order than the one in which they are read. Such a cell is inverted
+ * at some of its corners: the volumes at its corners have both signs, while those of a correct or mirrored cell all
+ * have the same sign; their sum may have any sign, or be 0. So cells with both signs are counted, and, for each
+ * possible value of vertex_order, the cells that would have a single sign if they were read in that order. */
 #include "session_vertex_order.h"
 
 #include "memory.h"
@@ -10,20 +10,21 @@
 #include "session_tally.h"
 #include "session_topology.h"
 
-enum { ORDERS = 3, SAMPLES = 256 /* approximate number of a mesh's cells that a rank samples */ };
+enum { ORDERS = 3, SAMPLES = 256 /* SAMPLES: approximate number of cells of a mesh that a rank samples */ };
 
-/* The types of cells for which the orders differ. Each type is judged separately, so that an error in hexes is found
- * even if few cells are hexes. */
+/* The types of cells whose vertex orders differ. Each type is judged separately, so that an error in hexes is found
+ * even if few of the cells are hexes. */
 enum { JUDGED = 4 };
 static const int judged[JUDGED] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_QUAD};
 
-/* Counts of the cells of one type. */
-enum type_sum { LOOKED_AT, BOTH_SIGNS, FIT, TYPE_SUMS = FIT + ORDERS };
+/* Counts of the cells of one type: sampled cells, those whose corners have both signs, and for each order those that
+ * would have a single sign. */
+enum type_sum { SAMPLED, BOTH_SIGNS, FITTING, TYPE_SUMS = FITTING + ORDERS };
 
 enum cell_sum { DRAWN, FLAT, INVERTED, SHELLS, SPLIT, OF_TYPES, CELL_SUMS = OF_TYPES + JUDGED * TYPE_SUMS };
 
-/* Returns whether all corners of the cell have the same sign if its vertices are assumed to be stored in `order`
- * instead of the order in which they are read. */
+/* Returns whether the volumes at all corners of the cell have the same sign if its vertices are read in `order`,
+ * whatever the order in which they are read now. */
 static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_vertex_order order)
 {
     const signed char *read = session_vertex_turn(mesh->given.vertex_order, type);
@@ -38,8 +39,8 @@ static bool fits_order(const session_mesh *mesh, int64_t cell, int type, insitu_
     return !tally_has_both_signs(type, points);
 }
 
-/* Returns the counts for the type of the cell. Returns NULL if the cell is not counted: it is a ghost, or the caller
- * describes it as a polyhedron, whose faces determine the order. */
+/* Returns the counts of the cell's type. Returns NULL if the cell is not counted: its type has a single order, it is a
+ * ghost, or the caller gave it as a polyhedron, whose faces determine the order. */
 static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t sums[CELL_SUMS])
 {
     const int type = grid_cell_type(&mesh->cells, cell);
@@ -49,8 +50,8 @@ static int64_t *find_type_sums(const session_mesh *mesh, int64_t cell, int64_t s
     return sums + OF_TYPES + at * TYPE_SUMS;
 }
 
-/* Adds the counts of a sample of the mesh's cells. share is the number of blocks among which the samples are divided,
- * with at least one sample for each. */
+/* Adds the counts of a sample of the mesh's cells. share: the number of blocks of the mesh, over which the samples are
+ * divided; each gets at least one. */
 static void sum_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SUMS])
 {
     const int64_t samples = (SAMPLES + share - 1) / share, step = mesh->cells.cell_count / samples + 1;
@@ -58,10 +59,10 @@ static void sum_orders(const session_mesh *mesh, int share, int64_t sums[CELL_SU
         const int type = grid_cell_type(&mesh->cells, cell);
         int64_t *of_type = find_type_sums(mesh, cell, sums);
         if (!of_type) continue;
-        of_type[LOOKED_AT]++;
+        of_type[SAMPLED]++;
         of_type[BOTH_SIGNS] += !fits_order(mesh, cell, type, mesh->given.vertex_order);
         for (int order = 0; order < ORDERS; order++)
-            of_type[FIT + order] += fits_order(mesh, cell, type, (insitu_vertex_order)order);
+            of_type[FITTING + order] += fits_order(mesh, cell, type, (insitu_vertex_order)order);
     }
 }
 
@@ -73,7 +74,7 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
         if (!part->is_given || part->source) continue;
         sums[DRAWN] += part->given_counts.drawn_count - part->given_counts.shell_count;
         sums[FLAT] += part->given_counts.flat_count - part->given_counts.shell_count;
-        /* the axes of a lattice may have either direction, so that left-handed cells are not counted */
+        /* the axes of a lattice may form a left-handed system, so that inverted cells are not counted */
         sums[INVERTED] += part->cells.lattice ? 0 : part->given_counts.inverted_count;
         sums[SHELLS] += part->given_counts.shell_count;
         sums[SPLIT] += part->topology.is_split;
@@ -81,17 +82,18 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
     }
 }
 
-/* Returns whether most cells of some type have corners of both signs. */
-static bool is_any_turned(const int64_t sums[CELL_SUMS])
+/* Returns whether most sampled cells of some type have corners of both signs. */
+static bool is_any_type_inverted(const int64_t sums[CELL_SUMS])
 {
     bool is_any = false;
     for (const int64_t *t = sums + OF_TYPES; t < sums + CELL_SUMS; t += TYPE_SUMS)
-        is_any = is_any || 2 * t[BOTH_SIGNS] > t[LOOKED_AT];
+        is_any = is_any || 2 * t[BOTH_SIGNS] > t[SAMPLED];
     return is_any;
 }
 
-/* Returns the order that fits most cells, if it fits most cells of each type; otherwise -1. */
-static int order_that_fits(const int64_t sums[CELL_SUMS])
+/* Returns the order with which most sampled cells have a single sign, if that holds for at least half of the cells of
+ * each type; otherwise -1. */
+static int find_fitting_order(const int64_t sums[CELL_SUMS])
 {
     int best = -1;
     int64_t most = -1;
@@ -99,8 +101,8 @@ static int order_that_fits(const int64_t sums[CELL_SUMS])
         int64_t fitting = 0;
         bool fits_each = true;
         for (const int64_t *t = sums + OF_TYPES; t < sums + CELL_SUMS; t += TYPE_SUMS) {
-            fitting += t[FIT + order];
-            fits_each = fits_each && 2 * t[FIT + order] >= t[LOOKED_AT];
+            fitting += t[FITTING + order];
+            fits_each = fits_each && 2 * t[FITTING + order] >= t[SAMPLED];
         }
         if (!fits_each || fitting <= most) continue;
         best = order;
@@ -116,8 +118,8 @@ static bool warn_of_corners(session_report *report, const char *mesh, const int6
     static const char *const words[] = {"VTK's order", "lexicographic order", "DMPlex's order"};
     static const char *const names[] = {"INSITU_ORDER_VTK", "INSITU_ORDER_LEXICOGRAPHIC", "INSITU_ORDER_DMPLEX"};
     const session_warning warning = {WARNING_ORDER, NULL, mesh, 0};
-    const bool are_turned = is_any_turned(sums);
-    const int order = order_that_fits(sums);
+    const bool are_turned = is_any_type_inverted(sums);
+    const int order = find_fitting_order(sums);
     if (order >= 0)
         session_warn(
             report, &warning, are_turned,

@@ -1,14 +1,15 @@
-/* Volumes are computed by closed formulas, which are exact up to rounding.
+/* Computes volumes by closed formulas, which are exact up to rounding.
  *
  * A cell is the region that its faces enclose, so that cells with the same faces have the same volume. A wedge or
- * pyramid is treated as a hex with coincident corners. The integral of a trilinear map's determinant is a sum of three
- * determinants of differences of the corners (Grandy, 1997).
+ * pyramid is treated as a hex with coincident corners. The volume of a hex is the integral of the Jacobian determinant
+ * of its trilinear map, which is a sum of three determinants of differences of the corners (Grandy, 1997).
  *
- * The volume of a polyhedron is the sum of the volumes of cones from any point over its faces, oriented outward. The
- * two triangulations of a quad enclose a tet, which the quad's bilinear patch divides into halves, so that the volume
- * of the cone over a patch is the mean of those over both triangulations.
+ * The volume of a polyhedron is the sum of the volumes of the cones from any point over its faces, oriented outward.
+ * The two triangulations of a quad enclose a tet, which the quad's bilinear patch divides into halves, so that the
+ * volume of the cone over a patch is the mean of those over both triangulations.
  *
- * A shell's area is the length of its vector area, which is half the sum of the cross products around it. */
+ * The area of a shell is the length of its vector area, which is half the sum of the cross products of consecutive
+ * vertices around it. */
 #include "session_volume.h"
 
 #include <math.h>
@@ -36,7 +37,7 @@ static double tet_volume(double (*p)[3])
     return determinant(u, v, w) / 6;
 }
 
-/* Returns, for each corner of a hex, which corner of the cell is used for it. */
+/* Returns, for each of the eight corners of a hex, the index of the corner of the cell that takes its place. */
 static const signed char *corners_as_hex(int type)
 {
     static const signed char hex[8] = {0, 1, 2, 3, 4, 5, 6, 7}, wedge[8] = {0, 1, 2, 2, 3, 4, 5, 5},
@@ -60,24 +61,24 @@ static double hex_volume(double (*p)[3], const signed char *corner)
 
 /* ---- polyhedra ------------------------------------------------------------------------------------------------ */
 
-void session_volume_free(volume_buffer *room)
+void session_volume_free(volume_buffer *buffer)
 {
-    base_free(room->bytes);
-    *room = (volume_buffer){0};
+    base_free(buffer->bytes);
+    *buffer = (volume_buffer){0};
 }
 
-static bool reserve_bytes(volume_buffer *room, size_t size)
+static bool reserve_bytes(volume_buffer *buffer, size_t size)
 {
-    if (size <= room->size) return true;
-    base_free(room->bytes);
-    room->requested_size = size + size / 2;
-    room->bytes = base_alloc(room->requested_size);
-    room->size = room->bytes ? room->requested_size : 0;
-    room->is_out_of_memory = room->is_out_of_memory || !room->bytes;
-    return room->bytes;
+    if (size <= buffer->size) return true;
+    base_free(buffer->bytes);
+    buffer->requested_size = size + size / 2;
+    buffer->bytes = base_alloc(buffer->requested_size);
+    buffer->size = buffer->bytes ? buffer->requested_size : 0;
+    buffer->is_out_of_memory = buffer->is_out_of_memory || !buffer->bytes;
+    return buffer->bytes;
 }
 
-/* Reads positions relative to the first vertex, so that digits do not cancel far from the origin. */
+/* Reads positions relative to the first vertex, so that no digits are lost if the cell is far from the origin. */
 static void read_positions(const grid *g, const closed_faces *c, double (*positions)[3])
 {
     double origin[3];
@@ -95,18 +96,18 @@ static double patch_cone_volume(const double (*p)[3], const int v[4])
     return (determinant(a, b, c) + determinant(a, c, d) + determinant(a, b, d) + determinant(b, c, d)) / 2;
 }
 
-static double polyhedron_volume(const grid *g, int64_t cell, volume_buffer *room)
+static double polyhedron_volume(const grid *g, int64_t cell, volume_buffer *buffer)
 {
     static const double origin[3] = {0, 0, 0};
     closed_faces c = {0};
     if (!closed_faces_count(&c, g, cell)) return NAN;
     const size_t bytes = 3 * (size_t)c.entry_count * sizeof(double);
-    if (!reserve_bytes(room, closed_faces_lay_out(&c, NULL) + bytes)) return NAN;
-    double(*places)[3] = (double(*)[3])(void *)(room->bytes + closed_faces_lay_out(&c, room->bytes));
+    if (!reserve_bytes(buffer, closed_faces_lay_out(&c, NULL) + bytes)) return NAN;
+    double(*places)[3] = (double(*)[3])(void *)(buffer->bytes + closed_faces_lay_out(&c, buffer->bytes));
     const double(*positions)[3] = (const double(*)[3])places;
     closed_faces_read(&c, g, cell);
-    room->vertices = c.vertices;
-    room->vertex_count = c.vertex_count;
+    buffer->vertices = c.vertices;
+    buffer->vertex_count = c.vertex_count;
     if (!c.vertex_count) return 0;
     read_positions(g, &c, places);
     closed_faces_orient(&c);
@@ -123,19 +124,19 @@ static double polyhedron_volume(const grid *g, int64_t cell, volume_buffer *room
 
 /* ---- shells ---------------------------------------------------------------------------------------------------- */
 
-/* Lists the vertices of the shell in the buffer. Returns false if memory runs out. */
-static bool read_vertices(const grid *g, int64_t cell, volume_buffer *room)
+/* Stores the vertices of the shell in the buffer. Returns false if memory runs out. */
+static bool read_vertices(const grid *g, int64_t cell, volume_buffer *buffer)
 {
     grid_walk walk = grid_walk_cell(g, cell);
     const int64_t count = walk.end - walk.next;
-    int64_t *vertices = room->corners;
+    int64_t *vertices = buffer->corners;
     if (count > GRID_MAX_CELL_VERTICES) {
-        if (!reserve_bytes(room, (size_t)count * sizeof *vertices)) return false;
-        vertices = (int64_t *)(void *)room->bytes;
+        if (!reserve_bytes(buffer, (size_t)count * sizeof *vertices)) return false;
+        vertices = (int64_t *)(void *)buffer->bytes;
     }
     for (int64_t i = 0; i < count; i++) grid_walk_next(&walk, &vertices[i]);
-    room->vertices = vertices;
-    room->vertex_count = (int)count;
+    buffer->vertices = vertices;
+    buffer->vertex_count = (int)count;
     return true;
 }
 
@@ -159,15 +160,15 @@ double session_shell_area(const grid *g, int64_t cell)
     return 0.5 * hypot(hypot(sum[0], sum[1]), sum[2]);
 }
 
-double session_cell_volume(const grid *g, int64_t cell, volume_buffer *room)
+double session_cell_volume(const grid *g, int64_t cell, volume_buffer *buffer)
 {
     double points[GRID_MAX_CELL_VERTICES][3];
     const int type = grid_cell_type(g, cell);
-    room->vertex_count = 0;
-    if (grid_is_shell_type(type)) return read_vertices(g, cell, room) ? session_shell_area(g, cell) : NAN;
-    if (type == GRID_POLYHEDRON) return polyhedron_volume(g, cell, room);
-    room->vertices = room->corners;
-    room->vertex_count = grid_cell_vertices(g, cell, room->corners);
-    for (int i = 0; i < room->vertex_count; i++) grid_vertex(g, room->corners[i], points[i]);
+    buffer->vertex_count = 0;
+    if (grid_is_shell_type(type)) return read_vertices(g, cell, buffer) ? session_shell_area(g, cell) : NAN;
+    if (type == GRID_POLYHEDRON) return polyhedron_volume(g, cell, buffer);
+    buffer->vertices = buffer->corners;
+    buffer->vertex_count = grid_cell_vertices(g, cell, buffer->corners);
+    for (int i = 0; i < buffer->vertex_count; i++) grid_vertex(g, buffer->corners[i], points[i]);
     return fabs(type == GRID_TET ? tet_volume(points) : hex_volume(points, corners_as_hex(type)));
 }

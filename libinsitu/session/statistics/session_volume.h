@@ -8,20 +8,20 @@
 
 /* Buffers of a thread. They must be initialized with {0}. */
 typedef struct volume_buffer {
-    const int64_t *vertices; /* vertices of the last cell, each listed once */
+    const int64_t *vertices; /* vertices of the cell that was computed last, without duplicates */
     int vertex_count;
     int64_t corners[GRID_MAX_CELL_VERTICES]; /* memory for the vertices of cells of a fixed size */
     char *bytes;                             /* memory for polyhedra and polygons */
-    size_t size, requested_size;             /* size of the memory and the size that was requested last, in bytes */
+    size_t size, requested_size;             /* size of `bytes`, and the size that was requested last */
     bool is_out_of_memory; /* set if the requested memory was not available, so that a volume could not be computed */
 } volume_buffer;
 
-void session_volume_free(volume_buffer *room);
+void session_volume_free(volume_buffer *buffer);
 
 /* Returns the unsigned volume of a valid cell of any shape, and the area of a shell. Quads are bilinear patches; other
  * faces of polyhedra, and their concave quads, are divided into triangles. Returns NaN if memory runs out, which is
  * possible only for a polyhedron or polygon that is larger than all before. */
-double session_cell_volume(const grid *g, int64_t cell, volume_buffer *room);
+double session_cell_volume(const grid *g, int64_t cell, volume_buffer *buffer);
 
 /* Returns the area of a shell, projected along the mean normal. For a flat shell this is its whole area, whether it is
  * convex or not. */
