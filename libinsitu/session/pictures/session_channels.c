@@ -49,8 +49,8 @@ static insitu_status draw_surface_numbers(const session_frame_target *target, co
     return status;
 }
 
-/* Returns the job without clips, volumes and transparency, so that only its surfaces are visible. `surfaces` is a
- * buffer for the job's surfaces. */
+/* Returns a copy of the job without volumes and clips, whose surfaces are all opaque. `surfaces` is a buffer for the
+ * copied surfaces. */
 static render_job make_opaque_job(const render_job *job, render_surface_layer *surfaces)
 {
     render_job out = *job;
@@ -67,7 +67,7 @@ static render_job make_opaque_job(const render_job *job, render_surface_layer *s
 
 /* ---- numbers ------------------------------------------------------------------------------------------------- */
 
-/* For each isovalue of the job, the numbers by which the user identifies its layer and its surface within the layer. */
+/* For each isovalue of the job: the index of its layer in the scene, and its index within the layer. */
 typedef struct surface_numbers {
     int count;
     float layer[RENDER_MAX_ISOVALUES], surface[RENDER_MAX_ISOVALUES];
@@ -81,8 +81,8 @@ static void add_surface_numbers(surface_numbers *n, int layer, int surfaces)
     }
 }
 
-/* Lists the numbers of all surfaces of the image. If has_shells, isosurfaces also have contour lines on shells, which
- * count as one surface per layer. */
+/* Lists the numbers of all surfaces of the image. If has_shells is set, each isosurface layer also has contour lines on
+ * shells, which are one more surface of the job. */
 static surface_numbers number_surfaces(const scene_image *image, bool has_shells)
 {
     surface_numbers out = {0};
@@ -96,8 +96,7 @@ static surface_numbers number_surfaces(const scene_image *image, bool has_shells
     return out;
 }
 
-/* Replaces the numbers of each pixel, which are (value, number of the isovalue, 0, opacity), by value, layer and
- * surface. */
+/* Converts each pixel from (value, number of the isovalue, 0, opacity) to (value, layer, surface). */
 static void convert_surface_numbers(const scene_image *image, bool has_shells, float *values, int threads)
 {
     const surface_numbers numbers = number_surfaces(image, has_shells);

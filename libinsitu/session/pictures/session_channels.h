@@ -1,5 +1,5 @@
-/* Additional channels that an EXR file may contain besides colours and depth: the normal, the value and the numbers of
- * the nearest surface. */
+/* Computes the additional channels that an EXR file may contain besides colours and depth: the normal, the value and
+ * the numbers of the nearest surface. */
 #ifndef SESSION_CHANNELS_H
 #define SESSION_CHANNELS_H
 
@@ -13,15 +13,16 @@
 enum { SESSION_CHANNELS = 6 };
 
 typedef struct session_channels {
-    float *normals, *values; /* 4 floats per pixel on rank 0; the last one of `values` is the number of the surface */
+    /* 4 floats per pixel, on rank 0 only; the last float of `values` is the number of the surface */
+    float *normals, *values;
     insitu_channel items[SESSION_CHANNELS];
 } session_channels;
 
-/* Returns whether an output of the image contains these channels. */
+/* Returns whether an output of the image requests these channels. */
 bool session_needs_channels(const scene_image *image);
 
-/* Draws the channels in two frames, which contain the job's surfaces, all of them opaque, sampled at the pixels'
- * centres. *taken receives the cost of the frames. The channels must be freed even after an error. Collective. */
+/* Draws the channels in two frames, in which all surfaces of the job are opaque and sampled at the pixels' centres.
+ * *taken receives the cost of both frames. The channels must be freed even after an error. Collective. */
 insitu_status session_draw_channels(const session_frame_target *target, const session_team *team,
                                     const scene_image *image, const render_job *job, session_channels *out,
                                     session_frame *taken, base_error *error);

@@ -1,4 +1,4 @@
-/* Determines whether an image needs a deep picture, which stores several samples per pixel, and manages its memory on
+/* Determines whether an image needs a deep picture, which stores all samples of each pixel, and manages its memory on
  * rank 0. */
 #ifndef SESSION_DEEP_H
 #define SESSION_DEEP_H

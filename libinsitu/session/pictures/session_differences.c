@@ -1,12 +1,12 @@
-/* A rank that has hits whose normals are computed by differences samples its own cells at the six points around each
- * hit, and requests samples from every rank whose cells' box contains one of these points. A request is the hit (16
- * bytes); its answer is the samples (32 bytes). If the partition consists of compact blocks, only hits near the faces
- * between blocks cause requests.
+/* Computes normals by central differences from the samples of all ranks. A rank samples its own cells at the six points
+ * around each of its hits, and requests samples from every rank whose bounding box contains one of these points. A
+ * request is the hit (16 bytes); its answer is the samples (32 bytes). If the partition consists of compact blocks,
+ * only hits near the faces between blocks cause requests.
  *
  *     rank A   hits -> own samples -> requests to ranks by their boxes ............ and all samples -> light
  *     rank B                          requests -> own samples -> answers
  *
- * Hits are processed in rounds, so that the memory for messages on each rank is bounded by that for one round. */
+ * Hits are processed in rounds, so that the memory for messages on each rank is limited to that of one round. */
 #include "session_differences.h"
 
 #include <math.h>
@@ -23,29 +23,29 @@ enum {
     ANSWER_WORDS = sizeof(render_difference_samples) / 8
 };
 
-typedef struct differing {
+typedef struct difference_exchange {
     MPI_Comm comm;
     const render_job *job;
     render_pending_list *list;
     int rank, ranks;
-    int64_t round_hits, rounds; /* number of hits per round, and number of rounds on all ranks */
-    /* Ranks that may have samples for any of this rank's hits, and their boxes. */
+    int64_t round_hits, rounds; /* number of hits of this rank per round; number of rounds, the same on all ranks */
+    /* ranks that may have samples for this rank's hits, and the bounding boxes of all ranks' cells */
     int near_count;
     int *near_ranks;
     render_box *boxes;
-    /* The hits of the current round and their samples. */
+    /* the first hit of the current round, the number of its hits, and their samples */
     int64_t first, count;
     render_difference_samples *samples;
-    int64_t *requested_hits; /* hits for which other ranks' samples are requested, in the order of the message */
-} differing;
+    int64_t *requested_hits; /* for each sent request, in the order of the message, the index of its hit in the round */
+} difference_exchange;
 
 /* ---- data shared by all ranks -------------------------------------------------------------------------------- */
 
-/* Indices in the array that is reduced to its maximum over the ranks: the ranges of the surfaces' fields (with negated
- * minima), the number of rounds, and an error flag. */
+/* Layout of the array that is reduced to its maximum over the ranks: the ranges of the surfaces' fields (minima are
+ * negated), the number of rounds, and an error flag. */
 enum { SHARED_ROUNDS = 2 * RENDER_MAX_ISOVALUES, SHARED_FAILURE, SHARED };
 
-static insitu_status share_ranges(differing *d, base_error *error)
+static insitu_status share_ranges(difference_exchange *d, base_error *error)
 {
     double shared[SHARED] = {0}, ranges[RENDER_MAX_ISOVALUES][2];
     for (int i = 0; i < RENDER_MAX_ISOVALUES; i++) shared[2 * i] = shared[2 * i + 1] = -INFINITY;
@@ -69,9 +69,9 @@ static insitu_status share_ranges(differing *d, base_error *error)
     return INSITU_OK;
 }
 
-/* Removes the ranks that are too far from this rank's hits to have samples for them. Hits lie in this rank's box, so
- * that the distance of their samples from it is at most the largest sampling radius. */
-static void keep_near_ranks(differing *d)
+/* Lists the ranks whose boxes are near enough to have samples for this rank's hits. Hits lie in this rank's own box, so
+ * that their samples are at most the largest sampling distance away from it. */
+static void keep_near_ranks(difference_exchange *d)
 {
     const render_box *own = &d->boxes[d->rank];
     double reach = 0;
@@ -86,7 +86,7 @@ static void keep_near_ranks(differing *d)
     }
 }
 
-static insitu_status share_boxes(differing *d, base_error *error)
+static insitu_status share_boxes(difference_exchange *d, base_error *error)
 {
     const render_box own = render_differences_box(d->job);
     const int doubles = sizeof own / sizeof(double);
@@ -99,7 +99,7 @@ static insitu_status share_boxes(differing *d, base_error *error)
 /* ---- a round ------------------------------------------------------------------------------------------------- */
 
 /* Packs the requests of the round. Returns false if memory runs out. */
-static bool write_requests(differing *d, session_mail *out)
+static bool write_requests(difference_exchange *d, session_mail *out)
 {
     int64_t capacity = d->count + 1;
     out->counts = base_calloc((size_t)d->ranks, sizeof *out->counts);
@@ -115,9 +115,9 @@ static bool write_requests(differing *d, session_mail *out)
                 capacity += capacity / 2 + 1024;
                 uint64_t *words = base_realloc(out->words, (size_t)capacity * REQUEST_WORDS * sizeof *words);
                 if (words) out->words = words;
-                int64_t *asked = base_realloc(d->requested_hits, (size_t)capacity * sizeof *asked);
-                if (asked) d->requested_hits = asked;
-                if (!words || !asked) return false;
+                int64_t *requested = base_realloc(d->requested_hits, (size_t)capacity * sizeof *requested);
+                if (requested) d->requested_hits = requested;
+                if (!words || !requested) return false;
             }
             memcpy(out->words + requests * REQUEST_WORDS, hit, sizeof *hit);
             d->requested_hits[requests++] = i;
@@ -127,8 +127,8 @@ static bool write_requests(differing *d, session_mail *out)
     return true;
 }
 
-/* Computes the answers to received requests. The words of a message are aligned for a request's type. */
-static bool write_answers(const differing *d, const session_mail *in, session_mail *out, base_error *error)
+/* Computes the answers to received requests in *in. The words of a message have the alignment of a request's type. */
+static bool write_answers(const difference_exchange *d, const session_mail *in, session_mail *out, base_error *error)
 {
     const int64_t count = in->total / REQUEST_WORDS;
     out->total = count * ANSWER_WORDS;
@@ -141,9 +141,9 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
     return true;
 }
 
-/* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next message exchange
- * passes it to all ranks. */
-static insitu_status exchange_round(differing *d, base_error *error)
+/* Exchanges requests and answers with other ranks. If an error occurs on one rank, the next exchange passes it to all
+ * ranks. */
+static insitu_status exchange_round(difference_exchange *d, base_error *error)
 {
     session_mail sent_requests = {0}, received_requests = {0}, sent_answers = {0}, received_answers = {0};
     if (!write_requests(d, &sent_requests)) session_fail_for_memory(error, d->count * 24, "samples of other ranks");
@@ -165,7 +165,7 @@ static insitu_status exchange_round(differing *d, base_error *error)
     return status;
 }
 
-static void light_round(const differing *d, fragment_list *fragments, base_error *error)
+static void light_round(const difference_exchange *d, fragment_list *fragments, base_error *error)
 {
     const int64_t count = fragments->count + d->count;
     if (count > fragments->capacity) {
@@ -182,7 +182,7 @@ static void light_round(const differing *d, fragment_list *fragments, base_error
         fragments->count = count;
 }
 
-static insitu_status run_rounds(differing *d, fragment_list *fragments, base_error *error)
+static insitu_status run_rounds(difference_exchange *d, fragment_list *fragments, base_error *error)
 {
     insitu_status status = INSITU_OK;
     for (int64_t round = 0; round < d->rounds && !status; round++) {
@@ -196,7 +196,7 @@ static insitu_status run_rounds(differing *d, fragment_list *fragments, base_err
     return status;
 }
 
-static insitu_status compute_differences(differing *d, fragment_list *fragments, base_error *error)
+static insitu_status compute_differences(difference_exchange *d, fragment_list *fragments, base_error *error)
 {
     const int64_t most = d->list->count < d->round_hits ? d->list->count : d->round_hits;
     d->samples = base_alloc((size_t)(most + 1) * sizeof *d->samples);
@@ -213,11 +213,11 @@ static insitu_status compute_differences(differing *d, fragment_list *fragments,
     return status;
 }
 
-insitu_status session_differ_fragments(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
-                                       base_error *error)
+insitu_status session_light_by_differences(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
+                                           base_error *error)
 {
     const double start = MPI_Wtime();
-    differing d = {.comm = comm, .job = job, .list = &job->waiting->list};
+    difference_exchange d = {.comm = comm, .job = job, .list = &job->waiting->list};
     MPI_Comm_rank(comm, &d.rank);
     MPI_Comm_size(comm, &d.ranks);
     d.round_hits = session_mail_round(d.ranks, ROUND_HITS);

@@ -1,7 +1,7 @@
-/* Draws all due images one after the other, frame by frame, so that the memory of each is freed before the next begins.
+/* Draws all due images one after the other, frame by frame, and frees the memory of each before the next begins.
  *
- * Errors that may occur on one rank alone (mostly lack of memory) are agreed on before the next collective call. An
- * image that fails is skipped, and the next one is drawn; the step returns the first error. */
+ * If an error (mostly lack of memory) may occur on one rank alone, all ranks agree on a status before the next
+ * collective call. An image that fails is skipped, and the next one is drawn; the step returns the first error. */
 #include "session_draw.h"
 
 #include <string.h>
@@ -21,25 +21,25 @@
 #include "session_shells.h"
 #include "session_view.h"
 
-/* Maximum number of fragments that a rank computes at once for pixels in which cells overlap. They need 64 MiB. */
+/* Maximum number of fragments that a rank stores at once for pixels in which cells overlap. They take 64 MiB. */
 enum { overlap_fragments = 1 << 21 };
 
-/* The pictures on rank 0: the current frame, and the sum of frames if there are several. Other ranks only store the
+/* The pictures on rank 0: the current frame, and the sum of frames if there are several. Other ranks only have their
  * size. */
 typedef struct canvas {
     image frame;
     /* block that holds the pixels of `frame`; the writer becomes its owner when the picture is passed to it */
     session_picture memory;
-    float *depth; /* depth of the frame, saved here while further frames are drawn without depth */
-    /* frames that contain only the pixels at edges, and the sums of these pixels, if only edges are drawn more than
-     * once */
+    float *depth; /* depth of the frame, kept here while more frames are drawn without depth */
+    /* if only pixels at edges are drawn more than once: frames that contain only these, and their sums */
     image samples;
     int64_t edge_count, *edges;
     double *edge_sums;
     double *frame_sum; /* sum of the frames; NULL: there is only one frame */
     session_channels channels;
     deep_image deep;
-    session_decorations *decorations; /* NULL: there are no decorations, and the frame contains its background */
+    /* decorations of the picture; NULL: none, and the frame contains its background */
+    session_decorations *decorations;
 } canvas;
 
 static void canvas_free(canvas *c, session_writer *writer)
@@ -171,7 +171,7 @@ static void average_frames(canvas *c, int frames, int threads)
     }
 }
 
-/* Converts depths from the ray parameter t to distances along the camera's axis. Infinity is kept. */
+/* Converts depths from the ray parameter t to distances along the camera's axis. Infinite depths are kept. */
 static void scale_depths(canvas *c, const render_space *space, int threads)
 {
     const int64_t count = (int64_t)c->frame.width * c->frame.height;
@@ -248,13 +248,13 @@ static void warn_of_overlaps(session_report *report, const scene_image *image, i
         image->name, (long long)pixels);
 }
 
-/* State shared by the frames of an image. */
+/* The state of drawing the frames of an image. */
 typedef struct frames_basis {
     const session_drawing *drawing;
     session_frame_target target;
     canvas *canvas;
-    int64_t overlap_count; /* number of pixels in which cells overlap, the maximum over the frames */
-    deep_image *deep;      /* deep picture that the next frame fills; NULL: there is none, or it has been drawn */
+    int64_t overlap_count; /* maximum over the frames of the number of pixels in which cells overlap */
+    deep_image *deep;      /* deep picture that the next frame fills; NULL: none, or a frame has filled it already */
 } frames_basis;
 
 static insitu_status draw_frame(frames_basis *b, const render_job *job, image *out, base_error *error)
@@ -268,7 +268,7 @@ static insitu_status draw_frame(frames_basis *b, const render_job *job, image *o
     return status;
 }
 
-/* Finds the pixels at edges in rank 0's picture, and sends them to all ranks. The caller must free *pixels. */
+/* Finds the pixels at edges in rank 0's picture, and sends the set to all ranks. The caller must free *pixels. */
 static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_error *error)
 {
     canvas *c = b->canvas;
@@ -284,8 +284,8 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
     return session_check_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
 }
 
-/* Draws one frame for each sample position in the pixels. If only edges are drawn, the job contains only their
- * pixels. */
+/* Draws the image's frames, whose sample positions in the pixels differ. If only edges are drawn, the job contains only
+ * their pixels. */
 static insitu_status draw_samples(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
@@ -300,8 +300,9 @@ static insitu_status draw_samples(frames_basis *b, const scene_image *image, ren
     return status;
 }
 
-/* Draws all frames of an image. A picture without volumes is drawn once through the pixels' centres, and then again
- * only at edges. With volumes the frame through the centres is used only for depth, and is not averaged. */
+/* Draws all frames of an image. If there are no volumes, the picture is drawn once through the pixels' centres, and
+ * then several times at edges only. If there are volumes and depth is needed, a frame through the pixels' centres is
+ * drawn first, only for its depth. */
 static insitu_status draw_all_frames(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
@@ -322,8 +323,8 @@ static insitu_status draw_all_frames(frames_basis *b, const scene_image *image, 
 static insitu_status draw_frames(const session_drawing *d, const scene_image *image, const session_view *view,
                                  const session_layers *layers, canvas *canvas, base_error *error)
 {
-    /* with decorations, edges of the outline may lie between the background and the picture, so that frames are drawn
-     * without the background */
+    /* if there are decorations, lines of the outline may lie between the background and the data, so that frames are
+     * drawn without a background */
     static const float no_background[4] = {0, 0, 0, 0};
     const float *background = image->decorations.is_given ? no_background : image->background;
     const comp_nodes nodes = {d->team->each_node_ranks, d->team->is_round_nodes};
@@ -405,9 +406,9 @@ static void queue_picture(const session_drawing *d, const scene_image *image, ca
     session_writer_queue(d->writer, files, error);
 }
 
-/* Passes an image to the writer. If nothing is written during the step, the only possible error is that rank 0 lacks
- * memory for passing the picture; the next step reports it together with the errors of the writing thread. ranges may
- * be NULL, or the ranges over the run. */
+/* Passes an image to the writer of rank 0. If pictures are written after the step, the only possible error is that rank
+ * 0 lacks memory; the next step reports it together with the errors of the writing thread. ranges: the ranges over the
+ * run, or NULL. */
 static insitu_status write_outputs(const session_drawing *d, const scene_image *image, canvas *c,
                                    session_image_ranges *ranges, base_error *error)
 {
@@ -425,7 +426,8 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-/* Finds the parts that insets will cover in the first file in which they cover any. Returns their number. */
+/* Finds the parts of the picture that insets will cover, in the first of the image's files in which insets cover any
+ * part. Returns the number of parts. */
 static int find_covered(const scene *scene, const scene_image *image, insitu_rectangle covered[SCENE_ANCHORS])
 {
     int count = 0;
@@ -438,8 +440,8 @@ static int find_covered(const scene *scene, const scene_image *image, insitu_rec
     return count;
 }
 
-/* Warns on rank 0 of texts that cannot be drawn as written. The writing thread lays the texts out again later; they are
- * also laid out here, so that the warnings belong to the step that draws them. */
+/* Warns on rank 0 of texts that cannot be drawn as they are written. Texts are laid out here only for these warnings,
+ * so that they belong to the step; the writing thread lays them out again. */
 static void warn_of_words(const session_drawing *d, const scene_image *image, const session_decorations *decorations)
 {
     insitu_word_faults faults;
@@ -455,8 +457,8 @@ static void warn_of_words(const session_drawing *d, const scene_image *image, co
                              "image \"%s\": %.900s", image->name, texts[i]);
 }
 
-/* Computes the decorations of an image. Collective if the outline consists of boxes of meshes or ranks. An error that
- * occurs only on rank 0 is shared in the next phase. */
+/* Computes the decorations of an image. Collective if the outline consists of boxes per mesh or per rank. An error that
+ * occurs only on rank 0 is passed to all ranks in the next phase. */
 static insitu_status make_image_decorations(const session_drawing *d, const scene_image *image,
                                             const session_view *view, const session_layers *layers, canvas *out,
                                             base_error *error)
@@ -476,8 +478,8 @@ static insitu_status make_image_decorations(const session_drawing *d, const scen
     return INSITU_OK;
 }
 
-/* Draws an image. An error that occurs on one rank alone, such as lack of memory, is passed in *error to the next
- * phase, which computes the layers or the first frame and shares it. */
+/* Draws an image. An error that occurs on one rank alone, such as lack of memory, is stored in *error; the next phase,
+ * which computes the layers or the first frame, passes it to all ranks. */
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, base_error *error)
 {
     const session_extent *extent = &d->space->extent;
@@ -509,7 +511,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     return status;
 }
 
-/* Writes on rank 0 the tables of databases, with lines for all pictures of the step, and the montages. Collective. */
+/* Writes, on rank 0, the tables of databases, with lines for all pictures of the step, and the montages. Collective. */
 static void write_tables(const session_drawing *d, base_error *first)
 {
     base_error reason = {.status = INSITU_OK};
@@ -554,7 +556,7 @@ insitu_status session_draw_images(const session_drawing *drawing, const session_
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
         has_lines = has_lines || scene_has_words(plan->images[i]);
-        /* a copy of the image with the camera's position in this step; its lists still belong to the scene */
+        /* a copy of the image, in which the camera is that of this step; the copy's lists belong to the scene */
         scene_image placed = *plan->images[i];
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->public_report.time);
         if (draw_image(d, &placed, &reason) == INSITU_OK) {

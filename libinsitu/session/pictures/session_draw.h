@@ -1,4 +1,4 @@
-/* Draws the images of the plan, and passes them to the writer of rank 0. */
+/* Draws the images of the plan, and passes them to the writer of rank 0 (session_writer.h). */
 #ifndef SESSION_DRAW_H
 #define SESSION_DRAW_H
 
@@ -15,11 +15,12 @@
 #include "session_team.h"
 #include "session_writer.h"
 
-/* The state of comparing the colour bars of a montage's pictures, which are to share their bars, during a step. */
+/* Compares, during a step, the colour bars of a montage's pictures, if the scene requests that they share their
+ * bars. */
 typedef struct session_shared_bars {
     const char *path;    /* path of the output, with placeholders; NULL: no picture has been drawn yet */
     uint64_t hash;       /* session_decorations.bars_hash of the first picture */
-    bool has_other_bars; /* set if another picture has other bars */
+    bool has_other_bars; /* set if the bars of a later picture differ from those of the first */
 } session_shared_bars;
 
 /* Input for drawing images. */
@@ -45,8 +46,8 @@ typedef struct session_drawing {
 } session_drawing;
 
 /* Draws the plan's images and passes them to the writer. An image that fails is skipped. Returns the error of the plan
- * if there is one, and otherwise the first error of an image. *drawn receives one bit for each image of the scene file
- * that was drawn, at the position of its number. Collective. */
+ * if there is one, and otherwise the first error of an image. In *drawn the bits of the images of the scene file that
+ * were drawn are set; a bit's position is the image's number in the file. Collective. */
 insitu_status session_draw_images(const session_drawing *drawing, const session_plan *plan, uint64_t *drawn,
                                   base_error *error);
 

@@ -1,4 +1,5 @@
-/* A drawn picture, together with all data that is needed to write its files after the step that drew it has ended. */
+/* A drawn picture with all data that is needed to write its files, which may happen after the step that drew it has
+ * ended. */
 #ifndef SESSION_FILES_H
 #define SESSION_FILES_H
 
@@ -14,14 +15,14 @@
 #include "session_picture.h"
 #include "session_report.h"
 
-/* A picture that is to be written, on rank 0. */
+/* A picture that is to be written. Used on rank 0 only. */
 typedef struct session_files {
     struct session_files *next; /* next element in a list of the writer (session_writer.h) */
     const scene *scene;         /* the scene of the image; it must exist until the files are written */
     session_cinema *cinema;
     session_montages *montages;
-    /* If not set, there is no picture: report.json is written if `news` is not NULL, and otherwise the tables of
-     * databases and the montages, which are written after all pictures of a step. */
+    /* set if there is a picture; otherwise report.json is written if `news` is not NULL, and else the tables of
+     * databases and the montages, which are written after all pictures of a step */
     bool has_picture;
     char *news;        /* text of report.json, owned by this struct (session_news.h); NULL: it is not written */
     scene_image image; /* a copy whose camera is that of the step, and whose lists belong to the scene */
@@ -29,10 +30,10 @@ typedef struct session_files {
     image frame;
     session_picture memory; /* block that holds the pixels of `frame`; owned by this struct */
     session_channels channels;
-    deep_image deep;                  /* samples for deep pictures; the member `counts` is NULL if there are none */
+    deep_image deep;                  /* samples of a deep picture; its member `counts` is NULL if there is none */
     session_decorations *decorations; /* NULL: there are no decorations, and the frame contains its background */
     base_error error;                 /* the first error of writing a file */
-    double ms;                        /* time that writing has taken, in milliseconds */
+    double ms;                        /* time in milliseconds that writing has taken */
 } session_files;
 
 /* Returns the size of the files' data in bytes. */

@@ -1,11 +1,12 @@
-/* Draws a frame, and draws those pixels in which cells overlap a second time.
+/* Draws a frame, and draws the pixels in which cells overlap a second time.
  *
- * Fragments that overlap cannot be sorted by depth, and the ranks that computed them no longer have the position of
- * each sample. So these pixels, which compositing finds and sends to all ranks, are traced once more with every sample
- * as a separate fragment (render.h), composited into a second picture, and copied into the first. In a mesh with a few
- * overlapping cells these are only a few pixels. Two meshes that fill the same space may produce a thousand fragments
- * in each of a million pixels. Such pixels are drawn in several turns, each with as many pixels as the busiest rank can
- * store fragments for. Segments of several volumes are drawn in this way on all pixels at once. */
+ * Fragments that overlap cannot be sorted by depth, and the positions of their samples are no longer known when
+ * compositing finds the overlap. So these pixels, whose set compositing sends to all ranks, are traced again with every
+ * sample as a separate fragment (render.h), composited into a second picture, and copied into the first. A mesh with a
+ * few overlapping cells causes only a few such pixels. Two meshes that fill the same space may cause a thousand
+ * fragments in each of a million pixels. Such pixels are drawn in several turns, each with as many pixels as the
+ * busiest rank can store fragments for. If segments of several volumes are drawn, all pixels are drawn in this way at
+ * once. */
 #include "session_frame.h"
 
 #include <math.h>
@@ -46,8 +47,8 @@ static insitu_status draw_alone(const session_frame_target *t, const render_job 
     return session_agree(t->comm, error);
 }
 
-/* Traces rays on all ranks. If normals are computed by differences, ranks exchange samples. Other errors of this rank
- * are stored in *error and not returned. */
+/* Traces the job's rays in this rank's cells. If normals are computed by differences, the ranks exchange samples, and
+ * the status is the same on all ranks. Other errors of this rank are stored in *error and not returned. */
 static insitu_status trace_fragments(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                                      render_statistics *rendered, base_error *error)
 {
@@ -58,11 +59,11 @@ static insitu_status trace_fragments(const session_frame_target *t, const render
     traced.waiting = ranks > 1 && render_has_differences(job) ? &waiting : NULL;
     if (job->part_count > 0 && !error->status) render_frame(&traced, fragments, rendered, error);
     if (!traced.waiting) return INSITU_OK;
-    return session_differ_fragments(t->comm, &traced, fragments, &rendered->surface_ms, error);
+    return session_light_by_differences(t->comm, &traced, fragments, &rendered->surface_ms, error);
 }
 
-/* Computes the lighting of the fragments. All turns of a frame use the same occluders, because they differ only in
- * their pixels. */
+/* Computes the lighting of the fragments. All turns of a frame use the same occluders, because their jobs differ only
+ * in their pixels. */
 static insitu_status light_fragments(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                                      session_frame *frame, render_statistics *rendered, base_error *error)
 {
@@ -94,7 +95,7 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
                                            &composited, error)
                  : comp_composite(&t->compositing, &fragments, t->background, job->threads, out, &composited, error);
     if (status && !composited.has_failed) *error = (base_error){0};
-    /* compositing returns the same status on all ranks, but messages may differ, so that ranks agree on one */
+    /* all ranks have the same status here, but their messages may differ, so that ranks agree on one */
     if (status) status = session_agree(t->comm, error);
     base_free(fragments.items);
     add_to_frame(frame, &rendered, composited.sent_fragments, 1e3 * (MPI_Wtime() - start));
@@ -105,9 +106,9 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
 
-/* Estimates the number of pixels that produce fragment_limit fragments. For samples the estimate is derived from the
- * length of a ray in the scene, which is about 1 in scaled units, and at most sqrt(3). For segments it is an empirical
- * value. */
+/* Estimates the number of pixels that produce fragment_limit fragments. The number of samples per pixel is estimated
+ * from the length of a ray in the scene, which is about 1, at most sqrt(3), in scaled units. The number of segments per
+ * pixel is an empirical value. */
 static int64_t estimate_turn_pixels(const render_job *job, int64_t fragment_limit)
 {
     enum { SEGMENTS = 500, CUT_BY_SURFACES = 5000 };
@@ -119,9 +120,9 @@ static int64_t estimate_turn_pixels(const render_job *job, int64_t fragment_limi
     return pixels > 1 ? (int64_t)pixels : 1;
 }
 
-/* Computes the number of pixels of the next turn from the number of fragments of the last one on the busiest rank. The
- * growth is bounded, as a few pixels are not representative of all others. Collective; the result is the same on all
- * ranks. */
+/* Computes the number of pixels of the next turn from the number of fragments that the busiest rank had in the last
+ * turn. The growth is limited, since the few pixels of a turn may not be representative. Collective; the result is the
+ * same on all ranks. */
 static insitu_status update_turn_pixels(const session_frame_target *t, int64_t fragments, int64_t *pixels,
                                         base_error *error)
 {
@@ -135,13 +136,16 @@ static insitu_status update_turn_pixels(const session_frame_target *t, int64_t f
     return INSITU_OK;
 }
 
-/* The order in which a picture's pixels are drawn in turns. Pixels are ordered by squares, so that the rays of a packet
- * are neighbours. Consecutive squares are far apart (their numbers are multiples of the golden ratio of the number of
- * squares), so that each turn contains a similar fraction of dense regions. */
-typedef struct set_row_major_strides {
+/* The order in which a picture's pixels are drawn in turns. Pixels are ordered by squares of SQUARE × SQUARE, so that
+ * the rays of a packet are neighbours. Squares that follow each other are far apart: the step between their numbers is
+ * about the number of squares divided by the golden ratio. Each turn therefore contains a similar share of dense
+ * regions. */
+typedef struct turn_order {
     int width, height, squares_per_row; /* size of the picture in pixels, and number of squares in a row of squares */
-    int64_t squares, stride;            /* number of squares, and step from one square to the next in the order */
-} set_row_major_strides;
+    /* number of squares; step in numbers from one square to the next in the order, which has no common divisor with
+     * it */
+    int64_t squares, stride;
+} turn_order;
 
 enum { SQUARE = 16 };
 
@@ -155,9 +159,9 @@ static int64_t greatest_divisor(int64_t a, int64_t b)
     return a;
 }
 
-static set_row_major_strides make_turn_order(const image *out)
+static turn_order make_turn_order(const image *out)
 {
-    set_row_major_strides order = {out->width, out->height, (out->width + SQUARE - 1) / SQUARE, 0, 0};
+    turn_order order = {out->width, out->height, (out->width + SQUARE - 1) / SQUARE, 0, 0};
     order.squares = (int64_t)order.squares_per_row * ((out->height + SQUARE - 1) / SQUARE);
     order.stride = (int64_t)(0.618 * (double)order.squares) + 1;
     while (greatest_divisor(order.stride, order.squares) > 1) order.stride++;
@@ -165,7 +169,7 @@ static set_row_major_strides make_turn_order(const image *out)
 }
 
 /* Returns the k-th pixel of the order, or -1 if it is outside of the picture. */
-static int64_t turn_order_pixel(const set_row_major_strides *order, int64_t k)
+static int64_t pixel_in_turn_order(const turn_order *order, int64_t k)
 {
     const int64_t square = k / (SQUARE * SQUARE) % order->squares * order->stride % order->squares;
     const int64_t x = square % order->squares_per_row * SQUARE + k % SQUARE;
@@ -173,16 +177,16 @@ static int64_t turn_order_pixel(const set_row_major_strides *order, int64_t k)
     return x < order->width && y < order->height ? y * order->width + x : -1;
 }
 
-/* Moves up to `most` pixels of a set into `taken`, beginning at position `first` of the order. Returns the position at
- * which to continue. */
-static int64_t move_turn_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
-                                unsigned char *taken)
+/* Stores in `taken` the next pixels of the set `from`, at most `most`, in the order of drawing from position `first`
+ * on. Returns the position at which to continue. */
+static int64_t select_turn_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
+                                  unsigned char *taken)
 {
-    const set_row_major_strides order = make_turn_order(out);
+    const turn_order order = make_turn_order(out);
     const int64_t end = order.squares * SQUARE * SQUARE;
     memset(taken, 0, pixel_set_bytes((int64_t)out->width * out->height));
     for (; first < end && most > 0; first++) {
-        const int64_t pixel = turn_order_pixel(&order, first);
+        const int64_t pixel = pixel_in_turn_order(&order, first);
         if (pixel < 0 || !pixel_set_has(from, pixel)) continue;
         pixel_set_add(taken, pixel);
         most--;
@@ -200,7 +204,7 @@ static void copy_pixels(const unsigned char *pixels, const image *from, image *t
     }
 }
 
-/* Removes these pixels' samples from the deep picture on rank 0, because the pixels are drawn again. */
+/* Removes the samples of these pixels from the deep picture on rank 0, because the pixels are drawn again. */
 static void remove_samples(const unsigned char *pixels, const image *out)
 {
     const int64_t count = (int64_t)out->width * out->height;
@@ -211,7 +215,7 @@ static void remove_samples(const unsigned char *pixels, const image *out)
 /* A second picture on rank 0, into which the pixels of a turn are drawn. */
 typedef struct second_picture {
     image picture;
-    unsigned char *turn_pixels; /* on every rank: the set of pixels that the turn draws */
+    unsigned char *turn_pixels; /* set of pixels that the turn draws; on every rank */
 } second_picture;
 
 static insitu_status second_picture_create(const session_frame_target *t, const comp_overlaps *overlaps,
@@ -253,7 +257,7 @@ static insitu_status redraw_overlaps(const session_frame_target *t, const render
     for (int64_t left = overlaps->count, at = 0; left > 0;) {
         const int64_t before = frame->fragments;
         comp_overlaps found = {0};
-        at = move_turn_pixels(out, overlaps->pixels, at, most, second->turn_pixels);
+        at = select_turn_pixels(out, overlaps->pixels, at, most, second->turn_pixels);
         if (out->deep && out->deep->counts) remove_samples(second->turn_pixels, out);
         insitu_status status = draw(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
         doubled += found.count;
@@ -310,8 +314,8 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
         out->is_folded = job->reproducible && job->volume_count > 0;
         status = draw(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
         out->is_folded = false;
-        /* Samples in cells that share a face may also be found in two cells because of rounding. So redraw_overlaps()
-         * counts the actual overlaps from the separate samples. */
+        /* because of rounding, a sample at the common face of two cells may be in both; redraw_overlaps() therefore
+         * counts the real overlaps from separate samples */
         frame->overlaps = job->integration == RENDER_SAMPLES ? 0 : overlaps.count;
     }
     if (!status && overlaps.count) status = draw_overlaps(t, job, &overlaps, out, frame, error);

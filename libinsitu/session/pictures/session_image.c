@@ -1,12 +1,12 @@
-/* The image library is loaded by its full path, so that no other library of the same name is used. It is searched in
- * the folder of the object that contains this code (libinsitu), and in the lib folder next to it, where it is if a
- * program in bin links libinsitu statically. Only if it is in neither, the loader searches for it, unless
- * LD_LIBRARY_PATH would make it search the working directory. It stays loaded until the process ends: C++ libraries
- * with threads and static objects cannot be unloaded safely.
+/* Loads the image library at run time, by its full path, so that no other library of the same name is used. It is
+ * searched in the folder of the object that contains this code (libinsitu), and then in the lib folder beside it, where
+ * it is if a program in bin links libinsitu statically. If it is in neither, the dynamic loader searches for it, unless
+ * LD_LIBRARY_PATH would make it search the working directory. The library stays loaded until the process ends: C++
+ * libraries with threads and static objects cannot be unloaded safely.
  *
  * Some library that OpenImageIO uses starts threads when it is loaded. These threads sleep, but could receive the
- * simulation's signals and run its handlers, so they are started with every signal blocked. Other libraries end the
- * process if their constructors cannot allocate memory, so nothing is loaded unless enough memory is available. */
+ * simulation's signals and run its handlers, so that they are started with all signals blocked. Other libraries end the
+ * process if their constructors cannot allocate memory, so that nothing is loaded unless enough memory is available. */
 #define _GNU_SOURCE 1 /* makes dlfcn.h declare dladdr1() */
 #include "session_image.h"
 
@@ -41,20 +41,21 @@ static void *open_library(const char *path, char *why, size_t size)
     if (handle) return handle;
     const char *reason = dlerror();
     const bool is_absent =
-        /* the loader names the file if it is missing; otherwise a library on which the file depends is missing */
+        /* if the file itself is missing, the loader's message begins with its path; otherwise a library on which it
+         * depends is missing */
         strncmp(reason, path, strlen(path)) == 0;
     if (!*why || !is_absent) snprintf(why, size, "%s", reason);
     return NULL;
 }
 
-/* Determines the folder of the object that contains this code, as it was when the object was loaded. */
+/* Determines the folder of the object that contains this code, by its path when it was loaded. */
 static bool find_own_folder(char folder[PATH_MAX])
 {
     Dl_info object;
     struct link_map *map = NULL;
     if (!dladdr1((const void *)library, &object, (void **)&map, RTLD_DL_LINKMAP) || !map) return false;
     if (*map->l_name) return dlinfo(map, RTLD_DI_ORIGIN, folder) == 0;
-    /* an empty name in the link map means that the object is the main program */
+    /* if the name in the link map is empty, the object is the main program */
     const ssize_t length = readlink("/proc/self/exe", folder, PATH_MAX - 1);
     if (length <= 0) return false;
     folder[length] = '\0';
@@ -70,8 +71,8 @@ static void *open_library_beside(const char *own_folder, const char *between, ch
     return length > 0 && (size_t)length < sizeof path ? open_library(path, why, size) : NULL;
 }
 
-/* Returns whether the loader would search the working directory. An entry that is empty or relative refers to the
- * working directory or a folder below it. */
+/* Returns whether LD_LIBRARY_PATH makes the loader search the working directory: an entry that is empty or relative
+ * refers to the working directory or a folder below it. */
 static bool searches_working_directory(void)
 {
     const char *entries = getenv("LD_LIBRARY_PATH");

@@ -1,4 +1,5 @@
-/* Writes pictures by an image library that is loaded at run time, so that the session is not linked to it. */
+/* Writes pictures with the image library libinsitu_image, which is loaded at run time, so that the session is not
+ * linked to it. */
 #ifndef SESSION_IMAGE_H
 #define SESSION_IMAGE_H
 
@@ -15,13 +16,13 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
 /* Draws the image with its decorations into its place in a larger picture (image_output.h). Local. Thread-safe. */
 insitu_status session_place_image(const insitu_image *image, const insitu_place *place, base_error *error);
 
-/* Loads the image library before the first picture is written. Errors are ignored, because writing the picture reports
- * them. Returns the time taken in milliseconds; 0 if the library was already loaded. Local. Thread-safe. */
+/* Loads the image library before the first picture is written. Errors are ignored, because writing the picture returns
+ * them again. Returns the time taken in milliseconds; 0 if the library was already loaded. Local. Thread-safe. */
 double session_load_image_library(void);
 
-/* Finds the reasons why a picture's texts cannot be drawn (image_output.h). Only the size and the decorations are read.
- * Finds none if the library cannot be loaded or memory runs out, since writing the picture then fails anyway. Local.
- * Thread-safe. */
+/* Finds the reasons why a picture's texts cannot be drawn (image_output.h). Only the size and the decorations of the
+ * picture are read. If the library cannot be loaded or memory runs out, none are found; writing the picture then fails
+ * anyway. Local. Thread-safe. */
 void session_check_words(const insitu_image *image, insitu_word_faults *out);
 
 /* Set if pictures may be written by a separate thread (session_writer.h). Tests that replace this file set it to

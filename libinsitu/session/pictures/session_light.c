@@ -1,12 +1,13 @@
-/* The rank that has a hit computes its lighting. It first traces the hit's shadow and occlusion rays in its own cells,
- * which block most of them. Then it sends requests to the ranks whose cells' box an unblocked ray intersects. A request
- * contains the hit and the set of its unblocked rays, 32 bytes in all, as the other rank computes the rays in the same
- * way. The answer has 8 or 16 bytes, with one bit per ray.
+/* Computes shadows and ambient occlusion over all ranks. The rank that has a hit computes its lighting. It first traces
+ * the hit's shadow and occlusion rays in its own cells, which block most of them. Then it sends requests to the ranks
+ * whose bounding box an unblocked ray intersects. A request consists of the hit and the set of its unblocked rays, 32
+ * bytes in all; the other rank computes the rays from the hit in the same way. The answer is the set of rays that are
+ * still unblocked, 8 or 16 bytes.
  *
  *     rank A   hits -> own cells -> unblocked rays -> requests to ranks by their boxes ...... all answers -> colours
  *     rank B                                          requests -> own cells -> unblocked rays -> answers
  *
- * Hits are processed in rounds, so that the memory for messages on each rank is bounded by that for one round. */
+ * Hits are processed in rounds, so that the memory for messages on each rank is limited to that of one round. */
 #include "session_light.h"
 
 #include <string.h>
@@ -18,10 +19,14 @@
 
 enum { ROUND_HITS = 1 << 16 };
 
-/* Sizes in words of a request, which consists of a hit and the set of its rays to trace, and of its answer. */
-enum { ASKED_WORDS = sizeof(render_hit) / 8 + sizeof(render_hit_rays) / 8, ANSWER_WORDS = sizeof(render_hit_rays) / 8 };
+/* Sizes in 8-byte words of a request, which consists of a hit and the set of its rays to trace, and of its answer,
+ * which is a set of rays. */
+enum {
+    REQUEST_WORDS = sizeof(render_hit) / 8 + sizeof(render_hit_rays) / 8,
+    ANSWER_WORDS = sizeof(render_hit_rays) / 8
+};
 
-/* The state of one round: some of this rank's hits, and their rays that are not blocked yet. */
+/* The state of a round: the hits of this rank that it contains, and the rays of each that are not blocked yet. */
 typedef struct lighting {
     MPI_Comm comm;
     const render_job *job;
@@ -35,7 +40,8 @@ typedef struct lighting {
     render_hit_rays *rays;
 } lighting;
 
-/* Requests in the order in which hits need them, the rank to which each is sent, and their order sorted by rank. */
+/* The requests in the order of the hits that need them. For each request: the rank to which it is sent, the hit and its
+ * rays. message_order sorts the requests by rank. */
 typedef struct request_list {
     int64_t count, capacity;
     int *ranks;
@@ -43,8 +49,8 @@ typedef struct request_list {
     render_hit_rays *rays;
     int64_t current_hit; /* index of the hit to which added requests belong */
     const lighting *lighting_state;
-    int64_t *first_requests; /* ranks + 1 entries: the first request to each rank */
-    int64_t *message_order;  /* for each position in the message, the index of the request */
+    int64_t *first_requests; /* ranks + 1 entries: position in the message of the first request to each rank */
+    int64_t *message_order;  /* for each position in the message, the request's index in this list */
     bool has_no_memory;
 } request_list;
 
@@ -113,13 +119,14 @@ static bool sort_requests(request_list *q)
 
 static bool write_requests(const lighting *l, const request_list *q, session_mail *out)
 {
-    out->total = q->count * ASKED_WORDS;
+    out->total = q->count * REQUEST_WORDS;
     out->counts = base_alloc((size_t)l->ranks * sizeof *out->counts);
     out->words = base_alloc((size_t)out->total * sizeof *out->words);
     if (!out->counts || !out->words) return false;
-    for (int r = 0; r < l->ranks; r++) out->counts[r] = (q->first_requests[r + 1] - q->first_requests[r]) * ASKED_WORDS;
+    for (int r = 0; r < l->ranks; r++)
+        out->counts[r] = (q->first_requests[r + 1] - q->first_requests[r]) * REQUEST_WORDS;
     for (int64_t i = 0; i < q->count; i++) {
-        uint64_t *words = out->words + i * ASKED_WORDS;
+        uint64_t *words = out->words + i * REQUEST_WORDS;
         const int64_t k = q->message_order[i];
         memcpy(words, &l->hits[q->hits[k]], sizeof *l->hits);
         memcpy(words + sizeof *l->hits / 8, &q->rays[k], sizeof *q->rays);
@@ -136,7 +143,7 @@ static insitu_status send_requests(const lighting *l, request_list *q, session_m
             render_rays_to_boxes(l->job, &l->hits[q->current_hit], &l->rays[q->current_hit], l->boxes, l->ranks,
                                  add_request, q);
     if (q->has_no_memory || !sort_requests(q) || !write_requests(l, q, &out))
-        session_fail_for_memory(error, q->count * ASKED_WORDS * 8, "rays to other ranks");
+        session_fail_for_memory(error, q->count * REQUEST_WORDS * 8, "rays to other ranks");
     insitu_status status = session_agree(l->comm, error);
     if (!status) status = session_mail_exchange(l->comm, &out, in, error);
     session_mail_free(&out);
@@ -145,15 +152,15 @@ static insitu_status send_requests(const lighting *l, request_list *q, session_m
 
 /* ---- answers ------------------------------------------------------------------------------------------------- */
 
-/* Copies the requests out of the message, whose words are not aligned for these types. */
+/* Copies the requests from the message, whose words are not aligned for their types. */
 static bool read_requests(const session_mail *in, render_hit **hits, render_hit_rays **rays)
 {
-    const int64_t count = in->total / ASKED_WORDS;
+    const int64_t count = in->total / REQUEST_WORDS;
     *hits = base_alloc((size_t)count * sizeof **hits);
     *rays = base_alloc((size_t)count * sizeof **rays);
     if (!*hits || !*rays) return false;
     for (int64_t i = 0; i < count; i++) {
-        const uint64_t *words = in->words + i * ASKED_WORDS;
+        const uint64_t *words = in->words + i * REQUEST_WORDS;
         memcpy(&(*hits)[i], words, sizeof **hits);
         memcpy(&(*rays)[i], words + sizeof **hits / 8, sizeof **rays);
     }
@@ -165,13 +172,13 @@ static insitu_status answer_requests(const lighting *l, session_mail *in, base_e
 {
     render_hit *hits = NULL;
     render_hit_rays *rays = NULL;
-    const int64_t count = in->total / ASKED_WORDS;
+    const int64_t count = in->total / REQUEST_WORDS;
     if (read_requests(in, &hits, &rays))
         render_occlude(l->occluders, hits, rays, count, error);
     else
         session_fail_for_memory(error, in->total * 8, "rays of other ranks");
     if (!error->status && rays) memcpy(in->words, rays, (size_t)count * sizeof *rays);
-    for (int r = 0; r < l->ranks; r++) in->counts[r] = in->counts[r] / ASKED_WORDS * ANSWER_WORDS;
+    for (int r = 0; r < l->ranks; r++) in->counts[r] = in->counts[r] / REQUEST_WORDS * ANSWER_WORDS;
     in->total = count * ANSWER_WORDS;
     base_free(hits);
     base_free(rays);
@@ -182,11 +189,11 @@ static void store_answers(lighting *l, const request_list *q, const session_mail
 {
     for (int64_t i = 0; i < q->count; i++) {
         const int64_t k = q->message_order[i];
-        const render_hit_rays *asked = &q->rays[k];
+        const render_hit_rays *requested = &q->rays[k];
         render_hit_rays open, *rays = &l->rays[q->hits[k]];
         memcpy(&open, answers->words + i * ANSWER_WORDS, sizeof open);
-        rays->samples &= ~(asked->samples & ~open.samples);
-        rays->lights &= ~(asked->lights & ~open.lights);
+        rays->samples &= ~(requested->samples & ~open.samples);
+        rays->lights &= ~(requested->lights & ~open.lights);
     }
 }
 
@@ -206,8 +213,8 @@ static insitu_status exchange_requests(lighting *l, base_error *error)
 
 /* ---- rounds -------------------------------------------------------------------------------------------------- */
 
-/* Collects the hits among the fragments, beginning with fragment `first`. Hits without rays are lit directly. Returns
- * the index of the fragment at which to continue. */
+/* Collects the hits among the fragments from index `first` on, until the round is full. Hits that need no rays are lit
+ * immediately. Returns the index of the fragment at which to continue. */
 static int64_t collect_hits(lighting *l, fragment_list *fragments, int64_t first)
 {
     static const render_hit_rays none = {0, 0, 0};
@@ -227,8 +234,8 @@ static void shade_hits(const lighting *l, fragment_list *fragments)
         render_light_fragment(l->job, &l->rays[i], &fragments->items[l->fragments[i]]);
 }
 
-/* Determines whether any rank has fragments left for a further round. */
-static insitu_status reduce_has_more(const lighting *l, bool has_more, bool *out, base_error *error)
+/* Determines, by a reduction, whether any rank has fragments left for another round. */
+static insitu_status any_rank_has_more_fragments(const lighting *l, bool has_more, bool *out, base_error *error)
 {
     int own = has_more, all = 0;
     const insitu_status status =
@@ -241,14 +248,14 @@ static insitu_status light_rounds(lighting *l, fragment_list *fragments, base_er
 {
     int64_t at = 0;
     bool goes_on = false;
-    insitu_status status = reduce_has_more(l, fragments->count > 0, &goes_on, error);
+    insitu_status status = any_rank_has_more_fragments(l, fragments->count > 0, &goes_on, error);
     while (!status && goes_on) {
         at = collect_hits(l, fragments, at);
         render_occlude(l->occluders, l->hits, l->rays, l->count, error);
         status = session_agree(l->comm, error);
         if (!status && l->ranks > 1) status = exchange_requests(l, error);
         if (!status) shade_hits(l, fragments);
-        if (!status) status = reduce_has_more(l, at < fragments->count, &goes_on, error);
+        if (!status) status = any_rank_has_more_fragments(l, at < fragments->count, &goes_on, error);
     }
     return status;
 }

@@ -26,7 +26,7 @@ static int64_t count_pixels(const scene_montage *montage)
     return (int64_t)width_of(montage) * height_of(montage);
 }
 
-/* Returns the place of a panel. rgba: the whole picture. */
+/* Returns the place of a panel in the montage, whose pixels are rgba. */
 static insitu_place find_place(const scene_montage *of, float *rgba, int panel)
 {
     const int left = of->are_bars_left ? of->bar_width : 0;
@@ -57,7 +57,7 @@ int session_find_covered(const scene_montage *montage, int panel, insitu_rectang
     return count;
 }
 
-/* Allocates the whole picture, which is transparent at first. */
+/* Allocates the montage's pixels, which are transparent at first. */
 static insitu_status begin_montage(session_montages *montages, const scene *scene, int index, base_error *error)
 {
     if (!montages->items) {
@@ -75,7 +75,7 @@ static insitu_status begin_montage(session_montages *montages, const scene *scen
     return m->rgba && (m->panels || !of->shares_bars) ? INSITU_OK : fail_for_memory(&scene->montages[index], error);
 }
 
-static void end(session_montage *m)
+static void free_montage(session_montage *m)
 {
     for (int i = 0; i < m->panel_count; i++) session_free_decorations(m->panels[i]);
     for (int i = 0; i < SCENE_ANCHORS; i++) {
@@ -88,8 +88,8 @@ static void end(session_montage *m)
     *m = (session_montage){0};
 }
 
-/* Returns a row of the picture that is in the place. */
-static float *row_of(const insitu_place *place, int y)
+/* Returns row y of the picture at the place. */
+static float *find_row(const insitu_place *place, int y)
 {
     return place->rgba + 4 * ((ptrdiff_t)(place->y + y) * place->width + place->x);
 }
@@ -99,7 +99,8 @@ static size_t row_size(int width)
     return 4 * (size_t)width * sizeof(float);
 }
 
-/* Keeps a picture without its decorations in its panel, and a copy of them. */
+/* Stores a picture without decorations in its panel, and a copy of its decorations, which are drawn after the last
+ * picture of the step. */
 static insitu_status keep_panel(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
                                 const session_decorations *decorations, base_error *error)
 {
@@ -107,11 +108,12 @@ static insitu_status keep_panel(const scene_montage *of, session_montage *m, int
     m->panels[panel] = session_copy_decorations(decorations);
     if (!m->panels[panel]) return fail_for_memory(of, error);
     for (int y = 0; y < picture->height; y++)
-        memcpy(row_of(&place, y), picture->rgba + 4 * (ptrdiff_t)picture->width * y, row_size(picture->width));
+        memcpy(find_row(&place, y), picture->rgba + 4 * (ptrdiff_t)picture->width * y, row_size(picture->width));
     return INSITU_OK;
 }
 
-/* Keeps a picture without its decorations, and a copy of them, until it is laid over the panels. */
+/* Stores a copy of a picture without decorations, and a copy of its decorations, until the picture is drawn over the
+ * panels. */
 static insitu_status keep_inset(const scene_montage *of, session_inset *inset, const scene_output *output,
                                 const insitu_image *picture, const session_decorations *decorations, base_error *error)
 {
@@ -124,7 +126,7 @@ static insitu_status keep_inset(const scene_montage *of, session_inset *inset, c
     return INSITU_OK;
 }
 
-/* Draws a picture into its panel, with decorations that keep clear of the insets. */
+/* Draws a picture into its panel, with decorations placed so that insets do not cover them. */
 static insitu_status draw_panel(const scene_montage *of, session_montage *m, int panel, const insitu_image *picture,
                                 base_error *error)
 {
@@ -169,8 +171,9 @@ insitu_status session_add_panel(session_montages *montages, const scene *scene, 
 
 /* ---- shared colour bars ------------------------------------------------------------------------------------------ */
 
-/* Returns the decorations of the first panel that has a picture, if all panels have the same bars, or else NULL. */
-static const session_decorations *find_shared(const scene_montage *of, const session_montage *m)
+/* Returns the decorations of the first panel that has a picture, if the bars of all panels are equal; otherwise
+ * NULL. */
+static const session_decorations *find_shared_bars(const scene_montage *of, const session_montage *m)
 {
     const session_decorations *first = NULL;
     for (int i = 0; i < of->panel_count; i++) {
@@ -181,7 +184,7 @@ static const session_decorations *find_shared(const scene_montage *of, const ses
     return first;
 }
 
-/* Draws the decorations of a panel over its picture. buffer has the size of the picture. */
+/* Draws the decorations of a panel over its picture. buffer: memory for a copy of the picture. */
 static insitu_status decorate_panel(const scene_montage *of, session_montage *m, int panel, bool has_bars,
                                     float *buffer, base_error *error)
 {
@@ -190,12 +193,12 @@ static insitu_status decorate_panel(const scene_montage *of, session_montage *m,
         .width = of->width, .height = of->height, .rgba = buffer, .decorations = &decorations};
     const insitu_place place = find_place(of, m->rgba, panel);
     for (int y = 0; y < of->height; y++)
-        memcpy(buffer + 4 * (ptrdiff_t)of->width * y, row_of(&place, y), row_size(of->width));
+        memcpy(buffer + 4 * (ptrdiff_t)of->width * y, find_row(&place, y), row_size(of->width));
     if (!has_bars) decorations.bar_count = 0;
     return draw_panel(of, m, panel, &picture, error);
 }
 
-/* Draws the bars into the strip beside the panels, with words as large as in the panels. */
+/* Draws the shared bars into the strip beside the panels, with text as large as in the panels. */
 static insitu_status draw_strip(const scene_montage *of, session_montage *m, const session_decorations *shared,
                                 base_error *error)
 {
@@ -215,7 +218,8 @@ static insitu_status draw_strip(const scene_montage *of, session_montage *m, con
     return status;
 }
 
-/* Draws the decorations of all panels, and the bars that they share. shared: decorations with these bars, or NULL. */
+/* Draws the decorations of all panels, and the bars that they share. shared: decorations that contain these bars; NULL:
+ * no bars are shared. */
 static insitu_status finish_panels(const scene_montage *of, session_montage *m, const session_decorations *shared,
                                    base_error *error)
 {
@@ -229,21 +233,22 @@ static insitu_status finish_panels(const scene_montage *of, session_montage *m, 
 
 /* ---- insets ------------------------------------------------------------------------------------------------------ */
 
-/* Draws the frame around an inset, in a grey that differs from dark and light backgrounds. */
+/* Draws the frame around an inset, in a grey that is visible on dark and light backgrounds. */
 static void draw_frame(const scene_montage *of, const insitu_place *place, const scene_rectangle *inset)
 {
-    static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1}; /* half of sRGB's range */
+    static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1}; /* sRGB 0.5 */
     const int frame = of->frame_width;
     for (int y = -frame; y < inset->height + frame; y++)
         for (int x = -frame; x < inset->width + frame; x++) {
             const bool is_inside = x >= 0 && x < inset->width && y >= 0 && y < inset->height;
-            if (!is_inside) memcpy(row_of(place, y) + 4 * x, grey, sizeof grey);
+            if (!is_inside) memcpy(find_row(place, y) + 4 * x, grey, sizeof grey);
         }
 }
 
-/* Lays a picture over a corner of the panels. shared: decorations with the bars in the strip, or NULL. */
-static insitu_status lay_inset(const scene_montage *of, session_montage *m, scene_anchor corner,
-                               const session_decorations *shared, base_error *error)
+/* Draws an inset and its frame over a corner of the panels. shared: decorations that contain the bars in the strip;
+ * NULL: no bars are shared. */
+static insitu_status draw_inset(const scene_montage *of, session_montage *m, scene_anchor corner,
+                                const session_decorations *shared, base_error *error)
 {
     const scene_rectangle *at = &of->insets[corner];
     const session_inset *inset = &m->insets[corner];
@@ -259,13 +264,13 @@ static insitu_status lay_inset(const scene_montage *of, session_montage *m, scen
     return status;
 }
 
-/* Draws all that was kept for after the last picture of the step. */
+/* Draws what must be drawn after the last picture of the step: decorations with shared bars, and insets. */
 static insitu_status finish_montage(const scene_montage *of, session_montage *m, base_error *error)
 {
-    const session_decorations *shared = of->shares_bars ? find_shared(of, m) : NULL;
+    const session_decorations *shared = of->shares_bars ? find_shared_bars(of, m) : NULL;
     insitu_status status = of->shares_bars ? finish_panels(of, m, shared, error) : INSITU_OK;
     for (int i = 0; i < SCENE_ANCHORS && !status; i++)
-        if (m->insets[i].rgba) status = lay_inset(of, m, (scene_anchor)i, shared, error);
+        if (m->insets[i].rgba) status = draw_inset(of, m, (scene_anchor)i, shared, error);
     return status;
 }
 
@@ -282,14 +287,14 @@ insitu_status session_write_montages(session_montages *montages, const scene *sc
         const insitu_image_format format = of->format == SCENE_PNG16 ? INSITU_PNG16 : INSITU_PNG8;
         if (finish_montage(of, m, &reason) || session_write_image(&whole, format, m->path, &reason) != INSITU_OK)
             base_fail(error, reason.status, "%.900s", reason.message);
-        end(m);
+        free_montage(m);
     }
     return error->status;
 }
 
 void session_montages_free(session_montages *montages)
 {
-    for (int i = 0; i < montages->count; i++) end(&montages->items[i]);
+    for (int i = 0; i < montages->count; i++) free_montage(&montages->items[i]);
     base_free(montages->items);
     *montages = (session_montages){0};
 }

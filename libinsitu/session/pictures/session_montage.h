@@ -1,14 +1,16 @@
-/* Montages, which are several pictures side by side in one file (outputs with a grid), and insets over their corners.
+/* Draws montages, which are several pictures (panels) side by side in one file, and insets, which are pictures over the
+ * corners of a montage.
  *
  * The writing thread receives a step's pictures one after the other. It draws the decorations of each panel and copies
- * it into its place. A panel whose picture is not due, or could not be drawn, remains transparent. After the last
- * picture of the step, insets are laid over the panels, and the whole picture is written. The decorations of a panel
- * keep clear of all insets of the scene, also of those that are not due, so that they are at the same places in all
- * steps.
+ * the panel into its place. A panel remains transparent if its picture is not due or could not be drawn. After the last
+ * picture of the step, the insets are drawn over the panels, and the montage is written. The decorations of a panel are
+ * placed so that no inset of the scene covers them, even if the inset is not due, so that they are at the same place in
+ * all steps.
  *
- * If the panels share their colour bars, they are drawn after the last picture, because only then it is known whether
- * all bars are the same. If so, the panels are drawn without them, and the bars in a strip beside the panels. An inset
- * does not decide whether bars are shared, but is drawn without its own if they are the same as those in the strip. */
+ * If the panels are to share their colour bars, decorations are drawn after the last picture, because only then it is
+ * known whether the bars of all panels are equal. If they are, the panels are drawn without bars, and the bars in a
+ * strip beside the panels. An inset does not influence whether bars are shared, but is drawn without its own bars if
+ * they equal those in the strip. */
 #ifndef SESSION_MONTAGE_H
 #define SESSION_MONTAGE_H
 
@@ -19,20 +21,20 @@
 
 /* The picture of an inset in this step. */
 typedef struct session_inset {
-    float *rgba;                      /* its pixels without decorations; NULL: there is no picture in this step */
-    session_decorations *decorations; /* a copy; NULL: the picture has none */
-    bool has_decorations;             /* set if all of them are drawn, otherwise only the background is */
+    float *rgba;                      /* its pixels without decorations; NULL: the inset has no picture in this step */
+    session_decorations *decorations; /* copy of its decorations; NULL: none */
+    bool has_decorations;             /* set if all decorations are drawn; otherwise only the background is */
 } session_inset;
 
 typedef struct session_montage {
-    float *rgba;      /* the whole picture, with the size set in the scene; NULL: it has not been allocated yet */
+    float *rgba;      /* pixels of the montage; NULL: not allocated yet */
     char *path;       /* path of the file for this step */
-    bool has_picture; /* set if a picture of this step is in it; otherwise no file is written */
-    /* If colour bars are shared: the decorations of each panel, a copy, with which the panel is drawn when those of all
-     * panels are known; until then rgba has the panel without them. NULL: the panel has no picture in this step */
+    bool has_picture; /* set if it contains a picture of this step; otherwise no file is written */
+    /* if bars are to be shared: a copy of the decorations of each panel, which are drawn when those of all panels are
+     * known; until then `rgba` has the panels without decorations. NULL: the panel has no picture in this step. */
     session_decorations **panels;
-    int panel_count;                     /* number of panels; 0 if there are none */
-    session_inset insets[SCENE_ANCHORS]; /* one for each corner */
+    int panel_count;                     /* number of entries of `panels`; 0 if it is NULL */
+    session_inset insets[SCENE_ANCHORS]; /* the inset of each corner */
 } session_montage;
 
 /* The montages on rank 0. The writing thread owns them while pictures are in its queue. */
@@ -41,12 +43,12 @@ typedef struct session_montages {
     session_montage *items; /* one for each montage of the scene; NULL before the first picture */
 } session_montages;
 
-/* Finds the parts of a panel, in its own pixels, that insets and their frames will cover. Returns their number. Local.
- */
+/* Finds the parts of a panel, in the panel's pixels, that insets and their frames will cover. Returns the number of
+ * parts. Local. */
 int session_find_covered(const scene_montage *montage, int panel, insitu_rectangle covered[SCENE_ANCHORS]);
 
-/* Draws the picture into its panel, or keeps it as an inset. decorations: those of the picture, or NULL. path is the
- * path of the file; the montage takes ownership of it. Local. */
+/* Draws the picture into its panel, or stores it as an inset. decorations: those of the picture, or NULL. path: the
+ * path of the file, of which the montage takes ownership. Local. */
 insitu_status session_add_panel(session_montages *montages, const scene *scene, const scene_image *image,
                                 const scene_output *output, const insitu_image *picture,
                                 const session_decorations *decorations, char *path, base_error *error);

@@ -19,7 +19,7 @@ float *session_reserve_picture(session_picture *picture, size_t bytes)
     return picture->pixels;
 }
 
-/* Copies the pixels. Images with decorations are drawn without their background, which is added to the copy. */
+/* Copies the pixels. If the image has decorations, it was drawn without its background, which is added to the copy. */
 static void copy_pixels(const scene_image *image, const struct image *picture, size_t pixels, float *rgba)
 {
     static const float none[4] = {0, 0, 0, 0};

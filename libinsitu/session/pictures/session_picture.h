@@ -1,5 +1,5 @@
-/* The memory of the last picture on rank 0 is used again for the next one, because allocating new pages takes as long
- * as filling them. */
+/* Manages the memory of pictures on rank 0. The memory of the last picture is used again for the next one, because
+ * allocating new pages takes as long as filling them. */
 #ifndef SESSION_PICTURE_H
 #define SESSION_PICTURE_H
 

@@ -1,11 +1,12 @@
-/* The caller's thread loads the image library before the writing thread is started. Loading takes 0.1 s, or 1 s from a
- * cold disk, and holds the loader's lock, which every start of a thread needs: if the writing thread loaded it during
- * the first step, all ranks would be blocked until it is loaded.
+/* Implements the writer and its thread. The caller's thread loads the image library before the writing thread is
+ * started. Loading takes 0.1 s, or 1 s from a cold disk, and holds the loader's lock, which every start of a thread
+ * needs: if the writing thread loaded the library during the first step, all ranks would wait until it is loaded.
  *
- * Some library that OpenImageIO uses creates threads and static objects when it is loaded. These are destroyed when the
- * process exits, in the reverse order of their creation. So the function that waits at exit is registered again after
- * the library is loaded, and after the first pictures are written, which create more such objects. It then runs first,
- * and no picture is written while these objects are being destroyed. */
+ * Some library that OpenImageIO uses creates threads and static objects when it is loaded. When the process exits,
+ * these are destroyed in the reverse order of their creation. So the function that waits for pictures at exit is
+ * registered again after the library is loaded, and again after the first pictures are written, because that creates
+ * more such objects. The function therefore runs first, and no picture is being written while these objects are
+ * destroyed. */
 #include "session_writer.h"
 
 #include <mpi.h>
@@ -44,8 +45,8 @@ static void wait_for_all(void)
     pthread_mutex_unlock(&all_mutex);
 }
 
-/* Waits until all pictures are written. MPI_Finalize() begins by deleting the attributes of MPI_COMM_SELF (MPI-3.1,
- * 8.7.1), which calls this function. */
+/* Waits until all pictures are written. This is called by MPI_Finalize(), which begins by deleting the attributes of
+ * MPI_COMM_SELF (MPI-3.1, 8.7.1). */
 static int wait_in_finalize(MPI_Comm comm, int key, void *value, void *state)
 {
     (void)comm, (void)key, (void)value, (void)state;
@@ -93,8 +94,8 @@ static int64_t free_bytes(const session_writer *w)
     return bytes;
 }
 
-/* Keeps the memory for future pictures, or frees it. Some is kept, because allocating new pages takes as long as
- * filling them. The mutex must be held. */
+/* Keeps the memory for future pictures, or frees it if enough is kept. Memory is kept because allocating new pages
+ * takes as long as filling them. The mutex must be held. */
 static void keep_memory(session_writer *w, session_picture *memory)
 {
     for (int i = 0; i < SESSION_FREE_PICTURES; i++)
@@ -105,8 +106,8 @@ static void keep_memory(session_writer *w, session_picture *memory)
     session_drop_picture(memory);
 }
 
-/* Takes a kept block of at least `bytes` bytes. If none is large enough, *memory stays empty, and one block that is too
- * small is freed. The mutex must be held. */
+/* Takes a kept block of at least `bytes` bytes. If none is large enough, *memory stays empty, and one of the kept
+ * blocks, which is too small, is freed. The mutex must be held. */
 static void reuse_memory(session_writer *w, size_t bytes, session_picture *memory)
 {
     int small = -1;
@@ -172,7 +173,7 @@ static void append_files(session_files **first, session_files **last, session_fi
     *last = files;
 }
 
-/* Moves the first files of the queue to the finished ones. The mutex must be held. */
+/* Moves the first element of the queue to the list of written files. The mutex must be held. */
 static void finish_first_files(session_writer *w)
 {
     session_files *files = w->first;

@@ -1,12 +1,12 @@
-/* The writer of rank 0: a thread that encodes and writes pictures while the simulation continues.
+/* Defines the writer of rank 0: a thread that encodes and writes pictures while the simulation continues.
  *
- * Pictures are put into a queue, which contains at most 128 MiB of them, or a single one: a step that draws more is
- * blocked until there is space. They are written in order, and the next step collects the results when it begins. If
- * the scene requests it, or no thread can be started, pictures are written before the step ends.
+ * Pictures are put into a queue, which holds at most 128 MiB, or a single larger picture; a step that draws more waits
+ * until there is space. Pictures are written in order, and the next step collects the results when it begins. If the
+ * scene requests it, or no thread can be started, pictures are written before the step ends.
  *
- * The thread does not call MPI, receives none of the process's signals, and leaves the image library loaded when it
- * ends. A process that ends without insitu_destroy() also waits for it, in MPI_Finalize() and when it exits. Queued
- * pictures are lost if a process is killed, but no file is ever incomplete (image_output.h). */
+ * The thread does not call MPI, receives none of the process's signals, and does not unload the image library when it
+ * ends. A process that ends without insitu_destroy() waits for it in MPI_Finalize() or when it exits. If a process is
+ * killed, queued pictures are lost, but no file is ever incomplete (image_output.h). */
 #ifndef SESSION_WRITER_H
 #define SESSION_WRITER_H
 
@@ -26,8 +26,8 @@ typedef struct session_writer {
     pthread_mutex_t mutex;
     pthread_cond_t has_changed; /* condition that signals a change of the queue or of is_ending */
     pthread_t thread;
-    bool is_running, is_refused; /* set if the thread was started, and if starting it has failed */
-    /* set if the thread must end, and if the image library was loaded or loading it has failed */
+    bool is_running, is_refused; /* is_running: the thread was started; is_refused: starting it has failed */
+    /* is_ending: the thread must end; is_loaded: the image library was loaded, or loading it has failed */
     bool is_ending, is_loaded;
     struct session_files *first, *last;                 /* the queue; the thread is writing its first element */
     struct session_files *finished, *last_finished;     /* list of written files, which the caller's thread collects */
@@ -35,21 +35,23 @@ typedef struct session_writer {
     int queued_count;                                   /* number of pictures in the queue */
     int64_t queued_bytes;                               /* size of all data in the queue */
     session_picture free_memory[SESSION_FREE_PICTURES]; /* unused blocks that are kept for future pictures */
-    base_error failure;          /* first error that no step has returned yet; used by the caller's thread only */
-    int failure_count;           /* number of errors since then, including the first */
-    double loading_ms;           /* time in milliseconds that loading took in insitu_create(), for the next report */
+    base_error failure; /* first error that no step has returned yet; used by the caller's thread only */
+    int failure_count;  /* number of errors since that one, which it includes */
+    /* time in milliseconds that loading the image library took in insitu_create(), for the next report */
+    double loading_ms;
     struct session_writer *next; /* next writer of this process */
 } session_writer;
 
 /* Initializes the writer. Nothing is started. Local. */
 void session_writer_create(session_writer *writer);
 
-/* Loads the image library and starts the thread if the scene has pictures, unless this has already been done. If the
- * scene requests that pictures are written during the step, no thread is started. Returns the time in milliseconds that
+/* Loads the image library and starts the thread if the scene has pictures, unless this has already been done. No thread
+ * is started if the scene requests that pictures are written during the step. Returns the time in milliseconds that
  * loading took. Local. */
 double session_writer_begin(session_writer *writer, const scene *scene);
 
-/* Returns whether session_writer_begin() has started the thread, or will start it for this scene. Local. */
+/* Returns whether pictures are written after the step: session_writer_begin() has started the thread, or will start it
+ * for this scene. Local. */
 bool session_writer_is_behind(const session_writer *writer, const scene *scene);
 
 /* Records an error that occurred when a picture was passed to the writer. The next step returns it. Local. */
