@@ -6,7 +6,8 @@
 #include "memory.h"
 #include "text_file.h"
 
-enum { MOST_BYTES = 1 << 28 }; /* maximum size of a table that is continued; about four million pictures */
+/* maximum size of an existing table to which lines are added; about four million pictures */
+enum { MOST_BYTES = 1 << 28 };
 
 insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
                                     const file_failure *failure, base_error *error)
@@ -43,7 +44,7 @@ static bool reserve_text(session_table *t, size_t more)
     return true;
 }
 
-/* A line of the table while it is written. is_complete: memory has sufficed for all of the line so far. */
+/* A line of the table while it is being written. is_complete is set as long as memory has not run out. */
 typedef struct table_line {
     session_table *table;
     bool is_complete;
@@ -65,8 +66,8 @@ static void add_number(table_line *line, double number)
     add_bytes(line, text, (size_t)length);
 }
 
-/* Adds a text to the line. It is quoted if it contains a character that separates fields (RFC 4180), and preceded by
- * `shield`, a character that prevents a spreadsheet from interpreting it as a formula, if it looks like one. */
+/* Adds a text to the line. The text is quoted if it contains a character that separates fields (RFC 4180). If a
+ * spreadsheet would interpret it as a formula, it is preceded by `shield`, a character that prevents this. */
 static void add_text(table_line *line, const char *shield, const char *text, char end)
 {
     const bool is_quoted = strpbrk(text, ",\"") != NULL, is_formula = *text && strchr("=+-@", *text);
@@ -77,7 +78,7 @@ static void add_text(table_line *line, const char *shield, const char *text, cha
     add_bytes(line, &end, 1);
 }
 
-/* Adds an empty field. In Spec D of Cinema databases it means that there is no value. */
+/* Adds an empty field, which means in Spec D of Cinema databases that there is no value. */
 static void add_empty_field(table_line *line)
 {
     add_bytes(line, ",", 1);
@@ -131,7 +132,7 @@ static void drop_lines_from_cycle(session_table *t, int64_t cycle)
     t->size = header + text_keep_below(t->text + header, cycle);
 }
 
-/* Copies those lines of the folder's existing table that belong to cycles before this one. */
+/* Copies the lines of the folder's existing table that belong to cycles before `cycle`. */
 static insitu_status copy_earlier_lines(session_table *t, const file_content *old, int64_t cycle, base_error *error)
 {
     const scene_database *database = t->database;
@@ -218,8 +219,8 @@ insitu_status session_record_picture(session_cinema *cinema, const scene *scene,
 
 /* ---- files ----------------------------------------------------------------------------------------------------- */
 
-/* Returns whether a byte must be escaped in a string of the script. Bytes above 0x7f need not be, since the page's
- * scripts are UTF-8. */
+/* Returns whether a byte must be escaped in a string of the script data.js. Bytes above 0x7f need no escape, since the
+ * script is UTF-8. */
 static bool must_escape(unsigned char byte)
 {
     return byte == '"' || byte == '\\' || byte < 0x20;
@@ -236,7 +237,7 @@ static void write_script_line(text_output *out, const char *line, size_t size)
     }
 }
 
-/* Writes the lines as a list of strings, which is the argument of a function of the page. */
+/* Writes the lines as a list of strings, which is the argument of a function that the page defines. */
 static void write_script(text_output *out, const void *what)
 {
     const session_table *t = what;
@@ -262,7 +263,7 @@ static bool write_script_file(const session_table *t, const char *path, file_fai
     return text_file_replace(path, write_script, t, failure);
 }
 
-/* Writes the page if it does not exist or has not been written by this session. Its content is always the same. */
+/* Writes index.html if it does not exist, or if this session has not written it yet. Its content is always the same. */
 static bool write_page_file(const session_table *t, const char *path, file_failure *failure)
 {
     if (t->has_page && file_exists(path)) return true;

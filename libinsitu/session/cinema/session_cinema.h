@@ -4,10 +4,10 @@
  * last. data.js contains the same lines as a script, because a page that was opened from a disk may load a script but
  * not read a file. index.html is a page that shows the pictures listed in data.js.
  *
- * A table is kept in memory and written as a whole at the end of each step that adds a line. It is written into a new
+ * A table is kept in memory and written as a whole at the end of each step that adds a line. It is written to a new
  * file that then replaces the old one, so that the file is complete even if the run is killed. A line has about 60
- * bytes and a picture about 100,000: writing all lines again takes as long as writing the step's pictures only after
- * thousands of steps. A new session keeps the lines of cycles before its own first one. */
+ * bytes and a picture about 100,000, so that writing all lines takes less time than writing the step's pictures until
+ * there have been thousands of steps. A new session keeps the lines of cycles before its own first cycle. */
 #ifndef SESSION_CINEMA_H
 #define SESSION_CINEMA_H
 
@@ -36,7 +36,7 @@ typedef struct session_cinema {
     session_table *tables; /* one table per database of the scene; NULL before the first picture */
 } session_cinema;
 
-/* Stores the cycle of the first step of the session, or of the first step since the scene was edited. Local. */
+/* Stores the first cycle: that of the session's first step, or of the first step after the scene was edited. Local. */
 void session_begin_cinema(session_cinema *cinema, int64_t cycle);
 
 /* Adds a line for a picture that was written for an output with a database. If the run has gone back to an earlier
@@ -45,8 +45,8 @@ insitu_status session_record_picture(session_cinema *cinema, const scene *scene,
                                      const scene_output *output, const scene_placeholder_values *moment,
                                      base_error *error);
 
-/* Writes all tables that have changed, even if some fail. Returns the first error. The next call tries those that
- * failed again. Local. */
+/* Writes all tables that have changed, even if some fail. Returns the first error. Tables that failed are written again
+ * by the next call. Local. */
 insitu_status session_write_cinema(session_cinema *cinema, base_error *error);
 
 void session_cinema_free(session_cinema *cinema);
@@ -54,7 +54,7 @@ void session_cinema_free(session_cinema *cinema);
 /* Returns the path of a file of the database. It is allocated by base_alloc(); NULL if memory runs out. */
 char *session_database_file(const scene_database *database, const char *file);
 
-/* Stores the error that the file could not be `what` ("read" or "written"), and returns its status. */
+/* Stores an error that says that the file could not be `what` ("read" or "written"), and returns its status. */
 insitu_status session_fail_database(const scene_database *database, const char *file, const char *what,
                                     const file_failure *failure, base_error *error);
 

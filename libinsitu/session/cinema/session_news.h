@@ -1,10 +1,10 @@
-/* Writes report.json into each database of the scene. It contains the state of a run, for a program that observes it
- * from outside, such as insitu-view: the last step's cycle, time and error, the scene's state with the error of its
- * last edit, the scene's parameters, and the last warnings. docs/live.md describes it.
+/* Writes report.json into each database of the scene. The file contains the state of a run for programs that observe
+ * the run, such as insitu-view: the last step's cycle, time and error, the scene's state with the error of its last
+ * edit, the scene's parameters, and the last warnings (docs/live.md).
  *
  * Rank 0 composes the text at the end of a step that has warnings or errors, or has drawn pictures. The writing thread
- * writes it after the step's pictures. It is not written into a database whose folder does not exist, as is the case
- * before the first picture. */
+ * writes the file after the step's pictures. It is not written to a database whose folder does not exist, as before the
+ * first picture. */
 #ifndef SESSION_NEWS_H
 #define SESSION_NEWS_H
 
@@ -22,10 +22,11 @@ enum { SESSION_NEWS_LINES = 64 };
 typedef struct session_news {
     bool is_new;   /* set if warnings or errors were added since the last text was made */
     int64_t count; /* number of warnings so far; the last SESSION_NEWS_LINES are kept */
-    /* warning i is stored at i % SESSION_NEWS_LINES; NULL: there was no memory for it */
+    /* text of warning i, at index i % SESSION_NEWS_LINES; NULL: there was no memory for the text */
     char *lines[SESSION_NEWS_LINES];
-    int64_t cycles[SESSION_NEWS_LINES]; /* cycle in which each of these warnings was added */
-    base_error error; /* error of the last step that failed or has drawn pictures; empty if it has drawn them */
+    int64_t cycles[SESSION_NEWS_LINES]; /* cycle in which the warning at this index was added */
+    /* error of the last step that has failed or has drawn pictures; empty if that step had no error */
+    base_error error;
 } session_news;
 
 /* The scene file's state, as written into report.json. */
@@ -34,12 +35,12 @@ typedef struct session_news_scene {
     const char *path; /* path of the file as given by the caller */
     /* state of the file when it was last read, whether it was accepted or not; NULL: there is no file */
     const struct stat *stamp;
-    const char *pieces;  /* text of the report's `pieces`; NULL: there is none */
-    const char *refusal; /* the reason why the last edit of the scene was refused; NULL: it was accepted */
+    const char *pieces;  /* text of `pieces` in the report; NULL: none */
+    const char *refusal; /* reason why the last edit of the scene was refused; NULL: it was accepted */
 } session_news_scene;
 
-/* Stores a step's error and its warnings. It must be called before the error of a refused scene file is added to them.
- * Local. */
+/* Stores a step's error and its warnings. Must be called before the step's warnings include the error of a refused
+ * scene file. Local. */
 void session_record_news(session_news *news, const session_report *report, const base_error *error);
 
 /* Returns the text of report.json, allocated by base_alloc(). Returns NULL if memory runs out; is_new then remains set.

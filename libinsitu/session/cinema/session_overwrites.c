@@ -5,8 +5,8 @@
 #include "memory.h"
 #include "session_hash.h"
 
-/* Computes the hash of a path without "./" and "//", so that different paths to the same file have equal hashes. The
- * result is never 0. */
+/* Computes a hash of a path that ignores "./" and repeated slashes, so that different paths to the same file have equal
+ * hashes. The result is never 0. */
 static uint64_t hash_path(const char *path)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -38,8 +38,8 @@ static const scene_image *find_image_with_output(const scene *scene, int output)
     return &scene->images[image];
 }
 
-/* Returns the output whose last picture was written to this file; -1: there is none. The same output at the same cycle
- * does not count, because the run has then repeated the step. */
+/* Returns the index of the output whose last picture was written to this file, or -1 if there is none. The same output
+ * at the same cycle is ignored, because the run has then repeated the step. */
 static int find_last_writer(const session_overwrites *all, uint64_t file, int output, long long cycle)
 {
     for (int i = 0; i < all->count; i++)
@@ -85,7 +85,7 @@ void session_record_written(session_overwrites *all, const scene *scene, int ima
     for (int i = 0; i < drawn->output_count; i++) {
         const scene_output *output = &drawn->outputs[i];
         if (output->montage >= 0 && output->first_panel + drawn->variant.view > 0)
-            continue; /* the panels of a montage are in one file, so that only the first one is recorded */
+            continue; /* the panels of a montage are written to one file, so that only the first is recorded */
         char *path = scene_expand(drawn->outputs[i].path, &moment);
         if (!path) continue;
         const uint64_t file = hash_path(path);

@@ -1,6 +1,6 @@
-/* The domain's box is convex and contains all data. So an edge between two faces that are seen from inside lies behind
- * all data, and any other edge lies in front of all data or beside it. Edges can therefore be drawn correctly without
- * depth, both among surfaces and inside a volume. */
+/* The box around the domain is convex and contains all data. An edge between two faces whose inner sides face the eye
+ * therefore lies behind all data, and any other edge lies in front of all data or beside it. So edges are drawn
+ * correctly without depth, over surfaces as well as volumes. */
 #include "session_decorations.h"
 
 #include <math.h>
@@ -49,7 +49,8 @@ static bool clip_at_near_plane(seen_point *a, seen_point *b, double near)
     return true;
 }
 
-/* Returns whether the face of the box perpendicular to this axis, at its low or high end, is seen from outside. */
+/* Returns whether the eye sees the outer side of the face of the box that is perpendicular to this axis, at its high or
+ * low end. */
 static bool is_seen_outside(const double lower[3], const double upper[3], const render_camera *c, int axis, bool high)
 {
     if (c->is_orthographic) return high ? c->forward[axis] < 0 : c->forward[axis] > 0;
@@ -88,8 +89,8 @@ typedef struct ruled_edge {
     double from[3], to[3]; /* the ends in scene coordinates */
     double pixels[2][2];   /* ends of the edge in pixels */
     double outward[2];     /* unit vector in the picture, perpendicular to the edge and pointing out of the box */
-    /* is_in_front: the edge lies in front of the eye; is_outer: it is on the box's outline, between a face that is seen
-     * from outside and one that is not */
+    /* is_in_front: the edge lies in front of the eye; is_outer: the edge is on the box's silhouette, between a face
+     * whose outer side is seen and one whose inner side is seen */
     bool is_in_front, is_outer;
 } ruled_edge;
 
@@ -135,9 +136,9 @@ static insitu_label make_label(const double at[2], const double away[2], double 
     return out;
 }
 
-/* Computes the position of an axis's name. It is the middle of the edge. If the numbers are beside the edge rather than
- * below it, it is instead the point between two neighbouring ticks that is nearest to the middle, so that the name does
- * not overlap a number. */
+/* Computes the position of an axis's name: the middle of the edge. If the numbers are beside the edge rather than below
+ * it, the name is instead placed between the two neighbouring ticks nearest to the middle, so that it does not overlap
+ * a number. */
 static void place_axis_name(const ruled_edge *e, const insitu_stroke *ticks, int count, double at[2])
 {
     double middle[2], least = INFINITY;
@@ -211,7 +212,7 @@ insitu_scale_bar session_make_scale_bar(const render_camera *camera, const doubl
 
 /* ---- texts and bars ------------------------------------------------------------------------------------------ */
 
-/* Chooses a light colour on a dark background, and a dark one on a light or transparent background. */
+/* Chooses the colour of text: light on a dark background, and dark on a light or transparent one. */
 static void choose_text_colour(const scene_image *image, float colour[3])
 {
     const float *b = image->background;
@@ -254,7 +255,8 @@ static bool shows_magnitude(const session_catalogue *catalogue, const scene_fiel
            (field->component == SCENE_COMPONENT_DEFAULT && components > 1);
 }
 
-/* Writes the name of what a layer shows, such as |v| for the magnitude of a field, v x or v 7 for a component. */
+/* Writes the name of the scalar that a layer shows: |v| for the magnitude of a field v, "v x" or "v 7" for a
+ * component. */
 static void write_name(const session_catalogue *catalogue, const scene_field *field, char *out, size_t size)
 {
     static const char *const axes[] = {"x", "y", "z"};
@@ -280,7 +282,7 @@ static void write_label(const scene_decorations *scene, int bar, const session_c
     if (unit) snprintf(label + length, size - length, " [%s]", unit);
 }
 
-/* Returns whether an earlier colour bar has the same field, colours and numbers, since several layers may show one
+/* Returns whether an earlier colour bar has the same field, colours and numbers, as happens if several layers show one
  * field. */
 static bool is_repeated_bar(const session_decorations *d, int bar)
 {
@@ -354,7 +356,7 @@ static void hash_colours(uint64_t *hash, const float *colours, int count)
     if (colours) session_hash_bytes(hash, colours, 3 * (size_t)count * sizeof *colours);
 }
 
-/* Returns a hash of all that the bars show: words, colours and numbers. */
+/* Returns a hash of the words, colours and numbers of all bars. */
 static uint64_t hash_bars(const insitu_decorations *d)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -385,7 +387,7 @@ static void fill_axes(session_decorations *d, const render_camera *c)
     }
 }
 
-/* Computes the decorations that show lengths: the scale bar and the rulers. */
+/* Computes the scale bar and the rulers. */
 static void fill_length_decorations(session_decorations *d, const scene_decorations *scene,
                                     const session_extent *extent, const render_camera *camera)
 {
@@ -434,8 +436,8 @@ session_decorations *session_make_decorations(const scene_image *image, const se
     return NULL;
 }
 
-/* Makes the pointers of a copied struct refer to the copy's own members. */
-static void refer_to_itself(session_decorations *copy)
+/* Changes the pointers of a copied struct so that they refer to the copy's own members. */
+static void redirect_pointers(session_decorations *copy)
 {
     insitu_decorations *const both[2] = {&copy->decorations, &copy->background};
     for (int i = 0; i < 2; i++) {
@@ -465,7 +467,7 @@ session_decorations *session_copy_decorations(const session_decorations *from)
         is_done = copy->words[i].text != NULL;
         copy->decorations.words_count += is_done;
     }
-    refer_to_itself(copy);
+    redirect_pointers(copy);
     if (is_done) return copy;
     session_free_decorations(copy);
     return NULL;

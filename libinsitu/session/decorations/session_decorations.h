@@ -1,5 +1,5 @@
-/* Computes the texts and lines that are drawn in addition to an image's data, in the form that the image library
- * expects. */
+/* Computes the decorations of an image, which are the texts and lines drawn in addition to its data, in the form that
+ * the image library expects. */
 #ifndef SESSION_DECORATIONS_H
 #define SESSION_DECORATIONS_H
 
@@ -18,8 +18,8 @@ enum { SESSION_RULER_STROKES = 3 * SESSION_MAX_TICKS, SESSION_RULER_LABELS = 3 *
 typedef struct session_decorations {
     /* all decorations; its pointers refer to members of this struct and to the layers */
     insitu_decorations decorations;
-    insitu_decorations background; /* decorations that contain only the background, for files without decorations */
-    insitu_words words[SESSION_MAX_WORDS];    /* the texts */
+    insitu_decorations background;         /* decorations that have only a background, for files without decorations */
+    insitu_words words[SESSION_MAX_WORDS]; /* the texts */
     insitu_colour_bar bars[SESSION_MAX_BARS]; /* the colour bars */
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
     char labels[SESSION_MAX_BARS][300];          /* label of each colour bar */
@@ -40,22 +40,23 @@ typedef struct session_decoration_basis {
     const session_catalogue *catalogue;
 } session_decoration_basis;
 
-/* Returns the decorations of an image, which must have some. Returns NULL if memory runs out. Local. */
+/* Returns the decorations of an image, for which the scene must request some. Returns NULL if memory runs out.
+ * Local. */
 session_decorations *session_make_decorations(const scene_image *image, const session_decoration_basis *basis);
 
-/* Returns a copy of the decorations, which refers to the same scene. Returns NULL if memory runs out. Local. */
+/* Returns a copy of the decorations. Both refer to the same scene. Returns NULL if memory runs out. Local. */
 session_decorations *session_copy_decorations(const session_decorations *from);
 
 /* Frees the decorations. decorations may be NULL. */
 void session_free_decorations(session_decorations *decorations);
 
-/* Computes the edges of a box as seen by the camera, clipped in front of the eye. Returns their number. An edge lies
- * behind the box's content if both of its faces are seen from inside. Local. */
+/* Computes the edges of a box as seen by the camera; parts behind the eye are clipped away. Returns their number. An
+ * edge is marked as behind the box's content if the inner sides of both of its faces are seen. Local. */
 int session_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
                         insitu_stroke strokes[SESSION_BOX_EDGES]);
 
-/* Adds ticks, numbers and names along three edges of the box, one per axis: among those on the outline, the lowest in
- * the picture. size is the height of texts in pixels. Local. */
+/* Adds ticks, numbers and names along three edges of the box, one per axis: of the edges on the silhouette, the lowest
+ * in the picture. size is the height of texts in pixels. Local. */
 void session_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
                         insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels);
 

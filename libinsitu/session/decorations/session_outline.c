@@ -12,8 +12,8 @@ void session_free_outline(session_outline *outline)
     *outline = (session_outline){0};
 }
 
-/* The bounds of a box in a form in which a reduction by minimum computes the union of boxes: x, y, z of the lower
- * corner, then the negated x, y, z of the upper one. */
+/* Layout of a box's bounds: x, y, z of the lower corner, then the negated x, y, z of the upper corner. A reduction by
+ * minimum therefore computes the union of boxes. */
 
 enum { ENDS = 6 };
 
@@ -26,7 +26,7 @@ static void widen_bounds(const session_mesh *mesh, double ends[ENDS])
     }
 }
 
-/* Adds the boxes that are not empty to the outline. */
+/* Adds those of the `count` boxes that are not empty to the outline. */
 static void add_boxes(const double *ends, int count, session_outline *out)
 {
     for (int i = 0; i < count; i++, ends += ENDS) {
@@ -39,7 +39,8 @@ static void add_boxes(const double *ends, int count, session_outline *out)
     }
 }
 
-/* Computes the bounds of this rank's cells, either one row for each mesh of the catalogue or one row for all meshes. */
+/* Computes the bounds of this rank's cells: one row per mesh of the catalogue if by_mesh is set, and otherwise one row
+ * for all meshes. */
 static void find_bounds(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh, double *ends)
 {
     for (int i = 0; i < (by_mesh ? catalogue->mesh_count : 1) * ENDS; i++) ends[i] = INFINITY;

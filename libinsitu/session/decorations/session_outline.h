@@ -10,12 +10,12 @@
 #include "session_team.h"
 
 typedef struct session_outline {
-    int count; /* number of boxes, on rank 0 only; 0: there is no outline */
+    int count; /* number of boxes; set on rank 0 only; 0: there is no outline */
     session_box *boxes;
 } session_outline;
 
-/* Computes the boxes of the outline. Collective if they are those of meshes or of ranks. After an error there is
- * nothing to free. */
+/* Computes the boxes of the outline. Collective if there is a box per mesh or per rank. After an error there is nothing
+ * to free. */
 insitu_status session_find_outline(const scene_decorations *decorations, const session_catalogue *catalogue,
                                    const session_meshes *meshes, const session_extent *extent, const session_team *team,
                                    session_outline *out, base_error *error);

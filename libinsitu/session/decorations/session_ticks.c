@@ -21,8 +21,8 @@ static round_step next_step(round_step step)
     return (round_step){step.factor == 1 ? 2 : 5, step.exponent};
 }
 
-/* Computes the first and the last multiple of the step in [low, high]. A bound that is a multiple up to rounding is
- * included. */
+/* Computes the first and the last multiple of the step in [low, high]. If a bound differs from a multiple only by
+ * rounding, that multiple is included. */
 static void find_multiples(double low, double high, double step, double *first, double *last)
 {
     const double slack = 1e-9 * (high - low) / step;
@@ -67,8 +67,8 @@ static void write_number(double value, bool is_plain, int digits, char *text, si
     if (!is_plain) shorten_exponent(text);
 }
 
-/* Writes the number in the form that the scene requests. Without such a form it is written with `digits` digits after
- * the decimal point, and with an exponent unless is_plain is set. */
+/* Writes the number in the form that the scene requests. If it requests none, the number is written with `digits`
+ * digits after the decimal point, and with an exponent unless is_plain is set. */
 static void write_in_form(double value, const scene_number_form *form, bool is_plain, int digits, insitu_tick *tick)
 {
     enum { MOST = sizeof tick->text - 2 };
@@ -110,7 +110,8 @@ static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
 
 /* ---- logarithmic --------------------------------------------------------------------------------------------- */
 
-/* The numbers that get a tick: 1, or 1, 2 and 5, multiplied by every n-th power of ten, where n is `step`. */
+/* The numbers that get a tick: 1, or 1, 2 and 5, each multiplied by every power of ten whose exponent is a multiple of
+ * `step`. */
 typedef struct decade_choice {
     bool has_2_and_5;
     int step;
@@ -132,7 +133,7 @@ static void add_tick(const session_scale *s, double value, insitu_tick *ticks, i
     (*count)++;
 }
 
-/* Adds ticks at the powers of ten from the smallest visible one to the largest, with the given sign. */
+/* Adds ticks at the powers of ten, with the given sign, from the smallest to the largest one in the range. */
 static void add_decades(const session_scale *s, double sign, decade_choice choice, insitu_tick *ticks, int *count)
 {
     const double largest = fmax(fabs(s->low), fabs(s->high));
@@ -169,8 +170,8 @@ static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
     return count < 2 ? fill_multiples(s, most, ticks) : count;
 }
 
-/* Adds one tick in the centre of each band if the bands correspond to the integers of the range, that is, if the range
- * ends at integers or half a band beyond them. Otherwise returns 0. */
+/* Adds one tick in the centre of each band if the bands correspond to the integers of the range: the range begins and
+ * ends at integers, or half a band beyond them. Otherwise returns 0. */
 static int fill_integer_ticks(const session_scale *s, int bands, insitu_tick *ticks)
 {
     const double half = s->high - s->low == bands ? 0.5 : 0, first = s->low + half, largest = 1e9;

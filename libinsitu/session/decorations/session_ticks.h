@@ -16,16 +16,15 @@ typedef struct session_scale {
     scene_number_form number_form;
 } session_scale;
 
-/* Computes at most `most` (2 .. SESSION_MAX_TICKS) ticks at round numbers of the range. On a linear scale they are
- * multiples of 1, 2 or 5 times a power of ten. On other scales they are powers of ten, 2 and 5 times these if there is
- * space, and 0. If the range covers less than a power of ten, the numbers are chosen as on a linear scale. They are
- * written in the format of the C locale, with enough digits to distinguish neighbours, unless the scale sets the number
- * of digits. Returns their number. Local. */
+/* Computes at most `most` (2 .. SESSION_MAX_TICKS) ticks at round numbers in the range, and returns their number. On a
+ * linear scale ticks are at multiples of a step, which is 1, 2 or 5 times a power of ten. On other scales they are at
+ * powers of ten, at 2 and 5 times these if there is space, and at 0. If the range covers less than a factor of ten,
+ * they are chosen as on a linear scale. Numbers are written in the format of the C locale, with enough digits to
+ * distinguish neighbours, unless the scale sets the number of digits. Local. */
 int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[SESSION_MAX_TICKS]);
 
-/* Computes ticks in the same way as session_make_ticks(), for a range of `bands` bands of equal width. If each band
- * contains one integer of a linear range, as with ids, the ticks are in the centres of the bands: of all of them, or of
- * every n-th. Local. */
+/* As session_make_ticks(), for a range that is divided into `bands` bands of equal width. If each band contains one
+ * integer of a linear range, as for ids, the ticks are in the centres of the bands, or of every n-th band. Local. */
 int session_make_band_ticks(const session_scale *scale, int bands, int most, insitu_tick ticks[SESSION_MAX_TICKS]);
 
 /* Computes the single tick of a range whose values are all equal, in its middle. Returns 1. Local. */

@@ -1,12 +1,13 @@
-/* An automatic camera looks along a given direction. Its position is computed so that the sphere around the bounds, or
- * their corners, just fit into the part of the frame that decorations leave free.
+/* Computes cameras. An automatic camera looks along a given direction. Its position is such that the sphere around the
+ * bounds, or the corners of the bounds, just fit into the part of the frame that decorations leave free.
  *
- * Let a corner be at (x, y) across the view and w towards the eye. Seen from a position s to the right and D towards
- * the eye, it is within the right border if x - s <= r (D - w), where r is the border's tangent, and within the left
- * one, of tangent l, if s - x <= l (D - w). So with a = max(x + r w) and b = max(l w - x), s must be between a - r D
- * and l D - b. These are equal at D = (a + b) / (r + l). The same holds for up and down; the larger D is used. A sphere
- * of radius R has a = R sqrt(1 + r^2) and b = R sqrt(1 + l^2). A box is positioned in the middle of its allowed range,
- * a sphere as near to the middle of the frame as allowed. */
+ * Coordinates are relative to the centre of the bounds: x to the right, y up, and w against the direction of view. Let
+ * a corner be at (x, y, w), and the eye at x = s and w = D. Let r and l be the tangents of the angles to the right and
+ * left border of the frame. The corner is within the right border if x - s <= r (D - w), and within the left one if s -
+ * x <= l (D - w). So with the maxima over the corners a = max(x + r w) and b = max(l w - x), s must be between a - r D
+ * and l D - b. These limits are equal at D = (a + b) / (r + l), the smallest possible distance. The same holds for up
+ * and down; the larger D is used. A sphere of radius R has a = R sqrt(1 + r^2) and b = R sqrt(1 + l^2). A box is placed
+ * in the middle of its allowed interval of s, a sphere as near to the middle of the frame as the interval allows. */
 #include "session_camera.h"
 
 #include <math.h>
@@ -14,8 +15,8 @@
 
 #include "vector3.h"
 
-/* Largest fraction of the half frame that the data fills. */
-static const double filled = 0.95;
+/* Largest fraction of half the frame that the data may fill. */
+static const double max_filled = 0.95;
 
 /* Returns `up` or, if that is parallel to the direction of view, a coordinate axis that is not. */
 static void choose_up(const double direction[3], const double up[3], double out[3])
@@ -43,8 +44,8 @@ static camera_tangents find_tangents(const scene_image *image)
     return (camera_tangents){up * image->width / image->height, up};
 }
 
-/* The maxima a and b over the corners, as derived at the top of this file, towards each side of the picture, and the
- * largest distance behind the centre. */
+/* The maxima a and b over the corners (see the top of this file) for each side of the picture, and the largest distance
+ * of a corner from the centre towards the eye. */
 typedef struct corner_reach {
     double right, left, up, down, back;
 } corner_reach;
@@ -55,8 +56,8 @@ typedef struct camera_frame {
     double right, left, up, down;
 } camera_frame;
 
-/* Extents of the data from the centre of the bounds, for a perspective and for an orthographic
- * camera, and the frame into which they must fit. */
+/* Extents of the data, measured from the centre of the bounds, for a perspective and for an orthographic camera, and
+ * the frames into which they must fit. */
 typedef struct camera_fit {
     corner_reach perspective_reach, orthographic_reach;
     camera_frame tangents, frame_fractions;
@@ -64,9 +65,9 @@ typedef struct camera_fit {
 } camera_fit;
 
 /* Space that decorations take from the picture, as multiples of the height of text: a column of colour bars, a title, a
- * line of text, and the numbers of rulers. Below: the shape of a colour bar, approximately as in
- * adaptors/image/layout.cpp. */
-static const double bar_room = 6.5, title_room = 2.4, line_room = 1.5, ruler_room = 3;
+ * line of text, and the numbers of rulers. The second row of constants is the shape of a colour bar, approximately that
+ * of adaptors/image/layout.cpp. */
+static const double bar_space = 6.5, title_space = 2.4, line_space = 1.5, ruler_space = 3;
 static const double letter_width = 0.6, label_width = 7, bar_borders = 1.2, bar_height = 5.3, line_height = 1.2;
 
 static double reduce_fraction(double most, double words, double pixels)
@@ -74,7 +75,7 @@ static double reduce_fraction(double most, double words, double pixels)
     return fmax(most - 2 * words / pixels, 0.5);
 }
 
-/* Returns the number of colour bars. *letters receives the length of the longest label. */
+/* Returns the number of colour bars. *letters receives the number of letters of the longest label. */
 static int count_bars(const scene_image *image, double *letters)
 {
     const scene_decorations *d = &image->decorations;
@@ -87,7 +88,7 @@ static int count_bars(const scene_image *image, double *letters)
     return count;
 }
 
-/* Returns whether a file shows the picture's colour bars inside the picture, and not beside it. */
+/* Returns whether some file shows the picture's colour bars inside the picture instead of beside it. */
 static bool has_bars_inside(const scene_image *image)
 {
     bool is_any = image->output_count == 0;
@@ -101,9 +102,9 @@ static double find_bar_width(const scene_image *image)
     const scene_decorations *d = &image->decorations;
     double letters;
     const int count = count_bars(image, &letters);
-    const double words = letter_width * letters, width = fmax(bar_room, fmin(words, label_width) + bar_borders);
+    const double words = letter_width * letters, width = fmax(bar_space, fmin(words, label_width) + bar_borders);
     const double each = bar_height + line_height * fmax(1, ceil(words / label_width));
-    const double rows = fmax(1, floor((1 / d->size - (d->title ? title_room : 0) - bar_borders) / each));
+    const double rows = fmax(1, floor((1 / d->size - (d->title ? title_space : 0) - bar_borders) / each));
     return has_bars_inside(image) ? width * fmax(1, ceil(count / rows)) : 0;
 }
 
@@ -126,18 +127,18 @@ static double find_lines_height(const scene_image *image, scene_anchor middle, s
     int most = 0;
     for (int place = 0; place < 3; place++)
         if (is_long[place] && counts[place] > most) most = counts[place];
-    return line_room * most + (most ? 0.5 : 0);
+    return line_space * most + (most ? 0.5 : 0);
 }
 
-/* Returns the part of the frame that decorations leave free. It is at most the fraction `most` of its half on each
- * side. */
+/* Returns the part of the frame that decorations leave free: towards each side, a fraction of half the frame of at most
+ * `most`. */
 static camera_frame find_free_frame(const scene_image *image, double most)
 {
     const scene_decorations *d = &image->decorations;
     if (!d->is_given) return (camera_frame){most, most, most, most};
-    const double size = d->size * image->height, rulers = d->has_rulers ? ruler_room : 0, bars = find_bar_width(image);
+    const double size = d->size * image->height, rulers = d->has_rulers ? ruler_space : 0, bars = find_bar_width(image);
     const double top =
-        (d->title ? title_room : 0) + find_lines_height(image, SCENE_TOP, SCENE_TOP_LEFT, SCENE_TOP_RIGHT);
+        (d->title ? title_space : 0) + find_lines_height(image, SCENE_TOP, SCENE_TOP_LEFT, SCENE_TOP_RIGHT);
     const double foot = find_lines_height(image, SCENE_BOTTOM, SCENE_BOTTOM_LEFT, SCENE_BOTTOM_RIGHT);
     const double right = rulers + (d->bar_anchor == SCENE_RIGHT ? bars : 0);
     const double left = rulers + (d->bar_anchor == SCENE_LEFT ? bars : 0);
@@ -174,7 +175,7 @@ static camera_fit make_fit(const session_extent *e, const render_camera *axes, c
     static const camera_frame nothing;
     const camera_tangents t = find_tangents(image);
     const bool by_box = image->camera.fits_box && e->half_diagonal > 0;
-    const camera_frame share = find_free_frame(image, by_box ? filled : 1);
+    const camera_frame share = find_free_frame(image, by_box ? max_filled : 1);
     const double radius = e->half_diagonal > 0 ? e->half_diagonal : 1;
     camera_fit fit = {.frame_fractions = share, .is_centred = by_box};
     fit.tangents = (camera_frame){share.right * t.horizontal, share.left * t.horizontal, share.up * t.vertical,
@@ -191,7 +192,7 @@ static double find_eye_distance(const camera_fit *fit, double half_diagonal)
     const camera_frame *f = &fit->tangents;
     const double back =
         fmax((near->right + near->left) / (f->right + f->left), (near->up + near->down) / (f->up + f->down));
-    /* the second bound keeps the eye outside of flat bounds that are viewed edge-on */
+    /* if bounds are flat and viewed edge-on, the second value keeps the eye outside of them */
     return fmax(back, near->back + 0.01 * half_diagonal);
 }
 
@@ -220,8 +221,8 @@ static double find_half_height(const scene_image *image, double fitting)
     return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;
 }
 
-/* Makes the camera orthographic if the scene requests it. The eye keeps its position, with all data in front of it,
- * since an orthographic picture is the same from any distance. */
+/* Makes the camera orthographic if the scene requests it. The eye keeps its position, from which all data lies in front
+ * of it: an orthographic picture is the same from any distance. */
 static void set_orthographic(const scene_image *image, double half_height, render_camera *camera)
 {
     if (!image->camera.is_orthographic) return;
@@ -273,7 +274,8 @@ static bool explicit_camera(const scene_image *image, render_camera *out)
 
 /* ---- defaults from the data ------------------------------------------------------------------------------------ */
 
-/* Directs the camera at flat data, with the first of the data's two axes to the right and the second one up. */
+/* Directs the camera at flat data, so that the first of the data's two axes points to the right and the second one
+ * up. */
 static void face_flat_data(int axis, scene_camera *c)
 {
     static const double towards[3][3] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}};

@@ -1,5 +1,6 @@
-/* The part of the bounds that remains after a set of clips is enclosed in a box. Each clip shrinks the box in turn,
- * repeatedly as long as other clips have shrunk it. If the box becomes empty, the clips leave nothing. */
+/* Finds out whether clips leave anything of the data. The part of the bounds that a set of clips leaves is enclosed in
+ * a box. Each clip in turn shrinks the box; this is repeated as long as it shrinks the box further. If the box becomes
+ * empty, the clips leave nothing. */
 #include "session_clips.h"
 
 #include <math.h>
@@ -8,8 +9,8 @@
 #include "session_distances.h"
 #include "vector3.h"
 
-/* Converts a clip to the renderer's form. The kept region is extended by twice the largest shift of a slice's plane
- * (SESSION_BORDER_SHARE), so that a slice on its border is visible. */
+/* Converts a clip to the renderer's form. The region that is kept is extended by twice the largest shift of a slice's
+ * plane (SESSION_BORDER_SHARE), so that a slice on the region's border is visible. */
 static render_clip make_clip(const session_extent *e, const scene_clip *clip)
 {
     const double reach = 2 * SESSION_BORDER_SHARE * e->half_diagonal, grown = clip->is_outside ? -reach : reach;
@@ -62,8 +63,8 @@ static void intersect_box(clip_box *box, const double lower[3], const double upp
     }
 }
 
-/* Clips the box to the half space normal . x <= distance. Each axis is limited by the distance that remains after the
- * least contributions of the other two axes are subtracted. */
+/* Shrinks the box to the part with normal . x <= distance. Along each axis, the limit follows from the distance that
+ * remains after the smallest contributions of the other two axes are subtracted. */
 static void intersect_plane(clip_box *box, const render_clip *clip)
 {
     double least[3], left = clip->distance;
@@ -146,7 +147,9 @@ typedef struct clip_basis {
     const scene_image *image;
     const render_clip *clips;
     session_report *report;
-    bool is_empty; /* set if all layers' clips together leave nothing */
+    /* set if there are no cells, or the clips that cut all layers leave nothing; then no further layers are warned
+     * of */
+    bool is_empty;
 } clip_basis;
 
 static void warn_of_layer(const clip_basis *b, const char *layer, const char *field, int number, uint32_t set)

@@ -9,14 +9,14 @@
 #include "session_team.h"
 
 typedef struct session_contours {
-    render_lines lines;                  /* number of lines; 0 if the field has no range */
+    render_lines lines;                  /* the lines for the renderer; their count is 0 if the field has no range */
     double values[RENDER_MAX_LINES];     /* value of the field on each contour line */
     float colours[3 * RENDER_MAX_LINES]; /* colour of each line, linear RGB */
 } session_contours;
 
-/* Computes the contour lines except for their fields. If the scene gives no values, the lines divide a range into equal
- * parts: that of `colours`, the transfer function of the layer's colours, or, if colours is NULL, that of the lines'
- * own field. Collective; the result is the same on all ranks. */
+/* Computes the contour lines, except the field that they show. If the scene gives no values, the lines divide a range
+ * into equal parts: the range of `colours`, which is the transfer function of the layer's colours, or, if colours is
+ * NULL, the range of the lines' own field. Collective; the result is the same on all ranks. */
 insitu_status session_make_contours(const session_meshes *meshes, const session_team *team, const scene_lines *in,
                                     const render_transfer *colours, session_contours *out, base_error *error);
 

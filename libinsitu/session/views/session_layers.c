@@ -1,6 +1,6 @@
-/* A part is a mesh of this rank that has a tree with cells in it. A layer has a field for each part. If a part does not
- * have the field, its ranges are NULL, and the renderer skips the part. If a part has the surface but not the field
- * that colours it, the values of that field are NaN. */
+/* Converts layers to the renderer's form. A part is a mesh of this rank that has a tree with cells. Each layer has one
+ * field per part. If a part does not have the field of a layer, its ranges are NULL, and the renderer skips the part.
+ * If a part has the surface but not the field that colours it, the values of that field are NaN. */
 #include "session_layers.h"
 
 #include <math.h>
@@ -90,7 +90,8 @@ static grid_field make_absent_field(void)
                         .component_count = 1};
 }
 
-/* Stores a part's field and ranges for a layer. scalar is NULL if the part lacks the field. */
+/* Stores a part's field for a layer at index `at`, and its ranges if wants_ranges is set. scalar is NULL if the part
+ * lacks the field. */
 static void set_scalar_field(session_layers *layers, ptrdiff_t at, const session_mesh *mesh,
                              const session_scalar *scalar, bool wants_ranges)
 {
@@ -98,8 +99,8 @@ static void set_scalar_field(session_layers *layers, ptrdiff_t at, const session
     if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
 }
 
-/* Stores the fields of all parts for a layer, in section number `slot` of the array of fields; a section has part_count
- * fields. If plane is not NULL, the values are the distances from it instead of the field's values. */
+/* Stores the fields of all parts for a layer in section `slot` of the array of fields; a section consists of part_count
+ * fields. If plane is not NULL, the distances from the plane take the place of the field's values. */
 static render_field set_layer_field(const session_meshes *meshes, session_layers *layers, int slot,
                                     const scene_field *field, const scene_plane *plane, bool wants_ranges)
 {
@@ -116,7 +117,7 @@ static render_field set_layer_field(const session_meshes *meshes, session_layers
     return out;
 }
 
-/* Sets the gradients at the vertices of the meshes that have the field. */
+/* Stores the gradients at the vertices of the parts that have the field, for the isosurface layer with this index. */
 static const render_vertex_gradients *set_gradients(const session_meshes *meshes, session_layers *layers, int index,
                                                     const scene_field *field)
 {
@@ -151,7 +152,7 @@ static void warn_of_width(const session_layer_basis *basis, const scene_field *f
         basis->image->name, field->name, low, high);
 }
 
-/* Computes a transfer function, whose range may include the range of the run so far. Collective. */
+/* Computes a transfer function. Its range may include the values of all steps so far. Collective. */
 static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field,
                                    const scene_colour_map *map, const scene_volume *volume, session_transfer *out,
                                    base_error *error)
@@ -166,10 +167,10 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
     warn_of_width(basis, field, low, high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
         session_fail_for_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
-    return INSITU_OK; /* if memory runs out here, the next phase shares *error */
+    return INSITU_OK; /* if memory ran out, the next phase passes *error to all ranks */
 }
 
-/* Returns the section in the array of fields for the contour lines of a surface. */
+/* Returns the index of the section (set_layer_field()) for the contour lines of a surface. */
 static int find_lines_slot(const session_layers *layers, const scene_image *image, int surface)
 {
     return 2 * layers->surface_count + image->volume_count + surface;
@@ -201,11 +202,11 @@ static insitu_status set_lines(const session_layer_basis *basis, const scene_lin
     return make_lines(basis, in, field, surface, layers, error);
 }
 
-/* An isosurface is as rough as its cells: it is curved within a cell, has an edge between two cells, and extends
- * outward at the faces of polyhedra. Hits of occlusion rays that are nearer than this fraction of a cell count as the
- * surface itself and do not darken it. A smaller fraction would leave dark spots on the facets of polyhedra, a larger
- * one would remove the shade of hollows (docs/development/decisions/surface.md). */
-#define CONTACT 0.2F
+/* Hits of occlusion rays that are nearer than this fraction of a cell are ignored, because they are on the surface
+ * itself: an isosurface is curved within a cell, has an edge between two cells, and extends outward at the faces of
+ * polyhedra. A smaller fraction would leave dark spots on the facets of polyhedra; a larger one would remove the
+ * shading of hollows (docs/development/decisions/surface.md). */
+#define OCCLUSION_CONTACT 0.2F
 
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
                                   session_layers *layers, base_error *error)
@@ -223,7 +224,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
                                             : layer->normals == SCENE_DIFFERENCES ? RENDER_DIFFERENCES
                                                                                   : RENDER_GRADIENT,
                                   .difference = layer->difference,
-                                  .contact = CONTACT,
+                                  .contact = OCCLUSION_CONTACT,
                                   .clips = layer->clips};
     if (is_smooth) out->gradients = set_gradients(basis->meshes, layers, index, &layer->field);
     insitu_status status = INSITU_OK;
@@ -237,7 +238,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* Returns whether the layer shows the outer faces that the part consists of. */
+/* Returns whether the layer shows the current part, which consists of the outer faces of a mesh. */
 static bool is_shown(const session_part_walk *walk, const scene_surface *layer)
 {
     return walk->outer && session_surface_is_on(layer, walk->whole) &&
@@ -274,7 +275,7 @@ static bool gather_values(const session_mesh *whole, const session_outer *outer,
     return *values != NULL;
 }
 
-/* Stores, as the layer's field, the values at the outer faces, which are gathered from the values of the cells. Returns
+/* Stores the values at the outer faces as the layer's field; they are gathered from the values of the cells. Returns
  * false if memory runs out. */
 static bool set_gathered_field(const session_meshes *meshes, session_layers *layers, int slot,
                                const scene_surface *layer, const scene_field *field, render_field *out)
@@ -344,7 +345,7 @@ static void warn_of_plane(const session_layer_basis *basis, const scene_image *i
                  image->name, low, high);
 }
 
-/* Sets up the surface of a slice's plane. surface is the plane's index among the surfaces. */
+/* Sets up the surface layer of a plane of a slice. surface: the plane's index among the surfaces. */
 static insitu_status fill_plane(const session_layer_basis *basis, const scene_image *image, const scene_slice *layer,
                                 const scene_plane *plane, int surface, session_layers *layers, base_error *error)
 {
@@ -392,8 +393,8 @@ static insitu_status fill_volume(const session_layer_basis *basis, const scene_i
     return make_transfer(basis, &layer->field, &layer->colour_map, layer, transfer, error);
 }
 
-/* Warns that several volumes are sampled without an error bound. A single volume has an error bound by default; with
- * several volumes that takes longer, since their segments must be mixed. */
+/* Warns that several volumes are sampled without an error bound. A single volume has an error bound by default; several
+ * do not, because their segments must be mixed, which takes longer. */
 static void warn_of_samples(const session_layer_basis *basis, const scene_image *image)
 {
     const session_warning warning = {WARNING_SAMPLES, image->name, NULL, 0};
@@ -410,7 +411,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     session_layers layers = {0};
     if (!error->status && !allocate_layers(basis, image, &layers))
         session_fail_for_memory(error, 1 << 10, "an image's layers");
-    /* Errors about a limit of the scene are the same on all ranks, so that the message names no rank. */
+    /* an error about a limit of the scene is the same on all ranks, so that its message names no rank */
     insitu_status status = error->status == INSITU_ERROR_SCENE ? session_agree_without_rank(basis->team->comm, error)
                                                                : session_agree(basis->team->comm, error);
     warn_of_samples(basis, image);
@@ -421,7 +422,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
         const scene_isosurface *isosurface = &image->isosurfaces[i - image->isosurface_count];
         const scene_surface shells = session_shells_of(isosurface, image->height);
         status = fill_outer(basis, &shells, i, &layers, error);
-        /* `shells` is a local variable, which no longer exists when the layer is drawn */
+        /* `shells` is a local variable, which does not exist any more when the layer is drawn */
         layers.surfaces[i].colours = isosurface->colours;
     }
     for (int i = 0; i < image->surface_count && !status; i++)

@@ -1,4 +1,4 @@
-/* The layers of an image on this rank's meshes, in the renderer's form. */
+/* Computes the layers of an image on this rank's meshes, in the renderer's form. */
 #ifndef SESSION_LAYERS_H
 #define SESSION_LAYERS_H
 
@@ -17,20 +17,20 @@ typedef struct session_layers {
     render_part *parts;
     int surface_count;
     int first_outer; /* index of the first outer surface in `surfaces` */
-    /* isosurfaces, their contour lines on shells if there are any, outer surfaces, planes */
+    /* in this order: isosurfaces, their contour lines on shells (if there are any), outer surfaces, planes of slices */
     render_surface_layer *surfaces;
     render_volume_layer *volumes;
     session_transfer *transfers; /* transfer functions of the surfaces, followed by those of the volumes */
-    double *distances;           /* isovalue of each surface that is drawn as a slice's plane; 0 for the others */
+    double *distances;           /* isovalue of each surface that is a plane of a slice; 0 for other surfaces */
     session_contours *contours;  /* contour lines of each surface */
-    /* sections of part_count fields: for each surface its field and its colour field, then one for each volume, then
-     * one for the lines of each surface */
+    /* sections of part_count fields: two per surface (its field and its colour field), then one per volume, then one
+     * per surface for its contour lines */
     grid_field *fields;
     int64_t field_count;
     render_vertex_gradients *gradients; /* gradients at vertices, part_count entries per isosurface */
-    /* values gathered at outer faces, in the same order as fields; NULL for other fields */
+    /* arrays of values gathered at outer faces, parallel to `fields`; NULL for other fields */
     double **gathered_values;
-    mmbvh_ranges *ranges; /* ranges of the fields, in the same order */
+    mmbvh_ranges *ranges; /* ranges of the fields, parallel to `fields` */
 } session_layers;
 
 /* Input for computing layers. */
@@ -42,13 +42,13 @@ typedef struct session_layer_basis {
     bool is_flat;         /* set if session_flat_axis() has found an axis */
     bool has_shells;      /* result of session_has_shells() */
     session_report *report;
-    session_image_ranges *run_ranges; /* ranges over the run; NULL: no layer has one */
+    session_image_ranges *run_ranges; /* value ranges over all time steps so far; NULL: no layer uses one */
     const scene_image *image;
 } session_layer_basis;
 
-/* Computes an image's layers. Collective, as ranges of the data are computed over all ranks. *error may hold an error
- * of this rank, on which all ranks agree first; after an error there is nothing to free. If only this rank lacks memory
- * for colours, *error is set and is shared in the next phase. */
+/* Computes an image's layers. Collective, because ranges of the data are computed over all ranks. *error may hold an
+ * error of this rank on entry, on which all ranks agree first. After an error there is nothing to free. If only this
+ * rank lacks memory for colours, *error is set and passed to all ranks in the next phase. */
 insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,
                                   base_error *error);
 

@@ -32,8 +32,8 @@ static void make_lights(const scene_image *image, const render_camera *camera, r
     }
 }
 
-/* Smallest default sampling distance, as a fraction of the half diagonal. It results in about 500,000 samples across
- * the scene. Cells with an extreme aspect ratio may be smaller. */
+/* Smallest default sampling distance, as a fraction of half the diagonal of the bounds: there are at most about 500,000
+ * samples across the scene, even if cells with an extreme aspect ratio are smaller. */
 static const double finest_step = 4e-6;
 
 /* Returns the distance between samples in scene units. If no cell has a volume, a hundredth of the diagonal is used
@@ -70,8 +70,8 @@ static void fill_view(const session_space *space, const scene_image *image, sess
 
 /* ---- time ---------------------------------------------------------------------------------------------------- */
 
-/* Time in seconds that a sample takes on one thread. Between 27 and 240 ns were measured, for all types of cells and
- * for many and few rays. */
+/* Estimated time in seconds that a sample takes on one thread. Measured times were 27 to 240 ns, over all types of
+ * cells and for many and few rays. */
 static const double sample_seconds = 1e-7;
 
 /* Returns the length of the part of a pixel's ray that lies within the bounds. */
@@ -82,15 +82,16 @@ static double chord_of_bounds(const session_extent *e, const render_camera *came
     for (int axis = 0; axis < 3; axis++) {
         const double a = (e->lower[axis] - base[axis]) / direction[axis];
         const double b = (e->upper[axis] - base[axis]) / direction[axis];
-        /* for a ray parallel to the faces, a and b are infinite with the right signs, or are NaN, which fmin()
-         * ignores */
+        /* if the ray is parallel to the faces, a and b are infinite with the correct signs, or NaN, which fmin() and
+         * fmax() ignore */
         begin = fmax(begin, fmin(a, b));
         end = fmin(end, fmax(a, b));
     }
     return end > begin ? (end - begin) * vector3_length(direction) : 0;
 }
 
-/* Estimates the number of samples that all ranks compute, as if cells filled the bounds and no sample were hidden. */
+/* Estimates the number of samples that all ranks compute, under the assumption that cells fill the bounds and no sample
+ * is hidden. */
 static double estimate_samples(const session_extent *e, const scene_image *image, const session_view *view)
 {
     enum { PROBES = 16 };
@@ -122,13 +123,12 @@ static insitu_status check_sampling_time(const session_extent *e, const char *sc
 
 /* ---- views without data -------------------------------------------------------------------------------------- */
 
-/* The bounds' corners as projected into the picture. */
+/* The corners of the bounds, projected into the picture. */
 typedef struct corner_bounds {
-    /* bounds of those corners that are in front of the eye, in coordinates in which the borders of the picture are at
-     * -1 and 1 */
+    /* bounds of the corners in front of the eye; the borders of the picture are at -1 and 1 */
     double low[2], high[2];
     int behind_count; /* number of corners behind the eye */
-    bool is_beside;   /* set if all corners lie beyond the same border of the picture */
+    bool is_beside;   /* set if all corners are outside of the picture, beyond the same border */
 } corner_bounds;
 
 static corner_bounds project_bounds(const session_extent *e, const render_camera *c)

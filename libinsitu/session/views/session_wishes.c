@@ -142,7 +142,7 @@ static const session_catalogue_field *find_shown(const session_catalogue_mesh *m
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
 }
 
-/* Returns whether the values are the caller's, so that they depend on no other cell. */
+/* Returns whether the drawn values are those that the caller gave, which depend on no other cell. */
 static bool is_own(const session_catalogue_mesh *mesh, const session_catalogue_field *field, const scene_field *shown)
 {
     return field->derived_index < 0 && !session_is_recentred(shown, field->centring, mesh->is_refined);

@@ -11,12 +11,12 @@
 typedef struct session_wish_views {
     int count; /* number of images of the scene */
     bool *are_due;
-    render_camera *cameras; /* of due images */
-    session_extent extent;  /* bounds of the caller's nodes; of no cells if neither cameras nor slices need them */
+    render_camera *cameras; /* cameras of the images that are due */
+    session_extent extent;  /* bounds of the caller's nodes; empty if neither cameras nor slices need them */
 } session_wish_views;
 
-/* Makes the cameras of the images that are due at the moment. A camera that has no direction of view is an error of the
- * drawing of its image, and is not due here. The caller must free *out in any case. Collective. */
+/* Computes the cameras of the images that are due at the moment. If a camera has no direction of view, its image is
+ * treated as not due; drawing it returns the error. The caller must free *out even after an error. Collective. */
 insitu_status session_make_wish_views(const scene *scene, const session_moment *moment, const session_meshes *meshes,
                                       MPI_Comm comm, session_wish_views *out, base_error *error);
 void session_free_wish_views(session_wish_views *views);
@@ -52,8 +52,8 @@ void session_list_wishes(const scene *scene, const session_wish_views *views, co
                          bool has_shells, session_wishes *out, session_report *report);
 void session_free_wishes(session_wishes *wishes);
 
-/* Returns a lower bound of the size, in scene units, of a pixel on a sphere in the images that show a wish; INFINITY if
- * none of them shows the sphere. of: a session_wish. */
+/* Returns a lower bound of the size, in scene units, of a pixel on a sphere, in the images that show the session_wish
+ * `of`; INFINITY if none of them shows the sphere. */
 double session_wish_pixel_size(const void *of, const double centre[3], double radius);
 
 #endif
