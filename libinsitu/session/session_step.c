@@ -66,7 +66,7 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     }
     const scene *now = &s->scene_file.scene;
     const bool are_same_pieces = now->finer_pieces == old.finer_pieces && now->finer_memory == old.finer_memory;
-    /* if there are statistics, all cells are refined (views/session_wishes.c) */
+    /* statistics need all cells to be refined (views/session_wishes.c) */
     if (are_same_pieces && now->statistics_count == old.statistics_count) return;
     session_end_finer(&s->meshes);
     s->meshes.are_cells_changed = s->meshes.are_names_changed = true;
@@ -136,9 +136,8 @@ static insitu_status name_derived(insitu_session *s, base_error *error)
     return session_name_derived(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team, error);
 }
 
-/* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields, and finds the groups
- * of meshes over which values at vertices are averaged (session_joints.h). An error in the last is only stored in
- * *error. Collective. */
+/* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and finds the
+ * joints of meshes. An error in finding joints is stored only in *error. Collective. */
 static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_shared, base_error *error)
 {
     insitu_status status = INSITU_OK;

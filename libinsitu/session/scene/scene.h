@@ -67,7 +67,7 @@ typedef struct scene_derived {
     /* fields from which the field is computed: for an expression its inputs; for a gradient a scalar; for other kinds a
      * vector field, or its two or three components */
     scene_field *inputs;
-    int *derived_indices; /* for each input, its index among the derived fields; -1 if it is not derived */
+    int *derived_indices; /* for each input, the index of the derived field that it is, or -1 */
     /* hash of the set of meshes over which gradients are averaged; set by the session (session_joints.h) */
     uint64_t joint_name;
 } scene_derived;
@@ -616,7 +616,7 @@ typedef struct scene {
     /* number of pieces along an edge between two nodes of a cell of higher order, 1 .. 8; 0: surface_error decides */
     int finer_pieces;
     double surface_error; /* bound of the error of these pieces in pixels, > 0; used if finer_pieces is 0 */
-    double finer_memory;  /* maximum memory of finer pieces on all ranks together, in MiB, > 0 */
+    double finer_memory;  /* memory that finer pieces may take on all ranks together, in MiB, > 0 */
     scene_tree tree;
     scene_schedule schedule;
     scene_writing writing;

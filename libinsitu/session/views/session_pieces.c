@@ -1,10 +1,11 @@
-/* The error of linear pieces falls with the square of their number. So each rank finds the largest error, in pixels,
- * that its cells have with one piece between two nodes, one reduction finds the largest of all ranks, and the number
- * follows from it. A mesh has one number, so that pieces of neighbours fit together.
+/* Chooses the number of linear pieces into which cells of higher order are divided. The error of the pieces falls with
+ * the square of their number. So each rank computes the largest error, in pixels, that its cells have with one piece
+ * between two nodes, one reduction finds the maximum over all ranks, and the number of pieces follows from it. All
+ * cells of a mesh have the same number, so that pieces of neighbours fit together.
  *
- * All that the number depends on is the same for any partition: cells' errors are those of their own nodes, cameras fit
- * the bounds of the nodes, and the memory is that of all ranks together. So are the cells that are refined, which
- * follow from their own values and positions. */
+ * The number does not depend on the partition: errors of cells depend on their own nodes only, cameras fit the bounds
+ * of all nodes, and the memory is the sum over all ranks. Nor does the set of cells that are refined depend on it,
+ * which follows from their own values and positions. */
 #include "session_pieces.h"
 
 #include <math.h>
@@ -129,7 +130,7 @@ static void fill_fields(const session_pieces_basis *basis, const session_wish_vi
     session_want_no_fields(basis->meshes);
 }
 
-/* What is summed over the ranks of one mesh. */
+/* Values of one mesh that are summed over the ranks. */
 typedef struct piece_sums {
     int64_t cell_count, unbounded_count;
     session_finer_bytes bytes[FINER_MOST_PARTS + 1];
@@ -224,7 +225,7 @@ static void warn_of_pyramids(const char *mesh, const scene *scene, const session
 
 /* ---- memory ------------------------------------------------------------------------------------------------------ */
 
-/* Returns the number of components of those fields of a mesh that images of the scene show. */
+/* Returns the number of components of all fields of a mesh that images of the scene show. */
 static int count_components(const scene *scene, const session_catalogue_mesh *mesh)
 {
     int count = 0;
@@ -240,20 +241,22 @@ static int count_components(const scene *scene, const session_catalogue_mesh *me
     return count;
 }
 
-/* Returns the bytes that so many finer pieces of a mesh take. They do not fall with the number of pieces. */
+/* Returns the number of bytes that the finer pieces of a mesh take, if there are `parts` pieces between two nodes. It
+ * does not decrease with `parts`. */
 static double find_bytes(const piece_error *of, int parts)
 {
     const session_finer_bytes *bytes = &of->bytes[parts];
     return (double)bytes->own + of->components * (double)bytes->per_component;
 }
 
-/* A number of pieces that a mesh may lose one of, and the bytes that they take. */
+/* A possible step of reducing the memory of a mesh: from `parts` pieces to one less. `bytes` is the memory that `parts`
+ * pieces take. */
 typedef struct piece_step {
     double bytes;
     int mesh, parts;
 } piece_step;
 
-/* Orders steps by decreasing bytes; if these are equal, by meshes, and in a mesh by decreasing pieces. */
+/* Orders steps by decreasing bytes; if these are equal, by mesh, and within a mesh by decreasing number of pieces. */
 static int compare_steps(const void *a, const void *b)
 {
     const piece_step *x = a, *y = b;
@@ -261,8 +264,9 @@ static int compare_steps(const void *a, const void *b)
     return x->mesh != y->mesh ? x->mesh - y->mesh : y->parts - x->parts;
 }
 
-/* Takes pieces from the mesh whose pieces need most memory, until those of all meshes fit. steps: space for
- * FINER_MOST_PARTS steps of each mesh. Returns the bytes before. */
+/* Reduces the numbers of pieces until the pieces of all meshes together take at most `limit` bytes; the mesh whose
+ * pieces take most is reduced first. steps: space for FINER_MOST_PARTS steps per mesh. Returns the number of bytes
+ * before the reduction. */
 static double take_pieces(int mesh_count, double limit, const piece_error *errors, piece_step *steps,
                           session_finer_choice *choices)
 {

@@ -1,11 +1,11 @@
-/* Chooses the number of pieces between two nodes of cells of higher order. */
+/* Chooses the number of linear pieces between two nodes of cells of higher order. */
 #ifndef SESSION_PIECES_H
 #define SESSION_PIECES_H
 
 #include "session_finer.h"
 #include "session_plan.h"
 
-/* Input of session_choose_pieces(). Scene, moment and catalogue are the same on every rank. */
+/* The input of the choice. Scene, moment and catalogue are the same on every rank. */
 typedef struct session_pieces_basis {
     const scene *scene;
     const session_moment *moment;

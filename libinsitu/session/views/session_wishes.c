@@ -1,10 +1,11 @@
-/* Isosurfaces and slices are drawn from the pieces that they cross. If an isovalue is outside the range of the
- * Bernstein coefficients of a cell, it is outside the range of all of the cell's faces, too, so that the surface
- * crosses none of them, however the cells on both sides are split. So only cells that may be crossed need finer pieces.
+/* Determines which cells of higher order need finer pieces. Isosurfaces and slices are drawn only from the pieces that
+ * they cross. If an isovalue is outside the range of the Bernstein coefficients of a cell, it is also outside the range
+ * of each of the cell's faces. The isosurface then crosses none of these faces, however the cells on both sides are
+ * divided into pieces. So only cells that may be crossed need finer pieces.
  *
  * All cells need them if faces of pieces are drawn or compared with those of neighbours (outer surfaces, contours of
- * shells), if rays pass cell by cell (volumes), if values at vertices are means or derivatives over neighbours, if
- * pieces are counted (percentiles), or if sums over the pieces are written (statistics). */
+ * shells), if rays pass from cell to cell (volumes), if values at vertices are means or derivatives over neighbours, if
+ * pieces are counted (percentiles), or if sums over pieces are written (statistics). */
 #include "session_wishes.h"
 
 #include <math.h>
@@ -49,9 +50,10 @@ insitu_status session_make_wish_views(const scene *scene, const session_moment *
     return INSITU_OK;
 }
 
-/* Returns a lower bound of the size of a pixel on a sphere; INFINITY if the camera does not see the sphere. In
- * perspective, a shift d at the distance z along the camera's axis and s from the eye is seen as one of at most
- * d s / z^2. Nearer than its radius a sphere counts as if it were its radius away. */
+/* Returns a lower bound of the size of a pixel on a sphere, in scene units; INFINITY if the camera does not see the
+ * sphere. In perspective, a displacement d of a point at the depth z along the camera's axis, at the distance s from
+ * the eye, appears at most as large as d s / z^2 on the plane at depth 1. A sphere that is nearer than its radius is
+ * treated as if its depth were its radius. */
 static double size_in_view(const render_camera *camera, const double centre[3], double radius)
 {
     const double aspect = (double)camera->width / camera->height, half = camera->half_height;
@@ -101,8 +103,8 @@ static bool is_same_wish(const session_wish *a, const session_wish *b)
     return strcmp(a->field, b->field) == 0 && a->component == b->component;
 }
 
-/* Returns the wish that is shown in the image in the same way as `like`. Further ones than there is space for count as
- * positions of all cells. */
+/* Returns the entry that equals `like`, and adds it if there is none. If there is no space, returns the entry for
+ * positions, and all cells are refined. */
 static session_wish *find_wish(session_wishes *wishes, const session_wish_views *views, const session_wish *like)
 {
     for (int i = 0; i < wishes->count; i++)
@@ -148,7 +150,8 @@ static bool is_own(const session_catalogue_mesh *mesh, const session_catalogue_f
     return field->derived_index < 0 && !session_is_recentred(shown, field->centring, mesh->is_refined);
 }
 
-/* Returns whether the layer's field is a polynomial in each cell: the caller's values at nodes, or one component. */
+/* Returns whether the scalar that the layer shows is a polynomial in each cell: values that the caller gave at nodes,
+ * or one component of them. */
 static bool is_polynomial(const session_catalogue_mesh *mesh, const session_catalogue_field *field,
                           const scene_field *shown)
 {
@@ -174,7 +177,7 @@ static void add_isosurface(session_wishes *wishes, const session_wish_views *vie
     session_wish *wish = show_wish(wishes, views, &like, index);
     for (int i = 0; i < shown->value_count && wish->field && image->variant.view == 0; i++)
         add_value(wishes, wish, shown->values[i]);
-    /* Central differences also sample neighbours of crossed cells. */
+    /* central differences also sample neighbours of crossed cells */
     wishes->needs_all = wishes->needs_all || !is_bounded || shown->normals == SCENE_DIFFERENCES ||
                         (shown->has_colour_by && counts_cells(&shown->colour_map));
     if (!report) return;

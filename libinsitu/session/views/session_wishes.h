@@ -1,5 +1,5 @@
-/* What the due images show of a mesh with cells of higher order: of which isosurfaces and positions the error is found,
- * and which cells are refined. */
+/* Lists what the due images show of a mesh with cells of higher order: the isosurfaces, slices and cells whose error is
+ * measured (each is a "wish"), and which cells must be refined. */
 #ifndef SESSION_WISHES_H
 #define SESSION_WISHES_H
 
@@ -21,33 +21,33 @@ insitu_status session_make_wish_views(const scene *scene, const session_moment *
                                       MPI_Comm comm, session_wish_views *out, base_error *error);
 void session_free_wish_views(session_wish_views *views);
 
-/* A field of whose isosurfaces, a plane of whose slice, or a mesh of whose positions the error is found. */
+/* Something whose error is measured: the isosurfaces of a field, a plane of a slice, or the positions of all cells. */
 typedef struct session_wish {
     const session_wish_views *views;
-    bool *images; /* images that show it */
+    bool *images; /* set for each image of the scene that shows it */
     bool is_shown;
-    const char *field; /* NULL: no field */
+    const char *field; /* name of the field; NULL: a plane or positions */
     int component;
     int value_count;
-    double *values; /* isovalues */
+    double *values; /* isovalues of the field */
     bool has_plane;
     session_plane plane;
 } session_wish;
 
 enum { SESSION_MOST_WISHES = 256 };
 
-/* The first wish is that of the positions of all cells. */
+/* All wishes of a mesh. The first one is the positions of all cells. */
 typedef struct session_wishes {
     int count;
-    bool is_complete; /* set as long as memory has sufficed */
+    bool is_complete; /* set as long as memory has not run out */
     bool is_shown;    /* set if some due image shows the mesh */
     bool needs_all;   /* set if all cells are refined, not only those that isosurfaces and slices may cross */
     session_wish items[SESSION_MOST_WISHES];
 } session_wishes;
 
-/* Lists what the due images show of a mesh. has_shells: some of its cells, on any rank, are triangles or quads. report:
- * receives warnings of isosurfaces without a bound; NULL: none is wanted. Local; the result is the same on every rank.
- * The caller must free *out. */
+/* Lists what the due images show of a mesh. has_shells: set if some of its cells, on any rank, are triangles or quads.
+ * report: receives warnings of isosurfaces whose error has no bound; may be NULL. Local; the result is the same on
+ * every rank. The caller must free *out. */
 void session_list_wishes(const scene *scene, const session_wish_views *views, const session_catalogue_mesh *mesh,
                          bool has_shells, session_wishes *out, session_report *report);
 void session_free_wishes(session_wishes *wishes);
