@@ -368,6 +368,41 @@ static void other_cells_are_not_refined(void **state)
     }
 }
 
+/* Returns the number of pieces on all ranks. */
+static int64_t count_pieces(const char *scene, const order_mesh *mesh)
+{
+    long long count = 0;
+    insitu_session *session = open_mesh(MPI_COMM_WORLD, scene, &mesh->mesh, &mesh->field);
+    drawn pictures = step_drawn(session, 0);
+    const char *end = strstr(insitu_last_report(session)->copied_why, " linear pieces of its cells");
+    while (end && end > insitu_last_report(session)->copied_why && end[-1] >= '0' && end[-1] <= '9') end--;
+    if (end) sscanf(end, "%lld", &count);
+    free_drawn(&pictures);
+    insitu_destroy(&session);
+    int64_t all = count;
+    MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    return all;
+}
+
+/* The sphere and the plane cross all 8 cubes. With 8 pieces between two nodes each of the cubes has 4096 hexes, of
+ * which a plane crosses some 400, and 27 are at nodes. With twice as many pieces there would be 8 times as many. */
+static void pieces_that_nothing_crosses_are_not_made(void **state)
+{
+    (void)state;
+#define BOTH                                                                                                           \
+    IMAGE("a", "isosurface: {field: f, values: [0.5]}")                                                                \
+    IMAGE("b", "slice: {field: f, planes: [{normal: [1, 2, 3]}]}")
+    order_mesh mesh;
+    order_mesh_create(&(order_kind){"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2}, 2, 0.05, order_sphere,
+                      own_rank, rank_count, &mesh);
+    const int64_t four = count_pieces(FINER("4") BOTH, &mesh), eight = count_pieces(FINER("8") BOTH, &mesh);
+    const int64_t all = count_pieces("statistics: [{field: f, path: few.csv}]\n" FINER("8") BOTH, &mesh);
+    if (own_rank == 0)
+        printf("%lld pieces, twice as fine %lld, all %lld\n", (long long)four, (long long)eight, (long long)all);
+    everywhere(all == 8 * 4096 && eight < all / 4 && eight < 5 * four);
+    order_mesh_free(&mesh);
+}
+
 /* ---- changes ----------------------------------------------------------------------------------------------------- */
 
 enum { VALUES, NODES, SCENE, NO_SCENE, CHANGES };
@@ -442,6 +477,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(cells_are_counted_as_the_caller_gave_them),
         cmocka_unit_test(mixed_cells_draw_the_same),
         cmocka_unit_test(other_cells_are_not_refined),
+        cmocka_unit_test(pieces_that_nothing_crosses_are_not_made),
         cmocka_unit_test(changes_are_drawn),
         cmocka_unit_test(limits_are_told),
     };

@@ -494,7 +494,7 @@ static void find_sphere(const bound_job *job, session_cell_bound *out)
     out->radius = zero == 0 ? vector3_length(half) : NAN;
 }
 
-static bool is_any_between(const session_isovalues *isovalues, double low, double high)
+bool session_is_any_between(const session_isovalues *isovalues, double low, double high)
 {
     for (int i = 0; i < isovalues->count; i++)
         if (isovalues->values[i] >= low && isovalues->values[i] <= high) return true;
@@ -558,7 +558,7 @@ static void bound_isosurface(bound_job *job, session_cell_bound *out)
             low = fmin(low, job->fine[SIZE * corners[c] + 3]);
             high = fmax(high, job->fine[SIZE * corners[c] + 3]);
         }
-        if (is_any_between(job->isovalues, low - between, high + between))
+        if (session_is_any_between(job->isovalues, low - between, high + between))
             least = fmin(least, least_gradient(job, corners, count));
         corners += count;
     }
@@ -593,7 +593,7 @@ bool session_may_cross(const session_bound *of, const double *values, const sess
         high = fmax(high, job.coefficients[i]);
     }
     const double rounding = 1e-6 * fmax(fabs(low), fabs(high)), tolerance = isovalues->tolerance + rounding;
-    return zero == 0 && is_any_between(isovalues, low - tolerance, high + tolerance);
+    return zero == 0 && session_is_any_between(isovalues, low - tolerance, high + tolerance);
 }
 
 session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,

@@ -59,6 +59,9 @@ typedef struct session_isovalues {
     double tolerance; /* a cell may be crossed if its range is so near to a value */
 } session_isovalues;
 
+/* Returns whether one of the values is in the interval. */
+bool session_is_any_between(const session_isovalues *isovalues, double low, double high);
+
 /* Returns the number of doubles that the functions below need as working memory. */
 size_t session_bound_room(const session_bound *of);
 

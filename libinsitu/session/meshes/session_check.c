@@ -539,7 +539,11 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
     mesh->drawn_count = tally.drawn_count;
     mesh->given_counts = (session_counts){tally.drawn_count, tally.ghost_count, tally.inverted_count, tally.flat_count,
                                           tally.shell_count};
-    if (mesh->topology.is_split) mesh->given_counts = session_count_parents(mesh, tally.inverted_count > 0);
+    /* finer pieces may be those of a part of each cell only */
+    if (mesh->finer.parts)
+        mesh->given_counts = mesh->finer.given_counts;
+    else if (mesh->topology.is_split)
+        mesh->given_counts = session_count_parents(mesh, tally.inverted_count > 0);
     /* cell count without the padding of lattices */
     if (mesh->cells.lattice) mesh->given_counts.ghost_count -= mesh->cells.cell_count - session_cell_count(mesh);
     mesh->flat_count = tally.flat_count;

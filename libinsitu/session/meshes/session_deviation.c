@@ -7,6 +7,39 @@
 #include "session_region.h"
 #include "session_rows.h"
 
+static void read_values(const session_rows *rows, const session_deviation_wish *wish, int64_t cell, int count,
+                        double *tuple, double *out)
+{
+    const session_node_values *values = wish->values;
+    const int64_t first = session_row_first(rows, cell);
+    for (int n = 0; n < count; n++) {
+        values->read(values->of,
+                     values->is_by_entry ? session_row_entry(rows, cell, n) : session_row_vertex(rows, first + n),
+                     tuple);
+        out[n] = tuple[wish->component];
+    }
+}
+
+static void read_distances(const session_rows *rows, const session_plane *plane, int64_t cell, int count, double *out)
+{
+    const int64_t first = session_row_first(rows, cell);
+    for (int n = 0; n < count; n++) {
+        double at[3];
+        grid_vertex(&rows->cells, session_row_vertex(rows, first + n), at);
+        out[n] = 0;
+        for (int x = 0; x < 3; x++) out[n] += plane->normal[x] * (at[x] - plane->point[x]);
+    }
+}
+
+void session_read_wish(const session_rows *rows, const session_deviation_wish *wish, int64_t cell, int count,
+                       double *tuple, double *out)
+{
+    if (wish->values)
+        read_values(rows, wish, cell, count, tuple, out);
+    else
+        read_distances(rows, wish->plane, cell, count, out);
+}
+
 /* The work on the cells of a mesh. */
 typedef struct deviation_work {
     session_rows rows; /* of the caller's cells */
@@ -14,11 +47,6 @@ typedef struct deviation_work {
     int field_size;                        /* number of components of the field, or 1 */
     session_bound bounds[ROWS_MOST_KINDS]; /* nothing for kinds of cells that are not measured */
 } deviation_work;
-
-static const insitu_mesh *find_nodal(const session_mesh *mesh)
-{
-    return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
-}
 
 /* Returns whether the cells have bounds. Linear ones are not measured, but are marked, since their neighbours may be of
  * higher order. */
@@ -29,7 +57,7 @@ static bool has_bound(const session_nodes *of)
 
 static bool begin_work(const session_mesh *mesh, const session_deviation_wish *wish, deviation_work *w)
 {
-    const insitu_mesh *nodal = find_nodal(mesh);
+    const insitu_mesh *nodal = session_nodal_mesh(mesh);
     bool is_made = true;
     *w = (deviation_work){.rows = session_given_rows(nodal),
                           .wish = wish,
@@ -59,32 +87,6 @@ static size_t find_room(const deviation_work *w)
     return most + (size_t)w->field_size;
 }
 
-/* Reads the field at the nodes of a cell. */
-static void read_values(const deviation_work *w, int64_t cell, int count, double *field, double *out)
-{
-    const session_node_values *values = w->wish->values;
-    const int64_t first = session_row_first(&w->rows, cell);
-    for (int n = 0; n < count; n++) {
-        values->read(values->of,
-                     values->is_by_entry ? session_row_entry(&w->rows, cell, n)
-                                         : session_row_vertex(&w->rows, first + n),
-                     field);
-        out[n] = field[w->wish->component];
-    }
-}
-
-static void read_distances(const deviation_work *w, int64_t cell, int count, double *out)
-{
-    const session_plane *plane = w->wish->plane;
-    const int64_t first = session_row_first(&w->rows, cell);
-    for (int n = 0; n < count; n++) {
-        double at[3];
-        grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + n), at);
-        out[n] = 0;
-        for (int x = 0; x < 3; x++) out[n] += plane->normal[x] * (at[x] - plane->point[x]);
-    }
-}
-
 /* Returns whether an isosurface or the plane may cross the cell, and marks it. */
 static bool may_cross(const deviation_work *w, const session_bound *of, int64_t cell, double *room)
 {
@@ -92,10 +94,7 @@ static bool may_cross(const deviation_work *w, const session_bound *of, int64_t 
     const int count = of->nodes.of.count;
     double *values = room + w->field_size;
     if (!wish->values && !wish->plane) return true;
-    if (wish->values)
-        read_values(w, cell, count, room, values);
-    else
-        read_distances(w, cell, count, values);
+    session_read_wish(&w->rows, wish, cell, count, room, values);
     if (!session_may_cross(of, values, &wish->isovalues, values + 5 * count)) return false;
     if (wish->marks) wish->marks[cell] = 1;
     return true;

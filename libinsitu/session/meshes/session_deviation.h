@@ -4,6 +4,7 @@
 
 #include "session_bound.h"
 #include "session_finer.h"
+#include "session_rows.h"
 
 /* The sizes of pixels in the views that show a mesh. */
 typedef struct session_pixels {
@@ -26,6 +27,17 @@ typedef struct session_deviation_wish {
     bool marks_only;      /* set if only marks are wanted */
     unsigned char *marks; /* one byte per cell, which is set if the cell may be crossed; NULL: not wanted */
 } session_deviation_wish;
+
+/* Returns the caller's description of a mesh, which may be read as finer lattices. */
+static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
+{
+    return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
+}
+
+/* Computes the wish's component of the field, or else the distance from its plane, at the `count` nodes of a cell.
+ * rows: those of the caller's cells. tuple: room for all components of the field. */
+void session_read_wish(const session_rows *rows, const session_deviation_wish *wish, int64_t cell, int count,
+                       double *tuple, double *out);
 
 typedef struct session_deviation {
     double error; /* largest bound in pixels if cells have one piece between two nodes */

@@ -6,6 +6,7 @@
 #include "session_agree.h"
 #include "session_derivatives.h"
 #include "session_interpolation.h"
+#include "session_piece_set.h"
 #include "session_region.h"
 #include "session_rows.h"
 #include "session_split.h"
@@ -216,9 +217,10 @@ void session_end_finer(session_meshes *meshes)
     }
 }
 
-/* Returns whether the lattices are those of the marks. */
-static bool has_marks(const session_finer *finer, const unsigned char *marks)
+/* Returns whether the lattices and their pieces are those of the marks. */
+static bool has_marks(const session_finer *finer, const session_cell_marks *marks)
 {
+    static const session_piece_set all = {NULL, NULL};
     session_rows rows = session_given_rows(&finer->nodal);
     int counts[ROWS_MOST_KINDS];
     bool is_same = true;
@@ -228,32 +230,38 @@ static bool has_marks(const session_finer *finer, const unsigned char *marks)
         counts[i] = session_complete_nodes(of->type, finer->parts * of->order).count;
     }
     for (int64_t cell = 0; is_same && cell < finer->nodal.cell_count; cell++)
-        is_same = (!marks || marks[cell]) == is_refined(finer, counts[session_kind_of(&rows, cell)], cell);
-    return is_same;
+        is_same = (!marks || marks->cells[cell]) == is_refined(finer, counts[session_kind_of(&rows, cell)], cell);
+    return is_same && session_is_same_piece_set(&finer->pieces, marks ? &marks->pieces : &all, finer->nodal.cell_count);
 }
 
 /* Returns whether the mesh has another description than before. */
 static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const session_finer_choice *choice,
-                            const unsigned char *marks, int threads, base_error *error)
+                            session_cell_marks *marks, int threads, base_error *error)
 {
     const session_finer *old = &mesh->finer;
     session_finer made = {.is_counted = true,
                           .parts = choice->parts > 1 ? choice->parts : 0,
                           .is_lobatto = choice->is_lobatto,
-                          .sizes = old->parts ? old->sizes : session_sizes_of(mesh)};
+                          .sizes = old->parts ? old->sizes : session_sizes_of(mesh),
+                          .given_counts = mesh->given_counts};
     memcpy(made.counts, old->counts, sizeof made.counts);
     if (old->parts == made.parts && (!made.parts || (old->is_lobatto == made.is_lobatto && has_marks(old, marks))))
         return false;
     end_finer_mesh(meshes, mesh);
     if (!made.parts || !session_has_higher_order(&mesh->given)) return true;
     made.nodal = mesh->given;
-    if (!make_cells(&made, marks, threads)) {
+    if (!make_cells(&made, marks ? marks->cells : NULL, threads)) {
         const int64_t bytes = made.bytes;
         session_drop_finer(&made);
         session_fail_for_memory(error, bytes, "finer lattices of nodes in cells of higher order");
         return true;
     }
     session_drop_finer(&mesh->finer);
+    if (marks) {
+        made.pieces = marks->pieces;
+        made.bytes += session_piece_set_bytes(&made.pieces, made.nodal.cell_count);
+        marks->pieces = (session_piece_set){0};
+    }
     mesh->finer = made;
     mesh->given = made.fine;
     drop_node_data(meshes, mesh);
@@ -373,8 +381,8 @@ bool session_begin_marks(session_finer_choice *choice, const session_parts *part
     bool is_made = choice->marks;
     if (is_made) choice->mark_count = parts->count;
     for (int i = 0; i < parts->count && is_made; i++) {
-        choice->marks[i] = base_calloc((size_t)parts->items[i]->given.cell_count + 1, 1);
-        is_made = choice->marks[i];
+        choice->marks[i].cells = base_calloc((size_t)parts->items[i]->given.cell_count + 1, 1);
+        is_made = choice->marks[i].cells;
     }
     return is_made;
 }
@@ -382,7 +390,10 @@ bool session_begin_marks(session_finer_choice *choice, const session_parts *part
 void session_free_choices(session_finer_choice *choices, int count)
 {
     for (int m = 0; choices && m < count; m++) {
-        for (int i = 0; i < choices[m].mark_count; i++) base_free(choices[m].marks[i]);
+        for (int i = 0; i < choices[m].mark_count; i++) {
+            base_free(choices[m].marks[i].cells);
+            session_drop_piece_set(&choices[m].marks[i].pieces);
+        }
         base_free(choices[m].marks);
     }
     base_free(choices);
@@ -415,7 +426,7 @@ void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *ma
 }
 
 insitu_status session_make_finer(session_meshes *meshes, const session_catalogue *catalogue,
-                                 const session_finer_choice *choices, const session_team *team, bool *are_changed,
+                                 session_finer_choice *choices, const session_team *team, bool *are_changed,
                                  base_error *error)
 {
     int mine = 0, any = 0;

@@ -21,6 +21,12 @@ typedef struct session_finer_bytes {
     int64_t own, per_component;
 } session_finer_bytes;
 
+/* What is refined of a part of a mesh on this rank. */
+typedef struct session_cell_marks {
+    unsigned char *cells;     /* one byte per cell, which the caller sets if the cell is refined */
+    session_piece_set pieces; /* the pieces of refined cells; empty if `parts` is 1 */
+} session_cell_marks;
+
 /* The cells of higher order of a mesh on all ranks, and the number of pieces that was chosen for them; the same on
  * every rank, apart from the marks. */
 typedef struct session_finer_choice {
@@ -28,10 +34,8 @@ typedef struct session_finer_choice {
     int64_t pyramid_count, serendipity_count, shell_count;
     bool is_lobatto; /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
     int parts; /* number of parts of each edge between two nodes, 1 .. FINER_MOST_PARTS; it is chosen by the caller */
-    /* For each part of the mesh on this rank, one byte per cell, which the caller sets if the cell is refined; NULL:
-     * all cells of the part are. */
-    int mark_count;
-    unsigned char **marks;
+    int mark_count;            /* number of parts of the mesh on this rank; 0: all cells are refined */
+    session_cell_marks *marks; /* for each of these parts */
 } session_finer_choice;
 
 /* Frees the choices of `count` meshes. */
@@ -50,9 +54,9 @@ insitu_status session_count_finer(session_meshes *meshes, const session_catalogu
 bool session_begin_marks(session_finer_choice *choice, const session_parts *parts);
 
 /* Returns the marks of a part of the mesh; NULL: all of its cells are refined. */
-static inline unsigned char *session_marks_of(const session_finer_choice *choice, int part)
+static inline session_cell_marks *session_marks_of(const session_finer_choice *choice, int part)
 {
-    return part < choice->mark_count ? choice->marks[part] : NULL;
+    return part < choice->mark_count ? &choice->marks[part] : NULL;
 }
 
 /* Adds the bytes that finer lattices in the marked cells take, and those in other cells, by the number of parts. There
@@ -61,10 +65,11 @@ void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *ma
                                session_finer_bytes out[FINER_MOST_PARTS + 1]);
 
 /* Makes finer lattices in the marked cells with the chosen numbers of parts, or none for 1 part. Other cells are then
- * split between their own nodes, of which serendipity cells get all. *are_changed is set if the cells of some mesh
- * change on any rank; these meshes must be checked again. Collective; all ranks return the same status. */
+ * split between their own nodes, of which serendipity cells get all. Sets of pieces are moved to the meshes.
+ * *are_changed is set if the cells of some mesh change on any rank; these meshes must be checked again. Collective; all
+ * ranks return the same status. */
 insitu_status session_make_finer(session_meshes *meshes, const session_catalogue *catalogue,
-                                 const session_finer_choice *choices, const session_team *team, bool *are_changed,
+                                 session_finer_choice *choices, const session_team *team, bool *are_changed,
                                  base_error *error);
 
 /* Reads the caller's cells in place of finer lattices, and the vertex ids again. Local. */

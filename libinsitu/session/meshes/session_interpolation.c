@@ -139,16 +139,36 @@ size_t session_interpolation_room(const session_interpolation *of, int component
     return ((size_t)of->complete.count + 2 * (size_t)of->fine.count) * (size_t)components;
 }
 
+/* Computes one row of a product, number by number, so that sums of short tuples stay in registers. */
+static void apply_row(const double *row, int columns, int inner, const double *in, double *out)
+{
+    for (int s = 0; s < inner; s++) {
+        const double first = in[s];
+        double sum = 0;
+        for (int c = 0; c < columns; c++) sum += row[c] * (in[c * inner + s] - first);
+        out[s] = sum + first;
+    }
+}
+
+/* As above for long tuples, in an order that suits vectors. Each sum has the same terms in the same order. */
+static void apply_long_row(const double *row, int columns, int inner, const double *restrict in, double *restrict out)
+{
+    for (int s = 0; s < inner; s++) out[s] = 0;
+    for (int c = 0; c < columns; c++)
+        for (int s = 0; s < inner; s++) out[s] += row[c] * (in[c * inner + s] - in[s]);
+    for (int s = 0; s < inner; s++) out[s] += in[s];
+}
+
 /* Multiplies each of `outer` arrays of columns x inner numbers with a matrix of rows x columns. */
 static void apply(const double *matrix, int rows, int columns, int outer, int inner, const double *in, double *out)
 {
+    enum { SHORT = 6 };
     for (int o = 0; o < outer; o++, in += columns * inner)
-        for (int r = 0; r < rows; r++, out += inner) {
-            for (int s = 0; s < inner; s++) out[s] = 0;
-            for (int c = 0; c < columns; c++)
-                for (int s = 0; s < inner; s++) out[s] += matrix[r * columns + c] * (in[c * inner + s] - in[s]);
-            for (int s = 0; s < inner; s++) out[s] += in[s];
-        }
+        for (int r = 0; r < rows; r++, out += inner)
+            if (inner <= SHORT)
+                apply_row(matrix + r * columns, columns, inner, in, out);
+            else
+                apply_long_row(matrix + r * columns, columns, inner, in, out);
 }
 
 static double value_beside(const cell_job *job, const int at[3], const int step[3], int component)

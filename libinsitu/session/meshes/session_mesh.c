@@ -179,8 +179,16 @@ void session_drop_torn(session_torn *torn)
     *torn = (session_torn){0};
 }
 
+void session_drop_piece_set(session_piece_set *set)
+{
+    base_free(set->first_words);
+    base_free(set->bits);
+    *set = (session_piece_set){0};
+}
+
 void session_drop_finer(session_finer *finer)
 {
+    session_drop_piece_set(&finer->pieces);
     base_free(finer->coordinates);
     base_free(finer->offsets);
     base_free(finer->types);

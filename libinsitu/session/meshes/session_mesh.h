@@ -192,15 +192,31 @@ typedef struct session_sizes {
     double size_sum;
 } session_sizes;
 
+/* Numbers of cells, one for each kind. Shells are cells that are drawn and have no volume. */
+typedef struct session_counts {
+    int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
+} session_counts;
+
+/* The pieces that are made of each cell of a mesh. */
+typedef struct session_piece_set {
+    /* for each cell and at the end, the index of the first of its words in `bits`; a cell without words has all of its
+     * pieces. NULL: all cells have all of their pieces */
+    int64_t *first_words;
+    uint64_t *bits; /* one bit per piece of a cell, in the order of the cell's pattern; set if the piece is made */
+} session_piece_set;
+
 enum { SESSION_FINER_COUNTS = 64 };
 
-/* Nodes of a finer lattice in cells of higher order, at which their polynomials are evaluated (session_finer.h). The
- * coordinates are a copy reported to the user. */
+/* Nodes of a finer lattice in cells of higher order, at which their polynomials are evaluated (session_finer.h). They
+ * are a copy reported to the user. */
 typedef struct session_finer {
     bool is_counted; /* set if `counts` are those of the current cells */
     int64_t counts[SESSION_FINER_COUNTS];
     int parts; /* number of parts of each edge between two nodes; 0: session_mesh.given is the caller's mesh */
-    session_sizes sizes; /* sizes that the mesh has without finer lattices */
+    /* what the mesh has without finer lattices */
+    session_sizes sizes;
+    session_counts given_counts;
+    session_piece_set pieces;
     bool is_lobatto;     /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
     insitu_mesh nodal;   /* the caller's mesh with copies in place of the arrays that cannot be read in place */
     insitu_mesh fine;    /* same as session_mesh.given: cells with separate nodes in lexicographic order */
@@ -272,11 +288,6 @@ typedef struct session_misfit {
     int64_t block, refinement; /* the finer block's number on its rank, and its refinement along the axis */
     int rank;                  /* rank that has the finer block */
 } session_misfit;
-
-/* Numbers of cells, one for each kind. Shells are cells that are drawn and have no volume. */
-typedef struct session_counts {
-    int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count;
-} session_counts;
 
 /* Block number of a mesh that does not consist of blocks; blocks have numbers from 0 on. */
 #define SESSION_WHOLE INT64_MIN
@@ -475,6 +486,7 @@ void session_drop_gradients(session_scalar *scalar);
 void session_drop_tree(session_mesh *mesh);
 void session_drop_topology(session_topology *topology);
 void session_drop_torn(session_torn *torn);
+void session_drop_piece_set(session_piece_set *set);
 void session_drop_finer(session_finer *finer);
 void session_drop_axes(session_lattice *lattice);
 void session_drop_conformed(session_conformed *conformed);

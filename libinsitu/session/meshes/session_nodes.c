@@ -229,6 +229,12 @@ static int number_triangle_row_node(int p, int i, int j)
     return i + j * (p + 1) - j * (j - 1) / 2;
 }
 
+/* Returns the number of nodes of a tet with so many on an edge. */
+static int count_tet_nodes(int n)
+{
+    return n * (n + 1) * (n + 2) / 6;
+}
+
 static int number_lexicographic_node(int type, int p, int i, int j, int k)
 {
     const int n = p + 1;
@@ -239,7 +245,7 @@ static int number_lexicographic_node(int type, int p, int i, int j, int k)
     case GRID_HEX: return i + n * (j + n * k);
     case GRID_WEDGE: return number_triangle_row_node(p, i, j) + k * (n * (n + 1) / 2);
     case GRID_TET:
-        for (int layer = 0; layer < k; layer++) below += (n - layer) * (n - layer + 1) / 2;
+        below = count_tet_nodes(n) - count_tet_nodes(n - k);
         return below + number_triangle_row_node(p - k, i, j);
     default:
         for (int layer = 0; layer < k; layer++) below += (n - layer) * (n - layer);

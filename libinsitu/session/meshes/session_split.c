@@ -27,8 +27,9 @@ typedef struct split_work {
     /* index of the first piece and of its first entry, for each cell, and the totals; first_entries is NULL if pieces
      * have one type */
     int64_t *first_pieces, *first_entries;
-    bool stores_entries;      /* set if pieces store entries of the caller's connectivity instead of vertices */
-    grid_array piece_entries; /* connectivity of the pieces, piece by piece */
+    const session_piece_set *set; /* the pieces that are made of each cell */
+    bool stores_entries;          /* set if pieces store entries of the caller's connectivity instead of vertices */
+    grid_array piece_entries;     /* connectivity of the pieces, piece by piece */
 } split_work;
 
 /* ---- the caller's cells ---------------------------------------------------------------------------------------- */
@@ -196,6 +197,42 @@ static void rank_midpoints(const split_work *w, const session_pattern *of, int64
     }
 }
 
+/* The pieces of a complete cell that are made. */
+typedef struct piece_walk {
+    const uint64_t *words; /* NULL: all pieces are made */
+    int count;             /* number of pieces of the pattern */
+    int next;              /* number of the first piece that has not been returned */
+} piece_walk;
+
+static piece_walk walk_pieces(const split_work *w, const session_pattern *of, int64_t cell)
+{
+    const int64_t *first = w->set->first_words;
+    const bool has_words = first && first[cell] < first[cell + 1];
+    return (piece_walk){has_words ? w->set->bits + first[cell] : NULL, of->piece_count, 0};
+}
+
+/* Returns the number of the next piece, or -1 if there are no more. */
+static int next_piece(piece_walk *walk)
+{
+    while (walk->words && walk->next < walk->count) {
+        const uint64_t left = walk->words[walk->next / 64] >> walk->next % 64;
+        if (left) {
+            walk->next += __builtin_ctzll(left);
+            break;
+        }
+        walk->next = (walk->next / 64 + 1) * 64;
+    }
+    return walk->next < walk->count ? walk->next++ : -1;
+}
+
+static int count_made(const split_work *w, const session_pattern *of, int64_t cell)
+{
+    piece_walk walk = walk_pieces(w, of, cell);
+    int count = 0;
+    while (walk.words && next_piece(&walk) >= 0) count++;
+    return walk.words ? count : of->piece_count;
+}
+
 static int cut_cell(const split_work *w, const session_pattern *of, int64_t cell, int places[PATTERN_MOST_LOOSE][4])
 {
     int ranks[27] = {0};
@@ -207,10 +244,14 @@ static void count_pieces(const split_work *w, int64_t cell)
 {
     const session_pattern *of = find_cell_pattern(w, cell);
     int loose[PATTERN_MOST_LOOSE][4];
-    const int cut = of->polygon_count ? cut_cell(w, of, cell, loose) : 0;
-    w->first_pieces[cell + 1] = of->polygon_count ? cut : of->piece_count;
-    if (w->first_entries)
-        w->first_entries[cell + 1] = of->polygon_count ? cut * (of->nodes.type == GRID_QUAD ? 3 : 4) : of->piece_size;
+    const int count = of->polygon_count ? cut_cell(w, of, cell, loose) : count_made(w, of, cell);
+    w->first_pieces[cell + 1] = count;
+    if (!w->first_entries) return;
+    if (of->polygon_count)
+        w->first_entries[cell + 1] = count * (of->nodes.type == GRID_QUAD ? 3 : 4);
+    else /* the pieces of a cell differ in type only if all are made */
+        w->first_entries[cell + 1] =
+            count == of->piece_count ? of->piece_size : count * grid_type_vertices(of->types[0]);
 }
 
 static void accumulate_counts(int64_t *counts, int64_t cells)
@@ -261,7 +302,12 @@ static void store_cell(const split_work *w, int64_t cell)
 {
     const session_pattern *of = find_cell_pattern(w, cell);
     int64_t at = w->first_entries ? w->first_entries[cell] : w->first_pieces[cell] * grid_type_vertices(w->only_type);
-    for (int n = 0; n < of->piece_size; n++) store_corner(w, cell, at++, of->piece_positions[n]);
+    piece_walk walk = walk_pieces(w, of, cell);
+    if (!walk.words)
+        for (int n = 0; n < of->piece_size; n++) store_corner(w, cell, at++, of->piece_positions[n]);
+    const int corners = walk.words ? grid_type_vertices(of->types[0]) : 0;
+    for (int piece; walk.words && (piece = next_piece(&walk)) >= 0;)
+        for (int n = 0; n < corners; n++) store_corner(w, cell, at++, of->piece_positions[piece * corners + n]);
     if (!of->polygon_count) return;
     int loose[PATTERN_MOST_LOOSE][4];
     const int size = of->nodes.type == GRID_QUAD ? 3 : 4, count = cut_cell(w, of, cell, loose);
@@ -345,7 +391,7 @@ static void end_split(split_work *w)
 
 insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *error)
 {
-    split_work w = {.mesh = mesh, .rows = session_rows_of(mesh)};
+    split_work w = {.mesh = mesh, .rows = session_rows_of(mesh), .set = &mesh->finer.pieces};
     insitu_status status = find_patterns(&w, error);
     if (!status) status = check_indices(&w, threads, error);
     if (!status) status = count_all_pieces(&w, threads, error);
@@ -356,7 +402,7 @@ insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *e
 
 insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error)
 {
-    split_work w = {.mesh = mesh, .rows = session_rows_of(mesh)};
+    split_work w = {.mesh = mesh, .rows = session_rows_of(mesh), .set = &mesh->finer.pieces};
     insitu_status status = find_patterns(&w, error);
     const int64_t nodes = session_cell_nodes(&mesh->given), cells = mesh->given.cell_count;
     const int64_t largest = w.rows.cells.offsets.data ? mesh->given.connectivity_count : cells * nodes;

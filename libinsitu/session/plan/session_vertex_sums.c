@@ -243,15 +243,18 @@ static bool filter_create(const session_key_table *keys, key_filter *out)
 }
 
 /* Finds all vertices with one of the keys: this rank's own keys, several of whose vertices may be doubled along a
- * crack, and the requested ones. */
-static void find_entries(const session_vertex_sums *sums, const session_sum_part *part, const key_filter *filter,
-                         int threads)
+ * crack, and the requested ones. In cells of higher order, few of whose pieces are made, most vertices belong to none
+ * and need no search. */
+static void find_entries(const session_vertex_sums *sums, session_sum_part *part, const key_filter *filter, int threads)
 {
+    const bool is_marked = part->mesh->finer.pieces.first_words != NULL;
+    if (is_marked) mark_vertices(part);
 #pragma omp parallel num_threads(session_region_threads(threads, part->mesh->cells.vertex_count))
     {
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t v = 0; v < part->mesh->cells.vertex_count; v++) {
+            if (is_marked && part->key_indices[v] < 0) continue;
             const session_key key = session_vertex_key(part->mesh, v, sums->by_id);
             const uint64_t bit = session_key_hash(&key) >> 32 & filter->mask;
             const bool may_be = filter->bits[bit / 64] >> bit % 64 & 1;

@@ -300,18 +300,22 @@ static int compare_nodes(const void *a, const void *b)
     return (x->vertex > y->vertex) - (x->vertex < y->vertex);
 }
 
+/* Ensures space for so many nodes. */
+static bool reserve_nodes(node_list *list, int64_t count)
+{
+    if (count <= list->capacity) return true;
+    const int64_t capacity = count < 64 ? 64 : 2 * count;
+    node *nodes = base_realloc(list->nodes, (size_t)capacity * sizeof *nodes);
+    list->is_out_of_memory = list->is_out_of_memory || !nodes;
+    if (!nodes) return false;
+    list->nodes = nodes;
+    list->capacity = capacity;
+    return true;
+}
+
 static bool add_node(node_list *list, target *to, int64_t vertex)
 {
-    if (list->count == list->capacity) {
-        const int64_t capacity = list->capacity ? 2 * list->capacity : 64;
-        node *nodes = base_realloc(list->nodes, (size_t)capacity * sizeof *nodes);
-        if (!nodes) {
-            list->is_out_of_memory = true;
-            return false;
-        }
-        list->nodes = nodes;
-        list->capacity = capacity;
-    }
+    if (!reserve_nodes(list, list->count + 1)) return false;
     return read_node(to->basis, vertex, to->scale, to->basis->field_count, &list->nodes[list->count++]);
 }
 
@@ -492,21 +496,54 @@ static void add_row_node(target *to, const session_derivatives *d, const node_li
                           field_count);
 }
 
+/* Reads one node of a row, unless it has been read. Returns whether its values are finite. */
+static bool read_row_node(target *to, int64_t cell, node_list *row, int n)
+{
+    if (row->nodes[n].vertex >= 0) return true;
+    return read_node(to->basis, session_row_node(&to->basis->polynomials->rows, cell, n), to->scale,
+                     to->basis->field_count, &row->nodes[n]);
+}
+
+/* Reads the nodes that have sums, and those by which their derivatives are determined: of finer lattices with few
+ * pieces these are few. Returns whether all values are finite. */
+static bool read_summed_nodes(target *to, int64_t cell, const session_derivatives *d, node_list *row, int size)
+{
+    const session_polynomials *p = to->basis->polynomials;
+    bool is_finite = true;
+    for (int n = 0; n < size; n++) row->nodes[n].vertex = -1;
+    for (int n = 0; n < size && is_finite; n++) {
+        if (to->basis->sum_indices[session_row_node(&p->rows, cell, n)] < 0) continue;
+        is_finite = read_row_node(to, cell, row, n);
+        const int end = d->starts[d->axis_count * (n + 1)];
+        for (int t = d->starts[d->axis_count * n]; t < end && is_finite; t++)
+            is_finite = read_row_node(to, cell, row, d->nodes[t]);
+    }
+    return is_finite;
+}
+
+static bool read_all_nodes(target *to, int64_t cell, node_list *row, int size)
+{
+    bool is_finite = true;
+    for (int n = 0; n < size; n++) row->nodes[n].vertex = -1;
+    for (int n = 0; n < size; n++) is_finite = read_row_node(to, cell, row, n) && is_finite;
+    return is_finite;
+}
+
 /* Adds the contributions of one of the caller's cells. If its derivatives are not known, or a value is not finite, its
  * pieces contribute as linear cells. */
 static void add_row(target *to, int64_t cell, node_list *row)
 {
     const session_polynomials *p = to->basis->polynomials;
-    const int64_t size = session_row_size(&p->rows, cell);
-    bool is_finite = true;
-    row->count = 0;
-    for (int n = 0; n < size; n++)
-        is_finite = add_node(row, to, session_row_node(&p->rows, cell, n)) && is_finite && !row->is_out_of_memory;
-    if (row->is_out_of_memory) return;
+    const int size = (int)session_row_size(&p->rows, cell);
+    const bool is_finer = p->nodal.kind_count > 0;
+    if (!reserve_nodes(row, size)) return;
+    bool is_finite = is_finer || read_all_nodes(to, cell, row, size);
     const session_derivatives *d =
         session_derivatives_of(p, cell, row->nodes->position, (int)(sizeof *row->nodes / sizeof(double)));
+    if (is_finer && d->axis_count) is_finite = read_summed_nodes(to, cell, d, row, size);
     if (is_finite && d->axis_count) {
-        for (int n = 0; n < size; n++) add_row_node(to, d, row, n);
+        for (int n = 0; n < size; n++)
+            if (row->nodes[n].vertex >= 0) add_row_node(to, d, row, n);
         return;
     }
     for (int64_t piece = p->first_pieces[cell]; piece < p->first_pieces[cell + 1]; piece++)

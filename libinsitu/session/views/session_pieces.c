@@ -19,6 +19,7 @@
 #include "session_distances.h"
 #include "session_filled.h"
 #include "session_indexed.h"
+#include "session_piece_set.h"
 #include "session_wishes.h"
 
 static const double bytes_per_mib = 1048576;
@@ -44,62 +45,86 @@ typedef struct mesh_work {
     piece_error *out;
 } mesh_work;
 
-/* A part of a mesh that is being measured. */
+/* A part of a mesh of which a wish is measured, or whose pieces are chosen by it. */
 typedef struct part_work {
+    const mesh_work *of;
     const session_mesh *mesh;
     session_deviation_wish wish;
-    int threads;
-    session_deviation *out;
+    session_piece_set *pieces; /* NULL: the wish is measured */
 } part_work;
 
-static insitu_status measure_values(void *of, const session_node_values *values, base_error *error)
+static insitu_status use_wish(part_work *work, base_error *error)
+{
+    const mesh_work *w = work->of;
+    const int threads = w->basis->team->threads;
+    if (!work->pieces) return session_measure_deviation(work->mesh, &work->wish, threads, &w->out->all, error);
+    return session_add_crossed_pieces(work->mesh, &work->wish, w->choice->parts, threads, work->pieces, error);
+}
+
+static insitu_status use_values(void *of, const session_node_values *values, base_error *error)
 {
     part_work *work = of;
     work->wish.values = values;
-    return session_measure_deviation(work->mesh, &work->wish, work->threads, work->out, error);
+    return use_wish(work, error);
 }
 
-static void measure_wish(const mesh_work *w, const session_mesh *mesh, unsigned char *marks, const session_wish *wish,
-                         base_error *error)
+static void use_part(part_work *work, const session_wish *wish, base_error *error)
 {
     static const double zero = 0;
-    part_work work = {.mesh = mesh,
-                      .wish = {.component = wish->component,
-                               .isovalues = {wish->value_count, wish->values, 0},
-                               .plane = wish->has_plane ? &wish->plane : NULL,
-                               .pixels = {wish, session_wish_pixel_size},
-                               .is_lobatto = w->choice->is_lobatto,
-                               .marks_only = w->marks_only,
-                               .marks = marks},
-                      .threads = w->basis->team->threads,
-                      .out = &w->out->all};
-    if (!wish->is_shown || (w->marks_only && !marks)) return;
+    const mesh_work *w = work->of;
+    work->wish.component = wish->component;
+    work->wish.isovalues = (session_isovalues){wish->value_count, wish->values, 0};
+    work->wish.plane = wish->has_plane ? &wish->plane : NULL;
+    work->wish.pixels = (session_pixels){wish, session_wish_pixel_size};
+    work->wish.is_lobatto = w->choice->is_lobatto;
+    work->wish.marks_only = w->marks_only;
+    work->wish.values = NULL;
     /* A slice at the border of the data may be moved by as much (session_slice_distance()). */
     if (wish->has_plane)
-        work.wish.isovalues =
+        work->wish.isovalues =
             (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * wish->views->extent.half_diagonal};
-    const int field = wish->field ? session_find_field(mesh, wish->field) : -1;
-    if (!wish->field) session_measure_deviation(mesh, &work.wish, work.threads, work.out, error);
-    if (field >= 0) session_read_nodes(mesh, field, measure_values, &work, error);
+    const int field = wish->field ? session_find_field(work->mesh, wish->field) : -1;
+    if (!wish->field) use_wish(work, error);
+    if (field >= 0) session_read_nodes(work->mesh, field, use_values, work, error);
 }
 
-static void measure_parts(const mesh_work *w, const char *name, base_error *error)
+static void measure_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks, base_error *error)
+{
+    unsigned char *cells = marks ? marks->cells : NULL;
+    part_work work = {.of = w, .mesh = mesh, .wish = {.marks = cells}};
+    for (int n = 0; n < w->wishes.count && !error->status; n++)
+        if (w->wishes.items[n].is_shown && (!w->marks_only || marks)) use_part(&work, &w->wishes.items[n], error);
+    session_count_finer_bytes(mesh, cells, w->out->bytes);
+}
+
+/* Lists the pieces of the refined cells. */
+static void choose_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks, base_error *error)
+{
+    part_work work = {.of = w, .mesh = mesh, .pieces = &marks->pieces};
+    session_begin_piece_set(mesh, marks->cells, w->choice->parts, work.pieces, error);
+    for (int n = 0; n < w->wishes.count && !error->status; n++)
+        if (w->wishes.items[n].is_shown) use_part(&work, &w->wishes.items[n], error);
+}
+
+/* Measures the parts of a mesh, or, if the number of pieces has been chosen, lists the pieces of refined cells. */
+static void use_parts(const mesh_work *w, const char *name, base_error *error)
 {
     const session_parts parts = session_find_parts(w->basis->meshes, name);
-    if (!w->wishes.needs_all && !session_begin_marks(w->choice, &parts))
+    const bool is_chosen = w->choice->parts > 1;
+    if (!is_chosen && !w->wishes.needs_all && !session_begin_marks(w->choice, &parts))
         session_fail_for_memory(error, parts.count, "marks of cells of higher order");
     for (int i = 0; i < parts.count && !error->status; i++) {
         const session_mesh *mesh = parts.items[i];
-        unsigned char *marks = session_marks_of(w->choice, i);
         if (!mesh->is_given || !mesh->topology.is_split) continue;
-        for (int n = 0; n < w->wishes.count && !error->status; n++)
-            measure_wish(w, mesh, marks, &w->wishes.items[n], error);
-        session_count_finer_bytes(mesh, marks, w->out->bytes);
+        if (is_chosen)
+            choose_part(w, mesh, &w->choice->marks[i], error);
+        else
+            measure_part(w, mesh, session_marks_of(w->choice, i), error);
     }
 }
 
-static void measure_mesh(const session_pieces_basis *basis, const session_wish_views *views, int mesh,
-                         session_finer_choice *choice, piece_error *out, session_report *report, base_error *error)
+static void use_mesh(const session_pieces_basis *basis, const session_wish_views *views, int mesh,
+                     session_finer_choice *choice, piece_error *out, session_report *report, base_error *error)
 {
     const scene *scene = basis->scene;
     mesh_work *w = base_alloc(sizeof *w);
@@ -111,7 +136,7 @@ static void measure_mesh(const session_pieces_basis *basis, const session_wish_v
         session_list_wishes(scene, views, &basis->catalogue->meshes[mesh], choice->shell_count > 0, &w->wishes,
                             w->marks_only ? NULL : report);
         out->is_shown = w->wishes.is_shown || (w->marks_only && w->wishes.needs_all);
-        if (w->wishes.is_complete) measure_parts(w, basis->catalogue->meshes[mesh].name, error);
+        if (w->wishes.is_complete) use_parts(w, basis->catalogue->meshes[mesh].name, error);
     }
     if (!w || !w->wishes.is_complete) session_fail_for_memory(error, sizeof *w, "bounds of isosurfaces");
     if (w) session_free_wishes(&w->wishes);
@@ -164,19 +189,25 @@ static insitu_status reduce_errors(piece_error *errors, int count, MPI_Comm comm
     return status;
 }
 
-static insitu_status find_errors(const session_pieces_basis *basis, session_finer_choice *choices, piece_error *errors,
-                                 session_report *report, base_error *error)
+static insitu_status find_errors(const session_pieces_basis *basis, const session_wish_views *views,
+                                 session_finer_choice *choices, piece_error *errors, session_report *report,
+                                 base_error *error)
 {
-    session_wish_views views = {.count = 0};
-    insitu_status status =
-        session_make_wish_views(basis->scene, basis->moment, basis->meshes, basis->team->comm, &views, error);
-    if (!status) fill_fields(basis, &views);
-    for (int m = 0; m < basis->catalogue->mesh_count && !status; m++)
+    fill_fields(basis, views);
+    for (int m = 0; m < basis->catalogue->mesh_count && !error->status; m++)
         if (choices[m].order > 0 && !choices[m].pyramid_count)
-            measure_mesh(basis, &views, m, &choices[m], &errors[m], report, error);
-    if (!status) status = reduce_errors(errors, basis->catalogue->mesh_count, basis->team->comm, error);
-    session_free_wish_views(&views);
-    return status;
+            use_mesh(basis, views, m, &choices[m], &errors[m], report, error);
+    return reduce_errors(errors, basis->catalogue->mesh_count, basis->team->comm, error);
+}
+
+/* Lists the pieces that are made in meshes not all of whose cells are refined. */
+static insitu_status list_pieces(const session_pieces_basis *basis, const session_wish_views *views,
+                                 session_finer_choice *choices, piece_error *errors, base_error *error)
+{
+    for (int m = 0; m < basis->catalogue->mesh_count && !error->status; m++)
+        if (choices[m].parts > 1 && choices[m].mark_count > 0)
+            use_mesh(basis, views, m, &choices[m], &errors[m], NULL, error);
+    return session_agree(basis->team->comm, error);
 }
 
 /* ---- numbers of pieces ------------------------------------------------------------------------------------------- */
@@ -343,12 +374,17 @@ insitu_status session_choose_pieces(const session_pieces_basis *basis, session_f
     const size_t count = (size_t)basis->catalogue->mesh_count + 1;
     piece_error *errors = base_calloc(count, sizeof *errors);
     piece_step *steps = base_calloc(count * FINER_MOST_PARTS, sizeof *steps);
+    session_wish_views views = {.count = 0};
     if (!errors || !steps)
         session_fail_for_memory(error, (int64_t)(count * (sizeof *errors + FINER_MOST_PARTS * sizeof *steps)),
                                 "numbers of pieces");
     insitu_status status = session_agree(basis->team->comm, error);
-    if (!status) status = find_errors(basis, choices, errors, report, error);
+    if (!status)
+        status = session_make_wish_views(basis->scene, basis->moment, basis->meshes, basis->team->comm, &views, error);
+    if (!status) status = find_errors(basis, &views, choices, errors, report, error);
     if (!status) choose_all(basis, errors, steps, choices, report);
+    if (!status) status = list_pieces(basis, &views, choices, errors, error);
+    session_free_wish_views(&views);
     base_free(errors);
     base_free(steps);
     return status;

@@ -1,0 +1,219 @@
+/* A linear piece contains an isovalue if it is in the range of the values at the piece's corners, so that these decide,
+ * and no bound is needed: pieces without the isovalue are seen by no ray. Neighbours of a piece that is made may be
+ * missing, since the surface crosses none of their common faces.
+ *
+ * The distance from a plane is a polynomial of the same order as the positions, and its values at the nodes of the
+ * finer lattice are computed from those at the cell's nodes. */
+#include "session_piece_set.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_pattern.h"
+#include "session_region.h"
+
+/* What is needed for one kind of cell. */
+typedef struct piece_kind {
+    session_interpolation nodes;
+    session_pattern pieces;
+    int corner_count; /* number of corners of a piece; the pieces of a kind have one type */
+    int word_count;   /* number of words of a cell's bits */
+} piece_kind;
+
+typedef struct piece_work {
+    session_rows rows; /* of the caller's cells */
+    piece_kind kinds[ROWS_MOST_KINDS];
+    const session_deviation_wish *wish;
+    session_piece_set *set;
+} piece_work;
+
+static bool make_kind(const session_nodes *of, insitu_vertex_order order, int parts, bool is_lobatto, piece_kind *out)
+{
+    const int type = session_lagrange_type(of->type);
+    if (!session_make_interpolation(of, order, parts, is_lobatto, &out->nodes)) return false;
+    if (!session_make_pattern(type, &out->nodes.fine, INSITU_ORDER_LEXICOGRAPHIC, &out->pieces)) return false;
+    out->corner_count = grid_type_vertices(out->pieces.types[0]);
+    out->word_count = (out->pieces.piece_count + 63) / 64;
+    return true;
+}
+
+static void end_work(piece_work *w)
+{
+    for (int i = 0; i < w->rows.kind_count; i++) {
+        session_drop_interpolation(&w->kinds[i].nodes);
+        session_drop_pattern(&w->kinds[i].pieces);
+    }
+}
+
+static bool begin_work(const session_mesh *mesh, int parts, bool is_lobatto, session_piece_set *set, piece_work *w)
+{
+    const insitu_mesh *nodal = session_nodal_mesh(mesh);
+    bool is_made = true;
+    *w = (piece_work){.rows = session_given_rows(nodal), .set = set};
+    session_list_kinds(&w->rows);
+    for (int i = 0; i < w->rows.kind_count && is_made; i++)
+        is_made = make_kind(&w->rows.kinds[i].nodes, nodal->vertex_order, parts, is_lobatto, &w->kinds[i]);
+    return is_made;
+}
+
+static const piece_kind *kind_of(const piece_work *w, int64_t cell)
+{
+    return &w->kinds[session_kind_of(&w->rows, cell)];
+}
+
+static void set_bit(uint64_t *bits, int piece)
+{
+    bits[piece / 64] |= (uint64_t)1 << piece % 64;
+}
+
+static insitu_status fail_for_memory(const session_mesh *mesh, base_error *error)
+{
+    return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for sets of pieces of its cells", mesh->label);
+}
+
+/* ---- pieces at nodes --------------------------------------------------------------------------------------------- */
+
+/* Finds a piece at each of the cell's own nodes. is_own: room for one flag per node of the finer lattice. */
+static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own, uint64_t *out)
+{
+    const session_nodes *fine = &kind->nodes.fine;
+    const int p = kind->nodes.of.order;
+    memset(is_own, 0, (size_t)fine->count * sizeof *is_own);
+    for (int k = 0; k <= p; k++)
+        for (int j = 0; j <= p; j++)
+            for (int i = 0; i <= p; i++)
+                if (session_is_node(&kind->nodes.of, i, j, k) &&
+                    session_node_index(&kind->nodes.of, INSITU_ORDER_LEXICOGRAPHIC, i, j, k) < kind->nodes.of.count)
+                    is_own[session_node_index(fine, INSITU_ORDER_LEXICOGRAPHIC, parts * i, parts * j, parts * k)] =
+                        true;
+    for (int i = 0; i < kind->pieces.piece_size; i++) {
+        const int node = kind->pieces.piece_positions[i];
+        if (is_own[node]) set_bit(out, i / kind->corner_count);
+        is_own[node] = false;
+    }
+}
+
+static bool fill_sets(const piece_work *w, const unsigned char *marks, int parts)
+{
+    const int64_t cells = w->rows.cells.cell_count;
+    uint64_t *at_nodes[ROWS_MOST_KINDS] = {NULL};
+    bool is_made = true;
+    for (int i = 0; i < w->rows.kind_count && is_made; i++) {
+        bool *is_own = base_alloc((size_t)w->kinds[i].nodes.fine.count * sizeof *is_own);
+        at_nodes[i] = base_calloc((size_t)w->kinds[i].word_count, sizeof *at_nodes[i]);
+        is_made = is_own && at_nodes[i];
+        if (is_made) find_pieces_at_nodes(&w->kinds[i], parts, is_own, at_nodes[i]);
+        base_free(is_own);
+    }
+    for (int64_t cell = 0; cell < cells && is_made; cell++) {
+        const int kind = session_kind_of(&w->rows, cell);
+        if (marks[cell])
+            memcpy(w->set->bits + w->set->first_words[cell], at_nodes[kind],
+                   (size_t)w->kinds[kind].word_count * sizeof **at_nodes);
+    }
+    for (int i = 0; i < w->rows.kind_count; i++) base_free(at_nodes[i]);
+    return is_made;
+}
+
+insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned char *marks, int parts,
+                                      session_piece_set *out, base_error *error)
+{
+    piece_work *w = base_alloc(sizeof *w);
+    *out = (session_piece_set){0};
+    bool is_made = w && begin_work(mesh, parts, false, out, w);
+    const int64_t cells = is_made ? w->rows.cells.cell_count : 0;
+    if (is_made) out->first_words = base_alloc((size_t)(cells + 1) * sizeof *out->first_words);
+    is_made = is_made && out->first_words;
+    if (is_made) out->first_words[0] = 0;
+    for (int64_t cell = 0; cell < cells && is_made; cell++)
+        out->first_words[cell + 1] = out->first_words[cell] + (marks[cell] ? kind_of(w, cell)->word_count : 0);
+    if (is_made) out->bits = base_alloc((size_t)(out->first_words[cells] + 1) * sizeof *out->bits);
+    is_made = is_made && out->bits && fill_sets(w, marks, parts);
+    if (w) end_work(w);
+    base_free(w);
+    return is_made ? INSITU_OK : fail_for_memory(mesh, error);
+}
+
+/* ---- crossed pieces ---------------------------------------------------------------------------------------------- */
+
+static size_t find_room(const piece_work *w, int field_size)
+{
+    size_t most = 0;
+    for (int i = 0; i < w->rows.kind_count; i++) {
+        const session_interpolation *of = &w->kinds[i].nodes;
+        const size_t own = (size_t)of->of.count + (size_t)of->fine.count + session_interpolation_room(of, 1);
+        most = own > most ? own : most;
+    }
+    return most + (size_t)field_size;
+}
+
+static void add_pieces(const piece_kind *kind, const session_isovalues *isovalues, const double *values, uint64_t *bits)
+{
+    double most = 0;
+    for (int n = 0; n < kind->nodes.fine.count; n++) most = fmax(most, fabs(values[n]));
+    const double tolerance = isovalues->tolerance + 1e-6 * most;
+    const int *corners = kind->pieces.piece_positions;
+    for (int piece = 0; piece < kind->pieces.piece_count; piece++, corners += kind->corner_count) {
+        double low = values[corners[0]], high = low;
+        for (int c = 1; c < kind->corner_count; c++) {
+            const double value = values[corners[c]];
+            low = value < low ? value : low;
+            high = value > high ? value : high;
+        }
+        if (session_is_any_between(isovalues, low - tolerance, high + tolerance)) set_bit(bits, piece);
+    }
+}
+
+static void add_cell(const piece_work *w, int64_t cell, int field_size, double *room)
+{
+    const piece_kind *kind = kind_of(w, cell);
+    const session_interpolation *of = &kind->nodes;
+    const int64_t first = session_row_first(&w->rows, cell);
+    double corners[8][3], *own = room + field_size, *fine = own + of->of.count;
+    for (int c = 0; c < grid_type_vertices(of->of.type); c++)
+        grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + of->corners[c]), corners[c]);
+    session_read_wish(&w->rows, w->wish, cell, of->of.count, room, own);
+    session_interpolate(of, (const double(*)[3])corners, 1, own, fine + of->fine.count, fine);
+    add_pieces(kind, &w->wish->isovalues, fine, w->set->bits + w->set->first_words[cell]);
+}
+
+static bool add_cells(const piece_work *w, int threads)
+{
+    const int64_t cells = w->rows.cells.cell_count, *first_words = w->set->first_words;
+    const int field_size = w->wish->values ? w->wish->values->component_count : 1;
+    const size_t room_size = find_room(w, field_size);
+    bool is_lacking = false;
+#pragma omp parallel num_threads(session_region_threads(threads, first_words[cells])) reduction(|| : is_lacking)
+    {
+        region_enter();
+        double *room = base_alloc(room_size * sizeof *room);
+        is_lacking = !room;
+#pragma omp for schedule(dynamic, 16)
+        for (int64_t cell = 0; cell < cells; cell++)
+            if (room && first_words[cell] < first_words[cell + 1]) add_cell(w, cell, field_size, room);
+        base_free(room);
+        region_leave();
+    }
+    return !is_lacking;
+}
+
+insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session_deviation_wish *wish, int parts,
+                                         int threads, session_piece_set *set, base_error *error)
+{
+    piece_work *w = base_alloc(sizeof *w);
+    bool is_made = w && begin_work(mesh, parts, wish->is_lobatto, set, w);
+    if (is_made) w->wish = wish;
+    is_made = is_made && add_cells(w, threads);
+    if (w) end_work(w);
+    base_free(w);
+    return is_made ? INSITU_OK : fail_for_memory(mesh, error);
+}
+
+bool session_is_same_piece_set(const session_piece_set *a, const session_piece_set *b, int64_t cell_count)
+{
+    if (!a->first_words || !b->first_words) return a->first_words == b->first_words;
+    const size_t firsts = (size_t)(cell_count + 1) * sizeof *a->first_words;
+    return memcmp(a->first_words, b->first_words, firsts) == 0 &&
+           memcmp(a->bits, b->bits, (size_t)a->first_words[cell_count] * sizeof *a->bits) == 0;
+}

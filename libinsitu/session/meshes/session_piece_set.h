@@ -1,0 +1,29 @@
+/* Which pieces of refined cells are made: those that an isosurface or a slice may cross, and one at each of the cell's
+ * own nodes. So the number of pieces grows with the square of the number along an edge, not with its cube. */
+#ifndef SESSION_PIECE_SET_H
+#define SESSION_PIECE_SET_H
+
+#include "session_deviation.h"
+
+/* Makes the sets of the marked cells, with so many pieces between two nodes, of those at the cells' own nodes: ranges
+ * of all fields contain the values there. Other cells have all of their pieces. Local; the caller must drop *out in any
+ * case. */
+insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned char *marks, int parts,
+                                      session_piece_set *out, base_error *error);
+
+/* Adds the pieces of the marked cells that an isosurface of the wish, or its plane, may cross, also if values are
+ * rounded to float32. Parallel. Local. */
+insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session_deviation_wish *wish, int parts,
+                                         int threads, session_piece_set *set, base_error *error);
+
+/* Returns whether two sets for the same cells are equal. */
+bool session_is_same_piece_set(const session_piece_set *a, const session_piece_set *b, int64_t cell_count);
+
+static inline int64_t session_piece_set_bytes(const session_piece_set *set, int64_t cell_count)
+{
+    if (!set->first_words) return 0;
+    return (cell_count + 1) * (int64_t)sizeof *set->first_words +
+           set->first_words[cell_count] * (int64_t)sizeof *set->bits;
+}
+
+#endif
