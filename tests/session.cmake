@@ -137,6 +137,14 @@ foreach(name order order_cells order_normals order_faults order_finer order_erro
   insitu_add_mpi_test(session_${name} test_session_${name} 2 WHOLE 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()
 
+if(INSITU_VTK) # reads a real grid
+  insitu_session_program(test_session_order_pictures)
+  target_sources(test_session_order_pictures PRIVATE test_mesh_order.c)
+  target_link_libraries(test_session_order_pictures PRIVATE test_data_cells)
+  insitu_add_mpi_test(session_order_pictures test_session_order_pictures 2 WHOLE 1 3 7 TIMEOUT 120
+    ARGS ${CMAKE_CURRENT_BINARY_DIR})
+endif()
+
 # Faces by owner and neighbour.
 foreach(name owner owner_faults patches patch_faults)
   insitu_session_program(test_session_${name})

@@ -190,9 +190,13 @@ static const char every_key[] =
     "schedule: radix\n";
 
 /* Keys that exclude others of the file above. */
-static const char excluding_keys[] = "surface_error: 0.25\n"
+static const char excluding_keys[] = "surface_error: 0.5\n"
                                      "images:\n"
                                      "- {name: a, layers: [volume: {field: p}], outputs: [{path: a.png}]}\n";
+
+static const char mirrored_keys[] = "meshes: {plate: {mirror: x}}\n"
+                                    "images:\n"
+                                    "- {name: a, layers: [volume: {field: p}], outputs: [{path: a.png}]}\n";
 
 static const char fewest_keys[] = "images:\n"
                                   "- name: a\n"
@@ -234,7 +238,7 @@ static void scene_image_keys_are_read(void **state)
     assert_int_equal(s.threads, 3);
     assert_int_equal(s.tree, SCENE_TREE_PARTIAL);
     assert_int_equal(s.writing, SCENE_WRITE_IN_STEP);
-    assert_true(s.finer_pieces == 1 && s.surface_error == 0 && s.finer_memory == 200.5);
+    assert_true(s.finer_pieces == 1 && s.finer_memory == 200.5);
     assert_int_equal(s.schedule, SCENE_SCHEDULE_RADIX);
     assert_int_equal(s.image_count, 3 + 4 * 2 * 3 * 2 + 2);
     const scene_image *image = &s.images[0];
@@ -397,7 +401,7 @@ static void scene_image_defaults_hold(void **state)
     assert_int_equal(s.threads, 0);
     assert_int_equal(s.tree, SCENE_TREE_AUTO);
     assert_int_equal(s.writing, SCENE_WRITE_BEHIND);
-    assert_true(s.finer_pieces == 1 && s.surface_error == 0 && s.finer_memory == 4096);
+    assert_true(s.finer_pieces == 0 && s.surface_error == 0.25 && !s.is_surface_error_given && s.finer_memory == 4096);
     assert_true(image->width == 1280 && image->height == 720 && image->cycle_interval == 1);
     check_colour(image->background, linear(0.08), linear(0.09), linear(0.11));
     assert_true(image->background[3] == 1);
@@ -1377,7 +1381,10 @@ static void keys_that_exclude_others_are_read(void **state)
     (void)state;
     scene s;
     parse_good(excluding_keys, &s);
-    assert_true(s.finer_pieces == 0 && s.surface_error == 0.25 && s.finer_memory == 4096);
+    assert_true(s.finer_pieces == 0 && s.surface_error == 0.5 && s.is_surface_error_given && s.finer_memory == 4096);
+    scene_free(&s);
+    parse_good(mirrored_keys, &s); /* warps and mirrors need pieces between nodes */
+    assert_true(s.finer_pieces == 1 && !s.is_surface_error_given);
     scene_free(&s);
 }
 

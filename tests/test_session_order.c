@@ -22,10 +22,13 @@ enum { WIDTH = 96, HEIGHT = 72, PIXELS = WIDTH * HEIGHT };
     "  - name: " name "\n    size: [96, 72]\n    background: [0, 0, 0, 0]\n" CAMERA "    layers:\n      - " layer      \
     "\n    outputs: [{path: " name ".exr}]\n"
 
+/* One piece between two nodes. */
+#define BETWEEN_NODES "finer_pieces: 1\n"
+
 static const char plane_scene[] = "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.1]}")
     IMAGE("b", "slice: {field: f, planes: [{normal: [0.3, 0.2, 1], point: [0, 0, 0.1]}]}")
         IMAGE("c", "surface: {colour_by: {field: f, map: grey, range: [-3, 3]}}");
-static const char sphere_scene[] = "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.5]}");
+static const char sphere_scene[] = BETWEEN_NODES "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.5]}");
 #define ALL(normals)                                                                                                   \
     "images:\n" IMAGE("a", "isosurface: {field: f, values: [0.1, 0.4], opacity: 0.6, normals: " normals "}")           \
         IMAGE("b", "slice: {field: f, planes: [{normal: [1, 2, 3]}]}")                                                 \
@@ -33,7 +36,7 @@ static const char sphere_scene[] = "images:\n" IMAGE("a", "isosurface: {field: f
                 IMAGE("d", "volume: {field: f}")
 static const char all_scene[] = ALL("gradient");
 /* Normals by which cells of higher order are drawn as the linear ones between their nodes. */
-static const char linear_scene[] = ALL("differences");
+static const char linear_scene[] = BETWEEN_NODES ALL("differences");
 static const char cell_scene[] =
     "images:\n" IMAGE("a", "surface: {threshold: {field: c, from: 0.5}, colour_by: {field: c}}")
         IMAGE("b", "volume: {field: c}") IMAGE("c", "isosurface: {field: f, values: [0.1]}");

@@ -10,10 +10,10 @@
 
 enum { SIDE = 240, PIXELS = SIDE * SIDE };
 
-/* A pixel is 1/100 wide; looked at along z from z = 5. */
+/* A pixel is 1/100 wide; looked at along z from z = 5. Cells have one piece between two nodes. */
 #define PICTURE(layer, more)                                                                                           \
-    "images:\n  - name: a\n    size: [240, 240]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, 5], "     \
-    "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2.4}\n"                                        \
+    "finer_pieces: 1\nimages:\n  - name: a\n    size: [240, 240]\n    background: [0, 0, 0, 0]\n"                     \
+    "    camera: {position: [0, 0, 5], focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2.4}\n"                                        \
     "    layers:\n      - " layer "\n    outputs: [{path: a.exr" more "}]\n"
 #define IMAGE(layer) PICTURE(layer, "")
 #define NUMBERED(layer) PICTURE(layer, ", data: true")

@@ -118,6 +118,10 @@ add_test(NAME manual_page COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/manual_page.sh $<T
   ${PROJECT_SOURCE_DIR}/docs/insitu-render.1)
 set_tests_properties(manual_page PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
 
+# Real grids with all nodes of their cells.
+add_library(test_data_cells STATIC test_data_cells.cpp)
+target_link_libraries(test_data_cells PRIVATE insitu_quick_flags VTK::IOXML)
+
 # Every scene of the gallery is drawn, where its grids are to be had.
 add_test(NAME gallery COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/gallery.sh $<TARGET_FILE:insitu-render>
   ${PROJECT_SOURCE_DIR}/docs/gallery ${CMAKE_CURRENT_BINARY_DIR}/gallery)

@@ -65,7 +65,8 @@ static void reload_scene(insitu_session *s, session_changes *changes)
         session_drop_derived(s->meshes.items[i]);
     }
     const scene *now = &s->scene_file.scene;
-    const bool are_same_pieces = now->finer_pieces == old.finer_pieces && now->finer_memory == old.finer_memory;
+    const bool are_same_pieces = now->finer_pieces == old.finer_pieces && now->finer_memory == old.finer_memory &&
+                                 now->is_surface_error_given == old.is_surface_error_given;
     /* statistics need all cells to be refined (views/session_wishes.c) */
     if (are_same_pieces && now->statistics_count == old.statistics_count) return;
     session_end_finer(&s->meshes);
@@ -166,7 +167,15 @@ static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed
     return status;
 }
 
-/* Reads cells of higher order as finer ones, if the scene says so. Which cells are refined follows from the images that
+/* Returns whether some mesh has cells of higher order on any rank. */
+static bool has_higher_order(const session_catalogue *catalogue)
+{
+    bool is_any = false;
+    for (int m = 0; m < catalogue->mesh_count; m++) is_any = is_any || catalogue->meshes[m].has_higher_order;
+    return is_any;
+}
+
+/* Reads cells of higher order as finer ones, unless the scene says otherwise. Which cells are refined follows from the images that
  * are due, and so does the number of pieces by surface_error. *are_cells_changed is set if cells are split otherwise on
  * any rank. Collective. */
 static insitu_status refine_cells(insitu_session *s, const session_moment *moment, bool *are_cells_changed,
@@ -175,7 +184,8 @@ static insitu_status refine_cells(insitu_session *s, const session_moment *momen
     const scene *scene = &s->scene_file.scene;
     const session_pieces_basis basis = {scene, moment, &s->catalogue, &s->team, &s->meshes};
     bool are_changed = false;
-    if (scene->finer_pieces == 1 || !(*are_cells_changed || session_count_due(scene, moment) > 0)) return INSITU_OK;
+    if (scene->finer_pieces == 1 || !has_higher_order(&s->catalogue)) return INSITU_OK;
+    if (!*are_cells_changed && session_count_due(scene, moment) == 0) return INSITU_OK;
     session_finer_choice *choices = base_calloc((size_t)s->catalogue.mesh_count + 1, sizeof *choices);
     if (!choices) session_fail_for_memory(error, s->catalogue.mesh_count * (int64_t)sizeof *choices, "finer pieces");
     insitu_status status = session_agree(s->team.comm, error);
@@ -205,10 +215,10 @@ static insitu_status update_meshes(insitu_session *s, const session_changes *cha
     if (are_cells_changed) session_forget_homes(&s->catalogue);
     if (scene->finer_pieces != 1) session_drop_ids(&s->meshes);
     insitu_status status = list_meshes(s, of_names, changes->are_names_shared && !refused->status, error);
-    if (!status) status = refine_cells(s, moment, &are_cells_changed, error);
-    if (are_cells_changed && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
     if ((are_cells_changed || of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
+    if (!status) status = refine_cells(s, moment, &are_cells_changed, error);
+    if (are_cells_changed && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
     if (!status) session_check_warps(scene, &s->catalogue, &s->report);
     return status ? status : session_check_mirrors(scene, &s->meshes, &s->catalogue, team, &s->report, error);
 }

@@ -240,7 +240,7 @@ static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const se
 {
     const session_finer *old = &mesh->finer;
     session_finer made = {.is_counted = true,
-                          .parts = choice->parts > 1 ? choice->parts : 0,
+                          .parts = choice->parts > 1 || choice->is_completed ? choice->parts : 0,
                           .is_lobatto = choice->is_lobatto,
                           .sizes = old->parts ? old->sizes : session_sizes_of(mesh),
                           .given_counts = mesh->given_counts};
@@ -274,7 +274,7 @@ void session_drop_ids(const session_meshes *meshes)
 {
     for (int i = 0; i < meshes->count; i++) {
         insitu_mesh *given = &meshes->items[i]->given;
-        if (given->vertex_ids.data && session_has_higher_order(given)) given->vertex_ids = (insitu_array){0};
+        if (meshes->items[i]->topology.is_split) given->vertex_ids = (insitu_array){0};
     }
 }
 
@@ -432,10 +432,11 @@ insitu_status session_make_finer(session_meshes *meshes, const session_catalogue
     int mine = 0, any = 0;
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_parts of = session_find_parts(meshes, catalogue->meshes[m].name);
-        for (int i = 0; i < of.count && !error->status; i++)
+        for (int i = 0; i < of.count && !error->status; i++) {
+            session_cell_marks *marks = choices[m].parts > 1 ? session_marks_of(&choices[m], i) : NULL;
             if (of.items[i]->is_given && of.items[i]->topology.is_split)
-                mine |= make_finer_mesh(meshes, of.items[i], &choices[m], session_marks_of(&choices[m], i),
-                                        team->threads, error);
+                mine |= make_finer_mesh(meshes, of.items[i], &choices[m], marks, team->threads, error);
+        }
     }
     insitu_status status = session_agree(team->comm, error);
     if (!status)

@@ -34,6 +34,7 @@ typedef struct session_finer_choice {
     int64_t pyramid_count, serendipity_count, shell_count;
     bool is_lobatto; /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
     int parts; /* number of parts of each edge between two nodes, 1 .. FINER_MOST_PARTS; it is chosen by the caller */
+    bool is_completed; /* set by the caller if serendipity cells get all nodes of their order, for 1 part */
     int mark_count;            /* number of parts of the mesh on this rank; 0: all cells are refined */
     session_cell_marks *marks; /* for each of these parts */
 } session_finer_choice;
@@ -64,7 +65,8 @@ static inline session_cell_marks *session_marks_of(const session_finer_choice *c
 void session_count_finer_bytes(const session_mesh *mesh, const unsigned char *marks,
                                session_finer_bytes out[FINER_MOST_PARTS + 1]);
 
-/* Makes finer lattices in the marked cells with the chosen numbers of parts, or none for 1 part. Other cells are then
+/* Makes finer lattices in the marked cells with the chosen numbers of parts; for 1 part only if cells are completed, in
+ * all cells. Other cells are then
  * split between their own nodes, of which serendipity cells get all. Sets of pieces are moved to the meshes.
  * *are_changed is set if the cells of some mesh change on any rank; these meshes must be checked again. Collective; all
  * ranks return the same status. */

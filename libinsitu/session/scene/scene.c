@@ -175,15 +175,14 @@ static insitu_status convert_images(const scene_document *d, const scene_file *i
 
 static insitu_status convert_pieces(const scene_document *d, const scene_file *in, scene *out)
 {
-    out->finer_pieces = in->surface_error ? 0 : in->finer_pieces ? *in->finer_pieces : 1;
-    out->surface_error = in->surface_error ? *in->surface_error : 0;
+    /* vertices are warped and mirrored before finer lattices are made */
+    const int otherwise = in->surface_error || in->meshes_count == 0 ? 0 : 1;
+    out->finer_pieces = in->finer_pieces ? *in->finer_pieces : otherwise;
+    out->surface_error = in->surface_error ? *in->surface_error : SCENE_SURFACE_ERROR;
+    out->is_surface_error_given = in->surface_error != NULL;
     out->finer_memory = in->finer_memory ? *in->finer_memory : SCENE_FINER_MEMORY;
     if (in->finer_pieces && in->surface_error)
         return scene_fail_at_key(d, "surface_error", "", "given beside finer_pieces, expected one of the two");
-    if (in->finer_memory && !in->finer_pieces && !in->surface_error)
-        return scene_fail_at_key(d, "finer_memory", "",
-                                 "given without finer_pieces or surface_error, expected it "
-                                 "beside one of them");
     return INSITU_OK;
 }
 

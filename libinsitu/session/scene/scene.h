@@ -579,6 +579,7 @@ typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_wri
 
 /* Default of scene.finer_memory, in MiB. */
 enum { SCENE_FINER_MEMORY = 4096 };
+#define SCENE_SURFACE_ERROR 0.25
 
 /* Maximum number of images of a scene file (session_events.h has one bit for each), and of pictures that they make in a
  * step. */
@@ -616,6 +617,7 @@ typedef struct scene {
     /* number of pieces along an edge between two nodes of a cell of higher order, 1 .. 8; 0: surface_error decides */
     int finer_pieces;
     double surface_error; /* bound of the error of these pieces in pixels, > 0; used if finer_pieces is 0 */
+    bool is_surface_error_given; /* set if the scene file has the bound; otherwise it is the default */
     double finer_memory;  /* memory that finer pieces may take on all ranks together, in MiB, > 0 */
     scene_tree tree;
     scene_schedule schedule;

@@ -487,18 +487,20 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
               "`insitu_destroy`, which waits for all pictures.",                                                       \
       .default_text = "`background`")                                                                                  \
     X(CYAML_FIELD_INT_PTR("finer_pieces", OPTIONAL, scene_file, finer_pieces),                                         \
-      .help = "Cells of higher order are drawn as linear pieces. This is the number of pieces along an edge between "  \
-              "two neighbouring nodes. With 1, the corners of pieces are the cells' own nodes. With more, the cells' " \
-              "polynomials are also evaluated between the nodes, and surfaces come closer to the polynomial's: with "  \
-              "twice as many pieces, their error is divided by 4. Memory and time grow with the number of pieces. "    \
-              "See [Cells of higher order](high_order.md#finer-pieces). Linear cells are not affected.",               \
-      .default_text = "`1`", .low = 1, .high = 8)                                                                      \
+      .help = "The number of linear pieces along an edge between two neighbouring nodes of a cell of higher "          \
+              "order, in place of one that `surface_error` chooses. With 1, the corners of pieces are the cells' "     \
+              "own nodes. With more, the cells' polynomials are also evaluated between the nodes, and surfaces "       \
+              "come closer to the polynomial's: with twice as many pieces, their error is divided by 4. Memory "       \
+              "and time grow with the number of pieces. See [Cells of higher order](high_order.md#finer-pieces). "     \
+              "Linear cells are not affected.",                                                                        \
+      .default_text = "by `surface_error`; `1` if `meshes` is given", .low = 1, .high = 8)                             \
     X(CYAML_FIELD_FLOAT_PTR("surface_error", OPTIONAL, scene_file, surface_error),                                     \
-      .help = "The number of pieces is chosen instead of given by `finer_pieces`, from 1 to 8 for each mesh and "      \
-              "step: isosurfaces, and positions in other layers, are then at most so many pixels away from those of "  \
-              "the cells' polynomials. 0.25 can hardly be seen. The report tells the numbers and the bounds. See "     \
-              "[Cells of higher order](high_order.md#an-error-in-pixels).",                                            \
-      .default_text = "by `finer_pieces`", .low = 0, .is_low_excluded = true, .high = 1000)                            \
+      .help = "Cells of higher order are drawn as linear pieces, whose number is chosen, from 1 to 8 for each "        \
+              "mesh and step: isosurfaces, and positions in other layers, are at most so many pixels away from "       \
+              "those of the cells' polynomials. The report tells the numbers and the bounds. Meshes all of whose "     \
+              "cells are refined have at most 2 pieces, unless the scene gives this key. See [Cells of higher "        \
+              "order](high_order.md#an-error-in-pixels).",                                                             \
+      .default_text = "`0.25`", .low = 0, .is_low_excluded = true, .high = 1000)                                       \
     X(CYAML_FIELD_FLOAT_PTR("finer_memory", OPTIONAL, scene_file, finer_memory),                                       \
       .help = "Memory in MiB that finer pieces, their nodes and the values there may take on all ranks together. If "  \
               "they would take more, there are fewer pieces, and a warning tells the numbers.",                        \

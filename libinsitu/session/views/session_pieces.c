@@ -28,6 +28,7 @@ static const double bytes_per_mib = 1048576;
 
 /* The errors of one mesh, and what follows from them. */
 typedef struct piece_error {
+    bool needs_all; /* set if all cells are refined; the same on every rank */
     bool is_shown; /* set if some due image shows the mesh, or a fixed number is that of all cells; the same on every
                       rank */
     session_deviation all;                           /* counts are those of isosurfaces */
@@ -134,7 +135,8 @@ static void use_mesh(const session_pieces_basis *basis, const session_wish_views
         w->marks_only = scene->finer_pieces > 0;
         w->out = out;
         session_list_wishes(scene, views, &basis->catalogue->meshes[mesh], choice->shell_count > 0, &w->wishes,
-                            w->marks_only ? NULL : report);
+                            scene->is_surface_error_given ? report : NULL);
+        out->needs_all = w->wishes.needs_all;
         out->is_shown = w->wishes.is_shown || (w->marks_only && w->wishes.needs_all);
         if (w->wishes.is_complete) use_parts(w, basis->catalogue->meshes[mesh].name, error);
     }
@@ -212,13 +214,15 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
 
 /* ---- numbers of pieces ------------------------------------------------------------------------------------------- */
 
-/* Returns the smallest number of pieces with which the error is allowed. Serendipity cells have more than one, since
- * without finer lattices they are split in another way, of which no bound is known. */
-static int find_pieces(const session_finer_choice *choice, const piece_error *of, double allowed)
+/* Returns the smallest number of pieces with which the error is allowed. In meshes all of whose cells are refined,
+ * memory and time grow with its cube, so that it must be asked for if it is more than 2. */
+static int find_pieces(const scene *scene, const session_finer_choice *choice, const piece_error *of)
 {
-    const int most = session_most_parts(choice);
-    int parts = choice->serendipity_count && of->is_shown ? 2 : 1;
-    while (parts < most && of->all.error > allowed * parts * parts) parts++;
+    enum { MOST_UNASKED = 2 };
+    const bool is_limited = of->needs_all && !scene->is_surface_error_given;
+    const int supported = session_most_parts(choice), most = is_limited ? MOST_UNASKED : FINER_MOST_PARTS;
+    int parts = 1;
+    while (parts < most && parts < supported && of->all.error > scene->surface_error * parts * parts) parts++;
     return parts;
 }
 
@@ -236,10 +240,11 @@ static void choose_fixed(const char *mesh, const scene *scene, const piece_error
 static void choose_by_error(const char *mesh, const scene *scene, const piece_error *of, session_finer_choice *choice,
                             session_report *report)
 {
-    choice->parts = choice->pyramid_count || choice->order < 2 ? 1 : find_pieces(choice, of, scene->surface_error);
+    choice->parts = choice->pyramid_count || choice->order < 2 ? 1 : find_pieces(scene, choice, of);
     const double met = of->all.error / (choice->parts * choice->parts);
     session_warn(
-        report, &(session_warning){WARNING_FINER, NULL, mesh, 1}, met > scene->surface_error,
+        report, &(session_warning){WARNING_FINER, NULL, mesh, 1},
+        scene->is_surface_error_given && met > scene->surface_error,
         "mesh \"%s\": %d pieces between two nodes are the most that are supported: they are within %.2g pixels "
         "of the cells' polynomials, and surface_error is %g",
         mesh, choice->parts, met, scene->surface_error);
@@ -248,7 +253,8 @@ static void choose_by_error(const char *mesh, const scene *scene, const piece_er
 static void warn_of_pyramids(const char *mesh, const scene *scene, const session_finer_choice *choice,
                              session_report *report)
 {
-    session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 0}, choice->pyramid_count > 0,
+    const bool is_asked = scene->finer_pieces || scene->is_surface_error_given;
+    session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 0}, is_asked && choice->pyramid_count > 0,
                  "mesh \"%s\": %lld of its cells are pyramids, whose polynomials are not known: %s has no effect on "
                  "it, and its cells are split at their own nodes",
                  mesh, (long long)choice->pyramid_count, scene->finer_pieces ? "finer_pieces" : "surface_error");
@@ -337,7 +343,7 @@ static void report_pieces(const char *mesh, const session_finer_choice *choice, 
                           session_report *report)
 {
     char bound[100] = "without a bound", cells[160] = "";
-    if ((choice->parts > 1 || !choice->serendipity_count) && choice->order <= BOUND_MOST_ORDER)
+    if (choice->order <= BOUND_MOST_ORDER)
         snprintf(bound, sizeof bound, "within %.3g pixels of the polynomials",
                  of->all.error / (choice->parts * choice->parts));
     if (of->all.cell_count)
@@ -364,8 +370,11 @@ static void choose_all(const session_pieces_basis *basis, piece_error *errors, p
         errors[m].wanted = choices[m].parts;
     }
     limit_memory(scene, catalogue, errors, steps, choices, report);
-    for (int m = 0; m < catalogue->mesh_count && !scene->finer_pieces; m++)
+    for (int m = 0; m < catalogue->mesh_count && !scene->finer_pieces; m++) {
+        /* the bound does not hold for serendipity cells without the nodes that they lack */
+        choices[m].is_completed = errors[m].is_shown && choices[m].parts == 1 && choices[m].serendipity_count > 0;
         if (errors[m].is_shown) report_pieces(catalogue->meshes[m].name, &choices[m], &errors[m], report);
+    }
 }
 
 insitu_status session_choose_pieces(const session_pieces_basis *basis, session_finer_choice *choices,
