@@ -413,6 +413,46 @@ static void fields_without_a_bound_are_told(void **state)
     order_mesh_free(&mesh);
 }
 
+#define WITH_SURFACE SMALL(ISO("0.1")) IMAGE("b", "[96, 72]", FRONT, "surface: {colour_by: {field: f}}")
+
+/* Without either key the error is 0.25 pixels, and at most 2 pieces are made if all cells are refined. Nothing is
+ * warned of that was not asked for. */
+static void defaults_are_within_a_quarter_of_a_pixel(void **state)
+{
+    (void)state;
+    order_mesh mesh;
+    order_mesh_create(&hex_27, 2, 0.05, order_wavy, own_rank, rank_count, &mesh);
+    told of = draw(MPI_COMM_WORLD, "images:\n" SMALL(ISO("0.1")), &mesh);
+    told asked = draw(MPI_COMM_WORLD, WITHIN("0.25") SMALL(ISO("0.1")), &mesh);
+    everywhere(of.count > 2 && of.bound <= 0.25 && strcmp(of.pieces, asked.pieces) == 0);
+    everywhere(own_rank || same_drawn(&of.pictures, &asked.pictures));
+    free_drawn(&of.pictures);
+    free_drawn(&asked.pictures);
+    const told all = tell("images:\n" WITH_SURFACE, &mesh), all_asked = tell(WITHIN("0.25") WITH_SURFACE, &mesh);
+    everywhere(all.count == 2 && all.bound > 0.25 && all_asked.count == asked.count);
+    const told derived = tell("fields: {g: 2 * f}\nimages:\n" SMALL("isosurface: {field: g, values: [0.1]}"), &mesh);
+    everywhere(!all.warnings[0] && !derived.warnings[0]);
+    order_mesh_free(&mesh);
+}
+
+/* Straight hexes of 20 nodes are drawn as those of 27 nodes that have the same polynomials, with one piece between two
+ * nodes if no isosurface needs more. The field has no terms that 20 nodes do not determine. */
+static void serendipity_cells_are_completed(void **state)
+{
+    (void)state;
+    const char *scene = "images:\n" SMALL("surface: {colour_by: {field: f}}");
+    order_mesh few, many;
+    order_mesh_create(&hex_20, 2, 0, order_sphere, own_rank, rank_count, &few);
+    order_mesh_create(&hex_27, 2, 0, order_sphere, own_rank, rank_count, &many);
+    told of = draw(MPI_COMM_WORLD, scene, &few), like = draw(MPI_COMM_WORLD, scene, &many);
+    everywhere(of.count == 1 && of.bound == 0 && strcmp(of.pieces, like.pieces) == 0);
+    everywhere(own_rank || colour_difference(&of.pictures.pictures[0], &like.pictures.pictures[0]) <= 1e-6);
+    free_drawn(&of.pictures);
+    free_drawn(&like.pictures);
+    order_mesh_free(&few);
+    order_mesh_free(&many);
+}
+
 static void linear_meshes_are_not_affected(void **state)
 {
     (void)state;
@@ -550,6 +590,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(surfaces_between_nodes_are_found),
         cmocka_unit_test(other_descriptions_have_the_same_pieces),
         cmocka_unit_test(fields_without_a_bound_are_told),
+        cmocka_unit_test(defaults_are_within_a_quarter_of_a_pixel),
+        cmocka_unit_test(serendipity_cells_are_completed),
         cmocka_unit_test(linear_meshes_are_not_affected),
         cmocka_unit_test(the_number_is_in_the_database),
         cmocka_unit_test(changes_are_drawn),
