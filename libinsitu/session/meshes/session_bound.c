@@ -609,6 +609,7 @@ session_cell_bound session_bound_cell(const session_bound *of, const double *tup
     if (!out.is_crossed) return out;
     bound_differences(&job);
     out.position_error = job.position_bound / (p * p);
+    out.value_error = job.value_bound / (p * p);
     if (isovalues) bound_isosurface(&job, &out);
     return out;
 }

@@ -80,6 +80,7 @@ typedef struct session_cell_bound {
     double node_distance;  /* distance of two neighbouring nodes: the root mean square of that on the cell's edges */
     double position_error; /* distance of positions */
     double surface_error;  /* distance of isosurfaces; INFINITY if the gradient may vanish near one */
+    double value_error;    /* difference of the field, in its unit */
 } session_cell_bound;
 
 /* Computes the bounds of a cell. tuples: x, y, z and the field's value at its nodes, in the order of its row.

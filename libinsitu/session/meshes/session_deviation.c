@@ -95,6 +95,7 @@ static bool may_cross(const deviation_work *w, const session_bound *of, int64_t 
     double *values = room + w->field_size;
     if (!wish->values && !wish->plane) return true;
     session_read_wish(&w->rows, wish, cell, count, room, values);
+    if (wish->is_of_values) return true;
     if (!session_may_cross(of, values, &wish->isovalues, values + 5 * count)) return false;
     if (wish->marks) wish->marks[cell] = 1;
     return true;
@@ -112,7 +113,8 @@ static session_cell_bound bound_cell(const deviation_work *w, const session_boun
         grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + n), tuples + 4 * n);
         tuples[4 * n + 3] = has_values ? values[n] : 0;
     }
-    return session_bound_cell(of, tuples, has_values ? &w->wish->isovalues : NULL, level, tuples + 4 * count);
+    const bool has_isovalues = has_values && !w->wish->is_of_values;
+    return session_bound_cell(of, tuples, has_isovalues ? &w->wish->isovalues : NULL, level, tuples + 4 * count);
 }
 
 /* Returns the largest error that counts: half the distance between two nodes. With linear pieces between nodes, half a
@@ -134,6 +136,19 @@ static double find_surface_error(const deviation_work *w, const session_bound *o
     return least;
 }
 
+/* Adds the range of a cell's values, and their error if some view shows the cell. */
+static void measure_values(const deviation_work *w, int count, const session_cell_bound *bound, const double *values,
+                           session_deviation *out)
+{
+    const session_pixels *pixels = &w->wish->pixels;
+    for (int n = 0; n < count; n++) {
+        out->low = fmin(out->low, values[n]);
+        out->high = fmax(out->high, values[n]);
+    }
+    if (pixels->size(pixels->of, bound->centre, bound->radius) < INFINITY)
+        out->value_error = fmax(out->value_error, bound->value_error);
+}
+
 /* A cell that does not increase the largest error needs no better bound, so that the result does not depend on the
  * order of cells. */
 static void measure_cell(const deviation_work *w, int64_t cell, double *room, session_deviation *out)
@@ -143,6 +158,10 @@ static void measure_cell(const deviation_work *w, int64_t cell, double *room, se
     if (!of->level_count || grid_is_ghost(&w->rows.cells, cell) || !may_cross(w, of, cell, room)) return;
     if (w->wish->marks_only || of->nodes.of.order < 2) return;
     const session_cell_bound bound = bound_cell(w, of, cell, 0, room);
+    if (w->wish->is_of_values) {
+        if (bound.is_crossed) measure_values(w, of->nodes.of.count, &bound, room + w->field_size, out);
+        return;
+    }
     const double size = bound.is_crossed ? pixels->size(pixels->of, bound.centre, bound.radius) : INFINITY;
     if (size == INFINITY) return;
     double error = bound.position_error;
@@ -160,25 +179,31 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
     const int64_t cells = w->rows.cells.cell_count;
     const size_t room_size = find_room(w);
     bool is_lacking = false;
-    double error = out->error;
+    double error = out->error, value_error = out->value_error, low = out->low, high = out->high;
     int64_t count = 0, unbounded = 0;
 #pragma omp parallel num_threads(session_region_threads(threads, cells)) reduction(|| : is_lacking)                    \
-    reduction(max : error) reduction(+ : count, unbounded)
+    reduction(max : error, value_error, high) reduction(min : low) reduction(+ : count, unbounded)
     {
         region_enter();
         double *room = base_alloc(room_size * sizeof *room);
-        session_deviation own = {.error = error};
+        session_deviation own = {.error = error, .low = low, .high = high};
         is_lacking = !room;
 #pragma omp for schedule(static)
         for (int64_t cell = 0; cell < cells; cell++)
             if (room) measure_cell(w, cell, room, &own);
         error = own.error;
+        value_error = own.value_error;
+        low = own.low;
+        high = own.high;
         count = own.cell_count;
         unbounded = own.unbounded_count;
         base_free(room);
         region_leave();
     }
     out->error = error;
+    out->value_error = value_error;
+    out->low = low;
+    out->high = high;
     out->cell_count += count;
     out->unbounded_count += unbounded;
     return !is_lacking;

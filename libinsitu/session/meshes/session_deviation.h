@@ -23,6 +23,7 @@ typedef struct session_deviation_wish {
     session_isovalues isovalues; /* values of the field; or 0, the distance from the plane */
     const session_plane *plane;
     session_pixels pixels;
+    bool is_of_values;    /* set if the error of the field's values is wanted, in place of that of isosurfaces */
     bool is_lobatto;      /* as in session_make_interpolation() */
     bool marks_only;      /* set if only marks are wanted */
     unsigned char *marks; /* one byte per cell, which is set if the cell may be crossed; NULL: not wanted */
@@ -44,6 +45,8 @@ typedef struct session_deviation {
     /* number of cells that an isosurface may cross, and of those that count with less than their bound, because the
      * distance of their nodes does not resolve the isosurface */
     int64_t cell_count, unbounded_count;
+    /* if is_of_values: largest error of values if cells have one piece between two nodes, and their range at nodes */
+    double value_error, low, high;
 } session_deviation;
 
 /* Measures the caller's cells of a mesh with cells of higher order, ghosts excepted, adds the result to *out, and sets

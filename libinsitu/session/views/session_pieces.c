@@ -26,15 +26,25 @@ static const double bytes_per_mib = 1048576;
 
 /* ---- errors ------------------------------------------------------------------------------------------------------ */
 
+enum { MOST_VOLUMES = 8 };
+
+/* What is measured of a volume of a mesh: the error of the values, and their range. */
+typedef struct volume_error {
+    double allowed, width; /* those of the wish; the same on every rank */
+    double error, minus_low, high;
+} volume_error;
+
 /* The errors of one mesh, and what follows from them. */
 typedef struct piece_error {
     bool needs_all; /* set if all cells are refined; the same on every rank */
-    bool is_shown; /* set if some due image shows the mesh, or a fixed number is that of all cells; the same on every
-                      rank */
+    bool is_shown;  /* set if some due image shows the mesh, or a fixed number is that of all cells; the same on every
+                       rank */
     session_deviation all;                           /* counts are those of isosurfaces */
     session_finer_bytes bytes[FINER_MOST_PARTS + 1]; /* that finer lattices take on all ranks */
-    int components; /* number of components of the fields that images of the scene show */
-    int wanted;     /* number of pieces without a limit of memory */
+    volume_error volumes[MOST_VOLUMES];
+    int volume_count; /* number of volumes, some of which may have no place in the list; the same on every rank */
+    int components;   /* number of components of the fields that images of the scene show */
+    int wanted;       /* number of pieces without a limit of memory */
 } piece_error;
 
 /* The work on one mesh. */
@@ -52,12 +62,25 @@ typedef struct part_work {
     const session_mesh *mesh;
     session_deviation_wish wish;
     session_piece_set *pieces; /* NULL: the wish is measured */
+    volume_error *volume;      /* of a volume */
 } part_work;
+
+static insitu_status measure_volume(part_work *work, base_error *error)
+{
+    session_deviation own = {.low = INFINITY, .high = -INFINITY};
+    volume_error *out = work->volume;
+    session_measure_deviation(work->mesh, &work->wish, work->of->basis->team->threads, &own, error);
+    out->error = fmax(out->error, own.value_error);
+    out->minus_low = fmax(out->minus_low, -own.low);
+    out->high = fmax(out->high, own.high);
+    return error->status;
+}
 
 static insitu_status use_wish(part_work *work, base_error *error)
 {
     const mesh_work *w = work->of;
     const int threads = w->basis->team->threads;
+    if (work->wish.is_of_values) return measure_volume(work, error);
     if (!work->pieces) return session_measure_deviation(work->mesh, &work->wish, threads, &w->out->all, error);
     return session_add_crossed_pieces(work->mesh, &work->wish, w->choice->parts, threads, work->pieces, error);
 }
@@ -80,6 +103,7 @@ static void use_part(part_work *work, const session_wish *wish, base_error *erro
     work->wish.is_lobatto = w->choice->is_lobatto;
     work->wish.marks_only = w->marks_only;
     work->wish.values = NULL;
+    work->wish.is_of_values = wish->is_volume;
     /* A slice at the border of the data may be moved by as much (session_slice_distance()). */
     if (wish->has_plane)
         work->wish.isovalues =
@@ -93,8 +117,13 @@ static void measure_part(const mesh_work *w, const session_mesh *mesh, session_c
 {
     unsigned char *cells = marks ? marks->cells : NULL;
     part_work work = {.of = w, .mesh = mesh, .wish = {.marks = cells}};
-    for (int n = 0; n < w->wishes.count && !error->status; n++)
-        if (w->wishes.items[n].is_shown && (!w->marks_only || marks)) use_part(&work, &w->wishes.items[n], error);
+    for (int n = 0, volume = 0; n < w->wishes.count && !error->status; n++) {
+        const session_wish *wish = &w->wishes.items[n];
+        work.volume = volume < MOST_VOLUMES ? &w->out->volumes[volume] : NULL;
+        volume += wish->is_volume;
+        if (wish->is_volume && (w->marks_only || volume > MOST_VOLUMES)) continue;
+        if (wish->is_shown && (!w->marks_only || marks)) use_part(&work, wish, error);
+    }
     session_count_finer_bytes(mesh, cells, w->out->bytes);
 }
 
@@ -124,6 +153,17 @@ static void use_parts(const mesh_work *w, const char *name, base_error *error)
     }
 }
 
+static void list_volumes(const session_wishes *wishes, piece_error *out)
+{
+    out->volume_count = 0;
+    for (int n = 0; n < wishes->count; n++) {
+        const session_wish *wish = &wishes->items[n];
+        if (wish->is_volume && out->volume_count < MOST_VOLUMES)
+            out->volumes[out->volume_count] = (volume_error){wish->allowed, wish->width, 0, -INFINITY, -INFINITY};
+        out->volume_count += wish->is_volume;
+    }
+}
+
 static void use_mesh(const session_pieces_basis *basis, const session_wish_views *views, int mesh,
                      session_finer_choice *choice, piece_error *out, session_report *report, base_error *error)
 {
@@ -137,6 +177,7 @@ static void use_mesh(const session_pieces_basis *basis, const session_wish_views
         session_list_wishes(scene, views, &basis->catalogue->meshes[mesh], choice->shell_count > 0, &w->wishes,
                             scene->is_surface_error_given ? report : NULL);
         out->needs_all = w->wishes.needs_all;
+        list_volumes(&w->wishes, out);
         out->is_shown = w->wishes.is_shown || (w->marks_only && w->wishes.needs_all);
         if (w->wishes.is_complete) use_parts(w, basis->catalogue->meshes[mesh].name, error);
     }
@@ -145,14 +186,18 @@ static void use_mesh(const session_pieces_basis *basis, const session_wish_views
     base_free(w);
 }
 
-/* Calls the fill functions of fields that isosurfaces show. If one fails, the field is not measured, and the plan
- * returns the error. Local, but fill functions may communicate. */
+/* Calls the fill functions of fields that isosurfaces and volumes show. If one fails, the field is not measured, and
+ * the plan returns the error. Local, but fill functions may communicate. */
 static void fill_fields(const session_pieces_basis *basis, const session_wish_views *views)
 {
     base_error unheard = {.status = INSITU_OK};
-    for (int i = 0; i < views->count; i++)
-        for (int layer = 0; views->are_due[i] && layer < basis->scene->images[i].isosurface_count; layer++)
-            session_want_field(basis->meshes, &basis->scene->images[i].isosurfaces[layer].field);
+    for (int i = 0; i < views->count; i++) {
+        const scene_image *image = &basis->scene->images[i];
+        for (int layer = 0; views->are_due[i] && layer < image->isosurface_count; layer++)
+            session_want_field(basis->meshes, &image->isosurfaces[layer].field);
+        for (int layer = 0; views->are_due[i] && layer < image->volume_count; layer++)
+            session_want_field(basis->meshes, &image->volumes[layer].field);
+    }
     session_fill_fields(basis->meshes, basis->catalogue, false, &unheard);
     session_want_no_fields(basis->meshes);
 }
@@ -163,27 +208,48 @@ typedef struct piece_sums {
     session_finer_bytes bytes[FINER_MOST_PARTS + 1];
 } piece_sums;
 
+static void pack_largest(const piece_error *of, double *out)
+{
+    *out++ = of->all.error;
+    for (int i = 0; i < MOST_VOLUMES; i++, out += 3)
+        memcpy(out, (const double[]){of->volumes[i].error, of->volumes[i].minus_low, of->volumes[i].high},
+               3 * sizeof *out);
+}
+
+static void unpack_largest(const double *in, piece_error *out)
+{
+    out->all.error = *in++;
+    for (int i = 0; i < MOST_VOLUMES; i++, in += 3) {
+        out->volumes[i].error = in[0];
+        out->volumes[i].minus_low = in[1];
+        out->volumes[i].high = in[2];
+    }
+}
+
 static insitu_status reduce_errors(piece_error *errors, int count, MPI_Comm comm, base_error *error)
 {
     enum { WORDS = sizeof(piece_sums) / sizeof(int64_t) };
-    double *most = base_calloc((size_t)count + 1, sizeof *most);
+    enum { MOST_WORDS = 1 + 3 * MOST_VOLUMES };
+    double *most = base_calloc((size_t)count * MOST_WORDS + 1, sizeof *most);
     piece_sums *sums = base_calloc((size_t)count + 1, sizeof *sums);
     if (!most || !sums) session_fail_for_memory(error, count * (int64_t)sizeof *sums, "bounds of isosurfaces");
     insitu_status status = session_agree(comm, error);
     for (int m = 0; m < count && !status; m++) {
-        most[m] = errors[m].all.error;
+        pack_largest(&errors[m], most + m * MOST_WORDS);
         sums[m] =
             (piece_sums){.cell_count = errors[m].all.cell_count, .unbounded_count = errors[m].all.unbounded_count};
         memcpy(sums[m].bytes, errors[m].bytes, sizeof sums[m].bytes);
     }
     if (!status)
-        status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, most, count, MPI_DOUBLE, MPI_MAX, comm),
-                                   "MPI_Allreduce");
+        status = session_check_mpi(
+            error, MPI_Allreduce(MPI_IN_PLACE, most, MOST_WORDS * count, MPI_DOUBLE, MPI_MAX, comm), "MPI_Allreduce");
     if (!status)
         status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, WORDS * count, MPI_INT64_T, MPI_SUM, comm),
                                    "MPI_Allreduce");
     for (int m = 0; m < count && !status; m++) {
-        errors[m].all = (session_deviation){most[m], sums[m].cell_count, sums[m].unbounded_count};
+        unpack_largest(most + m * MOST_WORDS, &errors[m]);
+        errors[m].all.cell_count = sums[m].cell_count;
+        errors[m].all.unbounded_count = sums[m].unbounded_count;
         memcpy(errors[m].bytes, sums[m].bytes, sizeof sums[m].bytes);
     }
     base_free(most);
@@ -214,14 +280,28 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
 
 /* ---- numbers of pieces ------------------------------------------------------------------------------------------- */
 
+/* Returns the largest error of values in volumes if cells have one piece between two nodes: as a fraction of the width
+ * of the range, or as a multiple of what is allowed. */
+static double find_volume_error(const piece_error *of, bool is_multiple)
+{
+    double most = of->volume_count > MOST_VOLUMES ? INFINITY : 0;
+    for (int i = 0; i < of->volume_count && i < MOST_VOLUMES; i++) {
+        const volume_error *v = &of->volumes[i];
+        const double width = v->width > 0 ? v->width : v->high + v->minus_low;
+        if (v->error > 0) most = fmax(most, v->error / (is_multiple ? width * v->allowed : width));
+    }
+    return most;
+}
+
 /* Returns the smallest number of pieces with which the error is allowed. In meshes all of whose cells are refined,
- * memory and time grow with its cube, so that it must be asked for if it is more than 2. */
+ * memory and time grow with its cube, so that it must be asked for if it is more than 2; for volumes by its number,
+ * since few of their cells have the largest error. */
 static int find_pieces(const scene *scene, const session_finer_choice *choice, const piece_error *of)
 {
     enum { MOST_UNASKED = 2 };
     const bool is_limited = of->needs_all && !scene->is_surface_error_given;
     const int supported = session_most_parts(choice), most = is_limited ? MOST_UNASKED : FINER_MOST_PARTS;
-    int parts = 1;
+    int parts = supported > 1 && find_volume_error(of, true) > 1 ? MOST_UNASKED : 1;
     while (parts < most && parts < supported && of->all.error > scene->surface_error * parts * parts) parts++;
     return parts;
 }
@@ -342,15 +422,18 @@ static void limit_memory(const scene *scene, const session_catalogue *catalogue,
 static void report_pieces(const char *mesh, const session_finer_choice *choice, const piece_error *of,
                           session_report *report)
 {
-    char bound[100] = "without a bound", cells[160] = "";
+    char bound[100] = "without a bound", cells[160] = "", volumes[100] = "";
     if (choice->order <= BOUND_MOST_ORDER)
         snprintf(bound, sizeof bound, "within %.3g pixels of the polynomials",
                  of->all.error / (choice->parts * choice->parts));
     if (of->all.cell_count)
         snprintf(cells, sizeof cells, "; isosurfaces may cross %lld cells, of which %lld have no bound",
                  (long long)of->all.cell_count, (long long)of->all.unbounded_count);
-    session_text_add(&report->pieces, "mesh \"%s\": %d piece%s between two nodes: %s%s", mesh, choice->parts,
-                     choice->parts > 1 ? "s" : "", bound, cells);
+    if (of->volume_count)
+        snprintf(volumes, sizeof volumes, "; values in volumes within %.2g of their range",
+                 find_volume_error(of, false) / (choice->parts * choice->parts));
+    session_text_add(&report->pieces, "mesh \"%s\": %d piece%s between two nodes: %s%s%s", mesh, choice->parts,
+                     choice->parts > 1 ? "s" : "", bound, cells, volumes);
 }
 
 static void choose_all(const session_pieces_basis *basis, piece_error *errors, piece_step *steps,

@@ -98,6 +98,7 @@ static bool is_same_plane(const session_plane *a, const session_plane *b)
 
 static bool is_same_wish(const session_wish *a, const session_wish *b)
 {
+    if (a->is_volume != b->is_volume || a->allowed != b->allowed || a->width != b->width) return false;
     if (a->has_plane || b->has_plane) return a->has_plane && b->has_plane && is_same_plane(&a->plane, &b->plane);
     if (!a->field || !b->field) return !a->field && !b->field;
     return strcmp(a->field, b->field) == 0 && a->component == b->component;
@@ -202,6 +203,22 @@ static void add_slice(session_wishes *wishes, const session_wish_views *views, c
     wishes->needs_all = wishes->needs_all || counts_cells(&shown->colour_map);
 }
 
+static void add_volume(session_wishes *wishes, const session_wish_views *views, const session_catalogue_mesh *mesh,
+                       const scene_image *image, int index, int layer)
+{
+    static const double usual_error = 0.01; /* of volumes that are not integrated to an error */
+    const scene_volume *shown = &image->volumes[layer];
+    const session_catalogue_field *field = find_shown(mesh, &shown->field);
+    if (!field || !is_polynomial(mesh, field, &shown->field)) return;
+    const scene_range *range = &shown->colour_map.range;
+    const session_wish like = {.field = field->name,
+                               .component = session_resolve_component(&shown->field, field->component_count),
+                               .is_volume = true,
+                               .allowed = image->max_error > 0 ? image->max_error : usual_error,
+                               .width = range->is_fixed ? fabs(range->high - range->low) : 0};
+    show_wish(wishes, views, &like, index);
+}
+
 /* Returns whether a layer shows the mesh from all of its cells. */
 static bool has_whole_layers(const session_catalogue_mesh *mesh, const scene_image *image)
 {
@@ -241,6 +258,7 @@ void session_list_wishes(const scene *scene, const session_wish_views *views, co
         out->needs_all = out->needs_all || has_fields_of_neighbours(mesh, image);
         for (int layer = 0; layer < image->isosurface_count; layer++)
             add_isosurface(out, views, mesh, image, i, layer, report);
+        for (int layer = 0; layer < image->volume_count; layer++) add_volume(out, views, mesh, image, i, layer);
         for (int layer = 0; layer < image->slice_count; layer++) add_slice(out, views, mesh, image, i, layer);
     }
     out->needs_all = out->needs_all || !are_any_due;

@@ -32,6 +32,9 @@ typedef struct session_wish {
     double *values; /* isovalues of the field */
     bool has_plane;
     session_plane plane;
+    bool is_volume; /* set if it is a volume of the field */
+    double allowed; /* error of values in the volume that is allowed, as a fraction of the width of its range */
+    double width; /* 0: that of the values */
 } session_wish;
 
 enum { SESSION_MOST_WISHES = 256 };
