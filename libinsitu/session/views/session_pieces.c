@@ -36,9 +36,9 @@ typedef struct volume_error {
 
 /* The errors of one mesh, and what follows from them. */
 typedef struct piece_error {
-    bool needs_all; /* set if all cells are refined; the same on every rank */
-    bool is_shown;  /* set if some due image shows the mesh, or a fixed number is that of all cells; the same on every
-                       rank */
+    bool is_counted, needs_all; /* those of the wishes; the same on every rank */
+    bool is_shown; /* set if some due image shows the mesh, or a fixed number is that of all cells; the same on every
+                      rank */
     session_deviation all;                           /* counts are those of isosurfaces */
     session_finer_bytes bytes[FINER_MOST_PARTS + 1]; /* that finer lattices take on all ranks */
     volume_error volumes[MOST_VOLUMES];
@@ -176,6 +176,7 @@ static void use_mesh(const session_pieces_basis *basis, const session_wish_views
         w->out = out;
         session_list_wishes(scene, views, &basis->catalogue->meshes[mesh], choice->shell_count > 0, &w->wishes,
                             scene->is_surface_error_given ? report : NULL);
+        out->is_counted = w->wishes.is_counted;
         out->needs_all = w->wishes.needs_all;
         list_volumes(&w->wishes, out);
         out->is_shown = w->wishes.is_shown || (w->marks_only && w->wishes.needs_all);
@@ -293,6 +294,12 @@ static double find_volume_error(const piece_error *of, bool is_multiple)
     return most;
 }
 
+/* Returns whether the number of pieces must not depend on cameras, because statistics would. */
+static bool is_constant(const scene *scene, const piece_error *of)
+{
+    return of->is_counted && !scene->is_surface_error_given;
+}
+
 /* Returns the smallest number of pieces with which the error is allowed. In meshes all of whose cells are refined,
  * memory and time grow with its cube, so that it must be asked for if it is more than 2; for volumes by its number,
  * since few of their cells have the largest error. */
@@ -300,6 +307,7 @@ static int find_pieces(const scene *scene, const session_finer_choice *choice, c
 {
     enum { MOST_UNASKED = 2 };
     const bool is_limited = of->needs_all && !scene->is_surface_error_given;
+    if (is_constant(scene, of)) return 1;
     const int supported = session_most_parts(choice), most = is_limited ? MOST_UNASKED : FINER_MOST_PARTS;
     int parts = supported > 1 && find_volume_error(of, true) > 1 ? MOST_UNASKED : 1;
     while (parts < most && parts < supported && of->all.error > scene->surface_error * parts * parts) parts++;
@@ -423,7 +431,7 @@ static void report_pieces(const char *mesh, const session_finer_choice *choice, 
                           session_report *report)
 {
     char bound[100] = "without a bound", cells[160] = "", volumes[100] = "";
-    if (choice->order <= BOUND_MOST_ORDER)
+    if ((choice->parts > 1 || choice->is_completed || !choice->serendipity_count) && choice->order <= BOUND_MOST_ORDER)
         snprintf(bound, sizeof bound, "within %.3g pixels of the polynomials",
                  of->all.error / (choice->parts * choice->parts));
     if (of->all.cell_count)
@@ -455,7 +463,8 @@ static void choose_all(const session_pieces_basis *basis, piece_error *errors, p
     limit_memory(scene, catalogue, errors, steps, choices, report);
     for (int m = 0; m < catalogue->mesh_count && !scene->finer_pieces; m++) {
         /* the bound does not hold for serendipity cells without the nodes that they lack */
-        choices[m].is_completed = errors[m].is_shown && choices[m].parts == 1 && choices[m].serendipity_count > 0;
+        choices[m].is_completed = errors[m].is_shown && choices[m].parts == 1 && choices[m].serendipity_count > 0 &&
+                                  !is_constant(scene, &errors[m]);
         if (errors[m].is_shown) report_pieces(catalogue->meshes[m].name, &choices[m], &errors[m], report);
     }
 }

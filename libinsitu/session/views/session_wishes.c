@@ -244,11 +244,11 @@ void session_list_wishes(const scene *scene, const session_wish_views *views, co
 {
     const session_wish positions = {.field = NULL};
     bool are_any_due = false;
-    *out = (session_wishes){.is_complete = true, .needs_all = has_shells || scene->statistics_count > 0};
+    *out = (session_wishes){.is_complete = true, .is_counted = scene->statistics_count > 0, .needs_all = has_shells};
     find_wish(out, views, &positions);
     for (int i = 0; i < views->count; i++) {
         const scene_image *image = &scene->images[i];
-        out->needs_all = out->needs_all || image->condition.is_given;
+        out->is_counted = out->is_counted || image->condition.is_given;
         are_any_due = are_any_due || views->are_due[i];
         if (!views->are_due[i]) continue;
         if (has_whole_layers(mesh, image)) {
@@ -261,5 +261,5 @@ void session_list_wishes(const scene *scene, const session_wish_views *views, co
         for (int layer = 0; layer < image->volume_count; layer++) add_volume(out, views, mesh, image, i, layer);
         for (int layer = 0; layer < image->slice_count; layer++) add_slice(out, views, mesh, image, i, layer);
     }
-    out->needs_all = out->needs_all || !are_any_due;
+    out->needs_all = out->needs_all || out->is_counted || !are_any_due;
 }

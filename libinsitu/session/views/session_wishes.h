@@ -44,6 +44,7 @@ typedef struct session_wishes {
     int count;
     bool is_complete; /* set as long as memory has not run out */
     bool is_shown;    /* set if some due image shows the mesh */
+    bool is_counted;  /* set if statistics or conditions of images are sums over pieces */
     bool needs_all;   /* set if all cells are refined, not only those that isosurfaces and slices may cross */
     session_wish items[SESSION_MOST_WISHES];
 } session_wishes;
