@@ -74,7 +74,7 @@ static void set_segments(render_fixture *f, double step, double max_error)
 }
 
 /* The integral of a segment errs by 4.4e-7 of what it absorbs (kernel_integral.h), which sums to no more than 1 over a
- * ray; the ends are exact (kernel_double.h), and sums of light are compensated. */
+ * ray; the ends are exact (kernel_exact.h), and sums of light are compensated. */
 #define EXACT 1e-6
 
 static void tets_are_exact_for_every_camera(void **state)

@@ -42,6 +42,12 @@ static inline int kernel_shape_number(int type)
     return type == GRID_HEX ? KERNEL_SHAPE_HEX : type == GRID_WEDGE ? KERNEL_SHAPE_WEDGE : KERNEL_SHAPE_PYRAMID;
 }
 
+/* Returns the position of a cell type in the list kernel_lane_types. */
+static inline int kernel_lane_type_index(int type)
+{
+    return kernel_is_linear(type) ? KERNEL_CURVED_TYPES : kernel_shape_number(type);
+}
+
 /* Returns true for hexes: the reference domain is a box, and all faces are quads. */
 static inline bool kernel_is_box(int type)
 {

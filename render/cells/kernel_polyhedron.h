@@ -87,11 +87,6 @@ typedef struct kernel_polyhedron_interval {
     vf u_in, u_out;
 } kernel_polyhedron_interval;
 
-/* A linear piece of the field's profile along each ray: depths, values and colour values at both ends. */
-typedef struct kernel_profile_piece {
-    vf t0, t1, v0, v1, w0, w1;
-} kernel_profile_piece;
-
 SIMD_INLINE void *kernel_scratch_alloc(char **at, size_t bytes)
 {
     void *p = *at;
@@ -503,37 +498,45 @@ static void kernel_poly_profile(kernel_poly_crossings *r, kernel_polyhedron_inte
     }
 }
 
-/* Returns a piece of length zero at the begin of each ray's profile, which is the piecewise linear field along the
- * ray. */
-SIMD_INLINE kernel_profile_piece kernel_profile_begin(const kernel_polyhedron_interval *polyhedron_interval, vf v_in)
+/* Sets *piece to a piece of length zero at the begin of each ray's profile, which is the piecewise linear field along
+ * the ray. */
+SIMD_INLINE void kernel_profile_begin(const kernel_polyhedron_interval *polyhedron_interval, kernel_interval *piece)
 {
     const kernel_interval *i = &polyhedron_interval->interval;
-    return (kernel_profile_piece){i->t_in, i->t_in, v_in, v_in, i->w_in, i->w_in};
+    piece->mask = i->mask;
+    piece->t_in = piece->t_out = i->t_in;
+    piece->v_in = piece->v_out = polyhedron_interval->u_in;
+    piece->w_in = piece->w_out = i->w_in;
 }
 
 /* Replaces *piece by the next linear piece of the field along each ray. v_out is the value at the end of the ray's
  * interval. */
 SIMD_INLINE void kernel_profile_next(const kernel_poly_crossings *r,
                                      const kernel_polyhedron_interval *polyhedron_interval, vf v_out,
-                                     kernel_profile_piece *piece)
+                                     kernel_interval *piece)
 {
     vf t = polyhedron_interval->interval.t_out, v = v_out, w = polyhedron_interval->interval.w_out;
     for (int n = 0; n < r->sheet_count; n++) {
         const kernel_triangle_crossings *sheet = &r->sheets[r->met_sheets[n]];
         const vm nearer = vm_and(kernel_polyhedron_interval_contains(polyhedron_interval, sheet),
-                                 vm_and(vf_lt(piece->t1, sheet->t), vf_lt(sheet->t, t)));
+                                 vm_and(vf_lt(piece->t_out, sheet->t), vf_lt(sheet->t, t)));
         t = vf_select(nearer, sheet->t, t);
         v = vf_select(nearer, sheet->v_face, v);
         w = vf_select(nearer, sheet->w_face, w);
     }
-    *piece = (kernel_profile_piece){piece->t1, t, piece->v1, v, piece->w1, w};
+    piece->t_in = piece->t_out;
+    piece->v_in = piece->v_out;
+    piece->w_in = piece->w_out;
+    piece->t_out = t;
+    piece->v_out = v;
+    piece->w_out = w;
 }
 
 /* Returns those of the given rays on which the field has further linear pieces behind the given one. */
 SIMD_INLINE vm kernel_profile_continues(const kernel_polyhedron_interval *polyhedron_interval,
-                                        const kernel_profile_piece *piece, vm mask)
+                                        const kernel_interval *piece, vm mask)
 {
-    return vm_and(mask, vf_lt(piece->t1, polyhedron_interval->interval.t_out));
+    return vm_and(mask, vf_lt(piece->t_out, polyhedron_interval->interval.t_out));
 }
 
 #endif

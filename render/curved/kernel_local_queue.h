@@ -1,6 +1,5 @@
 /* Queues of cells of volumes, one per type, for arrays of any layout. When a queue is full, a vector of its cells is
- * transformed at once. kernel_tile_cells.h uses them for tets, kernel_local_samples.h and kernel_local_segments.h for
- * hexes, wedges and pyramids. */
+ * transformed at once (kernel_tile_cells.h). */
 #ifndef RENDER_KERNEL_LOCAL_QUEUE_H
 #define RENDER_KERNEL_LOCAL_QUEUE_H
 
@@ -36,26 +35,12 @@ typedef struct kernel_local_queue {
     int32_t vertex[8][KERNEL_LOCAL_ROOM];
 } kernel_local_queue;
 
-typedef struct kernel_local_lanes kernel_local_lanes;
-
-/* Callbacks that process a vector of a queue's cells (kernel_local_run.h). */
-typedef struct kernel_local_stages {
-    /* set if the rays of cells that are processed alone are the tile's own primary rays (kernel_packet.h) */
-    bool is_pencil;
-    /* Transforms the fetched cells; returns the visible ones. *lanes: those of them that can be processed in lanes. */
-    unsigned (*transform)(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes);
-    /* Processes the listed pixels, and empties the list. */
-    void (*process_pixels)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
-    /* called after all pixels of a vector of cells have been listed and processed */
-    void (*finish)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
-} kernel_local_stages;
-
-struct kernel_local_lanes {
-    const kernel_local_stages *stages;
-    kernel_tile_trace_cell *take; /* callback that traces cells that cannot be processed in lanes */
-    int volume, part;
-    kernel_arrays arrays; /* the arrays of the current mesh part */
-    kernel_local_queue queues[KERNEL_CURVED_TYPES];
+/* The queued cells of a volume in a mesh part, and the vector of cells that is being processed. */
+typedef struct kernel_local_lanes {
+    int volume, part;     /* part: -1 if there is none yet */
+    kernel_arrays arrays; /* the arrays of the volume's field on the mesh part */
+    kernel_local_queue queues[KERNEL_LANE_TYPES];
+    const kernel_local_queue *current; /* queue of the vector of cells that is being processed */
     /* coordinates and field values of the fetched cells in the caller's units, by vertex */
     double world[3][8][SIMD_WIDTH], scalars[8][SIMD_WIDTH];
     kernel_local_cells cells;
@@ -64,16 +49,13 @@ struct kernel_local_lanes {
     int32_t ends[4][SIMD_WIDTH];
     int alone; /* the lane whose cell is the tile's current cell (kernel_tile_make_current()); -1 if there is none */
     kernel_pixel_list rays;
-};
+} kernel_local_lanes;
 
-SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, const kernel_local_stages *stages, int volume,
-                                          kernel_tile_trace_cell *take)
+SIMD_INLINE void kernel_local_lanes_begin(kernel_local_lanes *l, int volume)
 {
-    l->stages = stages;
-    l->take = take;
     l->volume = volume;
     l->part = -1;
-    for (int i = 0; i < KERNEL_CURVED_TYPES; i++) l->queues[i].count = l->queues[i].indexed_count = 0;
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++) l->queues[i].count = l->queues[i].indexed_count = 0;
 }
 
 /* Makes the mesh part with index `part` the one whose cells are queued from now on. The queues must be empty. */
@@ -82,11 +64,6 @@ SIMD_INLINE void kernel_local_lanes_set_part(const kernel_tile_trace *t, kernel_
     l->part = part;
     kernel_arrays_begin(&l->arrays, t->frame->job->parts[part].cells,
                         &t->frame->job->volumes[l->volume].field.fields[part]);
-}
-
-SIMD_INLINE int kernel_local_queue_of(int type)
-{
-    return kernel_has_quads(type) ? kernel_shape_number(type) : -1;
 }
 
 /* ---- cells ---- */

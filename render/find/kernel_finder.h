@@ -52,12 +52,6 @@ SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
     return vertex;
 }
 
-/* Returns the position of a cell type in the list kernel_lane_types. */
-SIMD_INLINE int kernel_lane_type_index(int type)
-{
-    return kernel_is_linear(type) ? KERNEL_CURVED_TYPES : kernel_shape_number(type);
-}
-
 /* A queue of cells that one isovalue crosses, all of one type with quadrilateral faces, one per lane. It is processed
  * when all lanes are full (kernel_candidate_surfaces.h). */
 typedef struct kernel_crossed_queue {

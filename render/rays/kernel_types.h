@@ -297,7 +297,7 @@ typedef struct kernel_frame {
     bool needs_planes;  /* set if tiles traverse the trees, for which they need planes */
     bool needs_packets; /* set if single packets traverse trees as well, which normals by differences require */
     bool has_segments;  /* set if volumes are integrated by segments; otherwise they are sampled */
-    /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_double.h) */
+    /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_exact.h) */
     bool is_double;
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
     /* Limits for segments: the error allowed for the field and for mixing with other volumes; length of the scene in

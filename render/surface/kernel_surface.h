@@ -518,8 +518,8 @@ typedef struct kernel_profile_walk {
     vm below; /* rays that are below the isovalue at the end of the current piece */
     /* rays whose face value and profile are on different sides of the isovalue, at the entry and at the exit */
     vm jump_in, jump_out;
-    kernel_profile_piece piece; /* current piece of each ray */
-    vf t, w;                    /* depth of the crossing that was found, and the colour field there */
+    kernel_interval piece; /* current linear piece of each ray's profile */
+    vf t, w;               /* depth of the crossing that was found, and the colour field there */
 } kernel_profile_walk;
 
 static void kernel_profile_walk_begin(const kernel_polyhedron_interval *polyhedron_interval, vm rays,
@@ -532,17 +532,17 @@ static void kernel_profile_walk_begin(const kernel_polyhedron_interval *polyhedr
     walk->below = vf_lt(polyhedron_interval->u_in, zero);
     walk->jump_in = vm_and(rays, vm_xor(walk->below, below));
     walk->jump_out = vm_and(rays, vm_xor(vf_lt(polyhedron_interval->u_out, zero), vf_lt(i->v_out, zero)));
-    walk->piece = kernel_profile_begin(polyhedron_interval, polyhedron_interval->u_in);
+    kernel_profile_begin(polyhedron_interval, &walk->piece);
 }
 
-SIMD_INLINE void kernel_piece_select(vm rays, const kernel_profile_piece *from, kernel_profile_piece *to)
+SIMD_INLINE void kernel_piece_select(vm rays, const kernel_interval *from, kernel_interval *to)
 {
-    to->t0 = vf_select(rays, from->t0, to->t0);
-    to->t1 = vf_select(rays, from->t1, to->t1);
-    to->v0 = vf_select(rays, from->v0, to->v0);
-    to->v1 = vf_select(rays, from->v1, to->v1);
-    to->w0 = vf_select(rays, from->w0, to->w0);
-    to->w1 = vf_select(rays, from->w1, to->w1);
+    to->t_in = vf_select(rays, from->t_in, to->t_in);
+    to->t_out = vf_select(rays, from->t_out, to->t_out);
+    to->v_in = vf_select(rays, from->v_in, to->v_in);
+    to->v_out = vf_select(rays, from->v_out, to->v_out);
+    to->w_in = vf_select(rays, from->w_in, to->w_in);
+    to->w_out = vf_select(rays, from->w_out, to->w_out);
 }
 
 /* Advances the rays in `left` to the next piece. Returns the rays whose profile continues behind that piece; a jump at
@@ -553,14 +553,14 @@ SIMD_INLINE vm kernel_profile_walk_advance(const kernel_poly_crossings *r,
                                            const kernel_polyhedron_interval *polyhedron_interval, vm left,
                                            kernel_profile_walk *walk)
 {
-    kernel_profile_piece next = walk->piece;
+    kernel_interval next = walk->piece;
     const vf zero = vf_set(0);
     const vm inside = kernel_profile_continues(polyhedron_interval, &next, left);
     kernel_profile_next(r, polyhedron_interval,
                         vf_select(inside, polyhedron_interval->u_out, polyhedron_interval->interval.v_out), &next);
     const vm rounding = vm_and(kernel_profile_continues(polyhedron_interval, &next, inside),
-                               vf_le(vf_abs(next.v1), vf_set(KERNEL_ROOT_BAND)));
-    next.v1 = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v1);
+                               vf_le(vf_abs(next.v_out), vf_set(KERNEL_ROOT_BAND)));
+    next.v_out = vf_select(rounding, vf_select(walk->below, vf_set(-1e-30f), zero), next.v_out);
     kernel_piece_select(left, &next, &walk->piece);
     return vm_and(inside, vm_or(walk->jump_out, kernel_profile_continues(polyhedron_interval, &next, inside)));
 }
@@ -580,18 +580,16 @@ static vm kernel_profile_walk_next(const kernel_poly_crossings *r,
     walk->jump_in = vm_none();
     while (vm_any(left)) {
         const vm on = kernel_profile_walk_advance(r, polyhedron_interval, left, walk);
-        const vm cross = vm_and(left, vm_xor(vf_lt(walk->piece.v1, vf_set(0)), walk->below));
+        const vm cross = vm_and(left, vm_xor(vf_lt(walk->piece.v_out, vf_set(0)), walk->below));
         walk->below = vm_xor(walk->below, cross);
         walk->open = vm_andnot(walk->open, vm_andnot(left, on));
         found = vm_or(found, cross);
         left = vm_andnot(on, cross);
     }
-    const kernel_profile_piece *piece = &walk->piece;
-    const vf length = piece->t1 - piece->t0;
-    const vf t = kernel_secant(piece->t0, piece->v0, piece->t1, piece->v1);
-    const vf along = vf_select(vf_lt(vf_set(0), length), (t - piece->t0) / length, vf_set(0));
-    walk->t = vf_select(vf_lt(piece->t0, piece->t1), t, vf_select(jump, kernel_next_float(piece->t0), piece->t0));
-    walk->w = piece->w0 + along * (piece->w1 - piece->w0);
+    const kernel_interval *piece = &walk->piece;
+    const vf t0 = piece->t_in, t = kernel_secant(t0, piece->v_in, piece->t_out, piece->v_out);
+    walk->t = vf_select(vf_lt(t0, piece->t_out), t, vf_select(jump, kernel_next_float(t0), t0));
+    walk->w = piece->w_in + kernel_interval_fraction(piece, t) * (piece->w_out - piece->w_in);
     return found;
 }
 

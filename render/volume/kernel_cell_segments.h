@@ -9,7 +9,6 @@
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
 #include "kernel_crossings.h"
-#include "kernel_double.h"
 #include "kernel_exact.h"
 #include "kernel_integral.h"
 #include "kernel_visible_values.h"
@@ -67,7 +66,7 @@ typedef struct kernel_exact_point {
 
 /* State of the bisection of a ray's interval in a cell. */
 typedef struct kernel_bisection {
-    const kernel_segment_state *state;
+    kernel_segments *list;
     const kernel_cell_interval *cell_interval;
     const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
     /* constants of the ray: at depth t its point is (u, v) * (slope * t + depth_offset) */
@@ -143,12 +142,6 @@ static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, co
 
 /* ---- effect of a subinterval on the light ---- */
 
-/* Bounds of the transfer function over a range of values. */
-typedef struct kernel_medium_range {
-    /* minimum and maximum of the extinction; maximum slope of the extinction, and of the colours */
-    double least, most, slope, colour_slope;
-} kernel_medium_range;
-
 /* Return a lower and an upper bound of the extinction -ln(1 - a): the begin of the logarithm's series, and ln(1 + x) <=
  * x (6 + x) / (6 + 4 x) with x = a / (1 - a). */
 static inline double kernel_extinction_least(double a)
@@ -173,89 +166,80 @@ static inline double kernel_piece_high(const kernel_piece *p)
     return (double)p->entry[KERNEL_PIECE_HIGH] + (double)p->entry[KERNEL_PIECE_HIGH_REST];
 }
 
-static inline void kernel_medium_range_widen(kernel_medium_range *s, const kernel_piece *p, double low, double high)
+/* Widens the bounds by those of a piece between two values. */
+static inline void kernel_bound_widen(kernel_bound *b, const kernel_piece *p, double low, double high)
 {
     const double from = kernel_piece_low(p), slope = (double)p->entry[KERNEL_PIECE_SLOPE];
     const double x0 = fmax(low, from), x1 = fmin(high, kernel_piece_high(p));
     const double a0 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x0 - from) * slope, 1), 0);
     const double a1 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x1 - from) * slope, 1), 0);
     const double most = fmax(a0, a1);
-    s->least = fmin(s->least, kernel_extinction_least(fmin(a0, a1)));
-    s->most = fmax(s->most, kernel_extinction_most(most));
-    if (slope != 0) s->slope = fmax(s->slope, most < 1 ? fmin(fabs(slope) / (1 - most), 1e30) : 1e30);
+    b->extinction_low = fminf(b->extinction_low, (float)kernel_extinction_least(fmin(a0, a1)));
+    b->extinction_high = fmaxf(b->extinction_high, (float)kernel_extinction_most(most));
+    if (slope != 0)
+        b->extinction_slope =
+            fmaxf(b->extinction_slope, most < 1 ? (float)fmin(fabs(slope) / (1 - most), 1e30) : 1e30f);
     for (int c = 0; c < 3; c++)
-        s->colour_slope = fmax(s->colour_slope, fabs((double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]));
+        b->colour_slope = fmaxf(b->colour_slope, fabsf(p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]));
 }
 
 /* Returns bounds of the transfer function over the values from low to high. If that range covers several bins, the
  * bounds of the bins are used; otherwise those of the pieces. */
-static kernel_medium_range kernel_medium_range_of(const kernel_pieces *t, double low, double high)
+static kernel_bound kernel_bound_of_values(const kernel_pieces *t, double low, double high)
 {
-    const double last = KERNEL_BOUND_BINS - 1, begin = (double)t->bin_low, per_bin = (double)t->bound_inverse;
-    const double pieces_last = KERNEL_PIECE_BINS - 1;
-    kernel_medium_range out = {1e30, 0, 0, 0};
-    if ((high - low) * per_bin > 2) {
-        const int from = (int)fmin(fmax((low - begin) * per_bin, 0), last);
-        const int to = (int)fmin(fmax((high - begin) * per_bin, 0), last);
-        for (int i = from; i <= to; i++) {
-            out.least = fmin(out.least, (double)t->bounds[i].extinction_low);
-            out.most = fmax(out.most, (double)t->bounds[i].extinction_high);
-            out.slope = fmax(out.slope, (double)t->bounds[i].extinction_slope);
-            out.colour_slope = fmax(out.colour_slope, (double)t->bounds[i].colour_slope);
-        }
-        return out;
-    }
-    int at = (int)t->bin_first[(int)fmin(fmax((low - begin) * (double)t->bin_inverse, 0), pieces_last)];
+    if ((high - low) * (double)t->bound_inverse > 2) return kernel_bound_between(t, (float)low, (float)high);
+    const double last = KERNEL_PIECE_BINS - 1;
+    kernel_bound out = {.extinction_low = 1e30f};
+    int at = (int)t->bin_first[(int)fmin(fmax((low - (double)t->bin_low) * (double)t->bin_inverse, 0), last)];
     while (at > 0 && low < kernel_piece_low(&t->pieces[at])) at--;
     while (at + 1 < t->count && kernel_piece_high(&t->pieces[at]) <= low) at++;
     do {
-        kernel_medium_range_widen(&out, &t->pieces[at], low, high);
+        kernel_bound_widen(&out, &t->pieces[at], low, high);
         at++;
     } while (at < t->count && kernel_piece_low(&t->pieces[at]) < high);
     return out;
 }
 
 /* A subinterval of a ray: its end and middle, its bisection depth, and whether the field has been proved to be monotone
- * on it. */
+ * on it. deviation: largest sampled deviation of the field from its chord; low, high: range of the field's values. */
 typedef struct kernel_subinterval {
     kernel_exact_point end, middle;
     int depth;
     bool is_monotone;
+    double deviation, low, high;
 } kernel_subinterval;
 
-typedef struct kernel_subinterval_values {
-    double deviation, low, high;
-} kernel_subinterval_values;
-
-/* Computes the subinterval's largest sampled deviation from its chord, and the range of its values, from the field at
- * its middle and quarters. */
-static kernel_subinterval_values kernel_subinterval_sample(const kernel_bisection *h, const kernel_exact_point *from,
-                                                           kernel_subinterval *sub, const kernel_exact_point *first,
-                                                           const kernel_exact_point *third)
+/* Computes the subinterval's deviation from its chord, and the range of its values, from the field at its middle and
+ * quarters. */
+static void kernel_subinterval_sample(const kernel_bisection *h, const kernel_exact_point *from,
+                                      kernel_subinterval *sub, const kernel_exact_point *first,
+                                      const kernel_exact_point *third)
 {
     const double a = from->v, b = sub->end.v, rise = b - a;
-    kernel_subinterval_values out = {0, fmin(a, b), fmax(a, b)};
-    if (!h->map) return out;
-    out.deviation = fmax(fmax(fabs(a + 0.25 * rise - first->v), fabs(a + 0.75 * rise - third->v)),
-                         fabs(a + 0.5 * rise - sub->middle.v));
-    sub->is_monotone = sub->is_monotone || fabs(rise) >= 12 * out.deviation;
-    if (!sub->is_monotone) {
-        out.low -= 1.5 * out.deviation;
-        out.high += 1.5 * out.deviation;
-    }
-    return out;
+    sub->deviation = 0;
+    sub->low = fmin(a, b);
+    sub->high = fmax(a, b);
+    if (!h->map) return;
+    sub->deviation = fmax(fmax(fabs(a + 0.25 * rise - first->v), fabs(a + 0.75 * rise - third->v)),
+                          fabs(a + 0.5 * rise - sub->middle.v));
+    sub->is_monotone = sub->is_monotone || fabs(rise) >= 12 * sub->deviation;
+    if (sub->is_monotone) return;
+    sub->low -= 1.5 * sub->deviation;
+    sub->high += 1.5 * sub->deviation;
 }
 
 /* Returns a bound of the error of light if the subinterval becomes one segment. *all: the same bound for any deviation
  * of the field from the segment's chord. */
-static double kernel_subinterval_error(const kernel_bisection *h, const kernel_subinterval_values *sub,
-                                       const kernel_medium_range *s, double length, double *all)
+static double kernel_subinterval_error(const kernel_bisection *h, const kernel_subinterval *sub, const kernel_bound *s,
+                                       double length, double *all)
 {
-    const double contrast = (double)h->state->pieces->contrast;
-    const double seen = fmin(length, 1 / fmax(s->least, 1e-30)), lit = fmin(s->most * length, 1);
-    const double change = s->most - s->least, tint = fmin(s->colour_slope * (sub->high - sub->low), contrast);
-    *all = fmin(contrast * change * seen + tint * lit, contrast * lit);
-    return fmin(contrast * (s->slope * sub->deviation) * seen + fmin(s->colour_slope * sub->deviation, contrast) * lit,
+    const double least = (double)s->extinction_low, most = (double)s->extinction_high;
+    const double contrast = (double)h->list->pieces->contrast, colour_slope = (double)s->colour_slope;
+    const double seen = fmin(length, 1 / fmax(least, 1e-30)), lit = fmin(most * length, 1);
+    const double tint = fmin(colour_slope * (sub->high - sub->low), contrast);
+    *all = fmin(contrast * (most - least) * seen + tint * lit, contrast * lit);
+    return fmin(contrast * ((double)s->extinction_slope * sub->deviation) * seen +
+                    fmin(colour_slope * sub->deviation, contrast) * lit,
                 *all);
 }
 
@@ -264,7 +248,7 @@ static double kernel_subinterval_error(const kernel_bisection *h, const kernel_s
 /* Returns a step of the opacity whose value is strictly between low and high, or NULL if there is none. */
 static const kernel_step *kernel_step_between(const kernel_bisection *h, double low, double high)
 {
-    const kernel_step *steps = h->state->pieces->steps + h->cell_interval->first_step;
+    const kernel_step *steps = h->list->pieces->steps + h->cell_interval->first_step;
     for (int i = 0; i < h->cell_interval->step_count; i++)
         if (low < steps[i].at && steps[i].at < high) return &steps[i];
     return NULL;
@@ -277,13 +261,13 @@ typedef struct kernel_side_values {
 
 static kernel_side_values kernel_step_side(const kernel_bisection *h, double inside)
 {
-    const kernel_step *steps = h->state->pieces->steps;
+    const kernel_step *steps = h->list->pieces->steps;
     kernel_side_values out = {-3e38f, 3e38f};
     int n = 0;
-    for (; n < h->state->pieces->step_count && steps[n].at <= inside; n++) out.low = steps[n].cut;
+    for (; n < h->list->pieces->step_count && steps[n].at <= inside; n++) out.low = steps[n].cut;
     /* a segment whose constant value is a step's value lies above the step; rounding must not move other segments
      * there */
-    if (n < h->state->pieces->step_count) out.high = nextafterf(steps[n].cut, out.low);
+    if (n < h->list->pieces->step_count) out.high = nextafterf(steps[n].cut, out.low);
     return out;
 }
 
@@ -295,21 +279,27 @@ static void kernel_step_round(const kernel_side_values *side, double x, float *v
     *rest = side->low < *v && *v < side->high ? active - (double)*v : 0;
 }
 
-/* Returns bounds of the transfer function over the subinterval's values. inside: one of these values, by which the
- * range between two steps is found; step: a step among the values, or NULL. */
-static kernel_medium_range kernel_subinterval_range(const kernel_bisection *h, const kernel_subinterval_values *values,
-                                                    double inside, const kernel_step *step)
+/* Returns bounds of the transfer function over the subinterval's values. step: a step among the values, or NULL. */
+static kernel_bound kernel_subinterval_bound(const kernel_bisection *h, const kernel_subinterval *sub,
+                                             const kernel_step *step)
 {
-    const kernel_side_values side = kernel_step_side(h, inside);
+    const kernel_side_values side = kernel_step_side(h, sub->middle.v);
     if (step)
-        return kernel_medium_range_of(h->state->pieces, fmin(values->low, (double)nextafterf(step->cut, -3e38f)),
-                                      fmax(values->high, (double)nextafterf(step->cut, 3e38f)));
-    const double low = fmin(fmax(values->low, (double)side.low), (double)side.high);
-    const double high = fmin(fmax(values->high, (double)side.low), (double)side.high);
-    return kernel_medium_range_of(h->state->pieces, low, high);
+        return kernel_bound_of_values(h->list->pieces, fmin(sub->low, (double)nextafterf(step->cut, -3e38f)),
+                                      fmax(sub->high, (double)nextafterf(step->cut, 3e38f)));
+    const double low = fmin(fmax(sub->low, (double)side.low), (double)side.high);
+    const double high = fmin(fmax(sub->high, (double)side.low), (double)side.high);
+    return kernel_bound_of_values(h->list->pieces, low, high);
 }
 
 /* ---- segments ---- */
+
+/* Returns a segment of the given length between two values, each the sum of two numbers of v and rest. */
+static kernel_unit_segment kernel_exact_segment(double length, const float v[2], const double rest[2])
+{
+    return (kernel_unit_segment){vf_set((float)length), vf_set(v[0]), vf_set(v[1]), vf_set((float)rest[0]),
+                                 vf_set((float)rest[1])};
+}
 
 /* Emits the subinterval as `subdivisions` equal segments. */
 static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane,
@@ -320,14 +310,12 @@ static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h,
     for (int n = 1; n <= (int)subdivisions; n++) {
         const double before = (n - 1) / subdivisions, after = n / subdivisions;
         const float end = n < (int)subdivisions ? (float)kernel_interpolate(from->t, to->t, after) : (float)to->t;
-        const double in = kernel_interpolate(values[0], values[1], before);
-        const double out = kernel_interpolate(values[0], values[1], after);
-        const kernel_unit_segment run = {.length = vf_set((float)((to->t - from->t) / subdivisions * h->per_t)),
-                                         .v_in = vf_set((float)in),
-                                         .v_out = vf_set((float)out),
-                                         .rest_in = vf_set((float)(in - (double)(float)in)),
-                                         .rest_out = vf_set((float)(out - (double)(float)out))};
-        if (begin < end) kernel_emit_segment(p, h->state, lane, vf_set(begin), vf_set(end), &run);
+        const double x[2] = {kernel_interpolate(values[0], values[1], before),
+                             kernel_interpolate(values[0], values[1], after)};
+        const float v[2] = {(float)x[0], (float)x[1]};
+        const double rest[2] = {x[0] - (double)v[0], x[1] - (double)v[1]};
+        const kernel_unit_segment run = kernel_exact_segment((to->t - from->t) / subdivisions * h->per_t, v, rest);
+        if (begin < end) kernel_emit_segment(p, h->list, lane, vf_set(begin), vf_set(end), &run);
         begin = end;
     }
 }
@@ -336,56 +324,49 @@ static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h,
  * because they might then reach values that have not been checked. */
 static void kernel_subinterval_add_segments(kernel_packet *p, const kernel_bisection *h, vm lane,
                                             const kernel_exact_point *from, const kernel_subinterval *sub,
-                                            const kernel_subinterval_values *values, const kernel_medium_range *s)
+                                            const kernel_bound *s)
 {
-    kernel_segments *list = h->state->list;
-    const double inside = sub->middle.v;
-    const bool is_cut = kernel_step_between(h, values->low, values->high) != NULL;
-    const double x[2] = {from->v, sub->end.v};
+    const bool is_cut = kernel_step_between(h, sub->low, sub->high) != NULL;
+    const double x[2] = {from->v, sub->end.v}, length = (sub->end.t - from->t) * h->per_t;
     double rest[2] = {0, 0};
     float v[2] = {(float)x[0], (float)x[1]};
-    const kernel_side_values side = kernel_step_side(h, inside);
+    const kernel_side_values side = kernel_step_side(h, sub->middle.v);
     for (int i = 0; i < 2 && !is_cut; i++) kernel_step_round(&side, x[i], &v[i], &rest[i]);
-    if (h->state->mixing > 0) {
-        const double contrast = (double)h->state->pieces->contrast, change = values->high - values->low;
-        const double length = (sub->end.t - from->t) * h->per_t;
+    if (h->list->mixing > 0) {
+        const double contrast = (double)h->list->pieces->contrast, change = sub->high - sub->low;
+        const double most = (double)s->extinction_high, least = (double)s->extinction_low;
         const double moved = 0.25 * length *
-                             (contrast * fmin(change * s->slope, s->most - s->least) +
-                              s->most * fmin(change * s->colour_slope, contrast));
+                             (contrast * fmin(change * (double)s->extinction_slope, most - least) +
+                              most * fmin(change * (double)s->colour_slope, contrast));
         const double subdivisions =
-            sqrt(fmin(moved / (double)h->state->mixing, KERNEL_MAX_SUBDIVISIONS * KERNEL_MAX_SUBDIVISIONS));
+            sqrt(fmin(moved / (double)h->list->mixing, KERNEL_MAX_SUBDIVISIONS * KERNEL_MAX_SUBDIVISIONS));
         const double sums[2] = {(double)v[0] + rest[0], (double)v[1] + rest[1]};
         kernel_subinterval_emit(p, h, lane, from, &sub->end, sums, fmax(ceil(subdivisions), 1));
         return;
     }
-    const kernel_interval i = {.t_in = vf_set((float)from->t),
-                               .t_out = vf_set((float)sub->end.t),
-                               .v_in = vf_set(v[0]),
-                               .v_out = vf_set(v[1])};
-    const kernel_precise_interval precise = {vf_set((float)(sub->end.t - from->t)), vf_set((float)rest[0]),
-                                             vf_set((float)rest[1])};
-    if (!list->is_double) lane = vm_and(lane, vf_lt(i.t_in, i.t_out));
-    kernel_segments_add(h->state->pieces, list, lane, &i, list->is_double ? &precise : NULL);
+    const float t0 = (float)from->t, t1 = (float)sub->end.t;
+    const kernel_unit_segment run = kernel_exact_segment(length, v, rest);
+    if (h->list->is_double || t0 < t1) kernel_segments_add(h->list, lane, vf_set(t0), vf_set(t1), &run);
 }
 
 /* ---- bisection of an interval ---- */
 
-static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_subinterval_values *values,
-                                       const kernel_medium_range *s, double length, bool is_cut, bool is_monotone)
+static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_subinterval *sub, const kernel_bound *s,
+                                       double length, bool is_cut)
 {
-    const double reach = (double)h->state->reach, depth = s->least * length;
-    const double a = (double)(h->state->allowance > 0 ? h->state->allowance : h->state->mixing);
+    const double reach = (double)h->list->reach, depth = (double)s->extinction_low * length;
+    const double a = (double)(h->list->allowance > 0 ? h->list->allowance : h->list->mixing);
     double all;
-    const double error = kernel_subinterval_error(h, values, s, length, &all);
+    const double error = kernel_subinterval_error(h, sub, s, length, &all);
     if (!is_cut && h->light * error <= 0.875 * a * (length / reach + h->light * depth / (1 + depth))) return true;
-    return (is_cut || !is_monotone) && h->light * all <= a * h->length / (32 * reach);
+    return (is_cut || !sub->is_monotone) && h->light * all <= a * h->length / (32 * reach);
 }
 
 /* Divides an interval, whose ends and middle are known, into subintervals by bisection, and adds their segments. */
 static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_exact_point from,
                                      kernel_subinterval whole)
 {
-    const kernel_segments *list = h->state->list;
+    const kernel_segments *list = h->list;
     const vm only = vm_from_bits(1u << lane);
     kernel_subinterval stack[KERNEL_BISECTION_ROOM];
     int count = 1;
@@ -394,23 +375,22 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
         kernel_subinterval sub = stack[--count];
         const kernel_exact_point first = kernel_exact_point_between(h, &from, &sub.middle, 0.5);
         const kernel_exact_point third = kernel_exact_point_between(h, &sub.middle, &sub.end, 0.5);
-        const kernel_subinterval_values values = kernel_subinterval_sample(h, &from, &sub, &first, &third);
-        const kernel_step *step = kernel_step_between(h, values.low, values.high);
-        const kernel_medium_range s = kernel_subinterval_range(h, &values, sub.middle.v, step);
+        kernel_subinterval_sample(h, &from, &sub, &first, &third);
+        const kernel_step *step = kernel_step_between(h, sub.low, sub.high);
+        const kernel_bound s = kernel_subinterval_bound(h, &sub, step);
         const double length = (sub.end.t - from.t) * h->per_t;
         const bool is_last = sub.depth >= KERNEL_BISECTION_DEPTH || h->count >= KERNEL_BISECTION_SEGMENTS ||
                              count + 2 > KERNEL_BISECTION_ROOM;
-        if (is_last || kernel_subinterval_is_good(h, &values, &s, length, step != NULL, sub.is_monotone)) {
-            if (list->t_begin[lane] <= (float)from.t)
-                kernel_subinterval_add_segments(p, h, only, &from, &sub, &values, &s);
-            const double depth = s.least * length;
+        if (is_last || kernel_subinterval_is_good(h, &sub, &s, length, step != NULL)) {
+            if (list->t_begin[lane] <= (float)from.t) kernel_subinterval_add_segments(p, h, only, &from, &sub, &s);
+            const double depth = (double)s.extinction_low * length;
             h->light /= 1 + depth * (1 + 0.5 * depth);
             h->count++;
             from = sub.end;
             continue;
         }
-        kernel_subinterval near = {sub.middle, first, sub.depth + 1, sub.is_monotone};
-        kernel_subinterval far = {sub.end, third, sub.depth + 1, sub.is_monotone};
+        kernel_subinterval near = {.end = sub.middle, .middle = first, sub.depth + 1, sub.is_monotone};
+        kernel_subinterval far = {.end = sub.end, .middle = third, sub.depth + 1, sub.is_monotone};
         if (step && sub.is_monotone) {
             near.end = kernel_exact_point_where(h, &from, &sub.end, step->at);
             near.middle = kernel_exact_point_between(h, &from, &near.end, 0.5);
@@ -422,8 +402,7 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
 }
 
 /* Adds the segments of the rays' intervals from t0 to t1 by bisection; only those that begin in the window are kept. */
-static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_packet *p,
-                                                                        const kernel_segment_state *state,
+static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_packet *p, kernel_segments *list,
                                                                         const kernel_cell_interval *cell_interval,
                                                                         vm rays, vf t0, vf t1)
 {
@@ -433,11 +412,11 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
     kernel_exact_map map;
     kernel_lanes at;
     kernel_packet_lanes(p, &at);
-    const kernel_transfer *transfer = &f->volumes[state->volume];
+    const kernel_transfer *transfer = &f->volumes[list->volume];
     if (cell_interval->map) kernel_exact_setup(&map, p, cell_interval->cell, transfer);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int n = __builtin_ctz(bits);
-        kernel_bisection h = {.state = state,
+        kernel_bisection h = {.list = list,
                               .cell_interval = cell_interval,
                               .map = cell_interval->map ? &map : NULL,
                               .u = at.px[n] - p->tile->centre_x,
@@ -446,8 +425,8 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
                               .depth_offset = is_flat ? f->job->space.scale : p->tile->depth_shift,
                               .in = {.t = (double)i->t_in[n], .v = (double)i->v_in[n]},
                               .out = {.t = (double)i->t_out[n], .v = (double)i->v_out[n]},
-                              .per_t = (double)state->list->per_t[n],
-                              .length = (double)((t1[n] - t0[n]) * state->list->per_t[n]),
+                              .per_t = (double)list->per_t[n],
+                              .length = (double)((t1[n] - t0[n]) * list->per_t[n]),
                               .light = 1,
                               .map_failures = &p->thread->map_failures};
         for (int a = 0; a < 3 && cell_interval->map; a++) {
@@ -504,37 +483,32 @@ SIMD_INLINE vf kernel_parts_chord_offset(const kernel_parts *s, vm is_first, vm 
 }
 
 /* Adds a tet's interval from t0 to t1 as one segment, computed in double, if it begins in the window. */
-SIMD_INLINE void kernel_cell_interval_double(kernel_segment_state *state, const kernel_cell_interval *cell_interval,
-                                             vm rays, vf t0, vf t1)
+SIMD_INLINE void kernel_cell_interval_double(kernel_segments *list, const kernel_cell_interval *cell_interval, vm rays,
+                                             vf t0, vf t1)
 {
     const kernel_interval *i = cell_interval->interval;
-    const kernel_precise_interval *precise = cell_interval->precise;
-    const kernel_unit_segment whole = {precise->length, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
-    const kernel_unit_segment run =
-        kernel_unit_segment_part(&whole, kernel_interval_fraction(i, t0), kernel_interval_fraction(i, t1));
-    const kernel_interval sub = {.t_in = t0, .t_out = t1, .v_in = run.v_in, .v_out = run.v_out};
-    const kernel_precise_interval own = {run.length, run.rest_in, run.rest_out};
-    const vm mine = vm_and(vf_le(state->list->t_begin, t0), vf_lt(t0, state->list->t_end));
-    kernel_segments_add(state->pieces, state->list, vm_and(rays, mine), &sub, &own);
+    const kernel_unit_segment run = kernel_unit_segment_part(cell_interval->precise, kernel_interval_fraction(i, t0),
+                                                             kernel_interval_fraction(i, t1));
+    const vm mine = vm_and(vf_le(list->t_begin, t0), vf_lt(t0, list->t_end));
+    kernel_segments_add(list, vm_and(rays, mine), t0, t1, &run);
 }
 
 /* Adds the segments of the interval from t0 to t1 that begin in the window. */
-SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segment_state *state,
+SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segments *list,
                                                const kernel_cell_interval *cell_interval, vm rays, vf t0, vf t1)
 {
-    kernel_segments *list = state->list;
     kernel_parts s = {.t0 = t0, .t1 = t1, .from = t0};
     if (cell_interval->precise) {
-        kernel_cell_interval_double(state, cell_interval, rays, t0, t1);
+        kernel_cell_interval_double(list, cell_interval, rays, t0, t1);
         return;
     }
     s.before = kernel_cell_interval_value(p, cell_interval, rays, t0);
     s.last = kernel_cell_interval_value(p, cell_interval, rays, t1);
     vm halved;
     const kernel_interval stretch = {.t_in = t0, .t_out = t1, .v_in = s.before, .v_out = s.last};
-    s.count = kernel_cell_interval_subdivisions(p, state, cell_interval, rays, &stretch, &halved);
+    s.count = kernel_cell_interval_subdivisions(p, list, cell_interval, rays, &stretch, &halved);
     if (__builtin_expect(vm_any(halved), 0)) {
-        kernel_cell_interval_bisect(p, state, cell_interval, halved, t0, t1);
+        kernel_cell_interval_bisect(p, list, cell_interval, halved, t0, t1);
         rays = vm_andnot(rays, halved);
         if (!vm_any(rays)) return;
     }
@@ -548,16 +522,12 @@ SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segment_
         s.next_bend = (s.before - s.after) + (s.ahead - s.after);
         const vf lift = kernel_parts_chord_offset(&s, n == 1 ? rays : vm_none(), vm_not(inner));
         const vm mine = vm_and(vf_le(list->t_begin, s.from), vf_lt(s.from, list->t_end));
-        if (!(state->mixing > 0)) {
-            const kernel_interval sub = {
-                .t_in = s.from, .t_out = s.to, .v_in = s.before + lift, .v_out = s.after + lift};
-            const kernel_precise_interval precise = kernel_precise_interval_of(&sub);
-            kernel_segments_add(state->pieces, list, vm_and(open, mine), &sub, list->is_double ? &precise : NULL);
-        } else if (vm_any(vm_and(open, mine))) {
-            const kernel_unit_segment run =
-                kernel_unit_segment_of((s.to - s.from) * list->per_t, s.before + lift, s.after + lift);
-            kernel_emit_segment(p, state, vm_and(open, mine), s.from, s.to, &run);
-        }
+        const kernel_unit_segment run =
+            kernel_unit_segment_of((s.to - s.from) * list->per_t, s.before + lift, s.after + lift);
+        if (!(list->mixing > 0))
+            kernel_segments_add(list, vm_and(open, mine), s.from, s.to, &run);
+        else if (vm_any(vm_and(open, mine)))
+            kernel_emit_segment(p, list, vm_and(open, mine), s.from, s.to, &run);
         s.from = s.to;
         s.to = next;
         s.before = s.after;
@@ -568,87 +538,89 @@ SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segment_
 }
 
 /* Divides the interval at surfaces, and adds the segments of its parts that begin in the window. */
-SIMD_INLINE void kernel_cell_interval_integrate(kernel_packet *p, kernel_segment_state *state,
-                                                const kernel_cell_interval *cell_interval)
+static __attribute__((noinline)) void kernel_cell_interval_integrate(kernel_packet *p, kernel_segments *list,
+                                                                     const kernel_cell_interval *cell_interval)
 {
     const kernel_interval *i = cell_interval->interval;
-    const kernel_segments *list = state->list;
     vf from = vf_max(i->t_in, p->t_near);
     /* segments that compositing mixes with other volumes are not cut at this rank's surfaces, so that they are the same
      * on any partition */
-    const vf end = vf_min(i->t_out, state->mixing > 0 ? p->clip_out : p->t_far);
+    const vf end = vf_min(i->t_out, list->mixing > 0 ? p->clip_out : p->t_far);
     vm open = vm_and(i->mask, vm_and(p->active, vm_and(vf_lt(from, end), vf_lt(from, p->t_far))));
     while (vm_any(open)) {
-        vf to = end;
-        if (list->cuts.row_count) to = vf_min(end, kernel_next_cut(p, &list->cuts, from, true));
+        const vf to = vf_min(end, kernel_next_cut(p, list, from, true));
         const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
-        if (vm_any(mine)) kernel_cell_interval_segments(p, state, cell_interval, mine, from, to);
+        if (vm_any(mine)) kernel_cell_interval_segments(p, list, cell_interval, mine, from, to);
         from = to;
         open = vm_and(open, vf_lt(from, end));
     }
 }
 
-/* Adds a tet's segments on rays whose interval is cut by surfaces, or whose segments must be mixed with other
- * volumes. */
-static __attribute__((noinline)) void kernel_tet_segments_general(kernel_packet *p, kernel_segment_state *state,
-                                                                  const kernel_cell *c,
-                                                                  const kernel_double_cell *double_cell,
-                                                                  kernel_interval i)
+/* Returns a tet's interval as a segment, computed in double if the list is in double. */
+SIMD_INLINE kernel_unit_segment kernel_tet_segment(const kernel_packet *p, const kernel_segments *list,
+                                                   const kernel_cell *c, const kernel_double_face faces[4],
+                                                   const kernel_interval *i)
 {
-    kernel_cell_interval cell_interval = {.interval = &i};
-    kernel_precise_interval precise;
-    if (state->mixing > 0) {
-        kernel_cell_interval_bound(state, c->f, c->count, &cell_interval);
-    } else if (state->list->is_double) {
-        precise = kernel_tet_double(p, c, double_cell, &state->list->rays, &i);
-        cell_interval.precise = &precise;
-    }
-    kernel_cell_interval_integrate(p, state, &cell_interval);
+    kernel_unit_segment run = kernel_unit_segment_of(i->t_out - i->t_in, i->v_in, i->v_out);
+    if (list->is_double) kernel_tet_double(p, c, faces, &list->rays, i->mask, &run);
+    run.length *= list->per_t;
+    return run;
 }
 
-/* Adds a tet's interval as one segment, which only surfaces cut. double_cell is read only if the list is in double. */
-static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kernel_segment_state *state,
-                                                          const kernel_cell *c, const kernel_double_cell *double_cell,
-                                                          vm rays)
+/* Adds a tet's segments on rays whose interval is cut by surfaces, or whose segments must be mixed with other
+ * volumes. */
+static __attribute__((noinline)) void kernel_tet_segments_general(kernel_packet *p, kernel_segments *list,
+                                                                  const kernel_cell *c,
+                                                                  const kernel_double_face faces[4], kernel_interval i)
 {
-    kernel_segments *list = state->list;
+    kernel_cell_interval cell_interval = {.interval = &i};
+    kernel_unit_segment precise;
+    if (list->mixing > 0) {
+        kernel_cell_interval_bound(list, c->f, c->count, &cell_interval);
+    } else if (list->is_double) {
+        precise = kernel_tet_segment(p, list, c, faces, &i);
+        cell_interval.precise = &precise;
+    }
+    kernel_cell_interval_integrate(p, list, &cell_interval);
+}
+
+/* Adds a tet's interval as one segment, which only surfaces cut. faces: the tet's faces in double; read only if the
+ * list is in double. */
+static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kernel_segments *list, const kernel_cell *c,
+                                                          const kernel_double_face faces[4], vm rays)
+{
     kernel_interval i;
     kernel_tet_interval(p, c, rays, false, &i);
     if (!vm_any(i.mask)) return;
     const vm hit = i.mask;
     vm cut = vm_or(vf_lt(i.t_in, p->t_near), vf_lt(p->t_far, i.t_out));
-    if (list->cuts.row_count) cut = vm_or(cut, vf_lt(kernel_next_cut(p, &list->cuts, i.t_in, true), i.t_out));
-    cut = state->mixing > 0 ? hit : vm_and(hit, cut);
+    if (list->cut) cut = vm_or(cut, vf_lt(kernel_next_cut(p, list, i.t_in, true), i.t_out));
+    cut = list->mixing > 0 ? hit : vm_and(hit, cut);
     if (__builtin_expect(vm_any(cut), 0)) {
         i.mask = cut;
-        kernel_tet_segments_general(p, state, c, double_cell, i);
+        kernel_tet_segments_general(p, list, c, faces, i);
         i.mask = vm_andnot(hit, cut);
     }
     const vm window = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
-    vm mine = vm_and(i.mask, window);
-    if (!list->is_double) mine = vm_and(mine, vf_lt(i.t_in, i.t_out));
+    const vm mine = vm_and(i.mask, window);
     if (!vm_any(mine)) return;
-    kernel_precise_interval precise;
-    if (list->is_double) {
-        /* lengths are compared in double, because many segments of a ray may have ends that are equal in float32 */
-        precise = kernel_tet_double(p, c, double_cell, &list->rays, &i);
-        mine = vm_and(mine, vf_lt(vf_set(0), precise.length));
-    }
-    kernel_segments_add(state->pieces, list, mine, &i, list->is_double ? &precise : NULL);
+    /* the length decides which segments are kept, because in double it may be positive if both ends are the same
+     * float32 */
+    const kernel_unit_segment run = kernel_tet_segment(p, list, c, faces, &i);
+    kernel_segments_add(list, vm_and(mine, vf_lt(vf_set(0), run.length)), i.t_in, i.t_out, &run);
 }
 
 /* Adds the segments of a cell with quadrilateral faces. map: the cell's inverse map; NULL if the field is constant. */
-static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, kernel_segment_state *state,
-                                                             const kernel_cell *c, const kernel_map *map)
+static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, kernel_segments *list,
+                                                             const kernel_cell *c, const kernel_map *map, vm rays)
 {
-    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+    kernel_interval intervals[KERNEL_MAX_CELL_INTERVALS];
     kernel_cell_interval cell_interval = {.map = map, .cell = c};
-    const int intervals = kernel_curved_intervals(p, c, p->active, list);
-    if (intervals && (map || state->pieces->has_rests))
-        kernel_cell_interval_bound(state, c->f, c->count, &cell_interval);
-    for (int k = 0; k < intervals; k++) {
-        cell_interval.interval = &list[k];
-        kernel_cell_interval_integrate(p, state, &cell_interval);
+    const int count = kernel_curved_intervals(p, c, rays, intervals);
+    if (count && (map || list->pieces->has_rests)) kernel_cell_interval_bound(list, c->f, c->count, &cell_interval);
+    for (int k = 0; k < count; k++) {
+        cell_interval.interval = &intervals[k];
+        kernel_cell_interval_integrate(p, list, &cell_interval);
     }
 }
 
@@ -659,45 +631,20 @@ SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *
     for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_clamp((c->values[i] - t->low) * t->inverse_width, 1e18);
 }
 
-/* Sets the window's samples begin .. end - 1 that lie in the piece of the profile and in the interval. A sample that
- * another cell has already set keeps its value, as in kernel_fill(). */
-static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state,
-                                   const kernel_polyhedron_interval *polyhedron_interval,
-                                   const kernel_profile_piece *piece, int begin, int end)
-{
-    kernel_samples *s = state->samples;
-    const vf length = piece->t1 - piece->t0;
-    const vf slope = vf_select(vf_lt(vf_set(0), length), (piece->v1 - piece->v0) / length, vf_set(0));
-    for (int n = begin; n < end; n++) {
-        const vf t = kernel_sample_t(p, s->first + n);
-        vm own = vm_and(polyhedron_interval->interval.mask, vm_andnot(vf_lt(t, piece->t1), vf_lt(t, piece->t0)));
-        if (!vm_any(own)) continue;
-        const vf value = piece->v0 + slope * (t - piece->t0), active = s->value[state->volume][n];
-        const vm apart = vm_and(own, vf_eq(active, active));
-        if (__builtin_expect(vm_any(apart), 0)) {
-            kernel_emit_sample(p, state, &polyhedron_interval->interval, apart, t, value);
-            own = vm_andnot(own, apart);
-        }
-        s->value[state->volume][n] = vf_select(own, value, active);
-        if (p->frame->needs_contact) {
-            s->t_in[n] = vf_select(own, polyhedron_interval->interval.t_in, s->t_in[n]);
-            s->t_out[n] = vf_select(own, polyhedron_interval->interval.t_out, s->t_out[n]);
-        }
-    }
-}
-
-static void kernel_polyhedron_interval_integrate(kernel_packet *p, kernel_volume_state *state, kernel_poly_crossings *r,
-                                                 kernel_polyhedron_interval *polyhedron_interval)
+/* Sets the window's samples in one interval of the rays inside the polyhedron. */
+static void kernel_polyhedron_interval_fill(kernel_packet *p, kernel_samples *s, kernel_poly_crossings *r,
+                                            kernel_polyhedron_interval *polyhedron_interval)
 {
     const kernel_interval *i = &polyhedron_interval->interval;
+    kernel_interval piece;
     int begin, end;
-    kernel_sample_range(p, state->samples, i, &begin, &end);
+    kernel_sample_range(p, s, i, &begin, &end);
     if (begin >= end) return;
     if (!r->cell->is_constant) kernel_poly_profile(r, polyhedron_interval);
-    kernel_profile_piece piece = kernel_profile_begin(polyhedron_interval, polyhedron_interval->u_in);
+    kernel_profile_begin(polyhedron_interval, &piece);
     while (vm_any(kernel_profile_continues(polyhedron_interval, &piece, i->mask))) {
         kernel_profile_next(r, polyhedron_interval, polyhedron_interval->u_out, &piece);
-        kernel_polyhedron_fill(p, state, polyhedron_interval, &piece, begin, end);
+        kernel_fill(p, s, NULL, &piece, i);
     }
 }
 
@@ -718,36 +665,33 @@ static polyhedron *kernel_polyhedron_prepare(kernel_packet *p, int volume, int p
     return c;
 }
 
-static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *state, int part, uint32_t index, vm rays)
+static void kernel_polyhedron_volume(kernel_packet *p, kernel_samples *s, int part, uint32_t index, vm rays)
 {
-    const polyhedron *c = kernel_polyhedron_prepare(p, state->volume, part, index);
+    const polyhedron *c = kernel_polyhedron_prepare(p, s->volume, part, index);
     kernel_poly_crossings r;
     kernel_polyhedron_interval polyhedron_interval;
     if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    while (kernel_poly_next(&r, &polyhedron_interval))
-        kernel_polyhedron_interval_integrate(p, state, &r, &polyhedron_interval);
+    while (kernel_poly_next(&r, &polyhedron_interval)) kernel_polyhedron_interval_fill(p, s, &r, &polyhedron_interval);
 }
 
 /* Adds the segments of a polyhedron: the pieces of the ray's profile, on which the field is exactly linear. */
-static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *state, int part, uint32_t index, vm rays)
+static void kernel_polyhedron_segments(kernel_packet *p, kernel_segments *list, int part, uint32_t index, vm rays)
 {
-    const polyhedron *c = kernel_polyhedron_prepare(p, state->volume, part, index);
+    const polyhedron *c = kernel_polyhedron_prepare(p, list->volume, part, index);
     kernel_poly_crossings r;
     kernel_polyhedron_interval polyhedron_interval;
+    kernel_interval piece;
     if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    kernel_cell_interval cell_interval = {.map = NULL};
-    if (state->mixing > 0) kernel_cell_interval_bound(state, c->f, c->vertex_count, &cell_interval);
+    kernel_cell_interval cell_interval = {.interval = &piece};
+    if (list->mixing > 0) kernel_cell_interval_bound(list, c->f, c->vertex_count, &cell_interval);
     while (kernel_poly_next(&r, &polyhedron_interval)) {
         if (!c->is_constant) kernel_poly_profile(&r, &polyhedron_interval);
-        kernel_profile_piece piece = kernel_profile_begin(&polyhedron_interval, polyhedron_interval.u_in);
-        vm open = kernel_profile_continues(&polyhedron_interval, &piece, polyhedron_interval.interval.mask);
-        while (vm_any(open)) {
+        kernel_profile_begin(&polyhedron_interval, &piece);
+        for (;;) {
+            piece.mask = kernel_profile_continues(&polyhedron_interval, &piece, piece.mask);
+            if (!vm_any(piece.mask)) break;
             kernel_profile_next(&r, &polyhedron_interval, polyhedron_interval.u_out, &piece);
-            const kernel_interval i = {
-                .mask = open, .t_in = piece.t0, .t_out = piece.t1, .v_in = piece.v0, .v_out = piece.v1};
-            cell_interval.interval = &i;
-            kernel_cell_interval_integrate(p, state, &cell_interval);
-            open = kernel_profile_continues(&polyhedron_interval, &piece, open);
+            kernel_cell_interval_integrate(p, list, &cell_interval);
         }
     }
 }

@@ -313,7 +313,8 @@ SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_in
 }
 
 /* Integrates the segment, and adds its light to *light, behind the light already there. */
-SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_unit_segment *run, kernel_light *light)
+static __attribute__((noinline)) void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_unit_segment *run,
+                                                       kernel_light *light)
 {
     const kernel_segment_constants constants = kernel_segment_constants_of(run);
     const vf zero = vf_set(0);

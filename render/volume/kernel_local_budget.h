@@ -57,22 +57,17 @@ enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_PIECES = 32
 /* Share of the allowed error of light that the residual of Newton's method may cause. */
 #define KERNEL_LOCAL_SLACK 0.4f
 
-/* Bounds, per lane, of the change of light due to a field error, over the values of the lane's cell
- * (kernel_light_variation). cost: maximum of that change; error_variation: its variation. */
-typedef struct kernel_local_bounds {
-    float cost[SIMD_WIDTH];
-    float error_variation[SIMD_WIDTH];
-    /* upper bound of the change of the error's weight per depth: cost + R |s'|, as defined at the top of this file */
-    float weight_change[SIMD_WIDTH];
-    float extinction[SIMD_WIDTH];
-    float low[SIMD_WIDTH], high[SIMD_WIDTH]; /* range of values for which the bounds hold */
-} kernel_local_bounds;
-
 /* The error budget of the rays in a vector of cells. */
 typedef struct kernel_local_budget {
     const kernel_pieces *pieces;
     float allowance, reach;
-    kernel_local_bounds bounds;
+    /* Bounds, per lane, of the change of light due to a field error, over the values from low to high, which are those
+     * of the lane's cell (kernel_light_variation). cost: maximum of that change; error_variation: its variation. */
+    float low[SIMD_WIDTH], high[SIMD_WIDTH];
+    float cost[SIMD_WIDTH], error_variation[SIMD_WIDTH];
+    /* upper bound of the change of the error's weight per depth: cost + R |s'|, as defined at the top of this file */
+    float weight_change[SIMD_WIDTH];
+    float extinction[SIMD_WIDTH];
     kernel_local_nonlinear nonlinear;
     float per_t[KERNEL_LOCAL_PIXELS]; /* unit distances per t, by packet and lane */
 } kernel_local_budget;
@@ -97,12 +92,12 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
     const vi entry = kernel_light_variation_entry(t, low, high);
     vf_gather_pair(&t->variations->variation, entry, &error_variation, &cost);
     vf_gather_pair(&t->variations->extinction, entry, &extinction, &steepness);
-    vf_store(b->bounds.cost, cost);
-    vf_store(b->bounds.error_variation, error_variation);
-    vf_store(b->bounds.weight_change, cost + steepness);
-    vf_store(b->bounds.extinction, extinction);
-    vf_store(b->bounds.low, low);
-    vf_store(b->bounds.high, high);
+    vf_store(b->cost, cost);
+    vf_store(b->error_variation, error_variation);
+    vf_store(b->weight_change, cost + steepness);
+    vf_store(b->extinction, extinction);
+    vf_store(b->low, low);
+    vf_store(b->high, high);
     /* the residual of Newton's method may cause a share of the error that is allowed for the ray's length alone */
     const vf slack = vf_set(KERNEL_LOCAL_SLACK * b->allowance / b->reach) / (cost * vf_load(b->nonlinear.sensitivity));
     const vf tolerance = vf_min(vf_max(slack, vf_set(1e-6f)), vf_load(b->nonlinear.residual_limit));
@@ -135,8 +130,8 @@ SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_budget *b, const ker
 {
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_chord_offset(p);
     const vf low = vf_min(v0, v1) + lift, high = vf_max(v0, v1) + lift;
-    return vm_or(vf_lt(low, kernel_gather_lane(b->bounds.low, p->rays.lane)),
-                 vf_lt(kernel_gather_lane(b->bounds.high, p->rays.lane), high));
+    return vm_or(vf_lt(low, kernel_gather_lane(b->low, p->rays.lane)),
+                 vf_lt(kernel_gather_lane(b->high, p->rays.lane), high));
 }
 
 /* Errors, per ray, that arise if one segment replaces the ray's whole interval in its cell. */
@@ -159,12 +154,12 @@ SIMD_INLINE void kernel_local_errors_of(const kernel_local_budget *b, const kern
     const vf bend = kernel_gather_lane(b->nonlinear.bend, lane);
     const vf unseen = p->unsampled * kernel_gather_lane(b->nonlinear.unsampled, lane);
     const vf least = vf_muladd(0.01f * bend, parabola + cubic, unseen);
-    const vf depth = vf_min(kernel_gather_lane(b->bounds.extinction, lane) * length, vf_set(1));
+    const vf depth = vf_min(kernel_gather_lane(b->extinction, lane) * length, vf_set(1));
     out->quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), least);
     out->mean = 0.26f * parabola + (1.09f * cubic + 4.0f * out->quartic);
     out->residual_error = kernel_gather_lane(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
     out->length = length;
-    out->weight_change = kernel_gather_lane(b->bounds.weight_change, lane) * depth;
+    out->weight_change = kernel_gather_lane(b->weight_change, lane) * depth;
 }
 
 /* Returns the error of light per unit distance if the interval becomes one segment: the part that varies along the
@@ -221,8 +216,8 @@ SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local
     kernel_local_errors wrong;
     kernel_local_errors_of(b, p, &wrong);
     const vf one = vf_set(1), allowed = vf_set(b->allowance * (1 / b->reach));
-    const vf error_variation = kernel_gather_lane(b->bounds.error_variation, p->rays.lane),
-             cost = kernel_gather_lane(b->bounds.cost, p->rays.lane);
+    const vf error_variation = kernel_gather_lane(b->error_variation, p->rays.lane),
+             cost = kernel_gather_lane(b->cost, p->rays.lane);
     const vm strays = kernel_local_leaves_range(b, p);
     const vm enough =
         vm_andnot(vf_le(kernel_local_single_segment_error(&wrong, error_variation, cost), allowed), strays);

@@ -18,25 +18,17 @@
 #include "kernel_curved_rays.h"
 #include "kernel_local.h"
 #include "kernel_local_queue.h"
-#include "kernel_local_run.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_transformed_tets.h"
 #include "kernel_samples.h"
 #include "kernel_shapes.h"
 #include "kernel_tile_cells.h"
+#include "kernel_tile_depth.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"
-
-typedef struct kernel_tile_ray_samples {
-    kernel_samples samples;
-    kernel_blend blend;
-    /* active rays of the packet, saved here because the packet's own mask is reduced to rays that still receive
-     * light */
-    vm active;
-} kernel_tile_ray_samples;
 
 enum {
     KERNEL_LOCAL_SAMPLES = 1024,
@@ -47,50 +39,42 @@ enum {
     KERNEL_LOCAL_NUMBER = 16
 };
 
-typedef struct kernel_local_batch {
-    kernel_local_lanes lanes;         /* must be the first member, because callbacks cast its address to the batch */
-    kernel_tile_ray_samples *packets; /* packets of the tile */
-    int first, count;                 /* number of the window's first sample, and number of samples in the window */
-    int sample_count;
-    float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
+/* The samples of a tile's rays in a window. */
+typedef struct kernel_tile_volume {
+    kernel_samples packets[KERNEL_TILE_PACKETS];
+    kernel_tile_depth depth;
+    int first, count; /* number of the window's first sample, and number of samples in the window */
+    float pad;        /* error bound of sample numbers, as in kernel_samples */
     /* For each packet and lane: depth of sample 0 and distance between samples, side by side; and the depth at which
      * the window ends on the ray. */
     float steps[2 * KERNEL_TILE_PIXELS], far[KERNEL_TILE_PIXELS];
-    float pad; /* error bound of sample numbers, as in kernel_samples */
-} kernel_local_batch;
-
-/* Returns whether cells of this type are sampled in lanes. They are not if the frame has surfaces, which need the ends
- * of intervals (kernel_blend_breaks()), nor if samples are separate fragments. */
-SIMD_INLINE bool kernel_local_samples_use_lanes(const kernel_frame *f, int type)
-{
-    return !f->surface_count && !f->job->separate_samples && kernel_local_queue_of(type) >= 0;
-}
+    /* samples of hexes, wedges and pyramids whose values are still to be computed: depth and word of each */
+    int sample_count;
+    float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
+} kernel_tile_volume;
 
 /* ---- samples ---- */
 
 /* Decides, by the crossings of the cell's faces, whether a sample near the cell's border belongs to the cell, and sets
- * its value if it does. */
-static __attribute__((noinline, cold)) void kernel_local_sample_by_crossings(kernel_tile_trace *t,
-                                                                             kernel_local_batch *b,
-                                                                             const kernel_local_queue *q, int lane,
-                                                                             int at, int number)
+ * its value if it does. lane: the lane of the cell. */
+static __attribute__((noinline, cold)) void kernel_local_sample_by_crossings(kernel_tile_trace *t, int lane, int at,
+                                                                             int number)
 {
-    kernel_tile_cells *cells = t->thread->tile_cells;
+    const kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_packet *p = &t->packets[at / SIMD_WIDTH];
-    kernel_volume_state state = {b->lanes.volume, &b->packets[at / SIMD_WIDTH].samples};
+    kernel_samples *s = &t->thread->tile_volume->packets[at / SIMD_WIDTH];
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_local_lanes *l = &b->lanes;
-    if (!kernel_tile_make_current(t, l->volume, l->part, q->cell[lane], true, lane, &l->alone)) return;
+    if (!kernel_tile_make_current(t, lane)) return;
     const vm ray = vm_and(p->active, vm_from_bits(1u << at % SIMD_WIDTH));
     const int intervals = kernel_curved_intervals(p, &cells->cell, ray, list);
     for (int k = 0; k < intervals; k++)
-        kernel_fill_some(p, &state, cells->cell.is_constant ? NULL : &cells->map, &list[k], number, number + 1);
+        kernel_fill_some(p, s, cells->cell.is_constant ? NULL : &cells->map, &list[k], &list[k], number, number + 1);
 }
 
 /* Computes the values of a vector of samples, from index n on, that lie inside their cells. */
-SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batch *b, const kernel_local_queue *q,
-                                         int type, int n)
+SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volume *b, int type, int n)
 {
+    const kernel_local_lanes *l = &t->thread->tile_cells->lanes;
     const int left = b->sample_count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
     const vi bits = vi_from_bits(vf_load(b->bits + n));
@@ -102,12 +86,12 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batc
     kernel_lane_rays_of(&rays, &t->tile, bits & (KERNEL_TILE_PIXELS - 1), bits >> KERNEL_LOCAL_LANE);
     const vf place[3] = {rays.rays.origin_x + rays.rays.slope_x * depth, rays.rays.origin_y + rays.rays.slope_y * depth,
                          depth};
-    const vm known = kernel_local_find(type, &b->lanes.cells, rays.lane, place, &points);
+    const vm known = kernel_local_find(type, &l->cells, rays.lane, place, &points);
     const vf inside = kernel_local_border_distance(type, points.r),
-             error_bound = kernel_gather_lane(b->lanes.cells.error_bound, rays.lane);
+             error_bound = kernel_gather_lane(l->cells.error_bound, rays.lane);
     const vm own = vm_and(vm_and(active, known), vf_lt(error_bound, inside));
     const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -error_bound)));
-    vf_store(values, kernel_local_value(type, &b->lanes.cells, rays.lane, &points));
+    vf_store(values, kernel_local_value(type, &l->cells, rays.lane, &points));
     const vi numbers = bits >> KERNEL_LOCAL_NUMBER;
     memcpy(at, &rays.at, sizeof at);
     memcpy(number, &numbers, sizeof number);
@@ -115,27 +99,26 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_local_batc
     unsigned undecided = vm_bits(doubt);
     for (unsigned more = vm_bits(own); more; more &= more - 1) {
         const int i = __builtin_ctz(more);
-        float *value = (float *)(void *)&b->packets[at[i] / SIMD_WIDTH].samples.value[b->lanes.volume][number[i]];
+        float *value = (float *)(void *)&b->packets[at[i] / SIMD_WIDTH].value[l->volume][number[i]];
         const bool is_taken = value[at[i] % SIMD_WIDTH] == value[at[i] % SIMD_WIDTH];
         undecided |= (unsigned)is_taken << i;
         if (!is_taken) value[at[i] % SIMD_WIDTH] = values[i];
     }
     for (; __builtin_expect(undecided, 0); undecided &= undecided - 1) {
         const int i = __builtin_ctz(undecided);
-        kernel_local_sample_by_crossings(t, b, q, lane[i], at[i], number[i]);
+        kernel_local_sample_by_crossings(t, lane[i], at[i], number[i]);
     }
 }
 
-SIMD_INLINE void kernel_local_fill_all(kernel_tile_trace *t, kernel_local_batch *b, int type)
+SIMD_INLINE void kernel_local_fill_all(kernel_tile_trace *t, kernel_tile_volume *b, int type)
 {
-    const kernel_local_queue *q = &b->lanes.queues[kernel_shape_number(type)];
-    for (int n = 0; n < b->sample_count; n += SIMD_WIDTH) kernel_local_fill_lanes(t, b, q, type, n);
+    for (int n = 0; n < b->sample_count; n += SIMD_WIDTH) kernel_local_fill_lanes(t, b, type, n);
 }
 
 /* Computes the listed samples, and empties the list. */
-static __attribute__((noinline)) void kernel_local_fill(kernel_tile_trace *t, kernel_local_lanes *l, int type)
+static __attribute__((noinline)) void kernel_local_fill(kernel_tile_trace *t, int type)
 {
-    kernel_local_batch *b = (kernel_local_batch *)l;
+    kernel_tile_volume *b = t->thread->tile_volume;
     if (!b->sample_count) return;
     vf_store(b->bits + b->sample_count, vf_set(0));
     vf_store(b->t + b->sample_count, vf_set(0));
@@ -148,22 +131,23 @@ static __attribute__((noinline)) void kernel_local_fill(kernel_tile_trace *t, ke
 /* Returns the first sample number within the window, from the negated number of the interval's first sample. Rays that
  * miss the window may have any number; they get the number behind the last sample, so that it does not overflow an
  * int. */
-SIMD_INLINE vf kernel_local_first(const kernel_local_batch *b, vf negated)
+SIMD_INLINE vf kernel_local_first(const kernel_tile_volume *b, vf negated)
 {
     return vf_min(vf_max(-negated, vf_set(0)), vf_set((float)b->count));
 }
 
 /* Queues the samples of the list's rays n .. n + SIMD_WIDTH - 1 that may lie inside their cells. */
-SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, kernel_local_batch *b, int type, int n)
+SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const kernel_local_lanes *l, int type, int n)
 {
-    const int left = b->lanes.rays.count - n;
+    kernel_tile_volume *b = t->thread->tile_volume;
+    const int left = l->rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    const vi pixel = kernel_load_bytes(b->lanes.rays.pixel + n);
+    const vi pixel = kernel_load_bytes(l->rays.pixel + n);
     kernel_lane_rays rays;
     vf base, step, near, far;
-    kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_load_bytes(b->lanes.rays.lane + n));
-    const vf depth = kernel_gather_lane(b->lanes.cells.origin[2], rays.lane);
-    kernel_local_slab_interval(&b->lanes.cells, &rays, depth, &near, &far);
+    kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_load_bytes(l->rays.lane + n));
+    const vf depth = kernel_gather_lane(l->cells.origin[2], rays.lane);
+    kernel_local_slab_interval(&l->cells, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
     const vf inverse = 1.0f / step, begin = depth - base, end = vf_min(depth + far, vf_gather(b->far, rays.at)) - base;
     const float zero = (float)b->first;
@@ -171,7 +155,7 @@ SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, kernel_l
     const vf last = vf_min(vf_floor((end * inverse - zero) + b->pad), vf_set((float)(b->count - 1)));
     const vi key = pixel | rays.lane << KERNEL_LOCAL_LANE;
     for (vm more = vm_and(active, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
-        if (b->sample_count > KERNEL_LOCAL_SAMPLES - SIMD_WIDTH) kernel_local_fill(t, &b->lanes, type);
+        if (b->sample_count > KERNEL_LOCAL_SAMPLES - SIMD_WIDTH) kernel_local_fill(t, type);
         const vi whole = vi_from_vf(number);
         const vf place = base + step * vf_from_vi(whole + b->first);
         vf_compress(b->bits + b->sample_count, more, vf_from_bits(key | whole << KERNEL_LOCAL_NUMBER));
@@ -183,8 +167,7 @@ SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, kernel_l
 static __attribute__((noinline)) void kernel_local_queue_samples(kernel_tile_trace *t, kernel_local_lanes *l, int type)
 {
     kernel_pixel_list_close(&l->rays);
-    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH)
-        kernel_local_queue_samples_lanes(t, (kernel_local_batch *)l, type, n);
+    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_queue_samples_lanes(t, l, type, n);
     l->rays.count = 0;
 }
 
@@ -196,24 +179,19 @@ static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, kernel_local_
     return KERNEL_OF_TYPE(type, kernel_local_transform, t, l, lists, 4, KERNEL_LOCAL_BENT, lanes);
 }
 
-static const kernel_local_stages kernel_sample_stages = {true, kernel_local_transform_lanes, kernel_local_queue_samples,
-                                                         kernel_local_fill};
-
 /* Prepares the sampling of a volume in a window, for the packets of the given blocks, which must be set up. */
-SIMD_INLINE void kernel_local_samples_begin(const kernel_tile_trace *t, kernel_local_batch *b,
-                                            kernel_tile_ray_samples *packets, unsigned blocks, int volume,
-                                            kernel_tile_trace_cell *take)
+SIMD_INLINE void kernel_local_samples_begin(const kernel_tile_trace *t, kernel_tile_volume *b, unsigned blocks,
+                                            int volume)
 {
-    b->packets = packets;
     b->pad = 0;
     b->sample_count = 0;
-    kernel_local_lanes_begin(&b->lanes, &kernel_sample_stages, volume, take);
     for (int i = 0; i < KERNEL_TILE_PIXELS; i++) b->far[i] = -INFINITY;
     for (; blocks; blocks &= blocks - 1) {
         const int begin = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
         for (int i = begin; i < begin + KERNEL_BLOCK_PACKETS; i++) {
             const kernel_packet *p = &t->packets[i];
-            const kernel_samples *s = &packets[i].samples;
+            kernel_samples *s = &b->packets[i];
+            s->volume = volume;
             vf_store(b->far + i * SIMD_WIDTH, vf_select(p->active, p->t_far, vf_set(-INFINITY)));
             for (int n = 0; n < SIMD_WIDTH; n++) {
                 b->steps[2 * (i * SIMD_WIDTH + n)] = p->sample_base[n];

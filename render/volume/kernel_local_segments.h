@@ -8,13 +8,14 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
+#include "kernel_cell_segments.h"
+#include "kernel_exact.h"
 #include "kernel_integral.h"
 #include "kernel_local.h"
 #include "kernel_local_budget.h"
 #include "kernel_local_deviation.h"
 #include "kernel_local_crossings.h"
 #include "kernel_local_queue.h"
-#include "kernel_local_run.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_preintegral.h"
@@ -27,19 +28,6 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-typedef struct kernel_tile_ray_segments {
-    kernel_segments list;
-    kernel_segment_state state;
-    kernel_blend blend;
-    vf t_last; /* depth at which the ray ends: at an opaque surface, or behind all cells */
-    /* active rays of the packet, saved here because the packet's own mask is reduced to rays that have not ended */
-    vm active;
-} kernel_tile_ray_segments;
-
-/* Callback that adds a cell's segments on the packet's active rays. map is NULL for a constant field. */
-typedef void kernel_ray_segments_callback(kernel_packet *p, kernel_segment_state *state, const kernel_cell *c,
-                                          const kernel_map *map);
-
 /* A list of rays that have passed a stage, one word per ray: the pixel in the tile from bit 0 on, the lane of the cell
  * from KERNEL_LOCAL_CELL on, and the numbers of the two crossed faces from KERNEL_LOCAL_FACES on, three bits each. */
 typedef struct kernel_local_list {
@@ -49,37 +37,30 @@ typedef struct kernel_local_list {
 
 enum { KERNEL_LOCAL_CELL = 8, KERNEL_LOCAL_FACES = 16 };
 
-typedef struct kernel_local_segment_batch {
-    kernel_local_lanes lanes;            /* must be the first member, because callbacks cast its address to the batch */
-    kernel_tile_ray_segments *packets;   /* packets of the tile */
-    unsigned blocks;                     /* blocks of the current window */
-    kernel_ray_segments_callback *alone; /* callback that processes rays in a single cell */
+/* The segments of a tile's rays in a window, and the state of the vector of cells that is being processed. */
+typedef struct kernel_tile_segments {
+    kernel_segments packets[KERNEL_TILE_PACKETS];
+    kernel_double_face precise[4]; /* the current tet in double; set only if the frame is in double */
+    float depth;                   /* depth of the next window; 0 if it has not been determined yet */
+    unsigned blocks;               /* blocks of the current window */
     kernel_local_faces faces;
     kernel_local_budget budget;
     kernel_local_list met, crossed[2];
     /* For each packet and lane: begin and end of the window, side by side; likewise begin and end of the ray. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
-} kernel_local_segment_batch;
-
-/* Returns whether segments of cells of this type are computed in lanes in this frame. */
-SIMD_INLINE bool kernel_local_segments_use_lanes(const kernel_frame *f, int type)
-{
-    return kernel_segments_use_lanes(f) && f->pieces[0].variations && kernel_local_queue_of(type) >= 0;
-}
+} kernel_tile_segments;
 
 /* Adds a segment to a ray's list if it begins before the end of the ray's window; it must not begin before the window.
  * at: position of the ray's pixel among the packets. */
-SIMD_INLINE void kernel_local_store_segment(const kernel_local_segment_batch *b, int at, const kernel_segment *s)
+SIMD_INLINE void kernel_local_store_segment(kernel_tile_segments *b, int at, const kernel_segment *s)
 {
-    kernel_tile_ray_segments *r = &b->packets[at / SIMD_WIDTH];
-    kernel_segments *list = &r->list;
+    kernel_segments *list = &b->packets[at / SIMD_WIDTH];
     const int lane = at % SIMD_WIDTH;
     if (!(s->t_in < list->t_end[lane])) return;
-    const kernel_segment_double precise = {s->t_out - s->t_in, 0, 0, 0};
+    const kernel_segment_double precise = {(s->t_out - s->t_in) * list->per_t[lane], 0, 0, 0};
     if (__builtin_expect(kernel_segments_insert(list, lane, s, &precise), 1)) return;
-    const kernel_unit_segment run =
-        kernel_unit_segment_of((vf_set(s->t_out) - s->t_in) * list->per_t, vf_set(s->v_in), vf_set(s->v_out));
-    kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->unsorted_light);
+    const kernel_unit_segment run = kernel_unit_segment_of(vf_set(precise.length), vf_set(s->v_in), vf_set(s->v_out));
+    kernel_integrate(list->pieces, vm_from_bits(1u << lane), &run, &list->unsorted_light);
 }
 
 /* Coefficients of a polynomial that is zero at u = -1/2 and 1/2. kernel_local_deviation() returns its value at u,
@@ -102,7 +83,7 @@ SIMD_INLINE vf kernel_local_primitive(const kernel_local_polynomial *p, vf u)
 
 /* Adds one segment per lane to the lists of the given rays. ends: t_in, t_out, v_in, v_out; places: position of each
  * ray's pixel among the packets. */
-SIMD_INLINE void kernel_local_store_segments(const kernel_local_segment_batch *b, vi places, vm rays, const vf ends[4])
+SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places, vm rays, const vf ends[4])
 {
     kernel_segment all[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
@@ -115,7 +96,7 @@ SIMD_INLINE void kernel_local_store_segments(const kernel_local_segment_batch *b
 }
 
 /* Adds the segments of rays for which one segment is enough. */
-SIMD_INLINE void kernel_local_emit_one(const kernel_local_segment_batch *b, const kernel_local_pairs *p, vm rays)
+SIMD_INLINE void kernel_local_emit_one(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
     const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_chord_offset(p);
     const vf ends[4] = {t0, t1, p->ends[0].value + lift, p->ends[1].value + lift};
@@ -124,8 +105,8 @@ SIMD_INLINE void kernel_local_emit_one(const kernel_local_segment_batch *b, cons
 
 /* Adds the segments of rays that need several: equal subintervals of the interval, with chords that have the mean of
  * the polynomial through the sampled values. */
-static __attribute__((noinline)) void kernel_local_emit_several(const kernel_local_segment_batch *b,
-                                                                const kernel_local_pairs *p, vm rays)
+static __attribute__((noinline)) void kernel_local_emit_several(kernel_tile_segments *b, const kernel_local_pairs *p,
+                                                                vm rays)
 {
     const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].value,
              v1 = p->ends[1].value;
@@ -151,7 +132,7 @@ static __attribute__((noinline)) void kernel_local_emit_several(const kernel_loc
     }
 }
 
-SIMD_INLINE void kernel_local_emit(const kernel_local_segment_batch *b, const kernel_local_pairs *p, vm rays)
+SIMD_INLINE void kernel_local_emit(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
     const vm single = vm_and(rays, vf_le(p->count, vf_set(1))), more = vm_andnot(rays, single);
     kernel_local_emit_one(b, p, single);
@@ -162,56 +143,52 @@ SIMD_INLINE void kernel_local_emit(const kernel_local_segment_batch *b, const ke
 
 enum { KERNEL_LOCAL_PARTS = 8 };
 
-/* The division of rays' intervals into equal parts. In the ends of each part, depth and value are those of the part,
- * but the reference coordinates are those of the whole interval. */
-typedef struct kernel_local_division {
-    kernel_local_chord chord;
-    kernel_local_part at; /* end of the last part that was processed */
-    kernel_local_pairs parts[KERNEL_LOCAL_PARTS];
-} kernel_local_division;
-
-SIMD_INLINE void kernel_local_divide(kernel_local_division *d, const kernel_local_pairs *whole, vm rays, int number,
-                                     int count, int type)
+/* Computes part `number` of `count` equal parts of the rays' intervals. at: end of the part before it. In the ends of
+ * each part, depth and value are those of the part, but the reference coordinates are those of the whole interval. */
+SIMD_INLINE void kernel_local_divide(const kernel_local_chord *chord, const kernel_local_pairs *whole, vm rays,
+                                     int number, int count, kernel_local_part *at, kernel_local_pairs *parts, int type)
 {
     const kernel_point *first = &whole->ends[0], *last = &whole->ends[1];
     const float share = 1.0f / (float)count;
-    kernel_local_pairs *part = &d->parts[number];
+    kernel_local_pairs *part = &parts[number];
     *part = *whole;
     part->active = rays;
     part->unsampled = 2 * (share * share) * (share * share);
-    kernel_local_part_next(&d->chord, share, rays, type, &d->at, &part->off_chord);
-    if (number > 0) part->ends[0] = d->parts[number - 1].ends[1];
+    kernel_local_part_next(chord, share, rays, type, at, &part->off_chord);
+    if (number > 0) part->ends[0] = parts[number - 1].ends[1];
     if (number + 1 < count) {
         const vf along = vf_set((float)(number + 1) * share);
         part->ends[1].t = first->t + (last->t - first->t) * along;
-        part->ends[1].value = (first->value + (last->value - first->value) * along) + d->at.deviation;
+        part->ends[1].value = (first->value + (last->value - first->value) * along) + at->deviation;
     }
 }
 
 /* Adds the segments of rays for which one polynomial is not accurate enough: their intervals are divided into halves,
  * quarters or eighths, with a polynomial for each part. Returns the rays for which even eighths are not accurate
  * enough. */
-SIMD_INLINE vm kernel_local_divide_intervals(const kernel_tile_trace *t, const kernel_local_segment_batch *b,
+SIMD_INLINE vm kernel_local_divide_intervals(const kernel_tile_trace *t, kernel_tile_segments *b,
                                              const kernel_local_pairs *whole, vm rays, int type)
 {
-    kernel_local_division d;
-    kernel_local_chord_of(&b->lanes.cells, &b->budget.nonlinear, whole->rays.lane, whole->ends, type, &d.chord);
+    kernel_local_chord chord;
+    kernel_local_part at;
+    kernel_local_pairs parts[KERNEL_LOCAL_PARTS];
+    kernel_local_chord_of(&t->thread->tile_cells->lanes.cells, &b->budget.nonlinear, whole->rays.lane, whole->ends,
+                          type, &chord);
     for (int count = 2; count <= KERNEL_LOCAL_PARTS && vm_any(rays); count *= 2) {
         vm good = rays;
-        kernel_local_part_begin(&whole->ends[0], &d.at);
+        kernel_local_part_begin(&whole->ends[0], &at);
         for (int i = 0; i < count && vm_any(good); i++) {
-            kernel_local_divide(&d, whole, good, i, count, type);
-            const vm fails = kernel_local_count(t, &b->budget, &d.parts[i]);
-            good = vm_andnot(good, vm_or(fails, d.parts[i].off_chord.has_diverged));
+            kernel_local_divide(&chord, whole, good, i, count, &at, parts, type);
+            const vm fails = kernel_local_count(t, &b->budget, &parts[i]);
+            good = vm_andnot(good, vm_or(fails, parts[i].off_chord.has_diverged));
         }
-        for (int i = 0; i < count && vm_any(good); i++) kernel_local_emit(b, &d.parts[i], good);
+        for (int i = 0; i < count && vm_any(good); i++) kernel_local_emit(b, &parts[i], good);
         rays = vm_andnot(rays, good);
     }
     return rays;
 }
 
-static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_tile_trace *t,
-                                                                const kernel_local_segment_batch *b,
+static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_tile_trace *t, kernel_tile_segments *b,
                                                                 const kernel_local_pairs *whole, vm rays, int type)
 {
     return KERNEL_OF_TYPE(type, kernel_local_divide_intervals, t, b, whole, rays);
@@ -220,16 +197,15 @@ static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_til
 /* ---- rays ---- */
 
 /* Processes the rays in `wanted` cell by cell; rays with the same cell and packet are processed together. */
-static __attribute__((noinline)) void
-kernel_local_segments_process_singly(kernel_tile_trace *t, kernel_local_segment_batch *b, const kernel_local_queue *q,
-                                     const kernel_lane_rays *rays, unsigned wanted)
+static __attribute__((noinline)) void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places, vi lanes,
+                                                                           unsigned wanted)
 {
+    const kernel_tile_cells *cells = t->thread->tile_cells;
     int32_t at[SIMD_WIDTH], lane[SIMD_WIDTH];
-    memcpy(at, &rays->at, sizeof at);
-    memcpy(lane, &rays->lane, sizeof lane);
+    memcpy(at, &places, sizeof at);
+    memcpy(lane, &lanes, sizeof lane);
     while (wanted) {
-        const int first = __builtin_ctz(wanted);
-        const int packet = at[first] / SIMD_WIDTH;
+        const int first = __builtin_ctz(wanted), packet = at[first] / SIMD_WIDTH;
         unsigned same = 0;
         for (unsigned more = wanted; more; more &= more - 1) {
             const int i = __builtin_ctz(more);
@@ -237,15 +213,10 @@ kernel_local_segments_process_singly(kernel_tile_trace *t, kernel_local_segment_
             same |= 1u << at[i] % SIMD_WIDTH;
             wanted &= ~(1u << i);
         }
-        kernel_local_lanes *l = &b->lanes;
-        const uint32_t cell = q->cell[lane[first]];
-        if (!kernel_tile_make_current(t, l->volume, l->part, cell, false, lane[first], &l->alone)) continue;
-        const kernel_cell *c = &t->thread->tile_cells->cell;
+        if (!kernel_tile_make_current(t, lane[first])) continue;
         kernel_packet *p = &t->packets[packet];
-        const vm active = p->active;
-        p->active = vm_and(active, vm_from_bits(same));
-        b->alone(p, &b->packets[packet].state, c, c->is_constant ? NULL : &t->thread->tile_cells->map);
-        p->active = active;
+        kernel_curved_segments(p, &t->thread->tile_segments->packets[packet], &cells->cell,
+                               cells->cell.is_constant ? NULL : &cells->map, vm_and(p->active, vm_from_bits(same)));
     }
 }
 
@@ -267,8 +238,7 @@ SIMD_INLINE vm kernel_local_list_load(const kernel_local_list *list, const kerne
 
 /* Finds, for a vector of rays from index n on, the faces of their cells that they cross. Rays that cross two faces are
  * listed in `crossed`; rays for which this is uncertain are processed cell by cell. */
-SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_segment_batch *b,
-                                             const kernel_local_queue *q, int type, int n)
+SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_segments *b, int type, int n)
 {
     kernel_lane_rays rays;
     kernel_curved_crossed crossed;
@@ -280,13 +250,12 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_local_
     kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
     if (kernel_has_triangles(type)) kernel_local_list_add(&b->crossed[1], vm_andnot(crossed.two, on_quad), words);
     if (__builtin_expect(vm_any(crossed.alone), 0))
-        kernel_local_segments_process_singly(t, b, q, &rays, vm_bits(crossed.alone));
+        kernel_local_segments_process_singly(t, rays.at, rays.lane, vm_bits(crossed.alone));
 }
 
 /* Adds the segments of a vector of rays, from index n on, each of which crosses two faces of its cell. */
-SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_segment_batch *b,
-                                             const kernel_local_queue *q, const kernel_local_list *list, int type,
-                                             int n)
+SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *b,
+                                             const kernel_local_list *list, int type, int n)
 {
     kernel_local_pairs p;
     vi words;
@@ -300,143 +269,126 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     vf_gather_pair(b->reach, 2 * p.rays.at, &near, &far);
     p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
     const vm cut = vm_or(vf_lt(p.ends[0].t, near), vf_lt(far, p.ends[1].t));
-    kernel_local_deviations_of(&b->lanes.cells, &b->budget.nonlinear, p.rays.lane, p.active, p.ends, type,
-                               &p.off_chord);
+    kernel_local_deviations_of(&t->thread->tile_cells->lanes.cells, &b->budget.nonlinear, p.rays.lane, p.active, p.ends,
+                               type, &p.off_chord);
     vm alone = vm_and(p.active, vm_or(cut, p.off_chord.has_diverged));
     p.active = vm_andnot(p.active, alone);
     const vm coarse = vm_and(p.active, kernel_local_count(t, &b->budget, &p));
     kernel_local_emit(b, &p, vm_andnot(p.active, coarse));
     if (__builtin_expect(vm_any(coarse), 0)) alone = vm_or(alone, kernel_local_segments_parts(t, b, &p, coarse, type));
-    if (__builtin_expect(vm_any(alone), 0)) kernel_local_segments_process_singly(t, b, q, &p.rays, vm_bits(alone));
+    if (__builtin_expect(vm_any(alone), 0))
+        kernel_local_segments_process_singly(t, p.rays.at, p.rays.lane, vm_bits(alone));
 }
 
 /* Lists those of the rays from index n on that may meet their cells within the window. */
-SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, kernel_local_segment_batch *b, int n)
+SIMD_INLINE void kernel_local_segments_overlap(const kernel_tile_trace *t, const kernel_local_lanes *l,
+                                               kernel_tile_segments *b, int n)
 {
-    const int left = b->lanes.rays.count - n;
+    const int left = l->rays.count - n;
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
-    const vi pixel = kernel_load_bytes(b->lanes.rays.pixel + n), lane = kernel_load_bytes(b->lanes.rays.lane + n);
+    const vi pixel = kernel_load_bytes(l->rays.pixel + n), lane = kernel_load_bytes(l->rays.lane + n);
     kernel_lane_rays rays;
     vf near, far, begin, end;
     kernel_lane_rays_of(&rays, &t->tile, pixel, lane);
-    const vf depth = kernel_gather_lane(b->lanes.cells.origin[2], rays.lane);
-    kernel_local_slab_interval(&b->lanes.cells, &rays, depth, &near, &far);
+    const vf depth = kernel_gather_lane(l->cells.origin[2], rays.lane);
+    kernel_local_slab_interval(&l->cells, &rays, depth, &near, &far);
     vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
     const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
     kernel_local_list_add(&b->met, vm_and(active, meets), pixel | lane << KERNEL_LOCAL_CELL);
 }
 
-SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_local_segment_batch *b,
-                                           const kernel_local_queue *q, int type)
+SIMD_INLINE void kernel_local_segments_met(kernel_tile_trace *t, kernel_tile_segments *b, int type)
 {
     for (int i = 0; i < 2; i++) b->crossed[i].count = 0;
-    for (int n = 0; n < b->met.count; n += SIMD_WIDTH) kernel_local_segments_faces(t, b, q, type, n);
+    for (int n = 0; n < b->met.count; n += SIMD_WIDTH) kernel_local_segments_faces(t, b, type, n);
     for (int i = 0; i < 2; i++)
         for (int n = 0; n < b->crossed[i].count; n += SIMD_WIDTH)
-            kernel_local_segments_lanes(t, b, q, &b->crossed[i], type, n);
+            kernel_local_segments_lanes(t, b, &b->crossed[i], type, n);
 }
 
 static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, kernel_local_lanes *l, int type)
 {
-    kernel_local_segment_batch *b = (kernel_local_segment_batch *)l;
+    kernel_tile_segments *b = t->thread->tile_segments;
     kernel_pixel_list_close(&l->rays);
     b->met.count = 0;
-    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_segments_overlap(t, b, n);
-    KERNEL_OF_TYPE(type, kernel_local_segments_met, t, b, &l->queues[kernel_shape_number(type)]);
+    for (int n = 0; n < l->rays.count; n += SIMD_WIDTH) kernel_local_segments_overlap(t, l, b, n);
+    KERNEL_OF_TYPE(type, kernel_local_segments_met, t, b);
     l->rays.count = 0;
 }
 
-/* ---- batches ---- */
+/* ---- cells ---- */
 
 /* Transforms the queue's cells into tile space; returns the visible ones, and stores in *lanes those that can be
  * processed in lanes. */
-SIMD_INLINE unsigned kernel_local_segments_transform_of_type(const kernel_tile_trace *t, kernel_local_segment_batch *b,
-                                                             unsigned *lanes, int type)
+SIMD_INLINE unsigned kernel_local_segments_transform_of_type(const kernel_tile_trace *t, kernel_local_lanes *l,
+                                                             kernel_tile_segments *b, unsigned *lanes, int type)
 {
     vf lists[5][8];
-    kernel_local_rank((double(*const)[8][SIMD_WIDTH])b->lanes.world, grid_type_vertices(type), lists[4]);
-    const unsigned showing = kernel_local_transform(t, &b->lanes, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes, type);
-    kernel_local_faces_of(&t->tile, lists, b->lanes.ends, type, &b->faces);
-    kernel_local_nonlinear_of(&b->lanes.cells, type, &b->budget.nonlinear);
+    kernel_local_rank((double(*const)[8][SIMD_WIDTH])l->world, grid_type_vertices(type), lists[4]);
+    const unsigned showing = kernel_local_transform(t, l, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes, type);
+    kernel_local_faces_of(&t->tile, lists, l->ends, type, &b->faces);
+    kernel_local_nonlinear_of(&l->cells, type, &b->budget.nonlinear);
     return showing;
-}
-
-/* Returns the lanes whose cells have values at a step of the opacity or on a steep ramp. */
-SIMD_INLINE vm kernel_local_is_steep(const kernel_local_budget *b)
-{
-    const kernel_segment_state state = {.pieces = b->pieces};
-    const kernel_cell_interval all = {.step_count = b->pieces->step_count};
-    const vf low = vf_load(b->bounds.low), high = vf_load(b->bounds.high);
-    return vm_or(kernel_cell_interval_is_steep(&state, low, high, false),
-                 kernel_cell_interval_steps(&state, &all, low, high));
 }
 
 static __attribute__((noinline)) unsigned kernel_local_segments_transform(kernel_tile_trace *t, kernel_local_lanes *l,
                                                                           int type, unsigned *lanes)
 {
-    kernel_local_segment_batch *b = (kernel_local_segment_batch *)l;
-    const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_transform_of_type, t, b, lanes);
-    const float(*values)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])b->faces.at[3];
-    KERNEL_OF_TYPE(type, kernel_local_bound, &b->budget, values);
-    *lanes &= ~vm_bits(kernel_local_is_steep(&b->budget));
+    kernel_tile_segments *s = t->thread->tile_segments;
+    const kernel_pieces *pieces = s->budget.pieces;
+    const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_transform_of_type, t, l, s, lanes);
+    const float(*values)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])s->faces.at[3];
+    KERNEL_OF_TYPE(type, kernel_local_bound, &s->budget, values);
+    /* cells with values at a step of the opacity or on a steep ramp are not processed in lanes */
+    const vf low = vf_load(s->budget.low), high = vf_load(s->budget.high);
+    *lanes &= ~vm_bits(vm_or(kernel_values_are_steep(pieces, low, high, false),
+                             kernel_values_have_step(pieces, 0, pieces->step_count, low, high)));
     return showing;
 }
 
-/* Returns the farthest depth at which the window of one of the block's active rays ends. */
-SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kernel_tile_ray_segments *packets,
-                                          int block)
+/* Stores the farthest depth at which the window of one of the block's active rays ends. */
+SIMD_INLINE void kernel_block_set_window_end(kernel_tile_trace *t, const kernel_segments *packets, int block)
 {
     vf end = vf_set(-INFINITY);
-    for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
-        const int i = block * KERNEL_BLOCK_PACKETS + n;
-        end = vf_max(end, vf_select(t->packets[i].active, packets[i].list.t_end, vf_set(-INFINITY)));
-    }
-    return vf_reduce_max(end);
+    for (int i = block * KERNEL_BLOCK_PACKETS; i < (block + 1) * KERNEL_BLOCK_PACKETS; i++)
+        end = vf_max(end, vf_select(t->packets[i].active, packets[i].t_end, vf_set(-INFINITY)));
+    t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = vf_reduce_max(end);
 }
 
-/* Lowers the farthest depth of the blocks in which the window of a ray has been shortened. */
-SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_local_segment_batch *b)
+/* Lowers the farthest depth of those of the blocks in which the window of a ray has been shortened. */
+SIMD_INLINE void kernel_blocks_shorten(kernel_tile_trace *t, unsigned blocks)
 {
-    for (unsigned blocks = b->blocks; blocks; blocks &= blocks - 1) {
+    kernel_segments *packets = t->thread->tile_segments->packets;
+    for (; blocks; blocks &= blocks - 1) {
         const int block = __builtin_ctz(blocks);
         bool is_shortened = false;
-        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
-            kernel_segments *list = &b->packets[block * KERNEL_BLOCK_PACKETS + n].list;
-            is_shortened = is_shortened || list->is_shortened;
-            list->is_shortened = false;
+        for (int i = block * KERNEL_BLOCK_PACKETS; i < (block + 1) * KERNEL_BLOCK_PACKETS; i++) {
+            is_shortened = is_shortened || packets[i].is_shortened;
+            packets[i].is_shortened = false;
         }
-        if (is_shortened)
-            t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_window_end(t, b->packets, block);
+        if (is_shortened) kernel_block_set_window_end(t, packets, block);
     }
 }
 
-static void kernel_local_segments_finish(kernel_tile_trace *t, kernel_local_lanes *l, int unused)
+static void kernel_local_segments_finish(kernel_tile_trace *t, int unused)
 {
     (void)unused;
-    kernel_local_segments_shorten(t, (kernel_local_segment_batch *)l);
+    kernel_blocks_shorten(t, t->thread->tile_segments->blocks);
 }
 
-static const kernel_local_stages kernel_segment_stages = {false, kernel_local_segments_transform,
-                                                          kernel_local_segments_cast, kernel_local_segments_finish};
-
 /* Copies, for each pixel, the window and the ends of the ray from the packets into arrays. */
-static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_segment_batch *b,
-                                        kernel_tile_ray_segments *packets, unsigned blocks,
-                                        kernel_tile_trace_cell *take, kernel_ray_segments_callback *alone)
+static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_tile_segments *b, unsigned blocks)
 {
-    b->packets = packets;
-    b->alone = alone;
     b->budget.pieces = &t->frame->pieces[0];
     b->budget.allowance = t->frame->allowance;
     b->budget.reach = t->frame->reach[0];
     b->blocks = blocks;
-    kernel_local_lanes_begin(&b->lanes, &kernel_segment_stages, 0, take);
     for (int i = 0; i < KERNEL_LOCAL_PIXELS; i++) b->window[2 * i] = INFINITY, b->window[2 * i + 1] = -INFINITY;
     for (; blocks; blocks &= blocks - 1) {
         const int begin = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
         for (int i = begin; i < begin + KERNEL_BLOCK_PACKETS; i++) {
             const kernel_packet *p = &t->packets[i];
-            const kernel_segments *list = &packets[i].list;
+            const kernel_segments *list = &b->packets[i];
             const vf from = vf_select(p->active, list->t_begin, vf_set(INFINITY));
             vf_store(b->budget.per_t + i * SIMD_WIDTH, list->per_t);
             for (int n = 0; n < SIMD_WIDTH; n++) {

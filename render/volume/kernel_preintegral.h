@@ -164,12 +164,6 @@ static __attribute__((noinline)) void kernel_preint_subdivide(const kernel_prein
     all->table_error = all->absorbed * table_error;
 }
 
-static __attribute__((noinline)) void kernel_integrate_apart(const kernel_pieces *t, vm rays,
-                                                             const kernel_unit_segment *run, kernel_light *light)
-{
-    kernel_integrate(t, rays, run, light);
-}
-
 SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_preint_subinterval *sub, const kernel_light *light)
 {
     kernel_light out;
@@ -201,7 +195,7 @@ static __attribute__((noinline)) void kernel_preint_refine(const kernel_pieces *
     }
     if (!vm_any(left)) return;
     kernel_light exact = kernel_light_none();
-    kernel_integrate_apart(pieces, left, run, &exact);
+    kernel_integrate(pieces, left, run, &exact);
     const kernel_preint_subinterval sub = {.colour = {exact.colour[0], exact.colour[1], exact.colour[2]},
                                            .depth = exact.depth};
     *light = kernel_light_select(left, &sub, light);

@@ -28,20 +28,39 @@
  * drops, its own cells already leave no more light than this. */
 #define KERNEL_DARK FRAGMENT_DARK_OF_RANK
 
-/* The samples of a packet in a window; a value is NaN if no cell of this rank contains the sample. */
+/* For each ray, the fragment to which samples or segments are being added front to back. */
+typedef struct kernel_blend {
+    vm open;
+    vf t_first, t_last, contact_in, contact_out;
+    vf colour[3], transmittance;
+    /* used for segments: -ln(transmittance), and the accumulated rounding errors of the colour sums */
+    vf depth, rounding_errors[3];
+    vf light; /* share of the light that passes all of this rank's samples so far */
+    /* Used if all samples and segments of a ray are folded into few fragments (render_fold.h). interval_number: index
+     * of the interval, of length 1 / FRAGMENT_INTERVALS, that contains the last sample; within: light that passes all
+     * samples so far. `light` is then the light at the end of the last interval. */
+    vf interval_number, within;
+} kernel_blend;
+
+SIMD_INLINE kernel_blend kernel_blend_begin(void)
+{
+    return (kernel_blend){.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1), .within = vf_set(1)};
+}
+
+/* The samples of a packet's rays in a window; a value is NaN if no cell of this rank contains the sample. */
 typedef struct kernel_samples {
+    int volume; /* index of the volume whose samples are being computed */
     int first, count;
     float pad; /* error bound of sample numbers that are computed from depths */
     vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
     /* ends of the interval that contains the sample; set only if the frame needs_contact */
     vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP];
     vf overlap_depth; /* depth of the ray's nearest sample that lies in two cells, in this window and earlier ones */
+    kernel_blend blend;
+    /* active rays of the packet, saved here because the packet's own mask is reduced to rays that still receive
+     * light */
+    vm active;
 } kernel_samples;
-
-typedef struct kernel_volume_state {
-    int volume;
-    kernel_samples *samples;
-} kernel_volume_state;
 
 SIMD_INLINE vf kernel_sample_t(const kernel_packet *p, int m)
 {
@@ -79,10 +98,10 @@ SIMD_INLINE void kernel_sample_range(const kernel_packet *p, const kernel_sample
  * happens because another cell already contains the sample, and it marks the ray as overlapping (render.h). Only the
  * nearest such sample is emitted, because others may be behind another rank's opaque surface. A clear fragment is
  * emitted with it, so that the two overlap. cell: the ray's interval in the sample's cell. */
-static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_volume_state *state,
+static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_samples *s,
                                                                const kernel_interval *cell, vm mask, vf t, vf value)
 {
-    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
+    const kernel_transfer *transfer = &p->frame->volumes[s->volume];
     const vf zero = vf_set(0);
     vf absorbed, colour[3];
     const vf left = kernel_transmittance(kernel_opacity(transfer, value), transfer->exponent, &absorbed);
@@ -91,8 +110,8 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     mask = vm_and(mask, vm_and(vf_lt(t, p->t_far), vf_lt(zero, absorbed)));
     mask = vm_and(mask, vf_le(p->clip_in, t));
     if (!p->frame->job->separate_samples) {
-        mask = vm_and(mask, vf_lt(t, state->samples->overlap_depth));
-        state->samples->overlap_depth = vf_select(mask, t, state->samples->overlap_depth);
+        mask = vm_and(mask, vf_lt(t, s->overlap_depth));
+        s->overlap_depth = vf_select(mask, t, s->overlap_depth);
         /* marks the fragment for render_fold.h */
         const vf sign = p->frame->job->reproducible ? vf_set(FRAGMENT_LATE) : zero;
         const kernel_fragments clear = {t, t, {zero, zero, zero}, vf_set(1), sign};
@@ -104,22 +123,21 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     const vf error = vf_max(vf_abs(t), vf_set(1)) * RENDER_FACE_ERROR;
     const vf early = vf_select(vf_lt(t - cell->t_in, error), vf_set(FRAGMENT_EARLY), zero);
     const vf late = vf_select(vf_lt(cell->t_out - t, error), vf_set(FRAGMENT_LATE), zero);
-    const uint32_t kind = FRAGMENT_VOLUME + FRAGMENT_LAYER * (uint32_t)state->volume;
+    const uint32_t kind = FRAGMENT_VOLUME + FRAGMENT_LAYER * (uint32_t)s->volume;
     const kernel_fragments sample = {t, t, {colour[0], colour[1], colour[2]}, left, early + late};
     kernel_emit(p, mask, kind, &sample);
 }
 
-/* Sets those of the window's samples begin .. end - 1 that lie in the interval. A sample keeps the value of the first
- * cell that contains it. */
-SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
-                                  const kernel_interval *i, int begin, int end)
+/* Sets those of the window's samples begin .. end - 1 that lie in the interval i. A sample keeps the value of the first
+ * cell that contains it. cell: the rays' intervals in the whole cell, of which i is all or, in a polyhedron, a part. */
+SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_samples *s, const kernel_map *map, const kernel_interval *i,
+                                  const kernel_interval *cell, int begin, int end)
 {
-    kernel_samples *s = state->samples;
     const vf length = i->t_out - i->t_in;
     const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
     const vf base = p->sample_base, step = p->sample_step;
     const bool needs_contact = p->frame->needs_contact;
-    vf *values = s->value[state->volume];
+    vf *values = s->value[s->volume];
     for (int n = begin; n < end; n++) {
         const vf t = base + step * (float)(s->first + n);
         vm own = vm_and(i->mask, vm_andnot(vf_lt(t, i->t_out), vf_lt(t, i->t_in)));
@@ -131,38 +149,24 @@ SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_volume_state *state, 
         const vf active = values[n];
         const vm apart = vm_and(own, vf_eq(active, active));
         if (__builtin_expect(vm_any(apart), 0)) {
-            kernel_emit_sample(p, state, i, apart, t, value);
+            kernel_emit_sample(p, s, cell, apart, t, value);
             own = vm_andnot(own, apart);
         }
         values[n] = vf_select(own, value, active);
         if (needs_contact) {
-            s->t_in[n] = vf_select(own, i->t_in, s->t_in[n]);
-            s->t_out[n] = vf_select(own, i->t_out, s->t_out[n]);
+            s->t_in[n] = vf_select(own, cell->t_in, s->t_in[n]);
+            s->t_out[n] = vf_select(own, cell->t_out, s->t_out[n]);
         }
     }
 }
 
-SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
-                             const kernel_interval *i)
+SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_samples *s, const kernel_map *map, const kernel_interval *i,
+                             const kernel_interval *cell)
 {
     int begin, end;
-    kernel_sample_range(p, state->samples, i, &begin, &end);
-    if (begin < end) kernel_fill_some(p, state, map, i, begin, end);
+    kernel_sample_range(p, s, i, &begin, &end);
+    if (begin < end) kernel_fill_some(p, s, map, i, cell, begin, end);
 }
-
-/* For each ray, the fragment to which samples or segments are being added front to back. */
-typedef struct kernel_blend {
-    vm open;
-    vf t_first, t_last, contact_in, contact_out;
-    vf colour[3], transmittance;
-    /* used for segments: -ln(transmittance), and the accumulated rounding errors of the colour sums */
-    vf depth, rounding_errors[3];
-    vf light; /* share of the light that passes all of this rank's samples so far */
-    /* Used if all samples and segments of a ray are folded into few fragments (render_fold.h). interval_number: index
-     * of the interval, of length 1 / FRAGMENT_INTERVALS, that contains the last sample; within: light that passes all
-     * samples so far. `light` is then the light at the end of the last interval. */
-    vf interval_number, within;
-} kernel_blend;
 
 /* Ends the current fragments of the rays in mask, and emits them if they are visible. */
 SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
@@ -197,9 +201,10 @@ SIMD_INLINE void kernel_blend_separate(kernel_packet *p, kernel_blend *b, vm has
 
 /* Returns the rays whose current fragment must end before the sample at t, because a surface lies in between, or may
  * lie there on another rank. */
-SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_samples *s, int n,
-                                   const kernel_hits *hits, vf t)
+SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_samples *s, int n, const kernel_hits *hits,
+                                   vf t)
 {
+    const kernel_blend *b = &s->blend;
     vm broken = hits->overflowed;
     for (int i = 0; i < hits->cut_count; i++)
         broken = vm_or(broken, vm_and(vf_lt(b->t_last, hits->cut[i]), vf_le(hits->cut[i], t)));
@@ -236,9 +241,9 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
     *clear = through;
 }
 
-SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_blend *b, const kernel_samples *s,
-                                     const kernel_hits *hits)
+SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_samples *s, const kernel_hits *hits)
 {
+    kernel_blend *b = &s->blend;
     const bool is_alone = p->frame->job->is_alone, is_folded = p->frame->job->reproducible;
     for (int n = 0; n < s->count; n++) {
         const vf t = kernel_sample_t(p, s->first + n);
@@ -248,7 +253,7 @@ SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_blend *b, const ke
         has = vm_and(has, vf_le(p->clip_in, t));
         if (!is_alone) kernel_blend_close(p, b, vm_not(has));
         if (!vm_any(has)) continue;
-        kernel_blend_close(p, b, vm_and(has, kernel_blend_breaks(p, b, s, n, hits, t)));
+        kernel_blend_close(p, b, vm_and(has, kernel_blend_breaks(p, s, n, hits, t)));
         const vm fresh = vm_andnot(has, b->open);
         vf colour[3], clear;
         kernel_sample_colour(p, s, n, colour, &clear);

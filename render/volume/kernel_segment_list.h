@@ -1,6 +1,6 @@
 /* Stores the segments of each ray until everything in front of them is known: one unsorted list of bounded length per
- * ray, and the depths at which surfaces cut them. kernel_segments.h explains how windows of depth work with this
- * bounded length. */
+ * ray. kernel_segments.h explains how windows of depth work with this bounded length. Then decides into how many
+ * segments a ray's interval in a cell is divided. */
 #ifndef RENDER_KERNEL_SEGMENT_LIST_H
 #define RENDER_KERNEL_SEGMENT_LIST_H
 
@@ -10,36 +10,28 @@
 #include "fragment.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
-#include "kernel_double.h"
+#include "kernel_exact.h"
+#include "kernel_hits.h"
 #include "kernel_integral.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
+#include "kernel_samples.h"
 #include "kernel_types.h"
 #include "simd.h"
 
-enum { KERNEL_WINDOW = 128, KERNEL_LANE_CUTS = 32 };
+enum { KERNEL_WINDOW = 128 };
 
 typedef struct kernel_segment {
     float t_in, t_out, v_in, v_out;
 } kernel_segment;
 
-/* Exact length and rounding errors of a segment, used if no error is allowed (one lane of kernel_precise_interval). It
- * is as large as kernel_segment, so that one index serves both. */
+/* Length in unit distances and rounding errors of a segment's values, used if the ends of segments are stored in double
+ * (one lane of kernel_unit_segment). It is as large as kernel_segment, so that one index serves both. */
 typedef struct kernel_segment_double {
     float length, rest_in, rest_out, unused;
 } kernel_segment_double;
 
-/* Crossings of transparent surfaces. Row n holds the n-th crossing of each ray, sorted by depth; +inf if a ray has
- * fewer. */
-typedef struct kernel_cuts {
-    int row_count;
-    /* false if a ray crosses more transparent surfaces than there are rows; the depths at which its segments are cut
-     * are then searched for among the tile's fragments */
-    bool is_whole;
-    int64_t first, last; /* indices of the tile's surface fragments in the thread's list */
-    float row[KERNEL_LANE_CUTS][SIMD_WIDTH];
-} kernel_cuts;
-
+/* The segments of a packet's rays in a volume and a window of depth. */
 typedef struct kernel_segments {
     int count[SIMD_WIDTH];
     kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* segments of each ray, unsorted */
@@ -50,10 +42,24 @@ typedef struct kernel_segments {
     /* Light of the segments that do not fit into a list because too many begin at the same t, as in meshes that overlap
      * many times. Such segments have no order; they are integrated here at once, and blended behind the window. */
     kernel_light unsorted_light;
-    vf t_begin, t_end; /* depth interval of each ray's window */
-    bool is_shortened; /* set if t_end has been lowered since the flag was last cleared */
-    vf per_t;          /* number of unit distances (of the transfer function) per unit of t on each ray */
-    kernel_cuts cuts;
+    vf t_begin, t_end;      /* depth interval of each ray's window */
+    bool is_shortened;      /* set if t_end has been lowered since the flag was last cleared */
+    vf per_t;               /* number of unit distances (of the transfer function) per unit of t on each ray */
+    const kernel_hits *cut; /* the packet's crossings of transparent surfaces, which cut segments; NULL: no cuts */
+    int64_t first_fragment; /* index of the tile's first fragment in the thread's list */
+    int volume;
+    const kernel_pieces *pieces;
+    /* error allowed per share of the ray's length and of its absorption; 0: subintervals are as long as the sampling
+     * step */
+    float allowance;
+    /* > 0: error allowed by mixing; segments are then emitted at once, to be mixed with other volumes
+     * (kernel_cell_interval_subdivisions_mixed()) */
+    float mixing;
+    float reach; /* upper bound of a ray's length in the cells, in unit distances */
+    kernel_blend blend;
+    vf t_last; /* depth at which the ray ends: at an opaque surface, or behind all cells */
+    /* active rays of the packet, saved here because the packet's own mask is reduced to rays that have not ended */
+    vm active;
 } kernel_segments;
 
 /* Returns whether segments can be integrated one ray-cell pair per lane. They cannot if transparent surfaces cut them,
@@ -74,44 +80,14 @@ SIMD_INLINE int kernel_packet_lane_of_pixel(const kernel_packet *p, uint32_t pix
     return -1;
 }
 
-/* Collects the depths at which transparent surfaces cut the packet's rays. first: index of the tile's first fragment in
- * the thread's list. */
-SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_cuts *cuts)
-{
-    int count[SIMD_WIDTH] = {0};
-    cuts->row_count = 0;
-    cuts->is_whole = true;
-    cuts->first = first;
-    cuts->last = p->thread->out->count;
-    for (int64_t i = first; p->frame->has_transparent && i < cuts->last; i++) {
-        const fragment *hit = &p->thread->out->items[i];
-        /* skips fragments of volumes, which come from an earlier interval between clips */
-        if (hit->kind < FRAGMENT_SURFACE) continue;
-        const int lane = kernel_packet_lane_of_pixel(p, hit->pixel);
-        if (lane < 0) continue;
-        int at = count[lane];
-        if (at == KERNEL_LANE_CUTS) {
-            cuts->is_whole = false;
-            continue;
-        }
-        if (at == cuts->row_count) {
-            vf_store(cuts->row[at], vf_set(INFINITY));
-            cuts->row_count++;
-        }
-        for (; at > 0 && cuts->row[at - 1][lane] > hit->t_in; at--) cuts->row[at][lane] = cuts->row[at - 1][lane];
-        cuts->row[at][lane] = hit->t_in;
-        count[lane]++;
-    }
-}
-
 /* Finds the next depth at which transparent surfaces cut each ray, by a search of all of the tile's fragments. It is
- * used if a ray has more such depths than there are rows for them. */
-static vf kernel_next_cut_by_search(const kernel_packet *p, const kernel_cuts *cuts, vf from, bool beyond)
+ * used if a ray has more such depths than kernel_hits stores. */
+static vf kernel_next_cut_by_search(const kernel_packet *p, const kernel_segments *list, vf from, bool beyond)
 {
     float start[SIMD_WIDTH], next[SIMD_WIDTH];
     vf_store(start, from);
     vf_store(next, vf_set(INFINITY));
-    for (int64_t i = cuts->first; i < cuts->last; i++) {
+    for (int64_t i = list->first_fragment; i < p->thread->out->count; i++) {
         const fragment *hit = &p->thread->out->items[i];
         if (hit->kind < FRAGMENT_SURFACE) continue;
         const int lane = kernel_packet_lane_of_pixel(p, hit->pixel);
@@ -124,13 +100,14 @@ static vf kernel_next_cut_by_search(const kernel_packet *p, const kernel_cuts *c
 
 /* Returns the depth of the first transparent surface on each ray at or behind t, or only behind t if `beyond` is set;
  * +inf if there is none. */
-SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, vf t, bool beyond)
+SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_segments *list, vf t, bool beyond)
 {
     vf next = vf_set(INFINITY);
-    if (!cuts->is_whole) return kernel_next_cut_by_search(p, cuts, t, beyond);
-    for (int i = cuts->row_count; i-- > 0;) {
-        const vf cut = vf_load(cuts->row[i]);
-        next = vf_select(beyond ? vf_lt(t, cut) : vf_le(t, cut), cut, next);
+    if (!list->cut) return next;
+    if (vm_any(list->cut->overflowed)) return kernel_next_cut_by_search(p, list, t, beyond);
+    for (int i = 0; i < list->cut->cut_count; i++) {
+        const vf cut = list->cut->cut[i];
+        next = vf_min(vf_select(beyond ? vf_lt(t, cut) : vf_le(t, cut), cut, next), next);
     }
     return next;
 }
@@ -207,38 +184,23 @@ SIMD_INLINE bool kernel_segments_insert(kernel_segments *list, int lane, const k
     return true;
 }
 
-/* Adds the segment of each given ray to its list. The segments must begin in the rays' windows. precise: NULL unless
- * the list is in double. */
-SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays,
-                                     const kernel_interval *i, const kernel_precise_interval *precise)
+/* Adds a segment from t_in to t_out to the list of each given ray. Segments must begin in the rays' windows. */
+static __attribute__((noinline)) void kernel_segments_add(kernel_segments *list, vm rays, vf t_in, vf t_out,
+                                                          const kernel_unit_segment *run)
 {
     kernel_segment all[SIMD_WIDTH];
     kernel_segment_double doubles[SIMD_WIDTH];
-    float a[4][SIMD_WIDTH];
+    const vf ends[4] = {t_in, t_out, run->v_in, run->v_out};
+    const vf precise[4] = {run->length, run->rest_in, run->rest_out, vf_set(0)};
     unsigned bits = vm_bits(rays), left = 0;
     if (!bits) return;
-    vf_store(a[0], i->t_in);
-    vf_store(a[1], i->t_out);
-    vf_store(a[2], i->v_in);
-    vf_store(a[3], i->v_out);
-    for (int n = 0; n < SIMD_WIDTH; n++) all[n] = (kernel_segment){a[0][n], a[1][n], a[2][n], a[3][n]};
-    if (precise) {
-        vf_store(a[0], precise->length);
-        vf_store(a[1], precise->rest_in);
-        vf_store(a[2], precise->rest_out);
-        for (int n = 0; n < SIMD_WIDTH; n++) doubles[n] = (kernel_segment_double){a[0][n], a[1][n], a[2][n], 0};
-    }
+    vf_store_rows(&all[0].t_in, ends);
+    if (list->is_double) vf_store_rows(&doubles[0].length, precise);
     for (; bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
         if (!kernel_segments_insert(list, lane, &all[lane], &doubles[lane])) left |= bits & -bits;
     }
-    if (__builtin_expect(left != 0, 0)) {
-        kernel_unit_segment run = kernel_unit_segment_of((i->t_out - i->t_in) * list->per_t, i->v_in, i->v_out);
-        if (precise)
-            run = (kernel_unit_segment){precise->length * list->per_t, i->v_in, i->v_out, precise->rest_in,
-                                        precise->rest_out};
-        kernel_integrate(pieces, vm_from_bits(left), &run, &list->unsorted_light);
-    }
+    if (__builtin_expect(left != 0, 0)) kernel_integrate(list->pieces, vm_from_bits(left), run, &list->unsorted_light);
 }
 
 /* The packet's segments sorted by t_in: row n holds the n-th segment of each ray. */
@@ -310,26 +272,13 @@ enum { KERNEL_MAX_SUBDIVISIONS = 256 };
 /* Optical depth at which the transmittance exp(-depth) is KERNEL_BLACK or slightly more. */
 #define KERNEL_DARK_DEPTH 18.4f
 
-typedef struct kernel_segment_state {
-    kernel_segments *list;
-    const kernel_pieces *pieces;
-    int volume;
-    /* error allowed per share of the ray's length and of its absorption; 0: subintervals are as long as the sampling
-     * step */
-    float allowance;
-    /* > 0: error allowed by mixing; segments are then emitted at once, to be mixed with other volumes
-     * (kernel_cell_interval_subdivisions_mixed()) */
-    float mixing;
-    float reach; /* upper bound of a ray's length in the cells, in unit distances */
-} kernel_segment_state;
-
 /* The interval of a ray in the current cell, how the field is computed along it, and the accuracy that is required. */
 typedef struct kernel_cell_interval {
     const kernel_map *map; /* inverse map of the cell; NULL if the field is linear */
     /* the cell; NULL for a tet or a polyhedron; if `map` is NULL, the cell's field is constant */
     const kernel_cell *cell;
     const kernel_interval *interval;
-    const kernel_precise_interval *precise; /* exact length and values of a tet's interval, or NULL */
+    const kernel_unit_segment *precise; /* a tet's whole interval as a segment, computed in double; or NULL */
     float cost; /* change of light per unit distance for a field error of 1; 0 if neither error nor mixing is limited */
     /* first of the opacity's steps that lie within the range of the cell's values, and their number */
     int first_step, step_count;
@@ -345,6 +294,7 @@ SIMD_INLINE kernel_bound kernel_bound_between(const kernel_pieces *t, float low,
     const int to = (int)simd_min(simd_max((high - t->bin_low) * t->bound_inverse, 0), last);
     kernel_bound b = t->bounds[from];
     for (int i = from + 1; i <= to; i++) {
+        b.extinction_low = simd_min(t->bounds[i].extinction_low, b.extinction_low);
         b.extinction_high = simd_max(t->bounds[i].extinction_high, b.extinction_high);
         b.extinction_slope = simd_max(t->bounds[i].extinction_slope, b.extinction_slope);
         b.colour_slope = simd_max(t->bounds[i].colour_slope, b.colour_slope);
@@ -362,12 +312,12 @@ SIMD_INLINE float kernel_bound_cost(const kernel_pieces *t, const kernel_bound *
 
 /* Computes the maximum of this change of light over the cell's values, and finds the steps and ramps within these
  * values. */
-SIMD_INLINE void kernel_cell_interval_bound(const kernel_segment_state *state, const float *values, int count,
+SIMD_INLINE void kernel_cell_interval_bound(const kernel_segments *list, const float *values, int count,
                                             kernel_cell_interval *out)
 {
-    const kernel_pieces *t = state->pieces;
+    const kernel_pieces *t = list->pieces;
     float low = values[0], high = low;
-    if (!(state->allowance > 0) && !(state->mixing > 0)) return;
+    if (!(list->allowance > 0) && !(list->mixing > 0)) return;
     for (int i = 1; i < count; i++) {
         low = simd_min(values[i], low);
         high = simd_max(values[i], high);
@@ -391,24 +341,23 @@ SIMD_INLINE vf kernel_cell_interval_value(kernel_packet *p, const kernel_cell_in
 }
 
 /* Returns the rays whose values from low to high meet a steep ramp, or, if is_narrow is set, a narrow one. */
-SIMD_INLINE vm kernel_cell_interval_is_steep(const kernel_segment_state *state, vf low, vf high, bool is_narrow)
+SIMD_INLINE vm kernel_values_are_steep(const kernel_pieces *t, vf low, vf high, bool is_narrow)
 {
     vm any = vm_none();
-    for (int i = 0; i < state->pieces->steep_count; i++) {
-        const kernel_steep *steep = &state->pieces->steep[i];
+    for (int i = 0; i < t->steep_count; i++) {
+        const kernel_steep *steep = &t->steep[i];
         if (is_narrow && !steep->is_narrow) continue;
         any = vm_or(any, vm_and(vf_le(low, vf_set(steep->high)), vf_le(vf_set(steep->low), high)));
     }
     return any;
 }
 
-/* Returns the rays whose values from low to high contain a step of the opacity. */
-SIMD_INLINE vm kernel_cell_interval_steps(const kernel_segment_state *state, const kernel_cell_interval *cell_interval,
-                                          vf low, vf high)
+/* Returns the rays whose values from low to high contain one of the opacity's steps first .. first + count - 1. */
+SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, int first, int count, vf low, vf high)
 {
     vm any = vm_none();
-    for (int i = 0; i < cell_interval->step_count; i++) {
-        const vf cut = vf_set(state->pieces->steps[cell_interval->first_step + i].cut);
+    for (int i = first; i < first + count; i++) {
+        const vf cut = vf_set(t->steps[i].cut);
         any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
     }
     return any;
@@ -445,12 +394,12 @@ SIMD_INLINE vf kernel_cell_interval_curvature(const vf off[KERNEL_DEVIATION_SAMP
     return sum + 0.5f * (vf_abs(begin) + vf_abs(end));
 }
 
-SIMD_INLINE void kernel_cell_interval_deviate(kernel_packet *p, const kernel_segment_state *state,
+SIMD_INLINE void kernel_cell_interval_deviate(kernel_packet *p, const kernel_segments *list,
                                               const kernel_cell_interval *cell_interval, vm rays,
                                               const kernel_interval *stretch, kernel_cell_interval_deviation *out)
 {
     const vf t0 = stretch->t_in, length = stretch->t_out - t0, v0 = stretch->v_in, v1 = stretch->v_out;
-    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
+    const kernel_transfer *transfer = &p->frame->volumes[list->volume];
     vf off[KERNEL_DEVIATION_SAMPLES + 1];
     off[0] = off[KERNEL_DEVIATION_SAMPLES] = out->most = vf_set(0);
     out->opacity = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
@@ -475,17 +424,17 @@ SIMD_INLINE void kernel_cell_interval_deviate(kernel_packet *p, const kernel_seg
  * No number is enough in three cases: if a step of the opacity lies among the values; if a steep ramp does and too many
  * subintervals would be needed; or if a narrow ramp does in which the values' rounding alone would use an eighth of the
  * allowed error. */
-SIMD_INLINE vf kernel_cell_interval_subdivisions_curved(kernel_packet *p, const kernel_segment_state *state,
+SIMD_INLINE vf kernel_cell_interval_subdivisions_curved(kernel_packet *p, const kernel_segments *list,
                                                         const kernel_cell_interval *cell_interval, vm rays,
                                                         const kernel_interval *stretch, vf *deviation)
 {
     const vf length = stretch->t_out - stretch->t_in, v0 = stretch->v_in, v1 = stretch->v_out;
     kernel_cell_interval_deviation off;
-    kernel_cell_interval_deviate(p, state, cell_interval, rays, stretch, &off);
+    kernel_cell_interval_deviate(p, list, cell_interval, rays, stretch, &off);
     const vf largest = vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
     const vf bend = vf_max(off.most, off.bend - 0.5f * KERNEL_VALUE_ROUNDING * largest);
-    const vf distance = length * state->list->per_t, depth = distance * off.opacity;
-    const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
+    const vf distance = length * list->per_t, depth = distance * off.opacity;
+    const vf allowed = list->allowance * (distance / list->reach + depth / (1.0f + depth));
     const vf made = bend * cell_interval->cost * distance; /* a factor 3/2 and a factor 2/3 cancel each other */
     *deviation = off.most;
     const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
@@ -493,15 +442,15 @@ SIMD_INLINE vf kernel_cell_interval_subdivisions_curved(kernel_packet *p, const 
     if (!cell_interval->step_count && !cell_interval->is_steep) return subdivisions;
     const vf wide = 1.5f * off.most + KERNEL_VALUE_ROUNDING * largest, low = vf_min(v0, v1) - wide,
              high = vf_max(v0, v1) + wide;
-    vm too_few = kernel_cell_interval_steps(state, cell_interval, low, high);
+    vm too_few = kernel_values_have_step(list->pieces, cell_interval->first_step, cell_interval->step_count, low, high);
     if (cell_interval->is_steep) {
         const vm many = vf_lt(vf_set(KERNEL_MAX_SUBDIVISIONS), wanted);
-        too_few = vm_or(too_few, vm_and(many, kernel_cell_interval_is_steep(state, low, high, false)));
+        too_few = vm_or(too_few, vm_and(many, kernel_values_are_steep(list->pieces, low, high, false)));
     }
     if (cell_interval->is_narrow) {
         const vf rounded = (8 * KERNEL_VALUE_ROUNDING) * largest * cell_interval->cost * distance;
         const vm shows = vf_lt(allowed, rounded);
-        too_few = vm_or(too_few, vm_and(shows, kernel_cell_interval_is_steep(state, low, high, true)));
+        too_few = vm_or(too_few, vm_and(shows, kernel_values_are_steep(list->pieces, low, high, true)));
     }
     return vf_select(too_few, vf_set(2 * KERNEL_MAX_SUBDIVISIONS), subdivisions);
 }
@@ -511,16 +460,16 @@ SIMD_INLINE vf kernel_cell_interval_subdivisions_curved(kernel_packet *p, const 
  * displaced from its assumed position, and the effect on light is attenuated by the other volumes' depth in the
  * interval. That depth, times the light that arrives there, sums to 1 over a ray; so d v / 4 may be the whole error
  * allowed. */
-SIMD_INLINE vf kernel_cell_interval_subdivisions_mixed(const kernel_segment_state *state,
+SIMD_INLINE vf kernel_cell_interval_subdivisions_mixed(const kernel_segments *list,
                                                        const kernel_cell_interval *cell_interval, vf length, vf change)
 {
-    const vf moved = change * cell_interval->cost * (length * state->list->per_t) * 0.25f;
-    return vf_sqrt(vf_min(moved / state->mixing, vf_set(1e6f)));
+    const vf moved = change * cell_interval->cost * (length * list->per_t) * 0.25f;
+    return vf_sqrt(vf_min(moved / list->mixing, vf_set(1e6f)));
 }
 
 /* Returns the number of equal subintervals into which each ray's interval is divided. *halved receives the rays for
  * which no number is accurate enough, so that their intervals must be divided by bisection. */
-SIMD_INLINE vf kernel_cell_interval_subdivisions(kernel_packet *p, const kernel_segment_state *state,
+SIMD_INLINE vf kernel_cell_interval_subdivisions(kernel_packet *p, const kernel_segments *list,
                                                  const kernel_cell_interval *cell_interval, vm rays,
                                                  const kernel_interval *stretch, vm *halved)
 {
@@ -528,22 +477,23 @@ SIMD_INLINE vf kernel_cell_interval_subdivisions(kernel_packet *p, const kernel_
     const vf v0 = stretch->v_in, v1 = stretch->v_out;
     vf subdivisions = vf_set(1), off = vf_set(0);
     *halved = vm_none();
-    if (cell_interval->map && state->allowance > 0) {
-        subdivisions = kernel_cell_interval_subdivisions_curved(p, state, cell_interval, rays, stretch, &off);
+    if (cell_interval->map && list->allowance > 0) {
+        subdivisions = kernel_cell_interval_subdivisions_curved(p, list, cell_interval, rays, stretch, &off);
         *halved = vm_and(rays, vf_lt(most, subdivisions));
     } else if (cell_interval->map) {
         subdivisions = length / p->sample_step;
-        if (cell_interval->step_count && state->mixing > 0) {
-            const vf wanted = kernel_cell_interval_subdivisions_curved(p, state, cell_interval, rays, stretch, &off);
+        if (cell_interval->step_count && list->mixing > 0) {
+            const vf wanted = kernel_cell_interval_subdivisions_curved(p, list, cell_interval, rays, stretch, &off);
             *halved = vm_and(rays, vf_lt(most, wanted));
         }
-    } else if (cell_interval->step_count && state->mixing > 0) {
-        *halved = vm_and(rays, kernel_cell_interval_steps(state, cell_interval, vf_min(v0, v1), vf_max(v0, v1)));
+    } else if (cell_interval->step_count && list->mixing > 0) {
+        *halved = vm_and(rays, kernel_values_have_step(list->pieces, cell_interval->first_step,
+                                                       cell_interval->step_count, vf_min(v0, v1), vf_max(v0, v1)));
     } else if (cell_interval->is_narrow && cell_interval->cell) {
         *halved = rays;
     }
-    if (state->mixing > 0)
-        subdivisions = vf_max(subdivisions, kernel_cell_interval_subdivisions_mixed(state, cell_interval, length,
+    if (list->mixing > 0)
+        subdivisions = vf_max(subdivisions, kernel_cell_interval_subdivisions_mixed(list, cell_interval, length,
                                                                                     vf_abs(v1 - v0) + 2.0f * off));
     return vf_clamp(-vf_floor(-subdivisions), vf_set(1), most);
 }
@@ -573,7 +523,7 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segme
 /* Emits a segment as a fragment of its own. kernel_integrate() stops once all but KERNEL_BLACK of the light is
  * absorbed, so that its depth is then too small; but compositing mixes fragments by their depth. So a segment that is
  * so dense is bisected until its parts are not, and emission ends when no light is left. */
-static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *state, vm rays, vf t_in, vf t_out,
+static void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, vm rays, vf t_in, vf t_out,
                                 const kernel_unit_segment *whole)
 {
     const vf one = vf_set(1), black = vf_set(KERNEL_BLACK);
@@ -583,7 +533,7 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *st
         const kernel_unit_segment run = kernel_unit_segment_part(whole, from, to);
         const vf begin = t_in + (t_out - t_in) * from;
         const vf end = vf_select(vf_eq(to, one), t_out, t_in + (t_out - t_in) * to), middle = 0.5f * (from + to);
-        kernel_integrate(state->pieces, open, &run, &light);
+        kernel_integrate(list->pieces, open, &run, &light);
         const vm cut = vm_and(open, vm_and(vf_le(light.transmittance, black),
                                            vm_and(vf_lt(begin, t_in + (t_out - t_in) * middle), vf_lt(middle, to))));
         const vm put = vm_andnot(open, cut);

@@ -45,12 +45,12 @@ SIMD_INLINE vf kernel_segment_end(vf t_out)
 
 /* Returns the rays whose fragment must end before the segment from t_in to t_out: a surface or a gap lies in between,
  * or cells overlap by more than rounding; compositing detects overlaps by the overlapping fragments (render.h). */
-SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_cuts *cuts, vf t_in,
-                                     vf t_out)
+SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_segments *list, vf t_in, vf t_out)
 {
-    vm broken = vm_not(vf_eq(t_in, b->t_last));
-    if (p->frame->job->is_alone) broken = vf_le(t_in, kernel_segment_end(vf_min(t_out, b->t_last)));
-    if (cuts->row_count) broken = vm_or(broken, vf_le(kernel_next_cut(p, cuts, b->t_last, false), t_in));
+    const vf last = list->blend.t_last;
+    vm broken = vm_not(vf_eq(t_in, last));
+    if (p->frame->job->is_alone) broken = vf_le(t_in, kernel_segment_end(vf_min(t_out, last)));
+    if (list->cut) broken = vm_or(broken, vf_le(kernel_next_cut(p, list, last, false), t_in));
     return broken;
 }
 
@@ -86,9 +86,10 @@ SIMD_INLINE void kernel_blend_light(kernel_blend *b, vm has, vf t_in, vf t_out, 
     b->open = vm_or(b->open, has);
 }
 
-static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kernel_pieces *pieces,
-                                  const kernel_segments *list)
+static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
 {
+    const kernel_pieces *pieces = list->pieces;
+    kernel_blend *b = &list->blend;
     kernel_sorted sorted;
     kernel_preint_end end;
     end.value = vf_set(NAN);
@@ -107,7 +108,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         kernel_light light = kernel_light_none();
         if (list->is_double) {
             vf_gather_rows(&list->precise[0][0].length, items, precise);
-            run.length = precise[0] * list->per_t;
+            run.length = precise[0];
             run.rest_in = precise[1];
             run.rest_out = precise[2];
         }
@@ -115,7 +116,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
             light = kernel_preintegrated(pieces, has, &run, &end);
         else
             kernel_integrate(pieces, has, &run, &light);
-        kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in, t_out)));
+        kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, list, t_in, t_out)));
         if (p->frame->job->reproducible)
             kernel_blend_separate(p, b, has, t_in, t_out, light.colour, light.transmittance);
         else
@@ -137,13 +138,6 @@ SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
     list->unsorted_light = kernel_light_none();
     list->t_end = t_end;
     list->is_shortened = false;
-}
-
-SIMD_INLINE kernel_blend kernel_blend_begin(void)
-{
-    const vf zero = vf_set(0), one = vf_set(1);
-    return (kernel_blend){vm_none(),          zero, zero, zero, zero, {zero, zero, zero}, one, zero,
-                          {zero, zero, zero}, one,  zero, one};
 }
 
 #endif

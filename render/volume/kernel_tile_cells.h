@@ -1,7 +1,8 @@
-/* A volume's cells, for a whole tile and one window of depth: each is transformed once and passed to the packets of the
- * blocks that it may meet. If the whole picture has been traversed at once (kernel_candidates.h), the tile's cells are
- * known: they are sorted by depth, and a window processes those that overlap it. Else the tile traverses the trees once
- * per window.
+/* A volume's cells, for a whole tile and one window of depth. Cells are queued by type, and vectors of them are
+ * transformed at once and passed to samples or segments (kernel_volume_method). Other cells are transformed one by one
+ * and passed to the packets of the blocks that they may meet. If the whole picture has been traversed at once
+ * (kernel_candidates.h), the tile's cells are known: they are sorted by depth, and a window processes those that
+ * overlap it. Else the tile traverses the trees once per window.
  *
  *     cells, by where they begin   |--a--|  |---b---|    |-c-|
  *                                     |--d--|   |--e--|
@@ -34,9 +35,23 @@
 
 enum { KERNEL_OPEN_PIECE = 16, KERNEL_SORT_PIECE = 64, KERNEL_SORT_ENDS = 48 };
 
-/* Callback that traces those of the given lanes' tets for which one ray-tet pair per lane is faster. Returns the
- * remaining lanes. */
-typedef unsigned kernel_tile_trace_tets(kernel_tile_trace *t, unsigned lanes);
+/* Callbacks by which a volume is sampled (kernel_tile_volume.h) or integrated (kernel_tile_segments.h) in its cells. */
+typedef struct kernel_volume_method {
+    /* set if the rays of cells that are processed alone are the tile's own primary rays (kernel_packet.h) */
+    bool is_pencil;
+    /* Processes a cell by the packets of the given blocks. */
+    kernel_tile_trace_cell *take;
+    /* Processes those of the given lanes' tets for which one ray-tet pair per lane is faster. Returns the remaining
+     * lanes. */
+    unsigned (*process_tets)(kernel_tile_trace *t, unsigned lanes);
+    /* Transforms a fetched vector of hexes, wedges or pyramids; returns the visible ones. *lanes: those of them that
+     * can be processed in lanes. */
+    unsigned (*transform)(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes);
+    /* Processes the listed pixels of these cells, and empties the list. */
+    void (*process_pixels)(kernel_tile_trace *t, kernel_local_lanes *l, int type);
+    /* called after all pixels of a vector of cells have been listed and processed */
+    void (*finish)(kernel_tile_trace *t, int type);
+} kernel_volume_method;
 
 /* The cells of a volume in the tile. The first open_count items begin before the end of the last window and end behind
  * its begin; `next` is the first item that no window has reached. Only the first `sorted` items are sorted, because a
@@ -46,22 +61,22 @@ typedef struct kernel_tile_cells {
     kernel_tile_candidate *items;
     int count, open_count, next;
     int sorted, end_count, ends[KERNEL_SORT_ENDS];
-    kernel_cell cell;     /* the cell that packets are tracing */
-    kernel_map map;       /* inverse map of that cell */
-    kernel_arrays arrays; /* arrays of the volume's field on the current mesh part */
-    int plain_volume, plain_part;
-    kernel_transformed_tets transformed;
+    kernel_cell cell; /* the cell that packets are tracing */
+    kernel_map map;   /* inverse map of that cell */
+    const kernel_volume_method *method;
+    bool has_tet_lanes;    /* set if small tets are processed in lanes */
+    bool has_curved_lanes; /* set if hexes, wedges and pyramids are processed in lanes */
+    kernel_local_lanes lanes;
+    kernel_transformed_tets transformed; /* a vector of tets from the queue */
     kernel_block_rays block_rays;
-    kernel_local_queue tets; /* tets that are transformed SIMD_WIDTH at a time */
-    /* callback that traces small tets in lanes; NULL if each tet is traced by packets */
-    kernel_tile_trace_tets *trace_tets;
 } kernel_tile_cells;
 
 /* Transforms the cell that has been read, and prepares it for the rays of the blocks. Returns the blocks in which it
- * may be visible. is_pencil: the rays are the tile's own primary rays (kernel_packet.h). */
-SIMD_INLINE unsigned kernel_tile_transform_cell(kernel_tile_trace *t, kernel_tile_cells *cells, const grid *g,
-                                                const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
+ * may be visible. */
+static __attribute__((noinline)) unsigned kernel_tile_transform_cell(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                                                     const grid *g, unsigned blocks)
 {
+    const kernel_transfer *transfer = &t->frame->volumes[cells->lanes.volume];
     kernel_cell *c = &cells->cell;
     kernel_outline outline;
     if (!c->is_finite || !kernel_cell_is_visible(c, transfer)) return 0;
@@ -71,53 +86,49 @@ SIMD_INLINE unsigned kernel_tile_transform_cell(kernel_tile_trace *t, kernel_til
     if (!meets) return 0;
     kernel_cell_order(c);
     kernel_cell_domain(c, transfer);
-    if (is_pencil || kernel_is_linear(c->type)) kernel_cell_lines(c, t->frame, &t->tile);
+    if (cells->method->is_pencil || kernel_is_linear(c->type)) kernel_cell_lines(c, t->frame, &t->tile);
     if (kernel_is_linear(c->type)) return meets & kernel_tet_blocks(&cells->block_rays, c);
     if (!c->is_constant) kernel_map_setup(&cells->map, c);
     return meets;
 }
 
-/* Makes a cell of a batch the tile's current cell, which is traced on its own by the rays of all blocks. Does nothing
- * if it already is the current cell. cell: the cell's index; lane: its lane in the batch. Returns false if it is
- * invisible. *alone is the lane of the current cell, or -1. */
-static __attribute__((noinline, cold)) bool kernel_tile_make_current(kernel_tile_trace *t, int volume, int part,
-                                                                     uint32_t cell, bool is_pencil, int lane,
-                                                                     int *alone)
+/* Makes a cell of the current vector the tile's current cell, which is processed on its own by the rays of all blocks.
+ * Does nothing if it already is the current cell. Returns false if it is invisible. */
+static __attribute__((noinline, cold)) bool kernel_tile_make_current(kernel_tile_trace *t, int lane)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
-    const grid *g = t->frame->job->parts[part].cells;
-    if (*alone == lane) return true;
-    *alone = -1;
-    kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[volume].field.fields[part], cell);
-    if (!kernel_tile_transform_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, KERNEL_ALL_BLOCKS))
-        return false;
-    *alone = lane;
+    kernel_local_lanes *l = &cells->lanes;
+    const grid *g = l->arrays.cells;
+    if (l->alone == lane) return true;
+    l->alone = -1;
+    kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[l->volume].field.fields[l->part],
+                      l->current->cell[lane]);
+    if (!kernel_tile_transform_cell(t, cells, g, KERNEL_ALL_BLOCKS)) return false;
+    l->alone = lane;
     return true;
 }
 
-SIMD_INLINE void kernel_tile_process_cell(kernel_tile_trace *t, int volume, int part, uint32_t index, bool is_pencil,
-                                          unsigned blocks, kernel_tile_trace_cell *take)
+/* Processes a cell by packets. */
+static __attribute__((noinline)) void kernel_tile_process_cell(kernel_tile_trace *t, int part, uint32_t index,
+                                                               unsigned blocks)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_tile_trace_cell *take = cells->method->take;
     kernel_cell *c = &cells->cell;
     const grid *g = t->frame->job->parts[part].cells;
     t->thread->volume_cells++;
-    kernel_cell_fetch(c, g, &t->frame->job->volumes[volume].field.fields[part], index);
+    kernel_cell_fetch(c, g, &t->frame->job->volumes[cells->lanes.volume].field.fields[part], index);
     if (kernel_has_own_faces(c->type)) {
         take(t, part, c, NULL, blocks);
         return;
     }
-    blocks = kernel_tile_transform_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, blocks);
+    blocks = kernel_tile_transform_cell(t, cells, g, blocks);
     if (blocks) take(t, part, c, kernel_is_linear(c->type) || c->is_constant ? NULL : &cells->map, blocks);
 }
 
-enum { KERNEL_ALL_PIXELS = -1 };
-
-/* Returns a box of pixels in the format of candidates (kernel_types.h): `box` itself, or the bounding box of the blocks
- * if box is KERNEL_ALL_PIXELS. */
-SIMD_INLINE unsigned kernel_tile_box(unsigned blocks, int box)
+/* Returns the bounding box of the blocks' pixels, in the format of candidates (kernel_types.h). */
+SIMD_INLINE unsigned kernel_blocks_box(unsigned blocks)
 {
-    if (box >= 0) return (unsigned)box;
     int x0 = KERNEL_BLOCKS_ACROSS, x1 = 0, y0 = KERNEL_BLOCKS_ACROSS, y1 = 0;
     for (; blocks; blocks &= blocks - 1) {
         const int x = __builtin_ctz(blocks) % KERNEL_BLOCKS_ACROSS, y = __builtin_ctz(blocks) / KERNEL_BLOCKS_ACROSS;
@@ -167,141 +178,197 @@ SIMD_INLINE unsigned kernel_transformed_tets_visible(const kernel_tile_trace *t,
     return vm_bits(vm_andnot(vm_and(is_finite, shows), vf_lt(back + pad, vf_set(t->t_near))));
 }
 
-/* Transforms the first `count` pending tets. Returns the lanes of those that are visible in a block in which some ray
+/* Transforms the first `count` queued tets. Returns the lanes of those that are visible in a block in which some ray
  * has no nearer end. */
-SIMD_INLINE unsigned kernel_tile_transform_pending(kernel_tile_trace *t, kernel_tile_cells *cells, int count)
+SIMD_INLINE unsigned kernel_tile_transform_tets(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q,
+                                                int count)
 {
-    t->thread->volume_cells += count;
-    const kernel_transfer *transfer = &t->frame->volumes[cells->plain_volume];
+    const kernel_arrays *arrays = &cells->lanes.arrays;
+    const kernel_transfer *transfer = &t->frame->volumes[cells->lanes.volume];
     int32_t vertices[4][SIMD_WIDTH];
     float near[SIMD_WIDTH];
     unsigned lanes = 0;
-    kernel_local_read_indices(&cells->arrays, &cells->tets, count, GRID_TET);
-    for (int i = 0; i < 4; i++) memcpy(vertices[i], cells->tets.vertex[i], sizeof vertices[i]);
-    kernel_transform_tets(&cells->transformed, &cells->arrays, t->frame, &t->tile, vertices, count);
+    t->thread->volume_cells += count;
+    kernel_local_read_indices(arrays, q, count, GRID_TET);
+    for (int i = 0; i < 4; i++) memcpy(vertices[i], q->vertex[i], sizeof vertices[i]);
+    kernel_transform_tets(&cells->transformed, arrays, t->frame, &t->tile, vertices, count);
     kernel_transformed_domain(&cells->transformed, transfer);
     unsigned candidates =
         kernel_transformed_tets_visible(t, &cells->transformed, &transfer->visible_values, near) & ((1u << count) - 1);
-    candidates = kernel_arrays_drawn(&cells->arrays, cells->tets.cell, candidates);
+    candidates = kernel_arrays_drawn(arrays, q->cell, candidates);
     for (; candidates; candidates &= candidates - 1) {
         const int n = __builtin_ctz(candidates);
-        cells->tets.blocks[n] &= (uint16_t)kernel_blocks_beyond(t, near[n]);
-        lanes |= (unsigned)(cells->tets.blocks[n] != 0) << n;
+        q->blocks[n] &= (uint16_t)kernel_blocks_beyond(t, near[n]);
+        lanes |= (unsigned)(q->blocks[n] != 0) << n;
     }
     return lanes;
 }
 
-/* Transforms the first vector of pending tets, and passes them to trace_tets or, one by one, to take(). */
-static __attribute__((noinline)) void kernel_tile_process_vector(kernel_tile_trace *t, kernel_tile_cells *cells,
-                                                                 kernel_tile_trace_cell *take)
+/* Maximum number of pixels in the box of a tet that is processed in lanes. */
+enum { KERNEL_TET_PIXELS = 48 };
+
+_Static_assert(SIMD_WIDTH *(KERNEL_TET_PIXELS + 1) <= KERNEL_LIST_ROOM, "a vector of tets has room");
+
+/* Lists the pixels of those of the given lanes' tets whose bounding boxes have at most `most` pixels, for processing
+ * with one ray-tet pair per lane: most of a packet's rays would miss such a tet. Skips tets that lie between pixels.
+ * Returns the lanes of the larger tets. */
+static unsigned kernel_tile_list_small_tets(const kernel_tile_trace *t, unsigned lanes, int most)
 {
-    const int count = cells->tets.count < SIMD_WIDTH ? cells->tets.count : SIMD_WIDTH;
-    const bool is_double = t->frame->is_double;
-    unsigned lanes = kernel_tile_transform_pending(t, cells, count);
-    if (cells->trace_tets && lanes) lanes = cells->trace_tets(t, lanes);
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_local_lanes *l = &cells->lanes;
+    vf places[3][8];
+    unsigned others = 0;
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < 4; i++) places[a][i] = cells->transformed.at[a][i];
+    kernel_local_pixels(t, 4, (const vf(*)[8])places, l->ends);
+    l->rays.count = 0;
+    for (; lanes; lanes &= lanes - 1) {
+        const int n = __builtin_ctz(lanes);
+        unsigned box = l->queues[KERNEL_CURVED_TYPES].box[n];
+        if (!kernel_local_clip_box(l->ends, n, &box)) continue;
+        if (kernel_box_pixels(box) > most)
+            others |= 1u << n;
+        else
+            kernel_pixel_list_add_box(&l->rays, box, n);
+    }
+    kernel_pixel_list_close(&l->rays);
+    return others;
+}
+
+/* Processes the first vector of tets in the queue: small ones in lanes, the others by packets. */
+SIMD_INLINE void kernel_tile_process_tets(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q)
+{
+    const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH;
+    unsigned lanes = kernel_tile_transform_tets(t, cells, q, count);
+    if (cells->has_tet_lanes && lanes) lanes = cells->method->process_tets(t, lanes);
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         kernel_transformed_tets_cell(&cells->transformed, n, &cells->cell);
-        if (is_double) kernel_transformed_tets_double(&cells->transformed, n, &cells->cell);
-        const unsigned blocks = cells->tets.blocks[n] & kernel_tet_blocks(&cells->block_rays, &cells->cell);
-        cells->cell.index = cells->tets.cell[n];
-        if (blocks) take(t, cells->plain_part, &cells->cell, NULL, blocks);
+        if (t->frame->is_double) kernel_transformed_tets_double(&cells->transformed, n, &cells->cell);
+        const unsigned blocks = q->blocks[n] & kernel_tet_blocks(&cells->block_rays, &cells->cell);
+        cells->cell.index = q->cell[n];
+        if (blocks) cells->method->take(t, cells->lanes.part, &cells->cell, NULL, blocks);
     }
-    kernel_local_pop(&cells->tets);
 }
 
-SIMD_INLINE void kernel_tile_process_pending(kernel_tile_trace *t, kernel_tile_cells *cells,
-                                             kernel_tile_trace_cell *take)
-{
-    while (cells->tets.count) kernel_tile_process_vector(t, cells, take);
-}
+/* ---- SIMD_WIDTH hexes, wedges or pyramids at once ---- */
 
-/* Sets the volume and the mesh part of the tets that are queued from now on; queued tets of another part are processed
- * first. Returns whether the part's tets are processed in lanes. They are not if the field is constant per cell,
- * because nothing is interpolated then. */
-SIMD_INLINE bool kernel_tile_set_tet_part(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
-                                          kernel_tile_trace_cell *take)
+/* Processes the first vector of cells in the queue: lists the pixels in which each may be visible, and passes these to
+ * the method. Cells that cannot be processed in lanes are processed by packets. */
+SIMD_INLINE void kernel_tile_process_curved(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_local_queue *q,
+                                            int type)
 {
-    if (part != cells->plain_part || volume != cells->plain_volume) {
-        kernel_tile_process_pending(t, cells, take);
-        kernel_arrays_begin(&cells->arrays, t->frame->job->parts[part].cells,
-                            &t->frame->job->volumes[volume].field.fields[part]);
-        cells->plain_volume = volume;
-        cells->plain_part = part;
+    const kernel_volume_method *method = cells->method;
+    kernel_local_lanes *l = &cells->lanes;
+    unsigned transformed;
+    l->current = q;
+    const unsigned all = KERNEL_OF_TYPE(type, kernel_local_fetch_all, l, q);
+    const unsigned showing = method->transform(t, l, type, &transformed) & all;
+    transformed &= all;
+    t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~transformed));
+    l->rays.count = 0;
+    for (unsigned lanes = transformed; lanes; lanes &= lanes - 1) {
+        const int n = __builtin_ctz(lanes);
+        unsigned box = q->box[n];
+        if (!kernel_local_clip_box(l->ends, n, &box)) continue;
+        kernel_pixel_list_add_box(&l->rays, box, n);
+        if (l->rays.count >= KERNEL_LIST_PIXELS) method->process_pixels(t, l, type);
     }
-    return cells->arrays.has_lanes && !cells->arrays.is_by_cell;
+    method->process_pixels(t, l, type);
+    method->finish(t, type);
+    for (unsigned lanes = showing & ~transformed; lanes; lanes &= lanes - 1) {
+        const int n = __builtin_ctz(lanes);
+        kernel_tile_process_cell(t, l->part, q->cell[n], q->blocks[n]);
+    }
 }
 
-/* Queues a tet. If the queue is full, some tets are processed. box: its box of pixels (kernel_tile_box()). */
-SIMD_INLINE void kernel_tile_enqueue_tet(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
-                                         unsigned box, kernel_tile_trace_cell *take)
+/* ---- queues ---- */
+
+/* Processes the first vector of cells in the queue of a type. */
+static __attribute__((noinline)) void kernel_tile_process_queue(kernel_tile_trace *t, int index)
 {
-    if (kernel_local_push(&cells->arrays, &cells->tets, cell, blocks, box, GRID_TET))
-        kernel_tile_process_vector(t, cells, take);
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_local_queue *q = &cells->lanes.queues[index];
+    const int type = kernel_lane_types[index];
+    if (kernel_is_linear(type))
+        kernel_tile_process_tets(t, cells, q);
+    else
+        kernel_tile_process_curved(t, cells, q, type);
+    kernel_local_pop(q);
+}
+
+/* Processes all queued cells. */
+SIMD_INLINE void kernel_tile_process_queues(kernel_tile_trace *t)
+{
+    for (int i = 0; i < KERNEL_LANE_TYPES; i++)
+        while (t->thread->tile_cells->lanes.queues[i].count) kernel_tile_process_queue(t, i);
+}
+
+/* Queues a cell; if the queue of its type is full, a vector of its cells is processed. Returns false if the cell must
+ * be processed alone: polyhedra, cells with indices too large for lanes, and tets with a field that is constant per
+ * cell, in which nothing is interpolated. box: the cell's pixels, in a candidate's format. */
+static __attribute__((noinline)) bool kernel_tile_enqueue(kernel_tile_trace *t, int part, uint32_t cell,
+                                                          unsigned blocks, unsigned box)
+{
+    const grid *g = t->frame->job->parts[part].cells;
+    const int type = grid_cell_type(g, cell);
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_local_lanes *l = &cells->lanes;
+    if (kernel_has_own_faces(type) || !kernel_arrays_have_small_indices(g)) return false;
+    if (kernel_is_linear(type) ? t->frame->job->volumes[l->volume].field.fields[part].is_cell_centred
+                               : !cells->has_curved_lanes)
+        return false;
+    if (part != l->part) {
+        kernel_tile_process_queues(t);
+        kernel_local_lanes_set_part(t, l, part);
+    }
+    const int index = kernel_lane_type_index(type);
+    kernel_local_queue *q = &l->queues[index];
+    if (kernel_is_linear(type) ? kernel_local_push(&l->arrays, q, cell, blocks, box, GRID_TET)
+                               : KERNEL_OF_TYPE(type, kernel_local_push, &l->arrays, q, cell, blocks, box))
+        kernel_tile_process_queue(t, index);
+    return true;
 }
 
 /* ---- cells found by traversing trees ---- */
 
-/* Callbacks that process a volume's cells. */
-typedef struct kernel_cell_visitor {
-    bool is_pencil;
-    kernel_tile_trace_cell *take;
-    /* Queues a cell, if cells of its type are processed in lanes; otherwise returns false. box: the cell's pixels, in a
-     * candidate's format, or KERNEL_ALL_PIXELS for all pixels of the blocks. */
-    bool (*queue)(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box);
-} kernel_cell_visitor;
-
-SIMD_INLINE void kernel_tile_process_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume,
-                                          int part, const uint32_t *cells, int count, unsigned blocks)
+/* Processes a leaf's cells (kernel_tile_visit): queues those that are processed in lanes, and transforms the others. */
+static void kernel_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
     const grid *g = t->frame->job->parts[part].cells;
-    kernel_tile_cells *pending = t->thread->tile_cells;
-    const bool waits = kernel_tile_set_tet_part(t, pending, volume, part, visitor->take);
-    if (!waits) kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
-    const unsigned box = kernel_tile_box(blocks, KERNEL_ALL_PIXELS);
-    for (int n = 0; n < count; n++)
-        if (waits && kernel_is_linear(kernel_arrays_type(&pending->arrays, cells[n])))
-            kernel_tile_enqueue_tet(t, pending, cells[n], blocks, box, visitor->take);
-        else
-            kernel_tile_process_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
-}
-
-/* Traverses the trees of the given mesh parts, skipping nodes whose values are invisible in the volume. */
-SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, const uint32_t *parts, int count,
-                                          unsigned blocks, kernel_tile_visit *visit)
-{
-    const render_field *field = &t->frame->job->volumes[volume].field;
-    for (int n = 0; n < count; n++) {
-        const int part = (int)parts[n];
-        if (field->ranges[part].low)
-            kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part],
-                                 &t->frame->volumes[volume].visible_values, blocks, part, visit);
-    }
-}
-
-/* Traverses the trees of all mesh parts, or the tree over the parts if there is one. take() receives their cells. */
-SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, kernel_tile_visit *parts,
-                                       kernel_tile_trace_cell *take)
-{
-    const render_job *job = t->frame->job;
-    if (job->parent)
-        kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, parts);
-    else
-        for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) parts(t, 0, &part, 1, blocks);
-    kernel_tile_process_pending(t, t->thread->tile_cells, take);
-}
-
-/* Processes a leaf's cells: queues those whose types are processed in lanes, and transforms the others. */
-SIMD_INLINE void kernel_visit_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume, int part,
-                                   const uint32_t *cells, int count, unsigned blocks)
-{
-    const grid *g = t->frame->job->parts[part].cells;
+    const int volume = t->thread->tile_cells->lanes.volume;
+    const unsigned box = kernel_blocks_box(blocks);
     uint32_t others[MMBVH_MAX_LEAF];
     int left = 0;
     for (int n = 0; n < count; n++) kernel_prefetch_indices(g, cells[n]);
     for (int n = 0; n < count; n++)
-        if (!visitor->queue(t, part, cells[n], blocks, KERNEL_ALL_PIXELS)) others[left++] = cells[n];
-    if (left) kernel_tile_process_leaf(t, visitor, volume, part, others, left, blocks);
+        if (!kernel_tile_enqueue(t, part, cells[n], blocks, box)) others[left++] = cells[n];
+    kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], others, left);
+    for (int n = 0; n < left; n++) kernel_tile_process_cell(t, part, others[n], blocks);
+}
+
+/* Traverses the trees of the given mesh parts (kernel_tile_visit), skipping nodes whose values are invisible. */
+static void kernel_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count, unsigned blocks)
+{
+    const int volume = t->thread->tile_cells->lanes.volume;
+    const render_field *field = &t->frame->job->volumes[volume].field;
+    (void)unused;
+    for (int n = 0; n < count; n++) {
+        const int part = (int)parts[n];
+        if (field->ranges[part].low)
+            kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part],
+                                 &t->frame->volumes[volume].visible_values, blocks, part, kernel_volume_leaf);
+    }
+}
+
+/* Traverses the trees of all mesh parts, or the tree over the parts if there is one. */
+SIMD_INLINE void kernel_volume_trees(kernel_tile_trace *t, unsigned blocks)
+{
+    const render_job *job = t->frame->job;
+    if (job->parent)
+        kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, kernel_volume_parts);
+    else
+        for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) kernel_volume_parts(t, 0, &part, 1, blocks);
 }
 
 /* ---- cells found before, as candidates of the tile ---- */
@@ -360,14 +427,14 @@ static __attribute__((noinline)) void kernel_tile_cells_sort(kernel_tile_cells *
 }
 
 /* Begins a tile, before its first window. Returns false if the tile is known to have no cells. */
-SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, kernel_tile_trace_tets *trace_tets)
+SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t, const kernel_volume_method *method, bool has_tet_lanes,
+                                         bool has_curved_lanes)
 {
-    const kernel_frame *f = t->frame;
     kernel_tile_cells *cells = t->thread->tile_cells;
-    cells->tets.count = cells->tets.indexed_count = 0;
-    cells->trace_tets = trace_tets;
-    cells->plain_part = -1;
-    if (!f->volume_candidates) return true;
+    cells->method = method;
+    cells->has_tet_lanes = has_tet_lanes;
+    cells->has_curved_lanes = has_curved_lanes;
+    if (!t->frame->volume_candidates) return true;
     cells->items = t->thread->volume_bin.items;
     cells->count = t->thread->volume_bin.count;
     cells->open_count = cells->next = cells->sorted = 0;
@@ -393,19 +460,6 @@ SIMD_INLINE void kernel_tile_cells_select_window(const kernel_tile_trace *t, ker
     cells->open_count = count;
 }
 
-/* Processes one of the cells that overlap the window. */
-SIMD_INLINE void kernel_tile_process_item(kernel_tile_trace *t, kernel_tile_cells *cells,
-                                          const kernel_tile_candidate *item, bool is_pencil, unsigned blocks,
-                                          kernel_tile_trace_cell *take)
-{
-    const int part = (int)item->source;
-    if (kernel_tile_set_tet_part(t, cells, 0, part, take) &&
-        kernel_is_linear(kernel_arrays_type(&cells->arrays, item->cell)))
-        kernel_tile_enqueue_tet(t, cells, item->cell, blocks, item->box, take);
-    else
-        kernel_tile_process_cell(t, 0, part, item->cell, is_pencil, blocks, take);
-}
-
 /* Prefetches the next cells of the window: the vertex indices of 2 * KERNEL_OPEN_PIECE cells, and the vertices of
  * KERNEL_OPEN_PIECE cells. */
 SIMD_INLINE void kernel_tile_prefetch_window(const kernel_tile_trace *t, const kernel_tile_cells *cells, int first)
@@ -425,7 +479,7 @@ SIMD_INLINE void kernel_tile_prefetch_window(const kernel_tile_trace *t, const k
 }
 
 /* Processes all candidates of the tile that overlap the window. */
-SIMD_INLINE void kernel_visit_window(kernel_tile_trace *t, const kernel_cell_visitor *visitor, unsigned blocks)
+SIMD_INLINE void kernel_volume_candidates(kernel_tile_trace *t, unsigned blocks)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_tile_cells_select_window(t, cells);
@@ -433,10 +487,22 @@ SIMD_INLINE void kernel_visit_window(kernel_tile_trace *t, const kernel_cell_vis
         const kernel_tile_candidate *item = &cells->items[n];
         if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_window(t, cells, n);
         const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
-        if (met && !visitor->queue(t, (int)item->source, item->cell, met, item->box))
-            kernel_tile_process_item(t, cells, item, visitor->is_pencil, met, visitor->take);
+        if (met && !kernel_tile_enqueue(t, (int)item->source, item->cell, met, item->box))
+            kernel_tile_process_cell(t, (int)item->source, item->cell, met);
     }
-    kernel_tile_process_pending(t, cells, visitor->take);
+}
+
+/* ---- windows of depth ---- */
+
+/* Processes all cells of a volume that may overlap the window of the given blocks. */
+static __attribute__((noinline)) void kernel_tile_process_window(kernel_tile_trace *t, int volume, unsigned blocks)
+{
+    kernel_local_lanes_begin(&t->thread->tile_cells->lanes, volume);
+    if (t->frame->volume_candidates)
+        kernel_volume_candidates(t, blocks);
+    else
+        kernel_volume_trees(t, blocks);
+    kernel_tile_process_queues(t);
 }
 
 /* ---- windows of depth ---- */

@@ -20,20 +20,16 @@
 #include <string.h>
 
 #include "grid.h"
-#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_cell_segments.h"
-#include "kernel_double.h"
 #include "kernel_exact.h"
 #include "kernel_local_queue.h"
-#include "kernel_local_run.h"
 #include "kernel_local_segments.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_samples.h"
 #include "kernel_segment_list.h"
 #include "kernel_segments.h"
-#include "kernel_small_tets.h"
 #include "kernel_tets.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
@@ -41,14 +37,6 @@
 #include "kernel_types.h"
 #include "mmbvh.h"
 #include "simd.h"
-
-typedef struct kernel_tile_segments {
-    kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
-    kernel_double_cell precise;
-    kernel_local_segment_batch stretches;
-    int volume;  /* index of the current volume */
-    float depth; /* depth of the next window; 0 if it has not been determined yet */
-} kernel_tile_segments;
 
 /* ---- cells ---- */
 
@@ -58,61 +46,23 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
 {
     kernel_tile_segments *s = t->thread->tile_segments;
     if (kernel_is_linear(c->type) && t->frame->is_double)
-        kernel_double_begin(t->frame, &t->tile, c, &t->frame->volumes[0], &s->precise);
-    for (; blocks; blocks &= blocks - 1) {
-        const int block = __builtin_ctz(blocks);
-        bool is_shortened = false;
-        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
-            const int i = block * KERNEL_BLOCK_PACKETS + n;
+        kernel_double_begin(t->frame, &t->tile, c, &t->frame->volumes[0], s->precise);
+    for (unsigned left = blocks; left; left &= left - 1) {
+        const int first = __builtin_ctz(left) * KERNEL_BLOCK_PACKETS;
+        for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
             kernel_packet *p = &t->packets[i];
-            kernel_segment_state *state = &s->packets[i].state;
             if (kernel_has_own_faces(c->type))
-                kernel_polyhedron_segments(p, state, part, c->index, p->active);
+                kernel_polyhedron_segments(p, &s->packets[i], part, c->index, p->active);
             else if (kernel_is_linear(c->type))
-                kernel_tet_segments(p, state, c, &s->precise, p->active);
+                kernel_tet_segments(p, &s->packets[i], c, s->precise, p->active);
             else
-                kernel_curved_segments(p, state, c, map);
-            is_shortened = is_shortened || state->list->is_shortened;
-            state->list->is_shortened = false;
+                kernel_curved_segments(p, &s->packets[i], c, map, p->active);
         }
-        if (is_shortened)
-            t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_window_end(t, s->packets, block);
     }
-}
-
-static bool kernel_segments_queue(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box)
-{
-    const grid *g = t->frame->job->parts[part].cells;
-    const int type = grid_cell_type(g, cell);
-    if (!kernel_arrays_have_small_indices(g) || !kernel_local_segments_use_lanes(t->frame, type)) return false;
-    kernel_local_lanes *l = &t->thread->tile_segments->stretches.lanes;
-    kernel_local_enqueue(t, l, part, type, cell, blocks, kernel_tile_box(blocks, box));
-    return true;
-}
-
-static const kernel_cell_visitor kernel_segments_visitor = {false, kernel_tile_cell_segments, kernel_segments_queue};
-
-static void kernel_tile_segments_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
-{
-    kernel_visit_leaf(t, &kernel_segments_visitor, t->thread->tile_segments->volume, part, cells, count, blocks);
-}
-
-static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
-                                       unsigned blocks)
-{
-    (void)unused;
-    kernel_tile_volume_trees(t, t->thread->tile_segments->volume, parts, count, blocks, kernel_tile_segments_leaf);
+    kernel_blocks_shorten(t, blocks);
 }
 
 /* ---- small tets ---- */
-
-/* Returns whether tets may be processed one ray-tet pair per lane. They may not if the ends of segments are computed in
- * double, because that is done per packet. This must not depend on how many cells the rank has, because segments are
- * not the same to the bit in packets. */
-SIMD_INLINE bool kernel_tet_segments_use_lanes(const kernel_frame *f)
-{
-    return kernel_segments_use_lanes(f) && !f->is_double;
-}
 
 /* Adds the segments of rays that begin or end inside their tet; `rays` is a mask of lanes. */
 static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_trace *t, kernel_tile_segments *s,
@@ -125,7 +75,7 @@ static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_
     for (; rays; rays &= rays - 1) {
         const int i = __builtin_ctz(rays), packet = at[i] / SIMD_WIDTH;
         kernel_transformed_tets_cell(&cells->transformed, lane[i], &cells->cell);
-        kernel_tet_segments(&t->packets[packet], &s->packets[packet].state, &cells->cell, NULL,
+        kernel_tet_segments(&t->packets[packet], &s->packets[packet], &cells->cell, NULL,
                             vm_from_bits(1u << at[i] % SIMD_WIDTH));
     }
 }
@@ -134,34 +84,43 @@ static __attribute__((noinline, cold)) void kernel_tet_segments_cut(kernel_tile_
 static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_trace *t, unsigned lanes)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    kernel_local_segment_batch *b = &s->stretches;
-    const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_PIXELS, &b->lanes);
-    for (int n = 0; n < b->lanes.rays.count; n += SIMD_WIDTH) {
+    const unsigned others = kernel_tile_list_small_tets(t, lanes, KERNEL_TET_PIXELS);
+    const kernel_pixel_list *rays = &t->thread->tile_cells->lanes.rays;
+    for (int n = 0; n < rays->count; n += SIMD_WIDTH) {
         kernel_lane_rays r;
         kernel_interval i;
         vf begin, end, near, far;
-        kernel_lane_rays_begin(&r, t, &b->lanes.rays, n);
+        kernel_lane_rays_begin(&r, t, rays, n);
         const vi at = r.at;
-        vf_gather_pair(b->window, 2 * at, &begin, &end);
+        vf_gather_pair(s->window, 2 * at, &begin, &end);
         r.active = vm_and(r.active, vf_lt(begin, end));
         kernel_tet_rays_interval(&t->thread->tile_cells->transformed, &r, &i);
         if (!vm_any(i.mask)) continue;
-        vf_gather_pair(b->reach, 2 * at, &near, &far);
+        vf_gather_pair(s->reach, 2 * at, &near, &far);
         const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));
         const vm cut = vm_and(met, vm_or(vf_lt(i.t_in, near), vf_lt(far, i.t_out)));
         const vm own = vm_and(vm_andnot(met, cut), vm_and(vf_le(begin, i.t_in), vf_lt(i.t_in, i.t_out)));
         const vf ends[4] = {i.t_in, i.t_out, i.v_in, i.v_out};
-        if (vm_any(own)) kernel_local_store_segments(b, at, own, ends);
+        if (vm_any(own)) kernel_local_store_segments(s, at, own, ends);
         if (__builtin_expect(vm_any(cut), 0)) kernel_tet_segments_cut(t, s, at, r.lane, vm_bits(cut));
     }
-    b->lanes.rays.count = 0;
-    kernel_local_segments_shorten(t, b);
+    kernel_blocks_shorten(t, s->blocks);
     return others;
 }
 
+static const kernel_volume_method kernel_volume_by_segments = {
+    .is_pencil = false,
+    .take = kernel_tile_cell_segments,
+    .process_tets = kernel_tet_segments_small,
+    .transform = kernel_local_segments_transform,
+    .process_pixels = kernel_local_segments_cast,
+    .finish = kernel_local_segments_finish,
+};
+
 /* ---- windows of depth ---- */
 
-SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_segments *r, float far,
+/* Prepares the packet for segments of all volumes. hits: the packet's hits on surfaces. */
+SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *list, float far, const kernel_hits *hits,
                                            int64_t first_fragment)
 {
     const kernel_frame *f = p->frame;
@@ -169,22 +128,25 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_seg
     kernel_packet_lanes(p, &lanes);
     kernel_packet_samples(p, &lanes);
     p->is_pencil = false;
-    r->active = p->active;
-    r->blend = kernel_blend_begin();
-    r->t_last = vf_min(p->t_far, vf_set(far));
-    r->list.t_begin = p->t_near;
-    r->list.cuts.row_count = 0;
-    if (!f->job->separate_samples) kernel_cuts_find(p, first_fragment, &r->list.cuts);
-    kernel_segments_set_double(p, &r->list, f->is_double && !f->job->separate_samples);
+    list->active = p->active;
+    list->blend = kernel_blend_begin();
+    list->t_last = vf_min(p->t_far, vf_set(far));
+    list->t_begin = p->t_near;
+    list->cut = f->has_transparent && !f->job->separate_samples ? hits : NULL;
+    list->first_fragment = first_fragment;
+    kernel_segments_set_double(p, list, f->is_double && !f->job->separate_samples);
 }
 
 /* Prepares the packet for a volume: sets its error limits and its unit distances. */
-SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_tile_ray_segments *r, int volume)
+SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_segments *list, int volume)
 {
     const kernel_frame *f = p->frame;
-    const float mixing = f->job->separate_samples ? f->mixing : 0;
-    r->list.per_t = f->volumes[volume].exponent / p->sample_step * p->clip_length_ratio;
-    r->state = (kernel_segment_state){&r->list, &f->pieces[volume], volume, f->allowance, mixing, f->reach[volume]};
+    list->per_t = f->volumes[volume].exponent / p->sample_step * p->clip_length_ratio;
+    list->volume = volume;
+    list->pieces = &f->pieces[volume];
+    list->allowance = f->allowance;
+    list->mixing = f->job->separate_samples ? f->mixing : 0;
+    list->reach = f->reach[volume];
 }
 
 /* Deactivates rays that have ended or are dark; returns the least t_begin of the others, +inf if there are none. */
@@ -194,33 +156,29 @@ SIMD_INLINE float kernel_tile_segments_front(kernel_tile_trace *t, kernel_tile_s
     vf front = vf_set(INFINITY);
     for (int n = 0; n < count; n++) {
         kernel_packet *p = &t->packets[packets[n]];
-        const kernel_tile_ray_segments *r = &s->packets[packets[n]];
-        p->active =
-            vm_and(p->active, vm_and(vf_lt(r->list.t_begin, r->t_last), vf_lt(vf_set(KERNEL_DARK), r->blend.light)));
-        front = vf_min(front, vf_select(p->active, r->list.t_begin, vf_set(INFINITY)));
+        const kernel_segments *list = &s->packets[packets[n]];
+        p->active = vm_and(p->active,
+                           vm_and(vf_lt(list->t_begin, list->t_last), vf_lt(vf_set(KERNEL_DARK), list->blend.light)));
+        front = vf_min(front, vf_select(p->active, list->t_begin, vf_set(INFINITY)));
     }
     return vf_reduce_min(front);
 }
 
 /* Stores, for all blocks, the segments of the window that ends at depth `end`. */
-SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_segments *s, unsigned blocks, float end)
+SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_segments *s, int volume, unsigned blocks,
+                                           float end)
 {
-    for (int b = 0; b < KERNEL_BLOCKS; b++) {
-        float far = -INFINITY;
-        for (int n = 0; n < KERNEL_BLOCK_PACKETS && blocks >> b & 1; n++) {
-            kernel_tile_ray_segments *r = &s->packets[b * KERNEL_BLOCK_PACKETS + n];
-            kernel_segments_begin(&r->list, vf_max(r->list.t_begin, vf_min(r->t_last, vf_set(end))));
+    for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) t->far[v] = vf_set(-INFINITY);
+    for (unsigned left = blocks; left; left &= left - 1) {
+        const int block = __builtin_ctz(left);
+        for (int i = block * KERNEL_BLOCK_PACKETS; i < (block + 1) * KERNEL_BLOCK_PACKETS; i++) {
+            kernel_segments *list = &s->packets[i];
+            kernel_segments_begin(list, vf_max(list->t_begin, vf_min(list->t_last, vf_set(end))));
         }
-        if (blocks >> b & 1) far = kernel_block_window_end(t, s->packets, b);
-        t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
+        kernel_block_set_window_end(t, s->packets, block);
     }
-    kernel_local_segments_begin(t, &s->stretches, s->packets, blocks, kernel_tile_cell_segments,
-                                kernel_curved_segments);
-    if (t->frame->volume_candidates)
-        kernel_visit_window(t, &kernel_segments_visitor, blocks);
-    else
-        kernel_tile_all_trees(t, blocks, kernel_tile_segments_parts, kernel_tile_cell_segments);
-    kernel_local_end(t, &s->stretches.lanes);
+    kernel_local_segments_begin(t, s, blocks);
+    kernel_tile_process_window(t, volume, blocks);
 }
 
 /* Chooses the next window's depth from the lengths of this window's lists, so that the fullest list will be three
@@ -228,14 +186,14 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
 SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, const int *packets, int count, float begin,
                                                    float end)
 {
-    const int room = s->packets[packets[0]].list.capacity;
+    const int room = s->packets[packets[0]].capacity;
     int most = room / 16;
     vf least = vf_set(end);
     for (int n = 0; n < count; n++) {
-        const kernel_tile_ray_segments *r = &s->packets[packets[n]];
-        const vm is_full = vf_lt(r->list.t_end, r->t_last);
-        least = vf_min(least, vf_select(is_full, r->list.t_end, least));
-        for (int lane = 0; lane < SIMD_WIDTH; lane++) most = r->list.count[lane] > most ? r->list.count[lane] : most;
+        const kernel_segments *list = &s->packets[packets[n]];
+        const vm is_full = vf_lt(list->t_end, list->t_last);
+        least = vf_min(least, vf_select(is_full, list->t_end, least));
+        for (int lane = 0; lane < SIMD_WIDTH; lane++) most = list->count[lane] > most ? list->count[lane] : most;
     }
     s->depth = (vf_reduce_min(least) - begin) * (0.75f * (float)room) / (float)most;
 }
@@ -245,7 +203,6 @@ SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, cons
 SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets, int count,
                                          int volume, float near)
 {
-    s->volume = volume;
     for (int n = 0; n < count; n++) kernel_ray_segments_of(&t->packets[packets[n]], &s->packets[packets[n]], volume);
     const float front = kernel_tile_segments_front(t, s, packets, count);
     t->t_near = front < INFINITY ? fmaxf(front, near) : front;
@@ -258,7 +215,7 @@ static __attribute__((noinline, cold)) void kernel_tile_segments_separate(kernel
 {
     for (int volume = 0; volume < t->frame->volume_count; volume++) {
         kernel_tile_segments_of(t, s, packets, count, volume, reach->near);
-        if (t->t_near < INFINITY) kernel_tile_segments_find(t, s, reach->blocks, INFINITY);
+        if (t->t_near < INFINITY) kernel_tile_segments_find(t, s, volume, reach->blocks, INFINITY);
     }
 }
 
@@ -270,13 +227,12 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
         kernel_tile_segments_of(t, s, packets, count, 0, reach->near);
         if (!(t->t_near < INFINITY)) break;
         const float end = s->depth > 0 ? t->t_near + s->depth : reach->far;
-        kernel_tile_segments_find(t, s, reach->blocks, end);
+        kernel_tile_segments_find(t, s, 0, reach->blocks, end);
         kernel_tile_segments_adapt_window(s, packets, count, t->t_near, fminf(end, reach->far));
         for (int n = 0; n < count; n++) {
-            kernel_tile_ray_segments *r = &s->packets[packets[n]];
-            if (vm_any(t->packets[packets[n]].active))
-                kernel_blend_segments(&t->packets[packets[n]], &r->blend, r->state.pieces, &r->list);
-            r->list.t_begin = r->list.t_end;
+            kernel_segments *list = &s->packets[packets[n]];
+            if (vm_any(t->packets[packets[n]].active)) kernel_blend_segments(&t->packets[packets[n]], list);
+            list->t_begin = list->t_end;
         }
     }
 }
@@ -286,20 +242,26 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    if (!kernel_tile_cells_begin(t, kernel_tet_segments_use_lanes(t->frame) ? kernel_tet_segments_small : NULL)) return;
+    /* Tets are not processed in lanes if ends are in double, because these are computed per packet. Lanes must not
+     * depend on how many cells the rank has, because segments of tets in packets do not have the same bits. */
+    const bool has_lanes = kernel_segments_use_lanes(t->frame);
+    if (!kernel_tile_cells_begin(t, &kernel_volume_by_segments, has_lanes && !t->frame->is_double,
+                                 has_lanes && t->frame->pieces[0].variations))
+        return;
     const kernel_placement reach = kernel_tile_trees_placement(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
     for (int n = 0; n < count; n++)
-        kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, t->first_fragment);
+        kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, &t->hits[packets[n]],
+                                  t->first_fragment);
     if (t->frame->job->separate_samples)
         kernel_tile_segments_separate(t, s, packets, count, &reach);
     else
         kernel_tile_segments_windows(t, s, packets, count, &reach);
     for (int n = 0; n < count; n++) {
-        kernel_tile_ray_segments *r = &s->packets[packets[n]];
-        t->packets[packets[n]].active = r->active;
-        kernel_segments_close(&t->packets[packets[n]], &r->blend, r->active);
+        kernel_segments *list = &s->packets[packets[n]];
+        t->packets[packets[n]].active = list->active;
+        kernel_segments_close(&t->packets[packets[n]], &list->blend, list->active);
     }
 }
 

@@ -1,6 +1,6 @@
 /* Samples volumes for a whole tile, one window of samples at a time, for all blocks of the tile. Hexes, wedges and
  * pyramids are processed one sample per lane (kernel_local_samples.h), and tets of few pixels one ray-tet pair per lane
- * (kernel_small_tets.h). Other cells are fetched, transformed and given their edge functions once per window
+ * (kernel_tets.h). Other cells are fetched, transformed and given their edge functions once per window
  * (kernel_tile_cells.h), and passed to the packets of the blocks that they may meet, where they fill the samples that
  * they own. Window boundaries are numbers of samples, at most job->sample_group apart:
  *
@@ -19,16 +19,13 @@
 #include <math.h>
 
 #include "grid.h"
-#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_cell_segments.h"
 #include "kernel_crossings.h"
-#include "kernel_local_run.h"
 #include "kernel_local_samples.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_samples.h"
-#include "kernel_small_tets.h"
 #include "kernel_tets.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
@@ -38,29 +35,21 @@
 #include "render.h"
 #include "simd.h"
 
-typedef struct kernel_tile_volume {
-    kernel_tile_ray_samples packets[KERNEL_TILE_PACKETS];
-    int volume; /* index of the current volume */
-    kernel_tile_depth depth;
-    kernel_local_batch batch;
-} kernel_tile_volume;
-
 /* ---- cells ---- */
 
-static __attribute__((noinline)) void kernel_tile_tet_samples(kernel_packet *p, kernel_volume_state *state,
-                                                              const kernel_cell *c)
+static __attribute__((noinline)) void kernel_tile_tet_samples(kernel_packet *p, kernel_samples *s, const kernel_cell *c)
 {
     kernel_interval i;
     kernel_tet_interval(p, c, p->active, false, &i);
-    if (vm_any(i.mask)) kernel_fill(p, state, NULL, &i);
+    if (vm_any(i.mask)) kernel_fill(p, s, NULL, &i, &i);
 }
 
-static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *p, kernel_volume_state *state,
+static __attribute__((noinline)) void kernel_tile_curved_samples(kernel_packet *p, kernel_samples *s,
                                                                  const kernel_cell *c, const kernel_map *map)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int intervals = kernel_curved_intervals(p, c, p->active, list);
-    for (int k = 0; k < intervals; k++) kernel_fill(p, state, map, &list[k]);
+    for (int k = 0; k < intervals; k++) kernel_fill(p, s, map, &list[k], &list[k]);
 }
 
 /* Sets the samples of the cell on the rays of the given blocks. */
@@ -72,25 +61,15 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
         const int first = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
         for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
             kernel_packet *p = &t->packets[i];
-            kernel_volume_state state = {v->volume, &v->packets[i].samples};
+            kernel_samples *s = &v->packets[i];
             if (kernel_has_own_faces(c->type))
-                kernel_polyhedron_volume(p, &state, part, c->index, p->active);
+                kernel_polyhedron_volume(p, s, part, c->index, p->active);
             else if (kernel_is_linear(c->type))
-                kernel_tile_tet_samples(p, &state, c);
+                kernel_tile_tet_samples(p, s, c);
             else
-                kernel_tile_curved_samples(p, &state, c, map);
+                kernel_tile_curved_samples(p, s, c, map);
         }
     }
-}
-
-static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box)
-{
-    const grid *g = t->frame->job->parts[part].cells;
-    const int type = grid_cell_type(g, cell);
-    if (!kernel_arrays_have_small_indices(g) || !kernel_local_samples_use_lanes(t->frame, type)) return false;
-    kernel_local_enqueue(t, &t->thread->tile_volume->batch.lanes, part, type, cell, blocks,
-                         kernel_tile_box(blocks, box));
-    return true;
 }
 
 /* ---- small tets: sampled by the operations of kernel_samples.h, to the same bits ---- */
@@ -98,27 +77,19 @@ static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, 
 /* Maximum number of pixels in the box of a tet that is sampled in lanes. Larger tets are sampled as fast by packets. */
 enum { KERNEL_TET_SAMPLE_PIXELS = 12 };
 
-/* Returns whether tets may be sampled one ray-tet pair per lane. They may not if surfaces may end rays, or if each
- * sample becomes a fragment of its own. */
-SIMD_INLINE bool kernel_tet_samples_use_lanes(const kernel_frame *f)
-{
-    return !f->surface_count && !f->job->separate_samples;
-}
-
 /* Emits a sample that also lies in another cell as a fragment of its own. */
-static __attribute__((noinline, cold)) void kernel_tet_sample_separate(kernel_tile_trace *t, kernel_local_batch *b,
+static __attribute__((noinline, cold)) void kernel_tet_sample_separate(kernel_tile_trace *t, kernel_tile_volume *b,
                                                                        int at, float depth, float value)
 {
     const int packet = at / SIMD_WIDTH;
     const kernel_interval cell = {0};
-    kernel_volume_state state = {b->lanes.volume, &b->packets[packet].samples};
-    kernel_emit_sample(&t->packets[packet], &state, &cell, vm_from_bits(1u << at % SIMD_WIDTH), vf_set(depth),
-                       vf_set(value));
+    kernel_emit_sample(&t->packets[packet], &b->packets[packet], &cell, vm_from_bits(1u << at % SIMD_WIDTH),
+                       vf_set(depth), vf_set(value));
 }
 
 /* Stores the values of samples, one per lane, in the window. Samples that already have a value from another cell are
  * emitted instead. */
-SIMD_INLINE void kernel_tet_samples_store(kernel_tile_trace *t, kernel_local_batch *b, vm own, vi places, vi numbers,
+SIMD_INLINE void kernel_tet_samples_store(kernel_tile_trace *t, kernel_tile_volume *b, vm own, vi places, vi numbers,
                                           vf depth, vf value)
 {
     int32_t at[SIMD_WIDTH], number[SIMD_WIDTH];
@@ -128,8 +99,8 @@ SIMD_INLINE void kernel_tet_samples_store(kernel_tile_trace *t, kernel_local_bat
     vf_store(values, value);
     for (unsigned lanes = vm_bits(own); lanes; lanes &= lanes - 1) {
         const int i = __builtin_ctz(lanes);
-        float *to = (float *)(void *)&b->packets[at[i] / SIMD_WIDTH].samples.value[b->lanes.volume][number[i]];
-        to += at[i] % SIMD_WIDTH;
+        kernel_samples *s = &b->packets[at[i] / SIMD_WIDTH];
+        float *to = (float *)(void *)&s->value[s->volume][number[i]] + at[i] % SIMD_WIDTH;
         if (__builtin_expect(*to == *to, 0))
             kernel_tet_sample_separate(t, b, at[i], depth[i], values[i]);
         else
@@ -138,7 +109,7 @@ SIMD_INLINE void kernel_tet_samples_store(kernel_tile_trace *t, kernel_local_bat
 }
 
 /* Computes the values of the samples that lie in the rays' intervals. */
-SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batch *b, const kernel_interval *i, vi at)
+SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_tile_volume *b, const kernel_interval *i, vi at)
 {
     vf base, step;
     vf_gather_pair(b->steps, 2 * at, &base, &step);
@@ -160,46 +131,49 @@ SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_local_batc
 /* Samples those of the given lanes' pending tets that are small. Returns the lanes of the others. */
 static __attribute__((noinline)) unsigned kernel_tet_samples_small(kernel_tile_trace *t, unsigned lanes)
 {
-    kernel_local_batch *b = &t->thread->tile_volume->batch;
-    const unsigned others = kernel_small_tets_list(t, lanes, KERNEL_TET_SAMPLE_PIXELS, &b->lanes);
-    for (int n = 0; n < b->lanes.rays.count; n += SIMD_WIDTH) {
+    kernel_tile_volume *b = t->thread->tile_volume;
+    const unsigned others = kernel_tile_list_small_tets(t, lanes, KERNEL_TET_SAMPLE_PIXELS);
+    const kernel_pixel_list *rays = &t->thread->tile_cells->lanes.rays;
+    for (int n = 0; n < rays->count; n += SIMD_WIDTH) {
         kernel_lane_rays r;
         kernel_interval i;
-        kernel_lane_rays_begin(&r, t, &b->lanes.rays, n);
+        kernel_lane_rays_begin(&r, t, rays, n);
         const vi at = r.at;
         r.active = vm_and(r.active, vf_lt(vf_set(-INFINITY), vf_gather(b->far, at)));
         kernel_tet_rays_interval(&t->thread->tile_cells->transformed, &r, &i);
         if (vm_any(i.mask)) kernel_tet_samples_fill(t, b, &i, at);
     }
-    b->lanes.rays.count = 0;
     return others;
 }
 
-static const kernel_cell_visitor kernel_samples_visitor = {true, kernel_tile_samples, kernel_samples_queue};
+static const kernel_volume_method kernel_volume_by_samples = {
+    .is_pencil = true,
+    .take = kernel_tile_samples,
+    .process_tets = kernel_tet_samples_small,
+    .transform = kernel_local_transform_lanes,
+    .process_pixels = kernel_local_queue_samples,
+    .finish = kernel_local_fill,
+};
 
-static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
+/* Returns whether small tets, hexes, wedges and pyramids are sampled in lanes. They are not if the frame has surfaces,
+ * which may end rays and need the ends of intervals (kernel_blend_breaks()), nor if each sample becomes a fragment of
+ * its own. */
+SIMD_INLINE bool kernel_samples_use_lanes(const kernel_frame *f)
 {
-    kernel_visit_leaf(t, &kernel_samples_visitor, t->thread->tile_volume->volume, part, cells, count, blocks);
-}
-
-static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
-                                     unsigned blocks)
-{
-    (void)unused;
-    kernel_tile_volume_trees(t, t->thread->tile_volume->volume, parts, count, blocks, kernel_tile_volume_leaf);
+    return !f->surface_count && !f->job->separate_samples;
 }
 
 /* Prepares the packet for samples of a volume. Extends *first .. *last to include the numbers of its rays' samples
  * between the depths near and far. */
-SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samples *r, float near, float far,
-                                          int *first, int *last)
+SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_samples *s, float near, float far, int *first,
+                                          int *last)
 {
     kernel_lanes lanes;
     kernel_packet_lanes(p, &lanes);
     kernel_packet_samples(p, &lanes);
-    r->active = p->active;
-    r->blend = (kernel_blend){.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1), .within = vf_set(1)};
-    r->samples.overlap_depth = vf_set(INFINITY);
+    s->active = p->active;
+    s->blend = kernel_blend_begin();
+    s->overlap_depth = vf_set(INFINITY);
     const vf end = vf_min(p->t_far, vf_set(far));
     const vf from = (near - p->sample_base) * p->sample_inverse, to = (end - p->sample_base) * p->sample_inverse;
     const int lowest = (int)floorf(vf_reduce_min(from)) - 1, highest = (int)floorf(vf_reduce_max(to)) + 1;
@@ -210,13 +184,12 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samp
 
 /* Prepares the packet for a window. Returns the farthest depth of its rays' samples in the window, -inf if there are
  * none, and lowers *near to the least depth. */
-SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_tile_ray_samples *r, int volumes, float *near)
+SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_samples *s, int volumes, float *near)
 {
-    kernel_samples *s = &r->samples;
     const vf t_first = kernel_sample_t(p, s->first), t_last = kernel_sample_t(p, s->first + s->count - 1);
     const vf t_end = vf_min(t_last, p->t_far);
     const vf nothing = vf_set(p->frame->job->separate_samples ? 0 : NAN);
-    p->active = vm_and(p->active, vm_and(vf_lt(vf_set(KERNEL_DARK), r->blend.light), vf_le(t_first, t_end)));
+    p->active = vm_and(p->active, vm_and(vf_lt(vf_set(KERNEL_DARK), s->blend.light), vf_le(t_first, t_end)));
     if (!vm_any(p->active)) return -INFINITY;
     for (int v = 0; v < volumes; v++)
         for (int n = 0; n < s->count; n++) s->value[v][n] = nothing;
@@ -234,20 +207,16 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
         float far = -INFINITY;
         for (int n = 0; n < KERNEL_BLOCK_PACKETS && blocks >> b & 1; n++) {
             const int i = b * KERNEL_BLOCK_PACKETS + n;
-            kernel_samples_window(&t->packets[i], &v->packets[i].samples, first, last - first + 1);
+            kernel_samples_window(&t->packets[i], &v->packets[i], first, last - first + 1);
             far = simd_max(kernel_ray_window(&t->packets[i], &v->packets[i], job->volume_count, &t->t_near), far);
         }
         t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
         is_lit = is_lit || far > -INFINITY;
     }
     if (!is_lit) return false;
-    for (v->volume = 0; v->volume < job->volume_count; v->volume++) {
-        kernel_local_samples_begin(t, &v->batch, v->packets, blocks, v->volume, kernel_tile_samples);
-        if (t->frame->volume_candidates)
-            kernel_visit_window(t, &kernel_samples_visitor, blocks);
-        else
-            kernel_tile_all_trees(t, blocks, kernel_tile_volume_parts, kernel_tile_samples);
-        kernel_local_end(t, &v->batch.lanes);
+    for (int volume = 0; volume < job->volume_count; volume++) {
+        kernel_local_samples_begin(t, v, blocks, volume);
+        kernel_tile_process_window(t, volume, blocks);
     }
     return true;
 }
@@ -267,9 +236,9 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
 {
     for (int n = 0; n < count; n++) {
         const int i = packets[n];
-        kernel_tile_ray_samples *r = &v->packets[i];
-        if (vm_any(t->packets[i].active)) kernel_blend_window(&t->packets[i], &r->blend, &r->samples, &t->hits[i]);
-        kernel_depth_add(&v->depth, r->active, &r->blend);
+        kernel_samples *s = &v->packets[i];
+        if (vm_any(t->packets[i].active)) kernel_blend_window(&t->packets[i], s, &t->hits[i]);
+        kernel_depth_add(&v->depth, s->active, &s->blend);
     }
     kernel_depth_end_window(&v->depth, (float)samples * t->packets[packets[0]].sample_step[0]);
 }
@@ -278,7 +247,8 @@ SIMD_INLINE void kernel_tile_window_blend(kernel_tile_trace *t, kernel_tile_volu
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
-    if (!kernel_tile_cells_begin(t, kernel_tet_samples_use_lanes(t->frame) ? kernel_tet_samples_small : NULL)) return;
+    const bool has_lanes = kernel_samples_use_lanes(t->frame);
+    if (!kernel_tile_cells_begin(t, &kernel_volume_by_samples, has_lanes, has_lanes)) return;
     kernel_placement reach = kernel_tile_trees_placement(t);
     const unsigned blocks = reach.blocks;
     const float cells_near = kernel_tile_cells_near(t);

@@ -1,0 +1,304 @@
+/* Computes cells in double, from the caller's coordinates and values: the ends of a ray's segment in a tet, and the map
+ * and field of other cells at single points, which kernel_map.h computes in float32.
+ *
+ * Ends of segments in double are used for segments that may have no error, or almost
+ * none, and for transfer functions with extremely narrow ramps.
+ *
+ * In float32 a face's value errs by about 4e-7 of the transfer function's domain: three weights, their sum, and the
+ * vertices' positions and values have an error of 6e-8 each. A steep function magnifies that error, near an opacity of
+ * 1 by a factor of a hundred. And the length of a short segment is the difference of two depths that are rounded on the
+ * scale of the scene. So the decisions which faces a ray crosses, and in which order segments lie along it, are made in
+ * float32 as for all other cells (kernel_cell.h), with the same bits. But the segment's length, and its values at both
+ * ends, are computed from the caller's coordinates and values and from the ray's position in the picture, in double.
+ *
+ * An edge function is affine in the ray's u, v (kernel_cell.h). So are the sum D of a face's edge functions, and the
+ * sums N of its vertices' depths and values, weighted by the opposite edges: nine coefficients per face, computed once
+ * per cell and tile. A ray meets the face's plane at N / D. That point may lie outside the face, by as much as the
+ * decision is rounded, about 1e-7 of the edges' terms. If D is less than KERNEL_DOUBLE_EDGE of these terms, the face is
+ * seen so nearly edge on that the plane is met far outside the face, and the segment keeps both float32 ends.
+ * Everything is computed from the face's vertices in their order and from the ray, so that both cells of a face compute
+ * the same point if both use double. */
+#ifndef RENDER_KERNEL_EXACT_H
+#define RENDER_KERNEL_EXACT_H
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_integral.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_shapes.h"
+#include "kernel_tets.h"
+#include "kernel_types.h"
+#include "kernel_wide.h"
+#include "simd.h"
+
+/* A ray meets a face's plane outside the face by at most 1e-7 / KERNEL_DOUBLE_EDGE of the face's extent. */
+#define KERNEL_DOUBLE_EDGE 1e-3
+
+/* A tet's face: affine functions of the ray, c[0] + c[1] u + c[2] v. A tet has four, in the order of kernel_tet_face.
+ */
+typedef struct kernel_double_face {
+    double depth[3], value[3], weight[3];
+    double least; /* the face is not seen edge on if the weight is larger than this */
+} kernel_double_face;
+
+/* The (u, v) of a packet's rays in double, relative to the tile's centre. */
+typedef struct kernel_double_rays {
+    kernel_f64 u[2], v[2];
+} kernel_double_rays;
+
+SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_double_rays *out)
+{
+    kernel_lanes lanes;
+    kernel_packet_lanes(p, &lanes);
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        lanes.px[i] -= p->tile->centre_x;
+        lanes.py[i] -= p->tile->centre_y;
+    }
+    memcpy(out->u, lanes.px, sizeof out->u);
+    memcpy(out->v, lanes.py, sizeof out->v);
+}
+
+/* ---- a cell ---- */
+
+/* A vertex in tile space before it is rounded to float32. `depth` is the factor of u and v in the vertex's projection;
+ * t and value are the depth and the field. */
+typedef struct kernel_double_vertex {
+    double x, y, depth, t, value;
+} kernel_double_vertex;
+
+SIMD_INLINE kernel_double_vertex kernel_double_transform(const kernel_frame *f, const kernel_tile *tile,
+                                                         const double *world)
+{
+    double place[3] = {0, 0, 0};
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 3; b++) place[a] += f->scaled_axes[a][b] * (world[b] - f->job->camera.eye[b]);
+    const double depth = f->job->camera.is_orthographic ? f->job->space.scale : place[2];
+    return (kernel_double_vertex){.x = place[0] - tile->centre_x * depth,
+                                  .y = place[1] - tile->centre_y * depth,
+                                  .depth = depth,
+                                  .t = place[2] - tile->depth_shift};
+}
+
+/* Returns the value in the transfer function's domain, clamped to +-1e18. */
+static inline double kernel_double_domain(const kernel_transfer *transfer, double value)
+{
+    return fmax(fmin((value - transfer->low) * transfer->inverse_width, 1e18), -1e18);
+}
+
+SIMD_INLINE void kernel_double_edge(const kernel_double_vertex *a, const kernel_double_vertex *b, double edge[3])
+{
+    edge[0] = a->x * b->y - b->x * a->y;
+    edge[1] = b->depth * a->y - a->depth * b->y;
+    edge[2] = a->depth * b->x - b->depth * a->x;
+}
+
+/* Computes the affine sums of one face (a row of kernel_tet_face) from the tet's vertices and edge functions. radius:
+ * upper bound of the rays' |u| and |v|. */
+SIMD_INLINE void kernel_double_sums(const kernel_double_vertex *spots, double (*const edges)[3],
+                                    const signed char *face, double radius, kernel_double_face *out)
+{
+    const kernel_double_vertex *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
+    const double *ij = edges[face[3]], *jk = edges[face[4]], *ik = edges[face[5]];
+    out->least = 0;
+    for (int n = 0; n < 3; n++) {
+        out->depth[n] = (jk[n] * i->t - ik[n] * j->t) + ij[n] * k->t;
+        out->value[n] = (jk[n] * i->value - ik[n] * j->value) + ij[n] * k->value;
+        out->weight[n] = (jk[n] - ik[n]) + ij[n];
+        out->least += KERNEL_DOUBLE_EDGE * (n ? radius : 1) * ((fabs(ij[n]) + fabs(jk[n])) + fabs(ik[n]));
+    }
+}
+
+/* Computes the affine functions of a tet's faces. The tet must have been transformed and sorted. */
+static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f, const kernel_tile *tile,
+                                                          const kernel_cell *c, const kernel_transfer *transfer,
+                                                          kernel_double_face faces[4])
+{
+    kernel_double_vertex spots[4];
+    double edges[KERNEL_TET_EDGES][3];
+    for (int i = 0; i < 4; i++) {
+        spots[i] = kernel_double_transform(f, tile, c->world[i]);
+        spots[i].value = kernel_double_domain(transfer, c->values[i]);
+    }
+    for (int n = 0; n < KERNEL_TET_EDGES; n++)
+        kernel_double_edge(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]], edges[n]);
+    for (int n = 0; n < 4; n++) kernel_double_sums(spots, edges, kernel_tet_face[n], (double)tile->radius, &faces[n]);
+}
+
+/* ---- rays in a tet ---- */
+
+/* Points at which rays meet the plane of a face. is_sound: rays for which the face is not seen edge on, so that the
+ * point is valid. */
+typedef struct kernel_double_end {
+    kernel_f64 t, v;
+    kernel_f64_mask is_sound;
+} kernel_double_end;
+
+SIMD_INLINE kernel_f64 kernel_affine_at(const double c[3], kernel_f64 u, kernel_f64 v)
+{
+    return (c[0] + c[1] * u) + c[2] * v;
+}
+
+SIMD_INLINE kernel_double_end kernel_double_intersect(const kernel_double_face *face, kernel_f64 u, kernel_f64 v)
+{
+    const kernel_f64 weight = kernel_affine_at(face->weight, u, v), inverse = 1.0 / weight;
+    return (kernel_double_end){kernel_affine_at(face->depth, u, v) * inverse,
+                               kernel_affine_at(face->value, u, v) * inverse,
+                               (kernel_f64_mask)(weight * weight > face->least * face->least)};
+}
+
+SIMD_INLINE void kernel_double_select(kernel_f64_mask m, const kernel_double_end *from, kernel_double_end *to)
+{
+    to->t = kernel_f64_select(m, from->t, to->t);
+    to->v = kernel_f64_select(m, from->v, to->v);
+    to->is_sound = (from->is_sound & m) | (to->is_sound & ~m);
+}
+
+/* Stores half of a vector of doubles, rounded to float32, and the rounding errors. */
+SIMD_INLINE void kernel_double_value(kernel_f64 value, int half, vf *v, vf *rest)
+{
+    kernel_f64_store_lanes(v, half, value);
+    kernel_f64_store_lanes(rest, half, value - kernel_f64_of(v, half));
+}
+
+/* Computes half of the lanes of a tet's interval as a segment, whose length is in t. Returns the rays for which it is
+ * valid. hit: for each face, the rays that cross it. */
+SIMD_INLINE kernel_f64_mask kernel_double_half(const kernel_double_face faces[4], const kernel_double_rays *rays,
+                                               const vm hit[4], int half, kernel_unit_segment *out)
+{
+    kernel_double_end first = {0}, last = {0};
+    kernel_f64_mask met = {0};
+    for (int n = 0; n < 4; n++) {
+        const kernel_f64_mask m = kernel_f64_of_mask(hit[n], half);
+        const kernel_double_end end = kernel_double_intersect(&faces[n], rays->u[half], rays->v[half]);
+        kernel_double_select(m & ~met, &end, &first);
+        kernel_double_select(m & met, &end, &last);
+        met |= m;
+    }
+    const kernel_f64_mask swap = (kernel_f64_mask)(last.t < first.t);
+    const kernel_double_end nearer = first;
+    kernel_double_select(swap, &last, &first);
+    kernel_double_select(swap, &nearer, &last);
+    kernel_f64_store_lanes(&out->length, half, last.t - first.t);
+    kernel_double_value(first.v, half, &out->v_in, &out->rest_in);
+    kernel_double_value(last.v, half, &out->v_out, &out->rest_out);
+    return first.is_sound & last.is_sound;
+}
+
+/* Replaces, on the given rays, the length, in t, and the values of *run, a tet's interval in float32, by those computed
+ * in double. */
+static __attribute__((noinline)) void kernel_tet_double(const kernel_packet *p, const kernel_cell *c,
+                                                        const kernel_double_face faces[4],
+                                                        const kernel_double_rays *rays, vm active,
+                                                        kernel_unit_segment *run)
+{
+    kernel_unit_segment exact = *run;
+    vf sound = vf_set(0);
+    vm hit[4];
+    kernel_tet_faces(p, c, active, hit);
+    for (int half = 0; half < 2; half++) {
+        const kernel_f64_mask is_sound = kernel_double_half(faces, rays, hit, half, &exact);
+        kernel_f64_store_lanes(&sound, half, kernel_f64_select(is_sound, (kernel_f64){0} + 1, (kernel_f64){0}));
+    }
+    const vm better = vm_and(active, vf_lt(vf_set(0), sound));
+    run->length = vf_select(better, exact.length, run->length);
+    run->v_in = vf_select(better, exact.v_in, run->v_in);
+    run->v_out = vf_select(better, exact.v_out, run->v_out);
+    run->rest_in = vf_select(better, exact.rest_in, run->rest_in);
+    run->rest_out = vf_select(better, exact.rest_out, run->rest_out);
+}
+
+enum { KERNEL_EXACT_STEPS = 24 };
+
+/* ---- the map and the field ---- */
+
+typedef struct kernel_exact_map {
+    bool is_pyramid;
+    double position[3][8], field[8];
+} kernel_exact_map;
+
+static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, const kernel_cell *c,
+                               const kernel_transfer *transfer)
+{
+    double d[4][GRID_MAX_CELL_VERTICES];
+    for (int i = 0; i < c->count; i++) {
+        const kernel_double_vertex spot = kernel_double_transform(p->frame, p->tile, c->world[i]);
+        d[0][i] = spot.x;
+        d[1][i] = spot.y;
+        d[2][i] = spot.t;
+        d[3][i] = kernel_double_domain(transfer, c->values[i]);
+    }
+    m->is_pyramid = kernel_has_apex(c->type);
+    for (int a = 0; a < 3; a++) kernel_polynomial_fit(m->position[a], c->type, d[a]);
+    kernel_polynomial_fit(m->field, c->type, d[3]);
+}
+
+/* Returns the bilinear product m, a term of the cell's map (kernel_map.h), at the reference coordinates r, and its
+ * derivatives. */
+static inline double kernel_exact_product(bool is_pyramid, const double r[3], double slopes[3])
+{
+    slopes[0] = r[1];
+    slopes[1] = r[0];
+    slopes[2] = 0;
+    if (!is_pyramid) return r[0] * r[1];
+    const double inverse = 1 / fmax(r[2], 1e-9);
+    slopes[0] = fmax(fmin(r[1] * inverse, 2), -1);
+    slopes[1] = fmax(fmin(r[0] * inverse, 2), -1);
+    slopes[2] = -slopes[0] * slopes[1];
+    return slopes[1] * r[1];
+}
+
+static inline double kernel_exact_value(const double c[8], const double r[3], double m)
+{
+    return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
+           r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
+}
+
+static inline void kernel_exact_gradient(const double c[8], const double r[3], double m, const double slopes[3],
+                                         double out[3])
+{
+    const double of_m = c[4] + r[2] * c[7];
+    out[0] = c[1] + r[2] * c[5] + slopes[0] * of_m;
+    out[1] = c[2] + r[2] * c[6] + slopes[1] * of_m;
+    out[2] = c[3] + (r[0] * c[5] + r[1] * c[6]) + m * c[7] + slopes[2] * of_m;
+}
+
+/* Inverts the map by Newton's method in double, until a step is below 1e-8, after which the error is below rounding.
+ * Returns false if the method does not converge. */
+static bool kernel_exact_newton(const kernel_exact_map *map, const double target[3], double r[3])
+{
+    for (int n = 0; n < KERNEL_EXACT_STEPS; n++) {
+        double slopes[3], row[3][3], off[3], cross[3][3], largest = 0;
+        const double m = kernel_exact_product(map->is_pyramid, r, slopes);
+        for (int a = 0; a < 3; a++) {
+            off[a] = target[a] - kernel_exact_value(map->position[a], r, m);
+            kernel_exact_gradient(map->position[a], r, m, slopes, row[a]);
+        }
+        for (int a = 0; a < 3; a++) {
+            const double *x = row[(a + 1) % 3], *y = row[(a + 2) % 3];
+            for (int b = 0; b < 3; b++) cross[a][b] = x[(b + 1) % 3] * y[(b + 2) % 3] - x[(b + 2) % 3] * y[(b + 1) % 3];
+        }
+        const double det = row[0][0] * cross[0][0] + row[0][1] * cross[0][1] + row[0][2] * cross[0][2];
+        if (det == 0) return false;
+        for (int b = 0; b < 3; b++) {
+            const double move = (cross[0][b] * off[0] + cross[1][b] * off[1] + cross[2][b] * off[2]) / det;
+            largest = fmax(largest, fabs(move));
+            r[b] = fmax(fmin(r[b] + fmax(fmin(move, 1), -1), 2), -1);
+        }
+        if (largest <= 1e-8) return true;
+    }
+    return false;
+}
+
+static inline bool kernel_exact_is_near(const double r[3])
+{
+    bool near = true;
+    for (int a = 0; a < 3; a++)
+        near = near && -r[a] <= (double)KERNEL_MAP_BEYOND && r[a] - 1 <= (double)KERNEL_MAP_BEYOND;
+    return near;
+}
+
+#endif
