@@ -1,6 +1,6 @@
 /* Intersects rays with hexes, wedges or pyramids, one ray-cell pair per lane (kernel_curved_batch.h,
- * kernel_occlusion_hexes.h): finds the two faces of its cell that each ray crosses, and the crossing points. Each lane
- * gathers its cell's numbers from vectors in which lanes are cells. */
+ * kernel_occlusion_hexes.h, kernel_local_segments.h): finds the two faces of its cell that each ray crosses, and the
+ * crossing points. Each lane gathers its cell's numbers from vectors in which lanes are cells. */
 #ifndef RENDER_KERNEL_CURVED_RAYS_H
 #define RENDER_KERNEL_CURVED_RAYS_H
 
@@ -118,155 +118,163 @@ SIMD_INLINE void kernel_curved_faces(const kernel_transformed_curved *h, const k
 
 /* ---- crossing points ---- */
 
-/* Corners of a quad that differs from ray to ray: their vertex numbers in the cell, and the field values there. */
-typedef struct kernel_curved_quad {
-    vi corner[4];
-    vf f[4];
-} kernel_curved_quad;
+/* The corners of one face of each ray's cell, in the order of the face's word: vertex number, position in the ray's
+ * plane (x and y), depth, and field. The fourth corner of a triangle is meaningless. */
+typedef struct kernel_curved_corners {
+    vi vertex[4];
+    vf at[4][4];
+} kernel_curved_corners;
 
-SIMD_INLINE vi kernel_face_word(const kernel_transformed_curved *h, vi lane, vi face)
+/* Projects the corners, whose positions are in tile space, along the rays. */
+SIMD_INLINE void kernel_curved_corners_project(const kernel_rays *rays, kernel_curved_corners *c)
 {
-    return vi_from_bits(vf_gather((const float *)(const void *)h->corners, face * SIMD_WIDTH + lane));
-}
-
-SIMD_INLINE void kernel_curved_quad_gather(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
-                                           vi face, kernel_quad *q, kernel_curved_quad *out)
-{
-    const int count = grid_type_vertices(type);
-    const vi word = kernel_face_word(h, p->lane, face);
     for (int i = 0; i < 4; i++) {
-        const vi corner = word >> (4 * i) & 7;
-        out->corner[i] = corner;
-        q->z[i] = kernel_curved_gather_vertex(h->at[2], count, p->lane, corner);
-        q->x[i] = (kernel_curved_gather_vertex(h->at[0], count, p->lane, corner) - p->rays.origin_x) -
-                  p->rays.slope_x * q->z[i];
-        q->y[i] = (kernel_curved_gather_vertex(h->at[1], count, p->lane, corner) - p->rays.origin_y) -
-                  p->rays.slope_y * q->z[i];
-        out->f[i] = kernel_curved_gather_vertex(h->at[3], count, p->lane, corner);
+        vf *at = c->at[i];
+        at[0] = (at[0] - rays->origin_x) - rays->slope_x * at[2];
+        at[1] = (at[1] - rays->origin_y) - rays->slope_y * at[2];
     }
 }
 
-SIMD_INLINE void kernel_curved_quad_reference(int type, const kernel_curved_quad *own, const kernel_quad_point *place,
-                                              kernel_point *out)
+SIMD_INLINE void kernel_curved_corners_gather(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
+                                              vi face, kernel_curved_corners *out)
 {
+    const vi word = vi_from_bits(vf_gather((const float *)(const void *)h->corners, face * SIMD_WIDTH + p->lane));
+    for (int i = 0; i < 4; i++) {
+        out->vertex[i] = word >> (4 * i) & 7;
+        for (int n = 0; n < 4; n++)
+            out->at[i][n] = kernel_curved_gather_vertex(h->at[n], grid_type_vertices(type), p->lane, out->vertex[i]);
+    }
+    kernel_curved_corners_project(&p->rays, out);
+}
+
+SIMD_INLINE void kernel_curved_quad_point(int type, const kernel_curved_corners *c, const kernel_quad_point *place,
+                                          kernel_point *out)
+{
+    const vf f[4] = {c->at[0][3], c->at[1][3], c->at[2][3], c->at[3][3]};
     out->t = place->t;
-    out->value = kernel_bilinear(own->f, place->s, place->r);
+    out->value = kernel_bilinear(f, place->s, place->r);
     for (int a = 0; a < 3; a++) {
         vf at[4];
         for (int i = 0; i < 4; i++)
-            at[i] =
-                kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, own->corner[i]);
+            at[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, c->vertex[i]);
         out->r[a] = (at[0] + place->s * (at[1] - at[0])) + place->r * (at[3] - at[0]);
     }
 }
 
-/* The triangle that each ray crosses in its own cell: corners, and the edge functions ij, jk and ik on the ray. */
-typedef struct kernel_curved_triangle {
-    vi corner[3];
-    vf e[3];
-} kernel_curved_triangle;
+/* Computes the edge functions ij, jk and ik of triangles from their projected corners. */
+SIMD_INLINE void kernel_curved_triangle_edges(const kernel_curved_corners *c, vf e[3])
+{
+    const vf *i = c->at[0], *j = c->at[1], *k = c->at[2];
+    e[0] = vf_diff_of_products(i[0], j[1], j[0], i[1]);
+    e[1] = vf_diff_of_products(j[0], k[1], k[0], j[1]);
+    e[2] = vf_diff_of_products(i[0], k[1], k[0], i[1]);
+}
 
 /* Returns the rays on which the sum of the triangle's weights is too small to be accurate. number: number of each ray's
  * triangle. */
 SIMD_INLINE vm kernel_curved_triangle_inaccurate(const kernel_transformed_curved *h, vi lane, vm rays, vi number,
-                                                 const kernel_curved_triangle *own)
+                                                 const vf e[3])
 {
-    const vf weight = kernel_weight(own->e[0], own->e[1], own->e[2]);
-    return vm_and(rays, vf_lt(vf_abs(weight), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
+    return vm_and(rays,
+                  vf_lt(vf_abs(kernel_weight(e[0], e[1], e[2])), vf_gather(h->least[0], number * SIMD_WIDTH + lane)));
 }
 
-/* Computes edge functions of uncertain sign, and those of inaccurate weights, again from projected vertices. */
+/* Computes edge functions of uncertain sign, and those of inaccurate weights, again from projected corners. */
 static __attribute__((noinline, cold)) void kernel_curved_triangle_recompute(const kernel_transformed_curved *h,
-                                                                             const kernel_lane_rays *p, vm rays,
-                                                                             vi number, const vm doubt[3],
-                                                                             kernel_curved_triangle *own)
+                                                                             vi lane, vm rays, vi number,
+                                                                             const vm doubt[3],
+                                                                             const kernel_curved_corners *c, vf e[3])
 {
-    vf x[3], y[3], e[3];
-    for (int i = 0; i < 3; i++) {
-        const vi at = own->corner[i] * SIMD_WIDTH + p->lane;
-        const vf z = vf_gather(h->at[2][0], at);
-        x[i] = (vf_gather(h->at[0][0], at) - p->rays.origin_x) - p->rays.slope_x * z;
-        y[i] = (vf_gather(h->at[1][0], at) - p->rays.origin_y) - p->rays.slope_y * z;
-    }
-    e[0] = kernel_edge_between(x[0], y[0], x[1], y[1]);
-    e[1] = kernel_edge_between(x[1], y[1], x[2], y[2]);
-    e[2] = kernel_edge_between(x[0], y[0], x[2], y[2]);
-    for (int i = 0; i < 3; i++) own->e[i] = vf_select(doubt[i], e[i], own->e[i]);
-    const vm weak = kernel_curved_triangle_inaccurate(h, p->lane, rays, number, own);
-    for (int i = 0; i < 3; i++) own->e[i] = vf_select(weak, e[i], own->e[i]);
+    vf exact[3];
+    kernel_curved_triangle_edges(c, exact);
+    for (int i = 0; i < 3; i++) e[i] = vf_select(doubt[i], exact[i], e[i]);
+    const vm weak = kernel_curved_triangle_inaccurate(h, lane, rays, number, e);
+    for (int i = 0; i < 3; i++) e[i] = vf_select(weak, exact[i], e[i]);
 }
 
-/* Gathers the corners and edge functions of each ray's triangle for the given rays. face: number of the triangular face
- * in its cell, per ray. Other lanes get valid but meaningless numbers. */
-SIMD_INLINE void kernel_curved_triangle_gather(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
-                                               vm rays, vi face, kernel_curved_triangle *own)
+/* Computes the edge functions ij, jk and ik of the triangle `face` on the given rays from the cells' affine functions;
+ * other lanes get meaningless numbers. */
+SIMD_INLINE void kernel_curved_triangle_lines(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type,
+                                              vm rays, vi face, const kernel_curved_corners *c, vf e[3])
 {
     const int size = (int)(sizeof(kernel_triangle_lines) / sizeof(float));
     const vi number = vi_select(rays, face - kernel_first_triangle(type), vi_set(0)), at = number * size + p->lane;
-    const vi word = kernel_face_word(h, p->lane, face);
     vm doubt[3], any = vm_none();
-    for (int i = 0; i < 3; i++) own->corner[i] = word >> (4 * i) & 7;
     for (int i = 0; i < 3; i++) {
         const kernel_triangle_lines *lines = &h->triangles[0];
-        own->e[i] = vf_muladd(vf_gather(lines->cv[i], at), p->v,
-                              vf_muladd(vf_gather(lines->cu[i], at), p->u, vf_gather(lines->c[i], at)));
-        doubt[i] = vm_andnot(rays, vf_lt(vf_gather(lines->bound[i], at), vf_abs(own->e[i])));
+        e[i] = vf_muladd(vf_gather(lines->cv[i], at), p->v,
+                         vf_muladd(vf_gather(lines->cu[i], at), p->u, vf_gather(lines->c[i], at)));
+        doubt[i] = vm_andnot(rays, vf_lt(vf_gather(lines->bound[i], at), vf_abs(e[i])));
         any = vm_or(any, doubt[i]);
     }
-    any = vm_or(any, kernel_curved_triangle_inaccurate(h, p->lane, rays, number, own));
-    if (__builtin_expect(vm_any(any), 0)) kernel_curved_triangle_recompute(h, p, rays, number, doubt, own);
+    any = vm_or(any, kernel_curved_triangle_inaccurate(h, p->lane, rays, number, e));
+    if (__builtin_expect(vm_any(any), 0)) kernel_curved_triangle_recompute(h, p->lane, rays, number, doubt, c, e);
 }
 
-/* Returns the mean of the corners' values v, weighted by the edge functions. */
-SIMD_INLINE vf kernel_curved_weighted_mean(const kernel_curved_triangle *own, const vf v[3], vf inverse)
+/* Computes the crossings of triangles, as means of their corners, weighted by the edge functions e. */
+SIMD_INLINE void kernel_curved_triangle_point(int type, const kernel_curved_corners *c, const vf e[3],
+                                              kernel_point *out)
 {
-    return vf_muladd(own->e[0], v[2], vf_muladd(-own->e[2], v[1], own->e[1] * v[0])) * inverse;
-}
-
-SIMD_INLINE void kernel_curved_triangle_reference(const kernel_transformed_curved *h, int type, vi lane,
-                                                  const kernel_curved_triangle *own, kernel_point *out)
-{
-    const int count = grid_type_vertices(type);
-    const vf inverse = 1.0f / kernel_weight(own->e[0], own->e[1], own->e[2]);
-    vf v[3];
-    for (int i = 0; i < 3; i++) v[i] = kernel_curved_gather_vertex(h->at[2], count, lane, own->corner[i]);
-    out->t = kernel_curved_weighted_mean(own, v, inverse);
-    for (int i = 0; i < 3; i++) v[i] = kernel_curved_gather_vertex(h->at[3], count, lane, own->corner[i]);
-    out->value = kernel_curved_weighted_mean(own, v, inverse);
-    for (int a = 0; a < 3; a++) {
-        for (int i = 0; i < 3; i++)
-            v[i] = kernel_curved_vertex_coordinate(kernel_cell_shape(type), count, a, own->corner[i]);
-        out->r[a] = kernel_curved_weighted_mean(own, v, inverse);
+    const vf inverse = 1.0f / kernel_weight(e[0], e[1], e[2]);
+    vf v[5][3];
+    for (int i = 0; i < 3; i++) {
+        v[0][i] = c->at[i][2];
+        v[1][i] = c->at[i][3];
+        for (int a = 0; a < 3; a++)
+            v[2 + a][i] =
+                kernel_curved_vertex_coordinate(kernel_cell_shape(type), grid_type_vertices(type), a, c->vertex[i]);
     }
+    for (int n = 0; n < 5; n++) v[n][0] = vf_muladd(e[0], v[n][2], vf_muladd(-e[2], v[n][1], e[1] * v[n][0])) * inverse;
+    *out = (kernel_point){v[0][0], v[1][0], {v[2][0], v[3][0], v[4][0]}};
 }
 
+/* Computes the two crossings of each active ray, the nearer one first. corners: those of the two faces `face`. h: the
+ * cells, whose affine edge functions are used for triangles; NULL: edge functions are computed from the corners. */
+SIMD_INLINE void kernel_curved_cross_corners(const kernel_transformed_curved *h, const kernel_lane_rays *p, vm active,
+                                             int type, const vi face[2], const kernel_curved_corners corners[2],
+                                             kernel_point out[2])
+{
+    const int quads = kernel_has_apex(type) ? 1 : 2;
+    vm on_quad[2];
+    for (int n = 0; n < 2; n++) on_quad[n] = vm_and(active, kernel_curved_on_quad(type, n, face[n]));
+    if (kernel_has_triangles(type)) memset(out, 0, 2 * sizeof *out);
+    if (kernel_is_box(type) || vm_any(vm_or(on_quad[0], on_quad[1]))) {
+        kernel_quad quad[2];
+        kernel_quad_point places[2];
+        for (int n = 0; n < quads; n++)
+            for (int i = 0; i < 4; i++) {
+                quad[n].x[i] = corners[n].at[i][0];
+                quad[n].y[i] = corners[n].at[i][1];
+                quad[n].z[i] = corners[n].at[i][2];
+            }
+        /* these rays' edge functions have certain signs, so no ray meets an edge */
+        kernel_quads_cross(quad, quads, on_quad, true, places);
+        for (int n = 0; n < quads; n++) kernel_curved_quad_point(type, &corners[n], &places[n], &out[n]);
+    }
+    for (int n = 0; n < 2 && kernel_has_triangles(type); n++) {
+        const vm on_triangle = vm_andnot(active, on_quad[n]);
+        kernel_point place;
+        vf e[3];
+        if (!vm_any(on_triangle)) continue;
+        if (h)
+            kernel_curved_triangle_lines(h, p, type, on_triangle, face[n], &corners[n], e);
+        else
+            kernel_curved_triangle_edges(&corners[n], e);
+        kernel_curved_triangle_point(type, &corners[n], e, &place);
+        kernel_point_move(on_triangle, &place, &out[n]);
+    }
+    kernel_points_order(out);
+}
+
+/* Computes entry and exit of the active rays, which cross two faces. faces: number of the first face plus 8 times that
+ * of the second. */
 SIMD_INLINE void kernel_curved_cross(const kernel_transformed_curved *h, const kernel_lane_rays *p, int type, vi faces,
                                      kernel_point out[2])
 {
     const vi face[2] = {faces & 7, faces >> 3 & 7};
-    const vm on_quad[2] = {kernel_curved_on_quad(type, 0, face[0]), kernel_curved_on_quad(type, 1, face[1])};
-    const vm once[2] = {vm_and(p->active, on_quad[0]), vm_and(p->active, on_quad[1])};
-    const int quads = kernel_has_apex(type) ? 1 : 2;
-    memset(out, 0, 2 * sizeof *out);
-    if (kernel_is_box(type) || vm_any(vm_or(once[0], once[1]))) {
-        kernel_quad own[2];
-        kernel_curved_quad corners[2];
-        kernel_quad_point places[2];
-        for (int n = 0; n < quads; n++) kernel_curved_quad_gather(h, p, type, face[n], &own[n], &corners[n]);
-        /* the signs of these rays' edge functions are certain, so no ray meets an edge */
-        kernel_quads_cross(own, quads, once, true, places);
-        for (int n = 0; n < quads; n++) kernel_curved_quad_reference(type, &corners[n], &places[n], &out[n]);
-    }
-    for (int n = 0; n < 2 && kernel_has_triangles(type); n++) {
-        const vm on_triangle = vm_andnot(p->active, on_quad[n]);
-        kernel_curved_triangle own;
-        kernel_point place;
-        if (!vm_any(on_triangle)) continue;
-        kernel_curved_triangle_gather(h, p, type, on_triangle, face[n], &own);
-        kernel_curved_triangle_reference(h, type, p->lane, &own, &place);
-        kernel_point_move(on_triangle, &place, &out[n]);
-    }
-    kernel_points_order(out);
+    kernel_curved_corners corners[2];
+    for (int n = 0; n < 2; n++) kernel_curved_corners_gather(h, p, type, face[n], &corners[n]);
+    kernel_curved_cross_corners(h, p, p->active, type, face, corners, out);
 }
 
 SIMD_INLINE void kernel_curved_ends_add(const kernel_pixel_list *met, int n, const kernel_point ends[2], unsigned bits,

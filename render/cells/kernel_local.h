@@ -4,15 +4,14 @@
  * nonlinear terms:
  *     X(r) = X0 + M r + (nonlinear terms)      and so with A = 1 / M      y = A (X - X0) = r + n(r)
  * n is small if the cell is not far from a parallelepiped. With y known, r is computed by one step of Newton's method
- * and one more with the same derivatives. Hexes have the nonlinear terms ρσ, ρκ, σκ and ρσκ, wedges ρκ and σκ, a
- * pyramid αβ / k, and tets none:
+ * and one more with the same derivatives. Hexes have the nonlinear terms ρσ, ρκ, σκ and ρσκ, wedges ρκ and σκ, and
+ * a pyramid αβ / k:
  *              r                              inside
  *     hex      (ρ, σ, κ) from the middle      |ρ|, |σ|, |κ| <= 1/2
  *     wedge    ρ, σ from the triangle's       ρ, σ >= -1/3, ρ + σ <= 1/3, |κ| <= 1/2
  *              centroid, κ from the middle
  *     pyramid  α, β from the axis; k is 0     |α|, |β| <= k / 2, k <= 1
  *              at the apex
- *     tet      from the middle                ρ, σ, κ >= -1/4, ρ + σ + κ <= 1/4
  * The Frobenius norm of n's derivative must be less than 0.78 or 0.89 at every corner; other cells are not processed in
  * lanes. The norm is convex along each coordinate, so it is nowhere larger in the cell, and so r -> r + n(r) maps no
  * two points of the cell to the same point. The choice of the origin of the coordinates does not affect the position of
@@ -52,7 +51,7 @@ typedef struct kernel_local_cells {
 
 SIMD_INLINE int kernel_nonlinear_count(int type)
 {
-    return kernel_is_box(type) ? 4 : kernel_is_prism(type) ? 2 : kernel_has_apex(type) ? 1 : 0;
+    return KERNEL_BY_SHAPE(type, 4, 2, 1);
 }
 
 /* Computes the coefficients of the field or of a coordinate from its values at a hex's vertices: the value at the
@@ -95,22 +94,14 @@ SIMD_INLINE void kernel_pyramid_terms(const vf v[5], vf out[8])
     out[4] = nonlinear_part;
 }
 
-SIMD_INLINE void kernel_tet_terms(const vf v[4], vf out[8])
-{
-    out[0] = 0.25f * ((v[0] + v[1]) + (v[2] + v[3]));
-    for (int i = 1; i < 4; i++) out[i] = v[i] - v[0];
-}
-
 SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
 {
     if (kernel_is_box(type))
         kernel_hex_terms(v, out);
     else if (kernel_is_prism(type))
         kernel_wedge_terms(v, out);
-    else if (kernel_has_apex(type))
-        kernel_pyramid_terms(v, out);
     else
-        kernel_tet_terms(v, out);
+        kernel_pyramid_terms(v, out);
 }
 
 /* The nonlinear terms of a cell's map at given reference coordinates, and their derivatives along each of these. */
@@ -134,7 +125,7 @@ SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], kernel_nonli
         b->term[1] = r[1] * r[2];
         const vf along[2][3] = {{r[2], zero, r[0]}, {zero, r[2], r[1]}};
         memcpy(b->along, along, sizeof along);
-    } else if (kernel_has_apex(type)) {
+    } else {
         /* inside the cell |α / k| and |β / k| are at most 1/2; the clamp limits steps beyond the apex */
         const vf half = vf_set(0.75f), inverse = 1.0f / vf_max(r[2], vf_set(1e-6f));
         const vf a = vf_clamp(r[0] * inverse, -half, half), c = vf_clamp(r[1] * inverse, -half, half);
@@ -144,113 +135,13 @@ SIMD_INLINE void kernel_nonlinear_terms_at(int type, const vf r[3], kernel_nonli
     }
 }
 
-/* ---- the order of vertices ----
- * The rounding of terms depends on the order of a cell's vertices, which differs between simulation codes and ranks. So
- * vertices are permuted into a canonical order: first the vertex with the smallest position, then along its edges in
- * the order of positions. kernel_cell_canonical_order() does the same by the caller's coordinates. Positions in tile
- * space are the same on all ranks. Vertices with the same position keep their order; cells with such vertices are not
- * processed in lanes. */
-
-SIMD_INLINE vm kernel_local_before(const vf a[3], const vf b[3])
+/* Converts reference coordinates r of kernel_map.h to those of this file. */
+SIMD_INLINE void kernel_local_of_reference(int type, vf r[3])
 {
-    vm before = vf_lt(a[2], b[2]);
-    for (int k = 1; k >= 0; k--) before = vm_or(vf_lt(a[k], b[k]), vm_and(vf_eq(a[k], b[k]), before));
-    return before;
-}
-
-SIMD_INLINE vm kernel_local_is_before(vf (*const at)[8], int i, int j)
-{
-    const vf a[3] = {at[0][i], at[1][i], at[2][i]}, b[3] = {at[0][j], at[1][j], at[2][j]};
-    return kernel_local_before(a, b);
-}
-
-/* Exchanges vertices i and j in the given lanes. lists[0] to lists[2] are the vertices' positions; the further lists
- * are exchanged with them. */
-SIMD_INLINE void kernel_local_swap(vf (*lists)[8], int count, vm lanes, int i, int j)
-{
-    for (int n = 0; n < count; n++) {
-        const vf was = lists[n][i];
-        lists[n][i] = vf_select(lanes, lists[n][j], was);
-        lists[n][j] = vf_select(lanes, was, lists[n][j]);
-    }
-}
-
-/* Computes, for each of the `count` given vertices, the lanes in which it is the smallest of them. */
-SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertices, int count, vm is_least[8])
-{
-    vf least[3] = {at[0][(int)vertices[0]], at[1][(int)vertices[0]], at[2][(int)vertices[0]]};
-    is_least[0] = vm_all_lanes();
-    for (int n = 1; n < count; n++) {
-        const int i = vertices[n];
-        const vf place[3] = {at[0][i], at[1][i], at[2][i]};
-        is_least[n] = kernel_local_before(place, least);
-        for (int a = 0; a < 3; a++) least[a] = vf_select(is_least[n], place[a], least[a]);
-        for (int k = 0; k < n; k++) is_least[k] = vm_andnot(is_least[k], is_least[n]);
-    }
-}
-
-SIMD_INLINE void kernel_hex_sort_vertices(vf (*at)[8], int lists)
-{
-    /* vertex number of a hex for the bits of its reference coordinates x, y, z */
-    static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
-    vm is_least[8];
-    kernel_local_least(at, vertex, 8, is_least);
-    for (int a = 0; a < 3; a++) {
-        vm turn = vm_none();
-        for (int b = 0; b < 8; b++)
-            if (b >> a & 1) turn = vm_or(turn, is_least[b]);
-        for (int b = 0; b < 8; b++)
-            if (!(b >> a & 1)) kernel_local_swap(at, lists, turn, vertex[b], vertex[b | 1 << a]);
-    }
-    for (int k = 0; k < 3; k++) {
-        /* the network compares axes 0 and 1, then 1 and 2, then 0 and 1 */
-        const int low = k == 1 ? 2 : 1, high = 2 * low, other = 7 & ~(low | high);
-        const vm swap = kernel_local_is_before(at, vertex[high], vertex[low]);
-        kernel_local_swap(at, lists, swap, vertex[low], vertex[high]);
-        kernel_local_swap(at, lists, swap, vertex[low | other], vertex[high | other]);
-    }
-}
-
-SIMD_INLINE void kernel_wedge_sort_vertices(vf (*at)[8], int lists)
-{
-    static const signed char vertex[6] = {0, 1, 2, 3, 4, 5};
-    vm is_least[8];
-    kernel_local_least(at, vertex, 6, is_least);
-    const vm over = vm_or(vm_or(is_least[3], is_least[4]), is_least[5]);
-    for (int i = 0; i < 3; i++) kernel_local_swap(at, lists, over, i, i + 3);
-    for (int i = 1; i < 3; i++) {
-        const vm first = vm_or(is_least[i], is_least[i + 3]);
-        kernel_local_swap(at, lists, first, 0, i);
-        kernel_local_swap(at, lists, first, 3, i + 3);
-    }
-    const vm swap = kernel_local_is_before(at, 2, 1);
-    kernel_local_swap(at, lists, swap, 1, 2);
-    kernel_local_swap(at, lists, swap, 4, 5);
-}
-
-SIMD_INLINE void kernel_pyramid_sort_vertices(vf (*at)[8], int lists)
-{
-    static const signed char vertex[4] = {0, 1, 2, 3};
-    vm is_least[8];
-    kernel_local_least(at, vertex, 4, is_least);
-    kernel_local_swap(at, lists, is_least[1], 0, 1);
-    kernel_local_swap(at, lists, is_least[1], 3, 2);
-    kernel_local_swap(at, lists, is_least[2], 0, 2);
-    kernel_local_swap(at, lists, is_least[3], 0, 3);
-    kernel_local_swap(at, lists, is_least[3], 1, 2);
-    kernel_local_swap(at, lists, kernel_local_is_before(at, 3, 1), 1, 3);
-}
-
-/* Permutes the vertices of a hex, wedge or pyramid in each lane into the canonical order of their positions. at[0] to
- * at[2] are the positions; all lists are permuted with them. */
-SIMD_INLINE void kernel_local_sort_vertices(int type, vf (*at)[8], int lists)
-{
-    if (kernel_is_box(type))
-        kernel_hex_sort_vertices(at, lists);
-    else if (kernel_is_prism(type))
-        kernel_wedge_sort_vertices(at, lists);
-    else
-        kernel_pyramid_sort_vertices(at, lists);
+    vf middle = vf_set(kernel_is_box(type) ? 0.5f : 1.0f / 3);
+    if (kernel_has_apex(type)) middle = 0.5f * r[2];
+    for (int a = 0; a < 2; a++) r[a] -= middle;
+    if (!kernel_has_apex(type)) r[2] -= 0.5f;
 }
 
 /* Returns the distance of r from the cell's border, in reference coordinates; it is negative outside. */
@@ -387,7 +278,6 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
     kernel_local_error_bound(count, places, (const vf(*)[3])inverse, out);
     kernel_local_affine_bounds(count, (const vf(*)[8])at, (const vf(*)[3])inverse, offset, out);
     const vm sharp = vf_lt(vf_load(out->error_bound), vf_set(0.05f));
-    if (!bends) return sharp;
     const vf bend = kernel_local_nonlinearity(type, (const vf(*)[3])nonlinear_part);
     vf_store(out->bend, bend);
     return vm_and(sharp, vf_lt(bend, vf_set(most_bent)));
@@ -467,7 +357,6 @@ SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi l
         for (int a = 0; a < 3; a++) p->y[i] = vf_muladd(kernel_gather_lane(cells->inverse[i][a], lane), d[a], p->y[i]);
         p->r[i] = p->y[i];
     }
-    if (kernel_is_linear(type)) return vm_all_lanes();
     for (int k = 0; k < kernel_nonlinear_count(type); k++)
         for (int a = 0; a < 3; a++) p->nonlinear_part[k][a] = kernel_gather_lane(cells->nonlinear_part[k][a], lane);
     vf left[3];

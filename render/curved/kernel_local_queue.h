@@ -10,7 +10,6 @@
 #include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_visible_values.h"
-#include "kernel_lanes_cell.h"
 #include "kernel_local.h"
 #include "kernel_transformed_curved.h"
 #include "kernel_tile.h"
@@ -40,9 +39,8 @@ typedef struct kernel_local_lanes {
     int volume, part;     /* part: -1 if there is none yet */
     kernel_arrays arrays; /* the arrays of the volume's field on the mesh part */
     kernel_local_queue queues[KERNEL_LANE_TYPES];
-    const kernel_local_queue *current; /* queue of the vector of cells that is being processed */
-    /* coordinates and field values of the fetched cells in the caller's units, by vertex */
-    double world[3][8][SIMD_WIDTH], scalars[8][SIMD_WIDTH];
+    const kernel_local_queue *current;     /* queue of the vector of cells that is being processed */
+    kernel_transformed_curved transformed; /* its affine edge functions are not set */
     kernel_local_cells cells;
     /* first and last column, first and last row of pixels in which each lane's cell may be visible
      * (kernel_local_pixels()) */
@@ -68,38 +66,19 @@ SIMD_INLINE void kernel_local_lanes_set_part(const kernel_tile_trace *t, kernel_
 
 /* ---- cells ---- */
 
-/* Reads coordinates and values of the queue's first SIMD_WIDTH cells, which have this number of vertices. Values of
- * cells that are not drawn become NaN. */
-SIMD_INLINE void kernel_local_fetch(kernel_local_lanes *l, const kernel_local_queue *q, int vertices)
+/* Reads the field at the transformed cells' vertices, and converts it to the transfer function's domain, clamped to
+ * +-1e18. Returns the lanes whose cells are drawn and whose values are all finite and are visible. */
+SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, const kernel_local_lanes *l, int count, vf values[8])
 {
     const kernel_arrays *p = &l->arrays;
-    const kernel_wide_doubles none = kernel_wide_doubles_set(NAN);
-    const vm drawn = vm_from_bits(kernel_arrays_drawn(p, q->cell, (1u << SIMD_WIDTH) - 1));
-    for (int i = 0; i < vertices; i++) {
-        vi vertex;
-        memcpy(&vertex, q->vertex[i], sizeof vertex);
-        for (int a = 0; a < 3; a++) {
-            const kernel_wide_doubles place = kernel_numbers_gather(&p->coordinates[a], vertex);
-            memcpy(l->world[a][i], &place, sizeof place);
-        }
-        if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, q->cell, sizeof vertex);
-        kernel_wide_doubles value = kernel_numbers_gather(&p->values, vertex);
-        if (__builtin_expect(p->source_cells != NULL, 0)) value = kernel_wide_doubles_select(drawn, &value, &none);
-        memcpy(l->scalars[i], &value, sizeof value);
-    }
-}
-
-/* Converts field values to the transfer function's domain, clamped to +-1e18. Returns the lanes whose values are all
- * finite and are visible. */
-SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scalars)[SIMD_WIDTH], int count,
-                                   vf values[8])
-{
     vf plain[8], odd = vf_set(0);
-    vm finite = vm_all_lanes();
+    vm finite = vm_from_bits(kernel_arrays_drawn(p, l->current->cell, (1u << SIMD_WIDTH) - 1));
     for (int i = 0; i < count; i++) {
+        vi vertex;
+        memcpy(&vertex, p->is_by_cell ? (const void *)l->current->cell : l->transformed.vertex[i], sizeof vertex);
+        const kernel_wide_doubles all = kernel_numbers_gather(&p->values, vertex);
         for (int half = 0; half < 2; half++) {
-            kernel_f64 v;
-            memcpy(&v, scalars[i] + half * KERNEL_HALF, sizeof v);
+            const kernel_f64 v = all.half[half];
             kernel_f64_store_lanes(&odd, half, v - v);
             kernel_f64_store_lanes(&plain[i], half, kernel_f64_clamp(v, 3e38));
             kernel_f64_store_lanes(&values[i], half, kernel_f64_clamp((v - t->low) * t->inverse_width, 1e18));
@@ -156,26 +135,33 @@ SIMD_INLINE bool kernel_local_clip_box(int32_t ends[4][SIMD_WIDTH], int lane, un
     return true;
 }
 
-/* Transforms the fetched cells into tile space. lists[0] to lists[2] get the vertices' positions, lists[3] the field;
- * all list_count rows are then sorted by the vertices' canonical order. Returns a mask of the visible cells. *lanes:
- * mask of those that can be processed in lanes. */
-SIMD_INLINE unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_local_lanes *l, vf (*lists)[8],
-                                            int list_count, float most_bent, unsigned *lanes, int type)
+/* Reads, sorts and transforms the vertices of the queue's first SIMD_WIDTH cells, and computes their maps, which must
+ * be less nonlinear than most_bent. Returns a mask of the visible cells. *lanes: mask of those that can be processed in
+ * lanes. */
+SIMD_INLINE unsigned kernel_local_transform_of_type(const kernel_tile_trace *t, kernel_local_lanes *l, float most_bent,
+                                                    unsigned *lanes, int type)
 {
     const int count = grid_type_vertices(type);
-    const vm shows = kernel_local_domain(&t->frame->volumes[l->volume], l->scalars, count, lists[3]);
+    kernel_transformed_curved *h = &l->transformed;
+    int32_t vertices[8][SIMD_WIDTH];
+    vf places[3][8], values[8];
+    for (int i = 0; i < count; i++) memcpy(vertices[i], l->current->vertex[i], sizeof vertices[i]);
+    const vm collapsed = kernel_transform_curved_vertices(h, &l->arrays, t->frame, &t->tile, vertices, type);
+    const vm shows = kernel_local_domain(&t->frame->volumes[l->volume], l, count, values);
     for (int i = 0; i < count; i++) {
-        kernel_wide_doubles places[3];
-        vf at[3];
-        for (int a = 0; a < 3; a++) memcpy(&places[a], l->world[a][i], sizeof places[a]);
-        const kernel_wide_doubles *const world[3] = {&places[0], &places[1], &places[2]};
-        kernel_lanes_transform(t->frame, &t->tile, world, at);
-        for (int a = 0; a < 3; a++) lists[a][i] = at[a];
+        for (int a = 0; a < 3; a++) places[a][i] = vf_load(h->at[a][i]);
+        vf_store(h->at[3][i], values[i]);
     }
-    kernel_local_sort_vertices(type, lists, list_count);
-    kernel_local_pixels(t, count, (const vf(*)[8])lists, l->ends);
-    *lanes = vm_bits(vm_and(shows, kernel_local_setup(type, (const vf(*)[8])lists, lists[3], most_bent, &l->cells)));
+    kernel_local_pixels(t, count, (const vf(*)[8])places, l->ends);
+    const vm smooth = kernel_local_setup(type, (const vf(*)[8])places, values, most_bent, &l->cells);
+    *lanes = vm_bits(vm_andnot(vm_and(shows, smooth), collapsed));
     return vm_bits(shows);
+}
+
+static __attribute__((noinline)) unsigned kernel_local_transform(const kernel_tile_trace *t, kernel_local_lanes *l,
+                                                                 float most_bent, unsigned *lanes, int type)
+{
+    return KERNEL_OF_TYPE(type, kernel_local_transform_of_type, t, l, most_bent, lanes);
 }
 
 /* Reads the vertex indices of all queued cells before index `end` that have not been read yet. */
@@ -186,17 +172,17 @@ SIMD_INLINE void kernel_local_read_indices(const kernel_arrays *p, kernel_local_
                                KERNEL_LOCAL_ROOM);
 }
 
-/* Fetches the first SIMD_WIDTH cells of the queue. Returns the mask of lanes that have a cell; the other lanes get
- * copies of the first cell. */
-SIMD_INLINE unsigned kernel_local_fetch_all(kernel_local_lanes *l, kernel_local_queue *q, int type)
+/* Makes the first SIMD_WIDTH cells of the queue the current vector, and reads their vertex indices. Returns the mask of
+ * lanes that have a cell; the other lanes get copies of the first cell. */
+SIMD_INLINE unsigned kernel_local_begin_vector(kernel_local_lanes *l, kernel_local_queue *q, int type)
 {
-    const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH, vertices = grid_type_vertices(type);
+    const int count = q->count < SIMD_WIDTH ? q->count : SIMD_WIDTH;
     kernel_local_read_indices(&l->arrays, q, count, type);
     for (int n = count; n < SIMD_WIDTH; n++) {
         q->cell[n] = q->cell[0];
-        for (int i = 0; i < vertices; i++) q->vertex[i][n] = q->vertex[i][0];
+        for (int i = 0; i < grid_type_vertices(type); i++) q->vertex[i][n] = q->vertex[i][0];
     }
-    kernel_local_fetch(l, q, vertices);
+    l->current = q;
     l->alone = -1;
     return (1u << count) - 1;
 }

@@ -175,8 +175,7 @@ static __attribute__((noinline)) void kernel_local_queue_samples(kernel_tile_tra
 
 static unsigned kernel_local_transform_lanes(kernel_tile_trace *t, kernel_local_lanes *l, int type, unsigned *lanes)
 {
-    vf lists[4][8];
-    return KERNEL_OF_TYPE(type, kernel_local_transform, t, l, lists, 4, KERNEL_LOCAL_BENT, lanes);
+    return kernel_local_transform(t, l, KERNEL_LOCAL_BENT, lanes, type);
 }
 
 /* Prepares the sampling of a volume in a window, for the packets of the given blocks, which must be set up. */

@@ -244,7 +244,7 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_s
     kernel_curved_crossed crossed;
     vi words;
     const vm all = kernel_local_list_load(&b->met, &t->tile, n, &words, &rays);
-    kernel_local_find_faces(&b->faces, &rays, all, type, &crossed);
+    kernel_local_find_faces(&t->thread->tile_cells->lanes.transformed, &b->faces, &rays, all, type, &crossed);
     const vm on_quad = kernel_curved_on_quad(type, 0, crossed.first);
     words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
@@ -257,20 +257,19 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_s
 SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_segments *b,
                                              const kernel_local_list *list, int type, int n)
 {
+    const kernel_local_lanes *l = &t->thread->tile_cells->lanes;
     kernel_local_pairs p;
     vi words;
     vf end, near, far;
     p.unsampled = 1;
     p.active = kernel_local_list_load(list, &t->tile, n, &words, &p.rays);
-    const kernel_curved_crossed crossed = {p.active, vm_none(), words >> KERNEL_LOCAL_FACES & 7,
-                                           words >> (KERNEL_LOCAL_FACES + 3) & 7};
-    kernel_local_cross(&b->faces, &p.rays, &crossed, type, p.ends);
+    const vi face[2] = {words >> KERNEL_LOCAL_FACES & 7, words >> (KERNEL_LOCAL_FACES + 3) & 7};
+    kernel_local_cross(&l->transformed, &b->faces, &p.rays, p.active, type, face, p.ends);
     vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
     vf_gather_pair(b->reach, 2 * p.rays.at, &near, &far);
     p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
     const vm cut = vm_or(vf_lt(p.ends[0].t, near), vf_lt(far, p.ends[1].t));
-    kernel_local_deviations_of(&t->thread->tile_cells->lanes.cells, &b->budget.nonlinear, p.rays.lane, p.active, p.ends,
-                               type, &p.off_chord);
+    kernel_local_deviations_of(&l->cells, &b->budget.nonlinear, p.rays.lane, p.active, p.ends, type, &p.off_chord);
     vm alone = vm_and(p.active, vm_or(cut, p.off_chord.has_diverged));
     p.active = vm_andnot(p.active, alone);
     const vm coarse = vm_and(p.active, kernel_local_count(t, &b->budget, &p));
@@ -318,27 +317,24 @@ static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_tra
 
 /* ---- cells ---- */
 
-/* Transforms the queue's cells into tile space; returns the visible ones, and stores in *lanes those that can be
- * processed in lanes. */
-SIMD_INLINE unsigned kernel_local_segments_transform_of_type(const kernel_tile_trace *t, kernel_local_lanes *l,
-                                                             kernel_tile_segments *b, unsigned *lanes, int type)
+/* Computes what segments need of the vector of cells: their faces and error budget. */
+SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kernel_local_lanes *l,
+                                               kernel_tile_segments *s, int type)
 {
-    vf lists[5][8];
-    kernel_local_rank((double(*const)[8][SIMD_WIDTH])l->world, grid_type_vertices(type), lists[4]);
-    const unsigned showing = kernel_local_transform(t, l, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes, type);
-    kernel_local_faces_of(&t->tile, lists, l->ends, type, &b->faces);
-    kernel_local_nonlinear_of(&l->cells, type, &b->budget.nonlinear);
-    return showing;
+    kernel_local_faces_of(&t->tile, &l->transformed, l->ends, type, &s->faces);
+    kernel_local_nonlinear_of(&l->cells, type, &s->budget.nonlinear);
+    kernel_local_bound(&s->budget, (const float(*)[SIMD_WIDTH])l->transformed.at[3], type);
 }
 
+/* Transforms the queue's cells into tile space; returns the visible ones, and stores in *lanes those that can be
+ * processed in lanes. */
 static __attribute__((noinline)) unsigned kernel_local_segments_transform(kernel_tile_trace *t, kernel_local_lanes *l,
                                                                           int type, unsigned *lanes)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
     const kernel_pieces *pieces = s->budget.pieces;
-    const unsigned showing = KERNEL_OF_TYPE(type, kernel_local_segments_transform_of_type, t, l, s, lanes);
-    const float(*values)[SIMD_WIDTH] = (const float(*)[SIMD_WIDTH])s->faces.at[3];
-    KERNEL_OF_TYPE(type, kernel_local_bound, &s->budget, values);
+    const unsigned showing = kernel_local_transform(t, l, KERNEL_LOCAL_BENT_MOST, lanes, type);
+    KERNEL_OF_TYPE(type, kernel_local_segments_prepare, t, l, s);
     /* cells with values at a step of the opacity or on a steep ramp are not processed in lanes */
     const vf low = vf_load(s->budget.low), high = vf_load(s->budget.high);
     *lanes &= ~vm_bits(vm_or(kernel_values_are_steep(pieces, low, high, false),

@@ -261,8 +261,7 @@ SIMD_INLINE void kernel_tile_process_curved(kernel_tile_trace *t, kernel_tile_ce
     const kernel_volume_method *method = cells->method;
     kernel_local_lanes *l = &cells->lanes;
     unsigned transformed;
-    l->current = q;
-    const unsigned all = KERNEL_OF_TYPE(type, kernel_local_fetch_all, l, q);
+    const unsigned all = KERNEL_OF_TYPE(type, kernel_local_begin_vector, l, q);
     const unsigned showing = method->transform(t, l, type, &transformed) & all;
     transformed &= all;
     t->thread->volume_cells += __builtin_popcount(all & ~(showing & ~transformed));
