@@ -353,18 +353,14 @@ SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map *map
     return has_failed ? vf_select(failed, kernel_line_value(i, t), value) : value;
 }
 
-/* Computes the field and reference coordinates at depth t for a packet's rays in a single cell. */
-SIMD_INLINE vf kernel_solve(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t, vf r[3])
+/* Returns the field at depth t for a packet's rays in a single cell. */
+static __attribute__((noinline, unused)) vf kernel_value_at(kernel_packet *p, const kernel_map *map,
+                                                            const kernel_interval *i, vm rays, vf t)
 {
     const kernel_rays own = kernel_packet_rays(p);
-    return kernel_solve_lanes(&own, map, i, rays, t, r, &p->thread->map_failures);
-}
-
-SIMD_INLINE vf kernel_value_at(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t)
-{
     vf r[3];
     kernel_reference_on_chord(i, t, r);
-    return kernel_solve(p, map, i, rays, t, r);
+    return kernel_solve_lanes(&own, map, i, rays, t, r, &p->thread->map_failures);
 }
 
 SIMD_INLINE void kernel_point_ends(const kernel_interval *i, kernel_point *in, kernel_point *out)

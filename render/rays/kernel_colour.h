@@ -159,7 +159,8 @@ SIMD_INLINE vm kernel_fragment_is_visible(const vf colour[3], vf transmittance)
 }
 
 /* Appends the fragments of the rays in mask to the thread's list. */
-SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const kernel_fragments *f)
+static __attribute__((noinline, unused)) void kernel_emit(kernel_packet *p, vm mask, uint32_t kind,
+                                                          const kernel_fragments *f)
 {
     unsigned bits = vm_bits(mask);
     fragment_list *list = p->thread->out;

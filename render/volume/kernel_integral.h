@@ -169,7 +169,7 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
     return piece;
 }
 
-/* A ray's position in a piece of the transfer function. */
+/* A ray's position in a segment, and in a piece of the transfer function. */
 typedef struct kernel_piece_state {
     vf below, above;     /* distances of the value to the piece's low and high end */
     vf remaining;        /* remaining change of the value within this piece */
@@ -179,19 +179,16 @@ typedef struct kernel_piece_state {
      * segment's begin */
     vf edge, rest;
     vm is_last; /* the segment ends in this piece */
+    /* The following members are the same in all pieces. */
+    vm falling, level;
+    vf sign;      /* sign of the value's change along the ray: 1 or -1 */
+    vf per_value; /* length of the ray per change of the value */
 } kernel_piece_state;
 
-/* Properties of a segment that are the same in all its pieces. */
-typedef struct kernel_segment_constants {
-    vm falling, level;
-    vf sign; /* sign of the value's change along the ray: 1 or -1 */
-    vf v_out, rest_out, length, per_value;
-} kernel_segment_constants;
-
-SIMD_INLINE kernel_segment_constants kernel_segment_constants_of(const kernel_unit_segment *run)
+SIMD_INLINE kernel_piece_state kernel_piece_state_begin(const kernel_unit_segment *run)
 {
     const vf one = vf_set(1), rise = (run->v_out - run->v_in) + (run->rest_out - run->rest_in), change = vf_abs(rise);
-    kernel_segment_constants out = {.v_out = run->v_out, .rest_out = run->rest_out, .length = run->length};
+    kernel_piece_state out = {.edge = run->v_in, .rest = run->rest_in, .is_last = vm_none()};
     out.falling = vf_lt(rise, vf_set(0));
     out.level = vf_lt(change, vf_set(KERNEL_TINY));
     out.sign = vf_select(out.falling, -one, one);
@@ -200,24 +197,23 @@ SIMD_INLINE kernel_segment_constants kernel_segment_constants_of(const kernel_un
 }
 
 /* Sets the positions of the rays in `fresh`, which enter a piece with the given ends. */
-SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *piece_state, const kernel_segment_constants *constants,
-                                          vm fresh, const kernel_piece_ends *ends)
+SIMD_INLINE void kernel_piece_state_enter(kernel_piece_state *s, const kernel_unit_segment *run, vm fresh,
+                                          const kernel_piece_ends *ends)
 {
-    const vf v = piece_state->edge, zero = vf_set(0);
-    const vf below = vf_max((v - ends->low) + (piece_state->rest - ends->low_rest), zero);
-    const vf above = vf_max((ends->high - v) + (ends->high_rest - piece_state->rest), zero);
-    const vf ahead = vf_abs((constants->v_out - v) + (constants->rest_out - piece_state->rest));
-    const vf most = vf_select(constants->falling, below, above), remaining = vf_min(most, ahead);
-    piece_state->below = vf_select(fresh, below, piece_state->below);
-    piece_state->above = vf_select(fresh, above, piece_state->above);
-    piece_state->remaining = vf_select(fresh, remaining, piece_state->remaining);
-    const vf left = vf_select(constants->level, constants->length, remaining * constants->per_value);
-    piece_state->remaining_length = vf_select(fresh, left, piece_state->remaining_length);
-    piece_state->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, piece_state->shortest);
-    piece_state->edge = vf_select(fresh, vf_select(constants->falling, ends->low, ends->high), piece_state->edge);
-    piece_state->rest =
-        vf_select(fresh, vf_select(constants->falling, ends->low_rest, ends->high_rest), piece_state->rest);
-    piece_state->is_last = vm_or(vm_andnot(piece_state->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
+    const vf v = s->edge, zero = vf_set(0);
+    const vf below = vf_max((v - ends->low) + (s->rest - ends->low_rest), zero);
+    const vf above = vf_max((ends->high - v) + (ends->high_rest - s->rest), zero);
+    const vf ahead = vf_abs((run->v_out - v) + (run->rest_out - s->rest));
+    const vf most = vf_select(s->falling, below, above), remaining = vf_min(most, ahead);
+    s->below = vf_select(fresh, below, s->below);
+    s->above = vf_select(fresh, above, s->above);
+    s->remaining = vf_select(fresh, remaining, s->remaining);
+    const vf left = vf_select(s->level, run->length, remaining * s->per_value);
+    s->remaining_length = vf_select(fresh, left, s->remaining_length);
+    s->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, s->shortest);
+    s->edge = vf_select(fresh, vf_select(s->falling, ends->low, ends->high), s->edge);
+    s->rest = vf_select(fresh, vf_select(s->falling, ends->low_rest, ends->high_rest), s->rest);
+    s->is_last = vm_or(vm_andnot(s->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
 /* Interpolates between at_low and at_high from both ends of the piece. Near an end with value 0 the result is as exact
@@ -240,15 +236,15 @@ typedef struct kernel_integration_step {
 } kernel_integration_step;
 
 SIMD_INLINE kernel_integration_step kernel_integration_step_begin(const kernel_pieces *t, const kernel_piece_index *at,
-                                                                  const kernel_piece_state *piece_state, vf turn)
+                                                                  const kernel_piece_state *s)
 {
     const vf inverse = kernel_piece_entry(t, at, KERNEL_PIECE_INVERSE);
     kernel_integration_step out;
-    out.opacity = kernel_piece_state_interpolate(piece_state, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
+    out.opacity = kernel_piece_state_interpolate(s, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY),
                                                  kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY_HIGH));
-    out.clear = kernel_piece_state_interpolate(piece_state, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
+    out.clear = kernel_piece_state_interpolate(s, inverse, kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR),
                                                kernel_piece_entry(t, at, KERNEL_PIECE_CLEAR_HIGH));
-    out.rise = turn * piece_state->remaining * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
+    out.rise = s->sign * s->remaining * kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
     return out;
 }
 
@@ -316,30 +312,27 @@ SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_in
 static __attribute__((noinline)) void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_unit_segment *run,
                                                        kernel_light *light)
 {
-    const kernel_segment_constants constants = kernel_segment_constants_of(run);
-    const vf zero = vf_set(0);
-    kernel_piece_state piece_state = {zero, zero, zero, zero, zero, run->v_in, run->rest_in, vm_none()};
-    vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, constants.falling);
+    kernel_piece_state s = kernel_piece_state_begin(run);
+    vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, s.falling);
     vm open = rays, fresh = rays;
     while (vm_any(open)) {
         const kernel_piece_index at = kernel_piece_index_of(t, open, piece);
         if (vm_any(fresh)) {
             const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
-            kernel_piece_state_enter(&piece_state, &constants, fresh, &ends);
+            kernel_piece_state_enter(&s, run, fresh, &ends);
         }
-        kernel_integration_step st = kernel_integration_step_begin(t, &at, &piece_state, constants.sign);
-        kernel_integration_step_limit(&st, piece_state.remaining_length, piece_state.shortest);
-        const vf size = piece_state.remaining * st.share, move = constants.sign * size;
-        kernel_light_step(t, &at, open, piece_state.below, move, &st, light);
-        piece_state.below += move;
-        piece_state.above -= move;
-        piece_state.remaining -= size;
-        piece_state.remaining_length -= st.length;
+        kernel_integration_step st = kernel_integration_step_begin(t, &at, &s);
+        kernel_integration_step_limit(&st, s.remaining_length, s.shortest);
+        const vf size = s.remaining * st.share, move = s.sign * size;
+        kernel_light_step(t, &at, open, s.below, move, &st, light);
+        s.below += move;
+        s.above -= move;
+        s.remaining -= size;
+        s.remaining_length -= st.length;
         const vm through = vf_le(vf_set(1), st.share);
-        open = vm_and(vm_andnot(open, vm_and(through, piece_state.is_last)),
-                      vf_lt(vf_set(KERNEL_BLACK), light->transmittance));
+        open = vm_and(vm_andnot(open, vm_and(through, s.is_last)), vf_lt(vf_set(KERNEL_BLACK), light->transmittance));
         fresh = vm_and(open, through);
-        piece = vf_select(fresh, piece + constants.sign, piece);
+        piece = vf_select(fresh, piece + s.sign, piece);
     }
 }
 
