@@ -55,6 +55,39 @@ typedef struct kernel_tile_volume {
 
 /* ---- samples ---- */
 
+/* Finds the samples of the window that may lie between two depths on each ray: numbers in the window from *number to
+ * *last. Rays that miss the window may have any number; their first one is that behind the window's last sample, so
+ * that it does not overflow an int. base, step: depth of sample 0, and distance between samples. */
+SIMD_INLINE void kernel_local_sample_range(const kernel_tile_volume *v, vf base, vf step, vf near, vf far, vf *number,
+                                           vf *last)
+{
+    const vf inverse = 1.0f / step, first = vf_set((float)v->first);
+    const vf before = vf_floor(v->pad - ((near - base) * inverse - first));
+    *number = vf_min(vf_max(-before, vf_set(0)), vf_set((float)v->count));
+    *last = vf_min(vf_floor(((far - base) * inverse - first) + v->pad), vf_set((float)(v->count - 1)));
+}
+
+/* Sets the values of the given lanes' samples, unless another cell has set them. Returns the lanes whose samples have a
+ * value of another cell. numbers: the samples' numbers in the window. */
+SIMD_INLINE unsigned kernel_local_store_samples(kernel_tile_volume *v, vm own, vi places, vi numbers, vf value)
+{
+    int32_t at[SIMD_WIDTH], number[SIMD_WIDTH];
+    float values[SIMD_WIDTH];
+    unsigned taken = 0;
+    memcpy(at, &places, sizeof at);
+    memcpy(number, &numbers, sizeof number);
+    vf_store(values, value);
+    for (unsigned lanes = vm_bits(own); lanes; lanes &= lanes - 1) {
+        const int i = __builtin_ctz(lanes);
+        kernel_samples *s = &v->packets[at[i] / SIMD_WIDTH];
+        float *to = (float *)(void *)&s->value[s->volume][number[i]] + at[i] % SIMD_WIDTH;
+        const bool is_taken = *to == *to;
+        taken |= (unsigned)is_taken << i;
+        if (!is_taken) *to = values[i];
+    }
+    return taken;
+}
+
 /* Decides, by the crossings of the cell's faces, whether a sample near the cell's border belongs to the cell, and sets
  * its value if it does. lane: the lane of the cell. */
 static __attribute__((noinline, cold)) void kernel_local_sample_by_crossings(kernel_tile_trace *t, int lane, int at,
@@ -82,7 +115,6 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volum
     kernel_lane_rays rays;
     kernel_local_points points;
     int32_t at[SIMD_WIDTH], number[SIMD_WIDTH], lane[SIMD_WIDTH];
-    float values[SIMD_WIDTH];
     kernel_lane_rays_of(&rays, &t->tile, bits & (KERNEL_TILE_PIXELS - 1), bits >> KERNEL_LOCAL_LANE);
     const vf place[3] = {rays.rays.origin_x + rays.rays.slope_x * depth, rays.rays.origin_y + rays.rays.slope_y * depth,
                          depth};
@@ -91,19 +123,12 @@ SIMD_INLINE void kernel_local_fill_lanes(kernel_tile_trace *t, kernel_tile_volum
              error_bound = kernel_gather_lane(l->cells.error_bound, rays.lane);
     const vm own = vm_and(vm_and(active, known), vf_lt(error_bound, inside));
     const vm doubt = vm_andnot(vm_andnot(active, own), vm_and(known, vf_lt(inside, -error_bound)));
-    vf_store(values, kernel_local_value(type, &l->cells, rays.lane, &points));
     const vi numbers = bits >> KERNEL_LOCAL_NUMBER;
+    const vf value = kernel_local_value(type, &l->cells, rays.lane, &points);
+    unsigned undecided = vm_bits(doubt) | kernel_local_store_samples(b, own, rays.at, numbers, value);
     memcpy(at, &rays.at, sizeof at);
     memcpy(number, &numbers, sizeof number);
     memcpy(lane, &rays.lane, sizeof lane);
-    unsigned undecided = vm_bits(doubt);
-    for (unsigned more = vm_bits(own); more; more &= more - 1) {
-        const int i = __builtin_ctz(more);
-        float *value = (float *)(void *)&b->packets[at[i] / SIMD_WIDTH].value[l->volume][number[i]];
-        const bool is_taken = value[at[i] % SIMD_WIDTH] == value[at[i] % SIMD_WIDTH];
-        undecided |= (unsigned)is_taken << i;
-        if (!is_taken) value[at[i] % SIMD_WIDTH] = values[i];
-    }
     for (; __builtin_expect(undecided, 0); undecided &= undecided - 1) {
         const int i = __builtin_ctz(undecided);
         kernel_local_sample_by_crossings(t, lane[i], at[i], number[i]);
@@ -128,14 +153,6 @@ static __attribute__((noinline)) void kernel_local_fill(kernel_tile_trace *t, in
 
 /* ---- pixels ---- */
 
-/* Returns the first sample number within the window, from the negated number of the interval's first sample. Rays that
- * miss the window may have any number; they get the number behind the last sample, so that it does not overflow an
- * int. */
-SIMD_INLINE vf kernel_local_first(const kernel_tile_volume *b, vf negated)
-{
-    return vf_min(vf_max(-negated, vf_set(0)), vf_set((float)b->count));
-}
-
 /* Queues the samples of the list's rays n .. n + SIMD_WIDTH - 1 that may lie inside their cells. */
 SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const kernel_local_lanes *l, int type, int n)
 {
@@ -144,15 +161,13 @@ SIMD_INLINE void kernel_local_queue_samples_lanes(kernel_tile_trace *t, const ke
     const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
     const vi pixel = kernel_load_bytes(l->rays.pixel + n);
     kernel_lane_rays rays;
-    vf base, step, near, far;
+    vf base, step, near, far, number, last;
     kernel_lane_rays_of(&rays, &t->tile, pixel, kernel_load_bytes(l->rays.lane + n));
     const vf depth = kernel_gather_lane(l->cells.origin[2], rays.lane);
     kernel_local_slab_interval(&l->cells, &rays, depth, &near, &far);
     vf_gather_pair(b->steps, 2 * rays.at, &base, &step);
-    const vf inverse = 1.0f / step, begin = depth - base, end = vf_min(depth + far, vf_gather(b->far, rays.at)) - base;
-    const float zero = (float)b->first;
-    vf number = kernel_local_first(b, vf_floor(b->pad - ((begin + near) * inverse - zero)));
-    const vf last = vf_min(vf_floor((end * inverse - zero) + b->pad), vf_set((float)(b->count - 1)));
+    kernel_local_sample_range(b, base, step, depth + near, vf_min(depth + far, vf_gather(b->far, rays.at)), &number,
+                              &last);
     const vi key = pixel | rays.lane << KERNEL_LOCAL_LANE;
     for (vm more = vm_and(active, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
         if (b->sample_count > KERNEL_LOCAL_SAMPLES - SIMD_WIDTH) kernel_local_fill(t, type);

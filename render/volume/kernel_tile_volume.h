@@ -77,53 +77,34 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
 /* Maximum number of pixels in the box of a tet that is sampled in lanes. Larger tets are sampled as fast by packets. */
 enum { KERNEL_TET_SAMPLE_PIXELS = 12 };
 
-/* Emits a sample that also lies in another cell as a fragment of its own. */
-static __attribute__((noinline, cold)) void kernel_tet_sample_separate(kernel_tile_trace *t, kernel_tile_volume *b,
-                                                                       int at, float depth, float value)
+/* Emits samples that also lie in another cell as fragments of their own; `lanes` is a mask. */
+static __attribute__((noinline, cold)) void kernel_tet_samples_separate(kernel_tile_trace *t, unsigned lanes, vi places,
+                                                                        vf depth, vf value)
 {
-    const int packet = at / SIMD_WIDTH;
     const kernel_interval cell = {0};
-    kernel_emit_sample(&t->packets[packet], &b->packets[packet], &cell, vm_from_bits(1u << at % SIMD_WIDTH),
-                       vf_set(depth), vf_set(value));
-}
-
-/* Stores the values of samples, one per lane, in the window. Samples that already have a value from another cell are
- * emitted instead. */
-SIMD_INLINE void kernel_tet_samples_store(kernel_tile_trace *t, kernel_tile_volume *b, vm own, vi places, vi numbers,
-                                          vf depth, vf value)
-{
-    int32_t at[SIMD_WIDTH], number[SIMD_WIDTH];
-    float values[SIMD_WIDTH];
+    int32_t at[SIMD_WIDTH];
     memcpy(at, &places, sizeof at);
-    memcpy(number, &numbers, sizeof number);
-    vf_store(values, value);
-    for (unsigned lanes = vm_bits(own); lanes; lanes &= lanes - 1) {
-        const int i = __builtin_ctz(lanes);
-        kernel_samples *s = &b->packets[at[i] / SIMD_WIDTH];
-        float *to = (float *)(void *)&s->value[s->volume][number[i]] + at[i] % SIMD_WIDTH;
-        if (__builtin_expect(*to == *to, 0))
-            kernel_tet_sample_separate(t, b, at[i], depth[i], values[i]);
-        else
-            *to = values[i];
+    for (; lanes; lanes &= lanes - 1) {
+        const int i = __builtin_ctz(lanes), packet = at[i] / SIMD_WIDTH;
+        kernel_emit_sample(&t->packets[packet], &t->thread->tile_volume->packets[packet], &cell,
+                           vm_from_bits(1u << at[i] % SIMD_WIDTH), vf_set(depth[i]), vf_set(value[i]));
     }
 }
 
 /* Computes the values of the samples that lie in the rays' intervals. */
 SIMD_INLINE void kernel_tet_samples_fill(kernel_tile_trace *t, kernel_tile_volume *b, const kernel_interval *i, vi at)
 {
-    vf base, step;
+    vf base, step, number, last;
     vf_gather_pair(b->steps, 2 * at, &base, &step);
-    const vf inverse = 1.0f / step, length = i->t_out - i->t_in;
+    kernel_local_sample_range(b, base, step, i->t_in, i->t_out, &number, &last);
+    const vf length = i->t_out - i->t_in;
     const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
-    const float zero = (float)b->first;
-    vf number = kernel_local_first(b, vf_floor(b->pad - ((i->t_in - base) * inverse - zero)));
-    const vf last = vf_min(vf_floor(((i->t_out - base) * inverse - zero) + b->pad), vf_set((float)(b->count - 1)));
     for (vm more = vm_and(i->mask, vf_le(number, last)); vm_any(more); more = vm_and(more, vf_le(number, last))) {
         const vi whole = vi_from_vf(number);
-        const vf depth = base + step * vf_from_vi(whole + b->first);
+        const vf depth = base + step * vf_from_vi(whole + b->first), value = i->v_in + slope * (depth - i->t_in);
         const vm own = vm_and(more, vm_andnot(vf_lt(depth, i->t_out), vf_lt(depth, i->t_in)));
-        const vf value = i->v_in + slope * (depth - i->t_in);
-        if (vm_any(own)) kernel_tet_samples_store(t, b, own, at, whole, depth, value);
+        const unsigned taken = kernel_local_store_samples(b, own, at, whole, value);
+        if (__builtin_expect(taken, 0)) kernel_tet_samples_separate(t, taken, at, depth, value);
         number += 1.0f;
     }
 }
