@@ -92,6 +92,9 @@ typedef struct kernel_tile_queue {
     kernel_curved_batch curved_batch;
     int alone_count;
     kernel_tile_candidate alone[KERNEL_ALONE];
+    /* binned candidates whose cells' vertex indices are being prefetched */
+    int prefetched_count;
+    const kernel_tile_candidate *prefetched[SIMD_WIDTH];
 } kernel_tile_queue;
 
 static void kernel_tile_queue_begin(kernel_tile_queue *m)
@@ -103,7 +106,7 @@ static void kernel_tile_queue_begin(kernel_tile_queue *m)
         m->pending[i].layer = m->pending[i].part = -1;
     }
     kernel_curved_batch_begin(&m->curved_batch);
-    m->alone_count = 0;
+    m->alone_count = m->prefetched_count = 0;
 }
 
 /* Sets the mesh part of the cells that are queued next; their layer is the current one. */
@@ -206,46 +209,40 @@ SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_t
     kernel_prefetch_indices(f->job->parts[part].cells, candidate->cell);
 }
 
-/* Candidates whose cells' vertex indices are being prefetched. */
-typedef struct kernel_prefetch_queue {
-    int count;
-    const kernel_tile_candidate *items[SIMD_WIDTH];
-} kernel_prefetch_queue;
-
-/* Sorts pending cells by mesh part, and keeps their order of depth within each part. A batch can contain cells of one
- * part only, and without the sort cells of different parts would alternate. */
-static void kernel_pending_sort(kernel_prefetch_queue *w)
+/* Sorts prefetched cells by their part, and leaves them in order of depth within each: a batch contains cells of one
+ * part only, and cells of different blocks of a mesh alternate in depth. */
+static void kernel_prefetched_sort(const kernel_tile_candidate **items, int count)
 {
-    for (int n = 1; n < w->count; n++) {
-        const kernel_tile_candidate *item = w->items[n];
+    for (int n = 1; n < count; n++) {
+        const kernel_tile_candidate *item = items[n];
         const uint32_t part = item->source / RENDER_MAX_ISOVALUES;
         int at = n;
-        for (; at > 0 && w->items[at - 1]->source / RENDER_MAX_ISOVALUES > part; at--) w->items[at] = w->items[at - 1];
-        w->items[at] = item;
+        for (; at > 0 && items[at - 1]->source / RENDER_MAX_ISOVALUES > part; at--) items[at] = items[at - 1];
+        items[at] = item;
     }
 }
 
-/* Prefetches the vertices of all pending cells, then queues them for tracing. */
-static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_queue *m,
-                                                                   kernel_prefetch_queue *w)
+/* Prefetches the vertices of all prefetched cells, then queues them for tracing. */
+static __attribute__((noinline)) void kernel_tile_queue_prefetched(kernel_tile_trace *t, kernel_tile_queue *m)
 {
-    kernel_pending_sort(w);
-    for (int n = 0; n < w->count; n++) {
+    const kernel_tile_candidate **items = m->prefetched;
+    kernel_prefetched_sort(items, m->prefetched_count);
+    for (int n = 0; n < m->prefetched_count; n++) {
         int part;
-        kernel_tile_set_source(t, w->items[n]->source, &part);
+        kernel_tile_set_source(t, items[n]->source, &part);
         if (m->layer < 0) kernel_tile_queue_set_part(t, m, part);
         if (m->layer == t->layer && m->part == part &&
-            kernel_is_traced_in_vectors(m, w->items[n], kernel_arrays_type(&m->arrays, w->items[n]->cell)))
+            kernel_is_traced_in_vectors(m, items[n], kernel_arrays_type(&m->arrays, items[n]->cell)))
             continue; /* cells in vectors are prefetched by their queue */
         kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
-                                 w->items[n]->cell);
+                                 items[n]->cell);
     }
-    for (int n = 0; n < w->count; n++) {
+    for (int n = 0; n < m->prefetched_count; n++) {
         int part;
-        const int value = kernel_tile_set_source(t, w->items[n]->source, &part);
-        if (kernel_candidate_blocks(t, w->items[n])) kernel_tile_queue_add(t, m, w->items[n], part, value);
+        const int value = kernel_tile_set_source(t, items[n]->source, &part);
+        if (kernel_candidate_blocks(t, items[n])) kernel_tile_queue_add(t, m, items[n], part, value);
     }
-    w->count = 0;
+    m->prefetched_count = 0;
 }
 
 /* Traces the tile's transparent surfaces if `transparent` is set, otherwise its opaque ones, which must be traced
@@ -254,7 +251,6 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
                                                                    bool transparent)
 {
     kernel_tile_queue *queue = &((kernel_tile_search *)t->search)->queue;
-    kernel_prefetch_queue pending = {0};
     kernel_tile_queue_begin(queue);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
         for (int i = q->first[bin]; i >= 0; i = q->items[i].next) {
@@ -264,10 +260,10 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
                 t->frame->isovalues[source % RENDER_MAX_ISOVALUES].surface >= t->frame->opaque_count;
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
             kernel_candidate_prefetch(t->frame, candidate);
-            pending.items[pending.count++] = candidate;
-            if (pending.count == SIMD_WIDTH) kernel_tile_queue_prefetched(t, queue, &pending);
+            queue->prefetched[queue->prefetched_count++] = candidate;
+            if (queue->prefetched_count == SIMD_WIDTH) kernel_tile_queue_prefetched(t, queue);
         }
-    kernel_tile_queue_prefetched(t, queue, &pending);
+    kernel_tile_queue_prefetched(t, queue);
     kernel_tile_queue_finish(t, queue);
 }
 
