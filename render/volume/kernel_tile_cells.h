@@ -303,20 +303,24 @@ SIMD_INLINE void kernel_tile_process_queues(kernel_tile_trace *t)
         while (t->thread->tile_cells->lanes.queues[i].count) kernel_tile_process_queue(t, i);
 }
 
+/* Returns whether cells of this type in the mesh part are queued. Polyhedra, cells with indices too large for lanes,
+ * and tets with a field that is constant per cell, in which nothing is interpolated, are processed alone. */
+SIMD_INLINE bool kernel_tile_queues_type(const kernel_tile_trace *t, int part, int type)
+{
+    const kernel_tile_cells *cells = t->thread->tile_cells;
+    if (kernel_has_own_faces(type) || !kernel_arrays_have_small_indices(t->frame->job->parts[part].cells)) return false;
+    if (!kernel_is_linear(type)) return cells->has_curved_lanes;
+    return !t->frame->job->volumes[cells->lanes.volume].field.fields[part].is_cell_centred;
+}
+
 /* Queues a cell; if the queue of its type is full, a vector of its cells is processed. Returns false if the cell must
- * be processed alone: polyhedra, cells with indices too large for lanes, and tets with a field that is constant per
- * cell, in which nothing is interpolated. box: the cell's pixels, in a candidate's format. */
+ * be processed alone. box: the cell's pixels, in a candidate's format. */
 static __attribute__((noinline)) bool kernel_tile_enqueue(kernel_tile_trace *t, int part, uint32_t cell,
                                                           unsigned blocks, unsigned box)
 {
-    const grid *g = t->frame->job->parts[part].cells;
-    const int type = grid_cell_type(g, cell);
-    kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_local_lanes *l = &cells->lanes;
-    if (kernel_has_own_faces(type) || !kernel_arrays_have_small_indices(g)) return false;
-    if (kernel_is_linear(type) ? t->frame->job->volumes[l->volume].field.fields[part].is_cell_centred
-                               : !cells->has_curved_lanes)
-        return false;
+    const int type = grid_cell_type(t->frame->job->parts[part].cells, cell);
+    kernel_local_lanes *l = &t->thread->tile_cells->lanes;
+    if (!kernel_tile_queues_type(t, part, type)) return false;
     if (part != l->part) {
         kernel_tile_process_queues(t);
         kernel_local_lanes_set_part(t, l, part);
@@ -459,8 +463,8 @@ SIMD_INLINE void kernel_tile_cells_select_window(const kernel_tile_trace *t, ker
     cells->open_count = count;
 }
 
-/* Prefetches the next cells of the window: the vertex indices of 2 * KERNEL_OPEN_PIECE cells, and the vertices of
- * KERNEL_OPEN_PIECE cells. */
+/* Prefetches the next cells of the window: the vertex indices of 2 * KERNEL_OPEN_PIECE cells, and the vertices of those
+ * of KERNEL_OPEN_PIECE cells that are processed alone; queues prefetch the vertices of the others. */
 SIMD_INLINE void kernel_tile_prefetch_window(const kernel_tile_trace *t, const kernel_tile_cells *cells, int first)
 {
     const render_job *job = t->frame->job;
@@ -469,10 +473,10 @@ SIMD_INLINE void kernel_tile_prefetch_window(const kernel_tile_trace *t, const k
         for (int n = first; n < end && n < cells->open_count; n++) {
             const kernel_tile_candidate *item = &cells->items[n];
             const grid *g = job->parts[item->source].cells;
-            if (pass)
-                kernel_prefetch_vertices(g, &job->volumes[0].field.fields[item->source], item->cell);
-            else
+            if (!pass)
                 kernel_prefetch_indices(g, item->cell);
+            else if (!kernel_tile_queues_type(t, (int)item->source, grid_cell_type(g, item->cell)))
+                kernel_prefetch_vertices(g, &job->volumes[0].field.fields[item->source], item->cell);
         }
     }
 }
