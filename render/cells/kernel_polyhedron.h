@@ -139,6 +139,17 @@ SIMD_INLINE kernel_edge_error kernel_polyhedron_line(polyhedron *c, const kernel
                              kernel_polyhedron_position(c, b));
 }
 
+/* Returns the polyhedron with the values of a layer's field; NULL if they are not all finite, or if memory ran out. */
+SIMD_INLINE polyhedron *kernel_polyhedron_find(kernel_packet *p, const grid_field *field, int part, int layer,
+                                               uint32_t index)
+{
+    kernel_thread *thread = p->thread;
+    polyhedron *c =
+        thread->find_polyhedron(thread->polyhedra, p->frame->job->parts[part].cells, field, part, layer, index);
+    if (!c) thread->out_of_memory = true;
+    return c && c->is_finite ? c : NULL;
+}
+
 SIMD_INLINE void kernel_polyhedron_transform(polyhedron *c, const kernel_packet *p)
 {
     for (int i = 0; i <= c->vertex_count; i++) kernel_transform(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);

@@ -67,11 +67,9 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
     }
 }
 
-/* Per-lane values of a packet that is being set up, in plain arrays with one loop per quantity: compilers vectorize
- * these. */
+/* Column and row parameters of a packet's rays (kernel_tree_ray()). */
 typedef struct kernel_lanes {
     double px[SIMD_WIDTH], py[SIMD_WIDTH];
-    float value[SIMD_WIDTH];
 } kernel_lanes;
 
 static inline void kernel_packet_lanes(const kernel_packet *p, kernel_lanes *l)
@@ -100,28 +98,23 @@ static inline void kernel_packet_tile_rays(kernel_packet *p)
     p->slope_y = vf_load(lanes[3]);
 }
 
-/* Sets the packet's rays in tree space, axis by axis: the ray meets a plane at t = plane * inverse - shift. */
-static inline void kernel_packet_tree_rays(kernel_packet *p, kernel_lanes *l)
+/* Sets the packet's rays in tree space: a ray meets a plane at t = plane * inverse - shift. */
+static inline void kernel_packet_tree_rays(kernel_packet *p, const kernel_lanes *l)
 {
-    const render_camera *c = &p->frame->job->camera;
-    const render_space *space = &p->frame->job->space;
-    const bool flat = c->is_orthographic;
+    float inverse[3][SIMD_WIDTH], shift[3][SIMD_WIDTH];
     double size = 0;
-    for (int a = 0; a < 3; a++) {
-        float shift[SIMD_WIDTH];
-        const double start = (c->eye[a] - space->origin[a]) * space->scale;
-        for (int i = 0; i < SIMD_WIDTH; i++) {
-            const double sideways = l->px[i] * c->right[a] + l->py[i] * c->up[a];
-            const double along = c->forward[a] + (flat ? 0.0 : sideways);
-            const double base = start + (flat ? sideways * space->scale : 0.0) + p->frame->depth_shift * along;
-            const double slant = fabs(along) < 1e-12 ? 1e-12 : along;
-            const double inverse = (double)(float)(1 / slant);
-            l->value[i] = (float)inverse;
-            shift[i] = (float)(base * inverse);
-            size = fabs(base) > size ? fabs(base) : size;
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        double base[3], direction[3];
+        kernel_tree_ray(p->frame, l->px[i], l->py[i], base, direction);
+        for (int a = 0; a < 3; a++) {
+            inverse[a][i] = (float)(1 / (fabs(direction[a]) < 1e-12 ? 1e-12 : direction[a]));
+            shift[a][i] = (float)(base[a] * (double)inverse[a][i]);
+            size = fmax(size, fabs(base[a]));
         }
-        p->inverse[a] = vf_load(l->value);
-        p->shift[a] = vf_load(shift);
+    }
+    for (int a = 0; a < 3; a++) {
+        p->inverse[a] = vf_load(inverse[a]);
+        p->shift[a] = vf_load(shift[a]);
     }
     /* Positions near the scene and the base are at most size + 1. plane * inverse - shift errs by 2 roundings of that,
      * the base by 1, the direction by 1 over the scene's size: the factor 16 leaves a margin of 2. */
@@ -161,20 +154,20 @@ static inline int kernel_sample_first(const kernel_frame *f)
     return count > 0 && count < 1e9 ? -(int)count : 0;
 }
 
-static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
+static inline void kernel_packet_samples(kernel_packet *p, const kernel_lanes *l)
 {
     const kernel_frame *f = p->frame;
-    float step[SIMD_WIDTH];
+    float base[SIMD_WIDTH], step[SIMD_WIDTH];
     p->sample_first = kernel_sample_first(f);
     for (int i = 0; i < SIMD_WIDTH; i++) {
         const bool flat = f->job->camera.is_orthographic;
         const double length = flat ? 1 : sqrt(1 + l->px[i] * l->px[i] + l->py[i] * l->py[i]);
         const double dt = f->scaled_step / length;
         const double jitter = f->job->jitter ? render_jitter(p->pixel[i], (uint32_t)f->job->frame) : 0.5;
-        l->value[i] = (float)((-p->sample_first + jitter) * dt - f->depth_shift);
+        base[i] = (float)((-p->sample_first + jitter) * dt - f->depth_shift);
         step[i] = (float)dt;
     }
-    p->sample_base = vf_load(l->value);
+    p->sample_base = vf_load(base);
     p->sample_step = vf_load(step);
     p->sample_inverse = 1.0f / p->sample_step;
 }

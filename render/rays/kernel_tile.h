@@ -92,22 +92,6 @@ typedef struct kernel_plane_lanes {
     double right[KERNEL_LANES], up[KERNEL_LANES], forward[KERNEL_LANES], offset[KERNEL_LANES];
 } kernel_plane_lanes;
 
-SIMD_INLINE vf kernel_lanes_load(const float *lanes, int v)
-{
-    return vf_load(lanes + v * SIMD_WIDTH);
-}
-
-/* Returns the slope (perspective) or offset (orthographic) of border n between columns of blocks, relative to the
- * tile's centre. */
-static inline double kernel_border_x(const kernel_frame *f, const kernel_tile *tile, int n)
-{
-    return kernel_column(f, tile->x0 + n * KERNEL_BLOCK - 0.5) - tile->centre_x;
-}
-static inline double kernel_border_y(const kernel_frame *f, const kernel_tile *tile, int n)
-{
-    return kernel_row(f, tile->y0 + n * KERNEL_BLOCK - 0.5) - tile->centre_y;
-}
-
 /* Slopes (perspective) or offsets (orthographic) of all borders between blocks, and of the tile's central direction. */
 typedef struct kernel_borders {
     double x[KERNEL_BLOCKS_ACROSS + 1], y[KERNEL_BLOCKS_ACROSS + 1];
@@ -117,8 +101,8 @@ typedef struct kernel_borders {
 static inline void kernel_tile_borders(kernel_borders *b, const kernel_frame *f, const kernel_tile *tile)
 {
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
-        b->x[n] = kernel_border_x(f, tile, n) + tile->centre_x;
-        b->y[n] = kernel_border_y(f, tile, n) + tile->centre_y;
+        b->x[n] = kernel_column(f, tile->x0 + n * KERNEL_BLOCK - 0.5);
+        b->y[n] = kernel_row(f, tile->y0 + n * KERNEL_BLOCK - 0.5);
     }
     b->centre_x = tile->centre_x;
     b->centre_y = tile->centre_y;
@@ -156,6 +140,20 @@ static inline void kernel_plane_lanes_setup(kernel_plane_lanes *l, const kernel_
     l->up[KERNEL_ALONG_LANE] = flat ? 0 : b->centre_y;
 }
 
+/* Loads planes, one per number of each list. */
+static inline void kernel_planes_load(kernel_planes *q, float (*const normal)[KERNEL_LANES], const float *offset,
+                                      const float *error)
+{
+    for (int v = 0; v < KERNEL_LANE_VECTORS; v++) {
+        for (int a = 0; a < 3; a++) {
+            q->normal[a][v] = vf_load(normal[a] + v * SIMD_WIDTH);
+            q->size[a][v] = vf_abs(q->normal[a][v]);
+        }
+        q->offset[v] = vf_load(offset + v * SIMD_WIDTH);
+        q->error[v] = vf_load(error + v * SIMD_WIDTH);
+    }
+}
+
 /* Computes the planes in tree space, for boxes. Normals are rounded before the offsets are computed, so that the planes
  * still pass through the eye. The remaining error is a rotation by one rounding, at a distance of at most the eye's and
  * the scene's. */
@@ -184,25 +182,18 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
         offset[i] = (float)l.offset[i];
         error[i] = 16 * 6e-8f * (error[i] * ((float)size + 2) + fabsf(offset[i]));
     }
-    for (int v = 0; v < KERNEL_LANE_VECTORS; v++) {
-        for (int a = 0; a < 3; a++) {
-            q->normal[a][v] = kernel_lanes_load(normal[a], v);
-            q->size[a][v] = vf_abs(q->normal[a][v]);
-        }
-        q->offset[v] = kernel_lanes_load(offset, v);
-        q->error[v] = kernel_lanes_load(error, v);
-    }
+    kernel_planes_load(q, normal, offset, error);
 }
 
 /* Computes the planes in tile space, against which cells are tested: X - slope * Z - origin for columns, and likewise Y
  * for rows. The lane of the distance along the direction is not used. */
-static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
+static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_borders *b)
 {
     const bool flat = f->job->camera.is_orthographic;
     const double reach = kernel_slope_to_origin(f);
-    float normal[3][KERNEL_LANES] = {{0}}, offset[KERNEL_LANES] = {0};
+    float normal[3][KERNEL_LANES] = {{0}}, offset[KERNEL_LANES] = {0}, error[KERNEL_LANES];
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
-        const double x = kernel_border_x(f, tile, n), y = kernel_border_y(f, tile, n);
+        const double x = b->x[n] - b->centre_x, y = b->y[n] - b->centre_y;
         const int row = KERNEL_ROWS_LANE + n;
         normal[0][n] = 1;
         normal[1][row] = -1;
@@ -212,14 +203,8 @@ static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, c
         offset[row] = (float)(y * reach);
     }
     normal[2][KERNEL_DEPTH_LANE] = 1;
-    for (int v = 0; v < KERNEL_LANE_VECTORS; v++) {
-        for (int a = 0; a < 3; a++) {
-            q->normal[a][v] = kernel_lanes_load(normal[a], v);
-            q->size[a][v] = vf_abs(q->normal[a][v]);
-        }
-        q->offset[v] = kernel_lanes_load(offset, v);
-        q->error[v] = vf_abs(q->offset[v]);
-    }
+    for (int i = 0; i < KERNEL_LANES; i++) error[i] = fabsf(offset[i]);
+    kernel_planes_load(q, normal, offset, error);
 }
 
 /* Returns the blocks for which the body is on the inner side of all borders. */
@@ -274,10 +259,10 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
     return placement;
 }
 
-/* An outline is a set of points in tile space whose convex hull contains a cell. It has at most this many points: */
-/* maximum number of points of an outline: eight vertices, and two points on each of the 28 lines between two of them */
-enum { KERNEL_OUTLINE_POINTS = 64 };
+/* Maximum number of points of an outline: eight, padded to a whole vector. */
+enum { KERNEL_OUTLINE_POINTS = 16 };
 
+/* Points in tile space whose convex hull contains a cell: its vertices, or the corners of its bounding box. */
 typedef struct kernel_outline {
     int count;
     float point[3][KERNEL_OUTLINE_POINTS];

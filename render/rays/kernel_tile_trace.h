@@ -151,7 +151,7 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     kernel_borders borders;
     kernel_tile_borders(&borders, f, &t->tile);
     kernel_tree_planes(&t->tree_planes, f, &borders);
-    kernel_tile_planes(&t->tile_planes, f, &t->tile);
+    kernel_tile_planes(&t->tile_planes, f, &borders);
 }
 
 /* An entry of the traversal's stack. A tile traverses a tree once for all its blocks, with a mask of the blocks that a

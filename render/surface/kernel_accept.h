@@ -337,12 +337,11 @@ static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *
     kernel_lanes l;
     unsigned kept = 0;
     kernel_packet_lanes(p, &l);
-    vf_store(l.value, t);
     for (unsigned left = vm_bits(hit); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
         kernel_clip_ray ray;
         kernel_tree_ray(p->frame, l.px[i], l.py[i], ray.base, ray.direction);
-        kept |= (unsigned)kernel_clip_keeps(p->frame->job, clips, &ray, (double)l.value[i]) << i;
+        kept |= (unsigned)kernel_clip_keeps(p->frame->job, clips, &ray, (double)t[i]) << i;
     }
     return vm_from_bits(kept);
 }

@@ -144,10 +144,8 @@ static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, co
 {
     const int part = occluder->part;
     const double value = o->surface->layer->values[occluder->value];
-    polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells,
-                                               &o->surface->layer->field.fields[part], part, o->layer, occluder->cell);
-    if (!c) p->thread->out_of_memory = true;
-    if (!c || !c->is_finite) return;
+    polyhedron *c = kernel_polyhedron_find(p, &o->surface->layer->field.fields[part], part, o->layer, occluder->cell);
+    if (!c) return;
     c->has_slopes = c->is_transformed = false;
     o->world = c->world;
     o->vertex_count = c->vertex_count;

@@ -682,10 +682,8 @@ static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *st
 static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *state, int part, uint32_t index, vm rays)
 {
     const render_surface_layer *layer = state->surface->layer;
-    polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells,
-                                               &layer->field.fields[part], part, state->layer, index);
-    if (!c) p->thread->out_of_memory = true;
-    if (!c || !c->is_finite) return;
+    polyhedron *c = kernel_polyhedron_find(p, &layer->field.fields[part], part, state->layer, index);
+    if (!c) return;
     for (int value = 0; value < layer->value_count; value++) {
         if (!kernel_values_straddle(c->values, c->vertex_count, layer->values[value])) continue;
         const bool is_fresh = !c->is_transformed;

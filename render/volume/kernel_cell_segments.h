@@ -83,7 +83,7 @@ static inline double kernel_interpolate(double from, double to, double share)
     return from + (to - from) * share;
 }
 
-/* Computes the ray's point at depth t, as kernel_solve() does: by Newton's method from the initial guess `guess`. */
+/* Computes the ray's point at depth t, as kernel_value_at() does: by Newton's method from the initial guess `guess`. */
 static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, double t, const double guess[3])
 {
     const double whole = h->out.t - h->in.t, share = whole > 0 ? (t - h->in.t) / whole : 0;
@@ -654,10 +654,8 @@ static polyhedron *kernel_polyhedron_prepare(kernel_packet *p, int volume, int p
 {
     const kernel_transfer *transfer = &p->frame->volumes[volume];
     const grid_field *field = &p->frame->job->volumes[volume].field.fields[part];
-    polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part,
-                                               p->frame->surface_count + volume, index);
-    if (!c) p->thread->out_of_memory = true;
-    if (!c || !c->is_finite || !kernel_values_are_visible(c->values, c->vertex_count, transfer)) return NULL;
+    polyhedron *c = kernel_polyhedron_find(p, field, part, p->frame->surface_count + volume, index);
+    if (!c || !kernel_values_are_visible(c->values, c->vertex_count, transfer)) return NULL;
     if (!c->is_transformed) {
         kernel_polyhedron_transform(c, p);
         kernel_polyhedron_domain(c, transfer);
