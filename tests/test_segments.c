@@ -293,7 +293,7 @@ static void lanes_have_what_cells_alone_have(void **state)
         for (int with_surface = 0; with_surface < 2; with_surface++) verify_tiles(kind, 9, with_surface, 0);
 }
 
-/* By float32 ends: tiles take tets of few pixels a ray and its tet a lane (kernel_small_tets.h). A ray meets more tets
+/* By float32 ends: tiles take tets of few pixels a ray and its tet a lane (kernel_tile_segments.h). A ray meets more tets
  * than a window has room for. */
 static void small_tets_are_the_same_in_lanes(void **state)
 {
