@@ -202,7 +202,7 @@ static session_cell_bound bound_of(const bound_kind *kind, const cell_functions 
     static double tuples[MOST_NODES][4];
     session_bound bound;
     assert_true(session_make_bound(&kind->nodes, kind->order, kind->is_lobatto, &bound));
-    double *room = malloc(session_bound_room(&bound) * sizeof *room);
+    double *room = malloc(session_bound_work_size(&bound) * sizeof *room);
     make_tuples(kind, of, tuples);
     session_cell_bound out = session_bound_cell(&bound, tuples[0], isovalues, 0, room);
     for (int level = 1; level < bound.level_count && isovalues; level++)

@@ -67,7 +67,7 @@ static void check_monomial(const session_interpolation *of, const double (*place
         memcpy(tuples[n], places[n], sizeof places[n]);
         tuples[n][3] = monomial(places[n], powers);
     }
-    assert_true(session_interpolation_room(of, 4) <= sizeof room / sizeof room[0]);
+    assert_true(session_interpolation_work_size(of, 4) <= sizeof room / sizeof room[0]);
     session_interpolate(of, (const double(*)[3])corners, 4, tuples[0], room, fine[0]);
     for (int k = 0; k <= p; k++)
         for (int j = 0; j <= p; j++)

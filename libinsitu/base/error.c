@@ -24,18 +24,18 @@ void base_escape(char *text, size_t capacity)
 {
     if (!has_control(text)) return;
     char escaped[2048];
-    const size_t room = capacity < sizeof escaped ? capacity : sizeof escaped;
+    const size_t space = capacity < sizeof escaped ? capacity : sizeof escaped;
     size_t size = 0;
     const unsigned char *c = (const unsigned char *)text;
-    while (*c && size + 1 < room) {
+    while (*c && size + 1 < space) {
         const size_t bytes = count_control_bytes(c);
         if (bytes == 0)
             escaped[size++] = (char)*c++;
         else
-            size += (size_t)snprintf(escaped + size, room - size, "\\x%02x", bytes == 1 ? c[0] : c[1]);
+            size += (size_t)snprintf(escaped + size, space - size, "\\x%02x", bytes == 1 ? c[0] : c[1]);
         c += bytes;
     }
-    size = size < room ? size : room - 1;
+    size = size < space ? size : space - 1;
     memcpy(text, escaped, size);
     text[size] = '\0';
 }

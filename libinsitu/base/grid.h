@@ -1,8 +1,8 @@
-/* A rank's cells and values as the rooms below the session access them: the caller's own arrays behind inline accessors
- * that handle each array's element type and stride. No data is copied.
+/* A rank's cells and values as the modules below the session access them: the caller's own arrays behind inline
+ * accessors that handle each array's element type and stride. No data is copied.
  *
  * The code that makes a grid has validated it (indices in range, types known, coordinates finite); the accessors check
- * nothing. They return all geometry in double: the rooms convert to float32 only after subtracting an origin. */
+ * nothing. They return all geometry in double: the modules convert to float32 only after subtracting an origin. */
 #ifndef BASE_GRID_H
 #define BASE_GRID_H
 

@@ -24,7 +24,7 @@
 #include "session_finer.h"
 #include "session_guard.h"
 #include "session_indexed.h"
-#include "session_joints.h"
+#include "session_mesh_groups.h"
 #include "session_lines.h"
 #include "session_mirrors.h"
 #include "session_pieces.h"
@@ -32,7 +32,7 @@
 #include "session_smooth.h"
 #include "session_summary.h"
 #include "session_surfaces.h"
-#include "session_torn.h"
+#include "session_discontinuous.h"
 #include "session_vertex_order.h"
 #include "session_warped.h"
 
@@ -56,7 +56,7 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     session_montages_free(&s->montages);
     session_overwrites_free(&s->overwrites);
     s->events = (session_events){0};
-    s->catalogue.are_joined = s->catalogue.are_hashes_known = false;
+    s->catalogue.are_meshes_grouped = s->catalogue.are_hashes_known = false;
     session_forget_warnings(&s->report);
     session_text_add(&s->report.warnings, "the scene file was edited: its images are drawn from this step on");
     s->catalogue.are_derived = false;
@@ -109,7 +109,7 @@ static insitu_status derive_for_events(insitu_session *s, const session_moment *
     /* all ranks agree on the status here, because fill functions may be collective */
     insitu_status status = session_agree(s->team.comm, error);
     if (!status) session_fill_fields(&s->meshes, &s->catalogue, false, error);
-    if (!error->status) session_copy_wanted(&s->meshes, s->team.threads, error);
+    if (!error->status) session_copy_requested(&s->meshes, s->team.threads, error);
     if (!status) status = session_agree(s->team.comm, error);
     return status ? status : session_derive(&basis, needed, error);
 }
@@ -138,13 +138,13 @@ static insitu_status name_derived(insitu_session *s, base_error *error)
 }
 
 /* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and finds the
- * joints of meshes. An error in finding joints is stored only in *error. Collective. */
+ * mesh groups of meshes. An error in finding mesh groups is stored only in *error. Collective. */
 static insitu_status list_meshes(insitu_session *s, bool are_names_new, bool is_shared, base_error *error)
 {
     insitu_status status = INSITU_OK;
     if (are_names_new) status = session_update_catalogue(&s->catalogue, &s->meshes, &s->team, is_shared, error);
     if (!status) status = name_derived(s, error);
-    if (!status) session_join_meshes(&s->scene_file.scene, &s->catalogue, &s->meshes, error);
+    if (!status) session_group_meshes(&s->scene_file.scene, &s->catalogue, &s->meshes, error);
     return status;
 }
 
@@ -272,7 +272,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     };
     session_plan plan = {0};
     insitu_status status = update_meshes(s, changes, moment, refused, error);
-    if (!status) status = session_tear_meshes(&s->meshes, &s->catalogue, basis.scene, team, error);
+    if (!status) status = session_make_discontinuous(&s->meshes, &s->catalogue, basis.scene, team, error);
     if (!status) update_events(s, &basis, &of_events);
     if (!status) status = make_plan(s, &basis, refused, &plan, error);
     const session_derive_basis derived = derive_basis(s);

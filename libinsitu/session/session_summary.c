@@ -112,7 +112,7 @@ static void report_field(session_report *out, copied_reasons *copied, const sess
                : mesh->finer.parts            ? "in finer cells of higher order"
                : field->index.data            ? "by its index"
                : field->corner_row            ? "in rows of corners"
-                                              : "at the corners of a torn mesh");
+                                              : "at the corners of a discontinuous mesh");
     if (is_field_in_use(mesh, index) && !mesh->source)
         out->public_report.bytes_borrowed +=
             value_bytes(field) + array_bytes(&field->index, session_count_field_positions(&mesh->original, field)) +
@@ -174,7 +174,7 @@ static void report_topology(session_report *out, copied_reasons *copied, const s
     if (mesh->covered) add_copied(copied, mesh->given.cell_count, "flags of cells that finer blocks cover");
     add_copied(copied, mesh->finer.bytes, "nodes of finer cells, with %d piece%s between two nodes",
                mesh->finer.parts, mesh->finer.parts > 1 ? "s" : "");
-    add_copied(copied, mesh->torn.bytes, "vertices of each cell's own, for fields with values at corners");
+    add_copied(copied, mesh->discontinuous.bytes, "vertices of each cell's own, for fields with values at corners");
 }
 
 static void report_part(session_report *out, copied_reasons *copied, const session_mesh *mesh)

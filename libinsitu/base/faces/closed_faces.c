@@ -23,9 +23,9 @@ bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell)
     return true;
 }
 
-size_t closed_faces_lay_out(closed_faces *c, char *room)
+size_t closed_faces_lay_out(closed_faces *c, char *memory)
 {
-    base_arena at = {room, 0};
+    base_arena at = {memory, 0};
     const size_t faces = (size_t)c->face_count, entries = (size_t)c->entry_count, table = (size_t)c->table_size;
     c->first_entries = base_arena_alloc(&at, (faces + 1) * sizeof(int));
     c->entry_vertices = base_arena_alloc(&at, entries * sizeof(int));

@@ -51,9 +51,9 @@ typedef struct closed_faces {
 /* Counts faces and entries. Returns false if their number exceeds int. */
 bool closed_faces_count(closed_faces *c, const grid *g, int64_t cell);
 
-/* Sets the arrays to sections of `room`, which must be aligned to 64 bytes, and returns the number of bytes that they
- * take. If room is NULL, only the size is computed. */
-size_t closed_faces_lay_out(closed_faces *c, char *room);
+/* Sets the arrays to sections of `memory`, which must be aligned to 64 bytes, and returns the number of bytes that they
+ * take. If memory is NULL, only the size is computed. */
+size_t closed_faces_lay_out(closed_faces *c, char *memory);
 
 /* Reads the faces, and numbers the vertices in the order in which they appear. Repeated successive vertices of a face
  * count once: a quad remains a quad even if corners are repeated, and a face whose entries are all the same vertex has

@@ -32,13 +32,13 @@ size_t polygon_work_bytes(int count)
     return (size_t)count * (5 * sizeof(double) + 3 * sizeof(int) + 1) + 8;
 }
 
-static polygon_work divide_work(int count, char *room, int (*triangles)[3])
+static polygon_work divide_work(int count, char *work, int (*triangles)[3])
 {
     const size_t n = (size_t)count;
     polygon_work w = {.count = count, .triangles = triangles};
-    w.positions = (double(*)[3])(void *)room;
-    w.projection = (double(*)[2])(void *)(room + 3 * n * sizeof(double));
-    w.order = (int *)(void *)(room + 5 * n * sizeof(double));
+    w.positions = (double(*)[3])(void *)work;
+    w.projection = (double(*)[2])(void *)(work + 3 * n * sizeof(double));
+    w.order = (int *)(void *)(work + 5 * n * sizeof(double));
     w.next = w.order + n;
     w.previous = w.next + n;
     w.is_ear = (char *)(w.previous + n);
@@ -253,9 +253,9 @@ static void cut_ears(polygon_work *w)
     add_fan(w, first);
 }
 
-void polygon_triangulate(const double (*corners)[3], int count, void *room, int (*triangles)[3])
+void polygon_triangulate(const double (*corners)[3], int count, void *work, int (*triangles)[3])
 {
-    polygon_work w = divide_work(count, room, triangles);
+    polygon_work w = divide_work(count, work, triangles);
     double normal[3];
     find_order(&w, corners);
     for (int i = 0; i < count; i++) {
@@ -273,8 +273,8 @@ void polygon_triangulate(const double (*corners)[3], int count, void *room, int 
 
 bool polygon_is_concave_quad(const double (*corners)[3])
 {
-    double room[4 * 8];
-    polygon_work w = divide_work(4, (char *)room, NULL);
+    double work[4 * 8];
+    polygon_work w = divide_work(4, (char *)work, NULL);
     find_order(&w, corners);
     return scale_positions(&w, corners) && is_concave_quad(&w);
 }

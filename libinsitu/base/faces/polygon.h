@@ -20,7 +20,7 @@ size_t polygon_work_bytes(int count);
 
 /* Cuts a polygon of count corners, at least 3, into count - 2 triangles of corner numbers, each of which runs in the
  * direction of the polygon. Triangles of coincident or collinear corners may have no area. */
-void polygon_triangulate(const double (*corners)[3], int count, void *room, int (*triangles)[3]);
+void polygon_triangulate(const double (*corners)[3], int count, void *work, int (*triangles)[3]);
 
 /* Returns whether four corners form a quad with exactly one concave corner. A quad that crosses itself has none; all
  * quads except concave ones are cut into a fan. */

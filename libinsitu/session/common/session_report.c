@@ -47,9 +47,9 @@ void session_text_add(session_text *text, const char *format, ...)
     char line[1536];
     va_list arguments;
     va_start(arguments, format);
-    const int wanted = vsnprintf(line, sizeof line, format, arguments);
+    const int length = vsnprintf(line, sizeof line, format, arguments);
     va_end(arguments);
-    if (wanted < 0) return;
+    if (length < 0) return;
     base_escape(line, sizeof line);
     const size_t size = strlen(line);
     if (!reserve_text(text, size + 2)) return;

@@ -47,12 +47,12 @@ static thread_limit find_thread_limit(void)
     return (thread_limit){cores > 1 ? cores : 1, "this rank may run on no more cores"};
 }
 
-static int requested_threads(int asked, int cores)
+static int requested_threads(int scene_threads, int cores)
 {
     const int most = omp_get_max_threads(), usual = cores < most ? cores : most;
-    const int wanted = asked > 0 ? asked : usual;
+    const int requested = scene_threads > 0 ? scene_threads : usual;
     const int cap = find_thread_limit().threads;
-    return wanted > cap ? cap : wanted > 1 ? wanted : 1;
+    return requested > cap ? cap : requested > 1 ? requested : 1;
 }
 
 /* ---- threads that ended -------------------------------------------------------------------------------------- */
@@ -80,10 +80,10 @@ static int count_living_threads(const session_threads *threads)
     return is_same && threads->ended_count == atomic_load(&ended_count) ? threads->count : 1;
 }
 
-bool session_lacks_threads(const session_threads *threads, int asked, int cores)
+bool session_lacks_threads(const session_threads *threads, int scene_threads, int cores)
 {
-    return requested_threads(asked, cores) > threads->count || !pthread_equal(threads->caller, pthread_self()) ||
-           threads->ended_count != atomic_load(&ended_count);
+    return requested_threads(scene_threads, cores) > threads->count ||
+           !pthread_equal(threads->caller, pthread_self()) || threads->ended_count != atomic_load(&ended_count);
 }
 
 /* ---- trial --------------------------------------------------------------------------------------------------- */
@@ -134,12 +134,13 @@ static size_t stack_of_environment(void)
     return most;
 }
 
-/* Starts up to `wanted` threads. Their number is stored in the trial. */
-static void start_trial_threads(trial *t, int wanted)
+/* Starts up to `requested` threads. Their number is stored in the trial. */
+static void start_trial_threads(trial *t, int requested)
 {
     pthread_attr_t attributes;
     sigset_t all, old;
-    *t = (trial){.threads = base_calloc((size_t)wanted, sizeof *t->threads), .spare_memory = base_alloc(SPARE_BYTES)};
+    *t =
+        (trial){.threads = base_calloc((size_t)requested, sizeof *t->threads), .spare_memory = base_alloc(SPARE_BYTES)};
     pthread_mutex_init(&t->exit_mutex, NULL);
     pthread_mutex_lock(&t->exit_mutex);
     if (!t->threads || !t->spare_memory || pthread_attr_init(&attributes) != 0) return;
@@ -149,7 +150,8 @@ static void start_trial_threads(trial *t, int wanted)
     sigfillset(&all);
     /* signals are blocked while threads are started, so that these never receive the caller's signals */
     pthread_sigmask(SIG_SETMASK, &all, &old);
-    while (t->count < wanted && pthread_create(&t->threads[t->count], &attributes, wait_at_gate, &t->exit_mutex) == 0)
+    while (t->count < requested &&
+           pthread_create(&t->threads[t->count], &attributes, wait_at_gate, &t->exit_mutex) == 0)
         t->count++;
     pthread_sigmask(SIG_SETMASK, &old, NULL);
     pthread_attr_destroy(&attributes);
@@ -166,9 +168,9 @@ static void join_trial_threads(trial *t)
 
 /* Tries to start threads before a rank's first parallel region, if any rank needs more than it has. All ranks try at
  * the same time, since those of a node share its limits. Collective. */
-static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm comm, base_error *error)
+static insitu_status try_threads(session_threads *threads, int requested, MPI_Comm comm, base_error *error)
 {
-    const int living = count_living_threads(threads), lacking = wanted - living;
+    const int living = count_living_threads(threads), lacking = requested - living;
     trial t = {.count = 0};
     pthread_once(&key_once, create_exit_key);
     if (lacking > 0) start_trial_threads(&t, lacking + SPARE_THREADS);
@@ -182,17 +184,17 @@ static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm 
 }
 
 /* Returns the number of threads for this step. Warns if there are fewer than requested. */
-static int choose_threads(const session_threads *threads, int asked, int wanted, session_report *report)
+static int choose_threads(const session_threads *threads, int scene_threads, int requested, session_report *report)
 {
-    const bool are_enough = threads->count >= wanted;
-    session_warn_locally(report, &(session_warning){WARNING_THREADS, NULL, NULL, 0}, asked > wanted,
-                         "the scene asks for %d threads, at most %d are used: %s", asked, wanted,
+    const bool are_enough = threads->count >= requested;
+    session_warn_locally(report, &(session_warning){WARNING_THREADS, NULL, NULL, 0}, scene_threads > requested,
+                         "the scene asks for %d threads, at most %d are used: %s", scene_threads, requested,
                          find_thread_limit().reason);
     session_warn_locally(
         report, &(session_warning){WARNING_THREADS, NULL, NULL, 1}, !are_enough,
         "%d of %d threads are used: no more can be started, by the limits of memory, processes or threads",
-        threads->count, wanted);
-    return are_enough ? wanted : threads->count;
+        threads->count, requested);
+    return are_enough ? requested : threads->count;
 }
 
 /* ---- stacks -------------------------------------------------------------------------------------------------- */
@@ -269,12 +271,12 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
     return status;
 }
 
-insitu_status session_begin_threads(session_threads *threads, session_team *team, int asked, bool is_new,
+insitu_status session_begin_threads(session_threads *threads, session_team *team, int scene_threads, bool is_new,
                                     const session_guard *guard, session_report *report, base_error *error)
 {
-    const int wanted = requested_threads(asked, team->cores);
-    insitu_status status = is_new ? try_threads(threads, wanted, team->comm, error) : INSITU_OK;
+    const int requested = requested_threads(scene_threads, team->cores);
+    insitu_status status = is_new ? try_threads(threads, requested, team->comm, error) : INSITU_OK;
     if (status) return status;
-    team->threads = choose_threads(threads, asked, wanted, report);
+    team->threads = choose_threads(threads, scene_threads, requested, report);
     return is_new ? check_stacks(threads, team, guard, error) : INSITU_OK;
 }

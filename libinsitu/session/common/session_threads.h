@@ -24,14 +24,14 @@ typedef struct session_threads {
     int64_t ended_count; /* number of threads of any team that had ended when `count` was determined */
 } session_threads;
 
-/* Returns whether this rank requests more threads than it is known to be able to start. asked is the number set in the
- * scene. If it is 0, the rank requests its share of the cores, or OpenMP's maximum if that is lower. Local. */
-bool session_lacks_threads(const session_threads *threads, int asked, int cores);
+/* Returns whether this rank requests more threads than it is known to be able to start. scene_threads is the number set
+ * in the scene. If it is 0, the rank requests its share of the cores, or OpenMP's maximum if that is lower. Local. */
+bool session_lacks_threads(const session_threads *threads, int scene_threads, int cores);
 
 /* Determines how many threads can be started, and sets team->threads. Warns if there are fewer than requested. If
  * is_new is set (because some rank lacks threads, or the scene was edited), threads are started and their stacks
  * measured; a stack that is too small is an error. Collective. */
-insitu_status session_begin_threads(session_threads *threads, session_team *team, int asked, bool is_new,
+insitu_status session_begin_threads(session_threads *threads, session_team *team, int scene_threads, bool is_new,
                                     const session_guard *guard, session_report *report, base_error *error);
 
 #endif

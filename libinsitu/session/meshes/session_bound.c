@@ -329,27 +329,27 @@ typedef struct bound_job {
     double *nodes, *coefficients;       /* tuples: at the equispaced nodes, and in Bernstein's form */
     double *fine, *slopes[3];           /* tuples at the fine nodes, and their derivatives along the axes */
     double (*gradients)[3];             /* of the field at the fine nodes; not finite where the cell is flat */
-    double *room;                       /* for products */
+    double *work;                       /* for products */
     double position_bound, value_bound; /* of the differences from interpolation in the whole cell */
 } bound_job;
 
-size_t session_bound_room(const session_bound *of)
+size_t session_bound_work_size(const session_bound *of)
 {
     const size_t nodes = (size_t)of->nodes.complete.count, fine = (size_t)of->levels[of->level_count - 1].count;
     return SIZE * (2 * nodes + 6 * fine) + 3 * fine;
 }
 
-static void place_arrays(bound_job *job, double *room)
+static void place_arrays(bound_job *job, double *work)
 {
     const size_t nodes = SIZE * (size_t)job->of->nodes.complete.count,
                  fine = SIZE * (size_t)job->of->levels[job->level].count;
-    job->nodes = room;
-    job->coefficients = room += nodes;
-    job->fine = room += nodes;
-    for (int a = 0; a < 3; a++) job->slopes[a] = room += fine;
-    room += fine;
-    job->gradients = (double(*)[3])room;
-    job->room = room + 3 * job->of->levels[job->level].count;
+    job->nodes = work;
+    job->coefficients = work += nodes;
+    job->fine = work += nodes;
+    for (int a = 0; a < 3; a++) job->slopes[a] = work += fine;
+    work += fine;
+    job->gradients = (double(*)[3])work;
+    job->work = work + 3 * job->of->levels[job->level].count;
 }
 
 /* Multiplies each factor of a product with its matrix. size: number of numbers of a tuple. */
@@ -362,7 +362,7 @@ static void apply(const bound_job *job, int size, const double *const matrices[3
     for (int f = 0; f < count; f++) {
         const session_bound_factor *factor = factor_of(job->of, f);
         const int rows = is_fine ? factor->fine_counts[job->level] : factor->node_count;
-        double *to = f == count - 1 ? out : job->room + f % 2 * SIZE * job->of->levels[job->level].count;
+        double *to = f == count - 1 ? out : job->work + f % 2 * SIZE * job->of->levels[job->level].count;
         outer /= factor->node_count;
         multiply(matrices[f], rows, factor->node_count, outer, inner, in, to);
         inner *= rows;
@@ -581,11 +581,11 @@ static double find_node_distance(const session_bound *of, const double *tuples)
     return sqrt(sum / shape->edge_count) / of->nodes.of.order;
 }
 
-bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *room)
+bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *work)
 {
     bound_job job = {.of = of};
     double low = INFINITY, high = -INFINITY, zero = 0;
-    place_arrays(&job, room);
+    place_arrays(&job, work);
     find_coefficients(&job, 1, values);
     for (int i = 0; i < of->nodes.complete.count; i++) {
         zero += 0 * job.coefficients[i]; /* NaN if a coefficient is not finite */
@@ -597,12 +597,12 @@ bool session_may_cross(const session_bound *of, const double *values, const sess
 }
 
 session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
-                                      int level, double *room)
+                                      int level, double *work)
 {
     bound_job job = {.of = of, .isovalues = isovalues, .level = level};
     session_cell_bound out = {.node_distance = find_node_distance(of, tuples)};
     const int p = of->nodes.of.order;
-    place_arrays(&job, room);
+    place_arrays(&job, work);
     find_coefficients(&job, SIZE, tuples);
     find_sphere(&job, &out);
     out.is_crossed = isfinite(out.radius);

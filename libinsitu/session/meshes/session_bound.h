@@ -63,12 +63,12 @@ typedef struct session_isovalues {
 bool session_is_any_between(const session_isovalues *isovalues, double low, double high);
 
 /* Returns the number of doubles that the functions below need as working memory. */
-size_t session_bound_room(const session_bound *of);
+size_t session_bound_work_size(const session_bound *of);
 
 /* Returns whether a cell may have a part of an isosurface, also if values are rounded to float32; false if a value is
  * not finite. values: the field at its
  * nodes, in the order of its row. */
-bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *room);
+bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *work);
 
 /* The distances, in scene units, if the cell has one piece between two nodes. With n pieces they are divided by the
  * square of n. */
@@ -87,6 +87,6 @@ typedef struct session_cell_bound {
  * isovalues: NULL if only positions are of interest. level: that of the lattice, 0 .. level_count - 1; a finer
  * one mostly gives a smaller bound, but takes longer. */
 session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
-                                      int level, double *room);
+                                      int level, double *work);
 
 #endif

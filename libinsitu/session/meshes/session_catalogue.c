@@ -22,8 +22,8 @@
 /* Writes a line within capacity bytes; returns the size of the text including the line, even if it does not fit. */
 static size_t append_line(char *text, size_t capacity, size_t at, char kind, int a, int b, const char *name)
 {
-    const size_t room = at < capacity ? capacity - at : 0;
-    const int size = snprintf(room ? text + at : NULL, room, "%c %d %d %s", kind, a, b, name);
+    const size_t space = at < capacity ? capacity - at : 0;
+    const int size = snprintf(space ? text + at : NULL, space, "%c %d %d %s", kind, a, b, name);
     return at + (size_t)size + 1;
 }
 
@@ -210,32 +210,32 @@ void session_vertex_groups_free(session_vertex_groups *groups)
     *groups = (session_vertex_groups){0};
 }
 
-void session_drop_joints(session_catalogue *catalogue)
+void session_drop_mesh_groups(session_catalogue *catalogue)
 {
-    for (int i = 0; i < catalogue->joint_count; i++) {
-        session_joint *joint = catalogue->joints[i];
-        session_hanging_free(&joint->hanging, true);
-        session_vertex_groups_free(&joint->groups);
-        session_homes_free(&joint->own_homes);
-        base_free(joint->meshes);
-        base_free(joint);
+    for (int i = 0; i < catalogue->mesh_group_count; i++) {
+        session_mesh_group *mesh_group = catalogue->mesh_groups[i];
+        session_hanging_free(&mesh_group->hanging, true);
+        session_vertex_groups_free(&mesh_group->groups);
+        session_homes_free(&mesh_group->own_homes);
+        base_free(mesh_group->meshes);
+        base_free(mesh_group);
     }
-    base_free(catalogue->joints);
-    catalogue->joints = NULL;
-    catalogue->joint_count = 0;
-    catalogue->are_joined = false;
+    base_free(catalogue->mesh_groups);
+    catalogue->mesh_groups = NULL;
+    catalogue->mesh_group_count = 0;
+    catalogue->are_meshes_grouped = false;
 }
 
-session_joint *session_find_joint(const session_catalogue *catalogue, uint64_t name)
+session_mesh_group *session_find_mesh_group(const session_catalogue *catalogue, uint64_t name)
 {
-    for (int i = 0; i < catalogue->joint_count; i++)
-        if (catalogue->joints[i]->name == name) return catalogue->joints[i];
+    for (int i = 0; i < catalogue->mesh_group_count; i++)
+        if (catalogue->mesh_groups[i]->name == name) return catalogue->mesh_groups[i];
     return NULL;
 }
 
 void session_catalogue_free(session_catalogue *catalogue)
 {
-    session_drop_joints(catalogue);
+    session_drop_mesh_groups(catalogue);
     for (int i = 0; i < catalogue->mesh_count; i++) {
         session_catalogue_mesh *mesh = &catalogue->meshes[i];
         for (int f = 0; f < mesh->field_count; f++) {
@@ -612,17 +612,18 @@ static insitu_status update_parts(session_catalogue *catalogue, const session_me
     return status;
 }
 
-bool session_list_joint_parts(const session_joint *joint, const session_meshes *meshes, session_joint_parts *out)
+bool session_list_mesh_group_parts(const session_mesh_group *mesh_group, const session_meshes *meshes,
+                                   session_mesh_group_parts *out)
 {
-    *out = (session_joint_parts){0};
-    out->first_parts = base_calloc((size_t)joint->count + 1, sizeof *out->first_parts);
+    *out = (session_mesh_group_parts){0};
+    out->first_parts = base_calloc((size_t)mesh_group->count + 1, sizeof *out->first_parts);
     out->items = base_calloc((size_t)meshes->count + 1, sizeof *out->items);
     if (!out->first_parts || !out->items) {
-        session_joint_parts_free(out);
+        session_mesh_group_parts_free(out);
         return false;
     }
-    for (int m = 0; m < joint->count; m++) {
-        const session_parts parts = session_find_parts(meshes, joint->meshes[m]->name);
+    for (int m = 0; m < mesh_group->count; m++) {
+        const session_parts parts = session_find_parts(meshes, mesh_group->meshes[m]->name);
         for (int i = 0; i < parts.count; i++)
             if (parts.items[i]->is_given) out->items[out->count++] = parts.items[i];
         out->first_parts[m + 1] = out->count;
@@ -630,30 +631,32 @@ bool session_list_joint_parts(const session_joint *joint, const session_meshes *
     return true;
 }
 
-void session_joint_parts_free(session_joint_parts *parts)
+void session_mesh_group_parts_free(session_mesh_group_parts *parts)
 {
     base_free(parts->first_parts);
     base_free(parts->items);
-    *parts = (session_joint_parts){0};
+    *parts = (session_mesh_group_parts){0};
 }
 
-static insitu_status update_joint(session_joint *joint, const session_meshes *meshes, double half_diagonal,
-                                  const session_team *team, base_error *error)
+static insitu_status update_mesh_group(session_mesh_group *mesh_group, const session_meshes *meshes,
+                                       double half_diagonal, const session_team *team, base_error *error)
 {
     uint64_t places = SESSION_HASH_BEGIN;
-    for (int i = 0; i < joint->count; i++)
-        session_hash_bytes(&places, &joint->meshes[i]->positions_hash, sizeof joint->meshes[i]->positions_hash);
-    const bool is_known = (places | 1) == joint->positions_hash && joint->homes && joint->homes->is_computed;
-    joint->positions_hash = places | 1;
-    joint->homes = joint->count == 1 ? &joint->meshes[0]->homes : &joint->own_homes;
-    if (is_known || joint->count == 1) return INSITU_OK;
-    session_joint_parts parts;
-    if (!session_list_joint_parts(joint, meshes, &parts))
+    for (int i = 0; i < mesh_group->count; i++)
+        session_hash_bytes(&places, &mesh_group->meshes[i]->positions_hash,
+                           sizeof mesh_group->meshes[i]->positions_hash);
+    const bool is_known =
+        (places | 1) == mesh_group->positions_hash && mesh_group->homes && mesh_group->homes->is_computed;
+    mesh_group->positions_hash = places | 1;
+    mesh_group->homes = mesh_group->count == 1 ? &mesh_group->meshes[0]->homes : &mesh_group->own_homes;
+    if (is_known || mesh_group->count == 1) return INSITU_OK;
+    session_mesh_group_parts parts;
+    if (!session_list_mesh_group_parts(mesh_group, meshes, &parts))
         session_fail_for_memory(error, meshes->count * (int64_t)sizeof *parts.items, "homes of meshes");
     const insitu_status status =
-        session_homes_find(&joint->own_homes, parts.items, parts.count, false, half_diagonal, team, error);
-    if (status) joint->positions_hash = 0;
-    session_joint_parts_free(&parts);
+        session_homes_find(&mesh_group->own_homes, parts.items, parts.count, false, half_diagonal, team, error);
+    if (status) mesh_group->positions_hash = 0;
+    session_mesh_group_parts_free(&parts);
     return status;
 }
 
@@ -669,8 +672,8 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
             status = session_homes_find(&mesh->homes, (const session_mesh *const *)parts.items, parts.count,
                                         mesh->has_ids, half_diagonal, team, error);
     }
-    for (int i = 0; i < catalogue->joint_count && !status; i++)
-        status = update_joint(catalogue->joints[i], meshes, half_diagonal, team, error);
+    for (int i = 0; i < catalogue->mesh_group_count && !status; i++)
+        status = update_mesh_group(catalogue->mesh_groups[i], meshes, half_diagonal, team, error);
     return status;
 }
 

@@ -47,10 +47,10 @@ typedef struct session_border {
     session_twin *twins; /* twins of the border's vertices, sorted by vertex */
 } session_border;
 
-/* This rank's hanging vertices in the meshes of a joint, and the values that it sends to other ranks for their hanging
- * vertices. */
+/* This rank's hanging vertices in the meshes of a mesh group, and the values that it sends to other ranks for their
+ * hanging vertices. */
 typedef struct session_hanging {
-    /* session_joint.positions_hash at the time when this struct was computed; 0: not computed yet */
+    /* session_mesh_group.positions_hash at the time when this struct was computed; 0: not computed yet */
     uint64_t positions_hash;
     int border_count;
     session_border *borders; /* one border per part; NULL: not computed yet */
@@ -62,10 +62,10 @@ typedef struct session_hanging {
     int64_t sent_total; /* number of values sent to all ranks together */
 } session_hanging;
 
-/* Groups of equal vertices of a joint's meshes on this rank (plan/session_vertex_groups.h). They are reused as long as
- * the meshes do not change. */
+/* Groups of equal vertices of a mesh group's meshes on this rank (plan/session_vertex_groups.h). They are reused as
+ * long as the meshes do not change. */
 typedef struct session_vertex_groups {
-    /* session_joint.positions_hash at the time when the groups were computed; 0: not computed yet */
+    /* session_mesh_group.positions_hash at the time when the groups were computed; 0: not computed yet */
     uint64_t positions_hash;
     /* index of each part's first vertex in group_of_vertex, and at the end the total number of vertices */
     int64_t *first_vertices;
@@ -94,8 +94,9 @@ typedef struct session_catalogue_mesh {
     base_error *fault;
     int field_count;
     session_catalogue_field *fields;
-    /* if the mesh has vertex ids: name of the joint that contains only this mesh (session_joint.name); otherwise 0 */
-    uint64_t single_joint_name;
+    /* if the mesh has vertex ids: name of the mesh group that contains only this mesh (session_mesh_group.name);
+     * otherwise 0 */
+    uint64_t single_group_name;
     /* hashes, over all ranks, of the stamps of cells and of coordinates; 0: not computed yet */
     uint64_t cells_hash, positions_hash;
     /* the home ranks of vertices and faces of this mesh; valid if computed for the current positions_hash */
@@ -103,31 +104,31 @@ typedef struct session_catalogue_mesh {
 } session_catalogue_mesh;
 
 /* A set of meshes across which cell values are averaged at equal vertices: the meshes without vertex ids that have a
- * layer's field. A mesh with ids is a joint by itself. */
-typedef struct session_joint {
-    /* name of the joint, as in scene_field.joint_name or session_catalogue_mesh.single_joint_name */
+ * layer's field. A mesh with ids is a mesh group by itself. */
+typedef struct session_mesh_group {
+    /* name of the mesh group, as in scene_field.mesh_group_name or session_catalogue_mesh.single_group_name */
     uint64_t name;
-    int count;                       /* number of meshes in the joint */
-    session_catalogue_mesh **meshes; /* the meshes of the joint, sorted by name; owned by the catalogue */
-    /* set if the joint is a single mesh with global vertex ids; vertices are then equal if their ids are equal */
+    int count;                       /* number of meshes in the mesh group */
+    session_catalogue_mesh **meshes; /* the meshes of the mesh group, sorted by name; owned by the catalogue */
+    /* set if the mesh group is a single mesh with global vertex ids; vertices are then equal if their ids are equal */
     bool by_id;
     uint64_t positions_hash;    /* hash of the vertex positions of all its meshes */
-    session_homes own_homes;    /* homes of a joint of several meshes; unused if it has one mesh */
+    session_homes own_homes;    /* homes of a mesh group of several meshes; unused if it has one mesh */
     const session_homes *homes; /* points to own_homes, or to the homes of the single mesh */
     session_vertex_groups groups;
     session_hanging hanging;
-} session_joint;
+} session_mesh_group;
 
 typedef struct session_catalogue {
-    bool is_known;         /* set if the catalogue has been computed since the session began */
-    bool has_faults;       /* set if some mesh or field has an error */
-    bool are_derived;      /* set if the catalogue contains the derived fields of the current scene */
-    bool are_joined;       /* set if the joints are those of the current scene */
-    bool are_hashes_known; /* set if the meshes' hashes of cells and positions are up to date */
-    base_error *fault;     /* error that belongs to no known mesh; no image can be drawn */
-    int mesh_count, joint_count;
+    bool is_known;           /* set if the catalogue has been computed since the session began */
+    bool has_faults;         /* set if some mesh or field has an error */
+    bool are_derived;        /* set if the catalogue contains the derived fields of the current scene */
+    bool are_meshes_grouped; /* set if the mesh groups are those of the current scene */
+    bool are_hashes_known;   /* set if the meshes' hashes of cells and positions are up to date */
+    base_error *fault;       /* error that belongs to no known mesh; no image can be drawn */
+    int mesh_count, mesh_group_count;
     session_catalogue_mesh *meshes;
-    session_joint **joints;
+    session_mesh_group **mesh_groups;
 } session_catalogue;
 
 /* Updates the catalogue. is_shared states that all ranks have equal names (compared by session_names_hash()) and that
@@ -136,36 +137,39 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);
 
-/* Computes the homes of all meshes and joints again whose cells or positions have changed. half_diagonal is that of the
- * scene's bounds. Collective; all ranks return the same status. */
+/* Computes the homes of all meshes and mesh groups again whose cells or positions have changed. half_diagonal is that
+ * of the scene's bounds. Collective; all ranks return the same status. */
 insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
                                    const session_team *team, base_error *error);
 /* Marks the homes as unknown. This must be called on all ranks if cells have changed on any rank;
  * session_update_homes() then finds out which meshes have changed. Local. */
 void session_forget_homes(session_catalogue *catalogue);
 
-/* Returns the name of the joint to which the mesh belongs if the layer's meshes are joined. */
-static inline uint64_t session_joint_name(const session_catalogue_mesh *mesh, uint64_t joined)
+/* Returns the name of the mesh group to which the mesh belongs if the layer's meshes are mesh_group_name. */
+static inline uint64_t session_mesh_group_name(const session_catalogue_mesh *mesh, uint64_t mesh_group_name)
 {
-    return mesh->single_joint_name ? mesh->single_joint_name : joined;
+    return mesh->single_group_name ? mesh->single_group_name : mesh_group_name;
 }
 
-/* Returns the joint with this name, or NULL if there is none. */
-session_joint *session_find_joint(const session_catalogue *catalogue, uint64_t name);
-void session_drop_joints(session_catalogue *catalogue);
+/* Returns the mesh group with this name, or NULL if there is none. */
+session_mesh_group *session_find_mesh_group(const session_catalogue *catalogue, uint64_t name);
+void session_drop_mesh_groups(session_catalogue *catalogue);
 /* Frees the data of the hanging vertices and, if with_borders, the data of the faces. */
 void session_hanging_free(session_hanging *hanging, bool with_borders);
 
-/* This rank's parts of the meshes of a joint, sorted by mesh. */
-typedef struct session_joint_parts {
+/* This rank's parts of the meshes of a mesh group, sorted by mesh. */
+typedef struct session_mesh_group_parts {
     int count;                  /* number of this rank's parts */
     const session_mesh **items; /* the parts, owned by session_meshes */
-    int *first_parts; /* index of the first part of each of the joint's meshes; one entry more than it has meshes */
-} session_joint_parts;
+    int *
+        first_parts; /* index of the first part of each of the mesh group's meshes; one entry more than it has meshes */
+} session_mesh_group_parts;
 
-/* Lists this rank's parts of the joint's meshes. Returns false if memory runs out; then there is nothing to free. */
-bool session_list_joint_parts(const session_joint *joint, const session_meshes *meshes, session_joint_parts *out);
-void session_joint_parts_free(session_joint_parts *parts);
+/* Lists this rank's parts of the mesh group's meshes. Returns false if memory runs out; then there is nothing to free.
+ */
+bool session_list_mesh_group_parts(const session_mesh_group *mesh_group, const session_meshes *meshes,
+                                   session_mesh_group_parts *out);
+void session_mesh_group_parts_free(session_mesh_group_parts *parts);
 
 void session_vertex_groups_free(session_vertex_groups *groups);
 

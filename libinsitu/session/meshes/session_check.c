@@ -59,20 +59,20 @@ typedef struct face_place {
     double position[3];    /* coordinates of the faulty vertex */
 } face_place;
 
-static void free_edge_buffer(edge_buffer *room)
+static void free_edge_buffer(edge_buffer *buffer)
 {
-    base_free(room->edges);
-    *room = (edge_buffer){0};
+    base_free(buffer->edges);
+    *buffer = (edge_buffer){0};
 }
 
-static bool reserve_edges(edge_buffer *room, int64_t count)
+static bool reserve_edges(edge_buffer *buffer, int64_t count)
 {
-    if (count <= room->capacity) return true;
+    if (count <= buffer->capacity) return true;
     const int64_t capacity = count + count / 2 + 64;
-    face_edge *edges = base_realloc(room->edges, (size_t)capacity * sizeof *edges);
+    face_edge *edges = base_realloc(buffer->edges, (size_t)capacity * sizeof *edges);
     if (!edges) return false;
-    room->edges = edges;
-    room->capacity = capacity;
+    buffer->edges = edges;
+    buffer->capacity = capacity;
     return true;
 }
 
@@ -133,7 +133,7 @@ static face_fault check_edges(face_edge *edges, int64_t count, face_place *place
     return FACES_GOOD;
 }
 
-static face_fault check_faces(const session_mesh *mesh, int64_t cell, edge_buffer *room, face_place *place)
+static face_fault check_faces(const session_mesh *mesh, int64_t cell, edge_buffer *buffer, face_place *place)
 {
     const grid *g = &mesh->cells;
     int64_t first, end, edges = 0;
@@ -144,10 +144,10 @@ static face_fault check_faces(const session_mesh *mesh, int64_t cell, edge_buffe
         place->face = grid_array_index(&g->connectivity, i);
         const face_fault fault = check_face(mesh, grid_is_ghost(g, cell), place);
         if (fault) return fault;
-        if (!reserve_edges(room, edges + place->end - place->first)) return FACES_NO_MEMORY;
-        edges = add_edges(g, place, room->edges, edges);
+        if (!reserve_edges(buffer, edges + place->end - place->first)) return FACES_NO_MEMORY;
+        edges = add_edges(g, place, buffer->edges, edges);
     }
-    return check_edges(room->edges, edges, place);
+    return check_edges(buffer->edges, edges, place);
 }
 
 static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face_fault fault, const face_place *place,
@@ -222,7 +222,7 @@ static cell_fault check_coordinates(const grid *g, const int64_t *vertices, int 
     return CELL_GOOD;
 }
 
-static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, edge_buffer *room, fault_place *place)
+static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, edge_buffer *buffer, fault_place *place)
 {
     const grid *g = &mesh->cells;
     if (!grid_has_faces(g) || !g->offsets.data) return BAD_TYPE;
@@ -230,7 +230,7 @@ static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, edge_
     place->end = grid_offset_end(&g->offsets, cell);
     if (place->first < 0 || place->end > mesh->topology.connectivity_count || place->end < place->first)
         return BAD_OFFSETS;
-    place->fault_of_faces = check_faces(mesh, cell, room, &place->faces);
+    place->fault_of_faces = check_faces(mesh, cell, buffer, &place->faces);
     return place->fault_of_faces ? BAD_FACES : CELL_GOOD;
 }
 
@@ -252,11 +252,11 @@ static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_pl
     return CELL_GOOD;
 }
 
-static cell_fault check_cell(const session_mesh *mesh, int64_t cell, edge_buffer *room, fault_place *place)
+static cell_fault check_cell(const session_mesh *mesh, int64_t cell, edge_buffer *buffer, fault_place *place)
 {
     const grid *g = &mesh->cells;
     place->type = grid_cell_type(g, cell);
-    if (place->type == GRID_POLYHEDRON) return check_polyhedron(mesh, cell, room, place);
+    if (place->type == GRID_POLYHEDRON) return check_polyhedron(mesh, cell, buffer, place);
     if (place->type == GRID_POLYGON) return check_polygon(mesh, cell, place);
     const int count = grid_type_vertices(place->type);
     if (count == 0) return BAD_TYPE;
@@ -356,9 +356,9 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
     fault_place place = {0};
-    edge_buffer room = {0};
-    const cell_fault fault = check_cell(mesh, cell, &room, &place);
-    free_edge_buffer(&room);
+    edge_buffer buffer = {0};
+    const cell_fault fault = check_cell(mesh, cell, &buffer, &place);
+    free_edge_buffer(&buffer);
     const long long base = mesh->given.index_base, at = session_given_cell(mesh, cell), vertex = place.vertex + base;
     const char *type = original_type_name(mesh, cell);
     switch (fault) {
@@ -387,13 +387,13 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
 }
 
 /* Checks cells of any layout one by one. */
-static int64_t check_cells_one_by_one(const session_mesh *mesh, int64_t begin, int64_t end, edge_buffer *room,
+static int64_t check_cells_one_by_one(const session_mesh *mesh, int64_t begin, int64_t end, edge_buffer *buffer,
                                       mesh_tally *tally)
 {
     mesh_tally own = tally_empty();
     fault_place place;
     int64_t cell = begin;
-    for (; cell < end && check_cell(mesh, cell, room, &place) == CELL_GOOD; cell++)
+    for (; cell < end && check_cell(mesh, cell, buffer, &place) == CELL_GOOD; cell++)
         tally_cell(&mesh->cells, cell, &own);
     tally_merge(tally, &own);
     return cell;
@@ -410,7 +410,7 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
     {
         region_enter();
         mesh_tally mine = tally_empty();
-        edge_buffer room = {0};
+        edge_buffer buffer = {0};
 #pragma omp for schedule(static)
         for (int64_t begin = 0; begin < count; begin += BLOCK_CELLS) {
             if (first_bad < count) continue;
@@ -418,10 +418,10 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
             /* The fast check ends at a bad cell, or at a polygon, which it cannot check; the cells after that are
              * checked one by one. */
             int64_t at = run ? run(mesh, begin, end, &mine) : begin;
-            if (at < end) at = check_cells_one_by_one(mesh, at, end, &room, &mine);
+            if (at < end) at = check_cells_one_by_one(mesh, at, end, &buffer, &mine);
             if (at < end) first_bad = at;
         }
-        free_edge_buffer(&room);
+        free_edge_buffer(&buffer);
 #pragma omp critical(session_check_tally)
         tally_merge(tally, &mine);
         region_leave();

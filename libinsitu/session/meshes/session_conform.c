@@ -143,7 +143,7 @@ void session_fill_conformed(session_mesh *mesh, int threads)
     }
 }
 
-/* ---- making room --------------------------------------------------------------------------------------------- */
+/* ---- making space --------------------------------------------------------------------------------------------- */
 
 static unsigned char byte_of_type(int type)
 {

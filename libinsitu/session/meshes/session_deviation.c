@@ -7,16 +7,16 @@
 #include "session_region.h"
 #include "session_rows.h"
 
-static void read_values(const session_rows *rows, const session_deviation_wish *wish, int64_t cell, int count,
+static void read_values(const session_rows *rows, const session_deviation_request *request, int64_t cell, int count,
                         double *tuple, double *out)
 {
-    const session_node_values *values = wish->values;
+    const session_node_values *values = request->values;
     const int64_t first = session_row_first(rows, cell);
     for (int n = 0; n < count; n++) {
         values->read(values->of,
                      values->is_by_entry ? session_row_entry(rows, cell, n) : session_row_vertex(rows, first + n),
                      tuple);
-        out[n] = tuple[wish->component];
+        out[n] = tuple[request->component];
     }
 }
 
@@ -31,19 +31,19 @@ static void read_distances(const session_rows *rows, const session_plane *plane,
     }
 }
 
-void session_read_wish(const session_rows *rows, const session_deviation_wish *wish, int64_t cell, int count,
-                       double *tuple, double *out)
+void session_read_request_values(const session_rows *rows, const session_deviation_request *request, int64_t cell,
+                                 int count, double *tuple, double *out)
 {
-    if (wish->values)
-        read_values(rows, wish, cell, count, tuple, out);
+    if (request->values)
+        read_values(rows, request, cell, count, tuple, out);
     else
-        read_distances(rows, wish->plane, cell, count, out);
+        read_distances(rows, request->plane, cell, count, out);
 }
 
 /* The work on the cells of a mesh. */
 typedef struct deviation_work {
     session_rows rows; /* of the caller's cells */
-    const session_deviation_wish *wish;
+    const session_deviation_request *request;
     int field_size;                        /* number of components of the field, or 1 */
     session_bound bounds[ROWS_MOST_KINDS]; /* nothing for kinds of cells that are not measured */
 } deviation_work;
@@ -55,17 +55,18 @@ static bool has_bound(const session_nodes *of)
     return of->order <= BOUND_MOST_ORDER && of->type != GRID_PYRAMID;
 }
 
-static bool begin_work(const session_mesh *mesh, const session_deviation_wish *wish, deviation_work *w)
+static bool begin_work(const session_mesh *mesh, const session_deviation_request *request, deviation_work *w)
 {
     const insitu_mesh *nodal = session_nodal_mesh(mesh);
     bool is_made = true;
     *w = (deviation_work){.rows = session_given_rows(nodal),
-                          .wish = wish,
-                          .field_size = wish->values ? wish->values->component_count : 1};
+                          .request = request,
+                          .field_size = request->values ? request->values->component_count : 1};
     session_list_kinds(&w->rows);
     for (int i = 0; i < w->rows.kind_count && is_made; i++)
         if (has_bound(&w->rows.kinds[i].nodes))
-            is_made = session_make_bound(&w->rows.kinds[i].nodes, nodal->vertex_order, wish->is_lobatto, &w->bounds[i]);
+            is_made =
+                session_make_bound(&w->rows.kinds[i].nodes, nodal->vertex_order, request->is_lobatto, &w->bounds[i]);
     return is_made;
 }
 
@@ -76,45 +77,45 @@ static void end_work(deviation_work *w)
 
 /* Returns the number of doubles that a cell needs: a tuple of the field, values and tuples at nodes, and working
  * memory. */
-static size_t find_room(const deviation_work *w)
+static size_t find_buffer_size(const deviation_work *w)
 {
     size_t most = 0;
     for (int i = 0; i < w->rows.kind_count; i++) {
         if (!w->bounds[i].level_count) continue;
-        const size_t own = 5 * (size_t)w->bounds[i].nodes.of.count + session_bound_room(&w->bounds[i]);
+        const size_t own = 5 * (size_t)w->bounds[i].nodes.of.count + session_bound_work_size(&w->bounds[i]);
         most = own > most ? own : most;
     }
     return most + (size_t)w->field_size;
 }
 
 /* Returns whether an isosurface or the plane may cross the cell, and marks it. */
-static bool may_cross(const deviation_work *w, const session_bound *of, int64_t cell, double *room)
+static bool may_cross(const deviation_work *w, const session_bound *of, int64_t cell, double *buffer)
 {
-    const session_deviation_wish *wish = w->wish;
+    const session_deviation_request *request = w->request;
     const int count = of->nodes.of.count;
-    double *values = room + w->field_size;
-    if (!wish->values && !wish->plane) return true;
-    session_read_wish(&w->rows, wish, cell, count, room, values);
-    if (wish->is_of_values) return true;
-    if (!session_may_cross(of, values, &wish->isovalues, values + 5 * count)) return false;
-    if (wish->marks) wish->marks[cell] = 1;
+    double *values = buffer + w->field_size;
+    if (!request->values && !request->plane) return true;
+    session_read_request_values(&w->rows, request, cell, count, buffer, values);
+    if (request->is_of_values) return true;
+    if (!session_may_cross(of, values, &request->isovalues, values + 5 * count)) return false;
+    if (request->marks) request->marks[cell] = 1;
     return true;
 }
 
 /* Computes the bound of a cell whose values have been read. */
 static session_cell_bound bound_cell(const deviation_work *w, const session_bound *of, int64_t cell, int level,
-                                     double *room)
+                                     double *buffer)
 {
-    const bool has_values = w->wish->values != NULL;
+    const bool has_values = w->request->values != NULL;
     const int64_t first = session_row_first(&w->rows, cell);
     const int count = of->nodes.of.count;
-    double *values = room + w->field_size, *tuples = values + count;
+    double *values = buffer + w->field_size, *tuples = values + count;
     for (int n = 0; n < count; n++) {
         grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + n), tuples + 4 * n);
         tuples[4 * n + 3] = has_values ? values[n] : 0;
     }
-    const bool has_isovalues = has_values && !w->wish->is_of_values;
-    return session_bound_cell(of, tuples, has_isovalues ? &w->wish->isovalues : NULL, level, tuples + 4 * count);
+    const bool has_isovalues = has_values && !w->request->is_of_values;
+    return session_bound_cell(of, tuples, has_isovalues ? &w->request->isovalues : NULL, level, tuples + 4 * count);
 }
 
 /* Returns the largest error that counts: half the distance between two nodes. With linear pieces between nodes, half a
@@ -127,12 +128,12 @@ static double limit_error(const session_cell_bound *bound)
 /* Finds the bound of the isosurfaces in a cell, by the lattices as fine as needed: it need not be below `enough` if it
  * is below the limit. */
 static double find_surface_error(const deviation_work *w, const session_bound *of, int64_t cell, double enough,
-                                 const session_cell_bound *first, double *room)
+                                 const session_cell_bound *first, double *buffer)
 {
     double least = first->surface_error;
     for (int level = 1; level < of->level_count; level++)
         if (!(least <= enough && least <= limit_error(first)))
-            least = fmin(least, bound_cell(w, of, cell, level, room).surface_error);
+            least = fmin(least, bound_cell(w, of, cell, level, buffer).surface_error);
     return least;
 }
 
@@ -140,7 +141,7 @@ static double find_surface_error(const deviation_work *w, const session_bound *o
 static void measure_values(const deviation_work *w, int count, const session_cell_bound *bound, const double *values,
                            session_deviation *out)
 {
-    const session_pixels *pixels = &w->wish->pixels;
+    const session_pixels *pixels = &w->request->pixels;
     for (int n = 0; n < count; n++) {
         out->low = fmin(out->low, values[n]);
         out->high = fmax(out->high, values[n]);
@@ -151,22 +152,22 @@ static void measure_values(const deviation_work *w, int count, const session_cel
 
 /* A cell that does not increase the largest error needs no better bound, so that the result does not depend on the
  * order of cells. */
-static void measure_cell(const deviation_work *w, int64_t cell, double *room, session_deviation *out)
+static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, session_deviation *out)
 {
     const session_bound *of = &w->bounds[session_kind_of(&w->rows, cell)];
-    const session_pixels *pixels = &w->wish->pixels;
-    if (!of->level_count || grid_is_ghost(&w->rows.cells, cell) || !may_cross(w, of, cell, room)) return;
-    if (w->wish->marks_only || of->nodes.of.order < 2) return;
-    const session_cell_bound bound = bound_cell(w, of, cell, 0, room);
-    if (w->wish->is_of_values) {
-        if (bound.is_crossed) measure_values(w, of->nodes.of.count, &bound, room + w->field_size, out);
+    const session_pixels *pixels = &w->request->pixels;
+    if (!of->level_count || grid_is_ghost(&w->rows.cells, cell) || !may_cross(w, of, cell, buffer)) return;
+    if (w->request->marks_only || of->nodes.of.order < 2) return;
+    const session_cell_bound bound = bound_cell(w, of, cell, 0, buffer);
+    if (w->request->is_of_values) {
+        if (bound.is_crossed) measure_values(w, of->nodes.of.count, &bound, buffer + w->field_size, out);
         return;
     }
     const double size = bound.is_crossed ? pixels->size(pixels->of, bound.centre, bound.radius) : INFINITY;
     if (size == INFINITY) return;
     double error = bound.position_error;
-    if (w->wish->values) {
-        error = find_surface_error(w, of, cell, out->error * size, &bound, room);
+    if (w->request->values) {
+        error = find_surface_error(w, of, cell, out->error * size, &bound, buffer);
         out->cell_count++;
         out->unbounded_count += error > limit_error(&bound);
         error = fmin(error, limit_error(&bound));
@@ -177,7 +178,7 @@ static void measure_cell(const deviation_work *w, int64_t cell, double *room, se
 static bool measure_cells(const deviation_work *w, int threads, session_deviation *out)
 {
     const int64_t cells = w->rows.cells.cell_count;
-    const size_t room_size = find_room(w);
+    const size_t buffer_size = find_buffer_size(w);
     bool is_lacking = false;
     double error = out->error, value_error = out->value_error, low = out->low, high = out->high;
     int64_t count = 0, unbounded = 0;
@@ -185,19 +186,19 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
     reduction(max : error, value_error, high) reduction(min : low) reduction(+ : count, unbounded)
     {
         region_enter();
-        double *room = base_alloc(room_size * sizeof *room);
+        double *buffer = base_alloc(buffer_size * sizeof *buffer);
         session_deviation own = {.error = error, .low = low, .high = high};
-        is_lacking = !room;
+        is_lacking = !buffer;
 #pragma omp for schedule(static)
         for (int64_t cell = 0; cell < cells; cell++)
-            if (room) measure_cell(w, cell, room, &own);
+            if (buffer) measure_cell(w, cell, buffer, &own);
         error = own.error;
         value_error = own.value_error;
         low = own.low;
         high = own.high;
         count = own.cell_count;
         unbounded = own.unbounded_count;
-        base_free(room);
+        base_free(buffer);
         region_leave();
     }
     out->error = error;
@@ -209,11 +210,11 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
     return !is_lacking;
 }
 
-insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_wish *wish, int threads,
+insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_request *request, int threads,
                                         session_deviation *out, base_error *error)
 {
     deviation_work *w = base_alloc(sizeof *w);
-    const bool is_made = w && begin_work(mesh, wish, w) && measure_cells(w, threads, out);
+    const bool is_made = w && begin_work(mesh, request, w) && measure_cells(w, threads, out);
     if (w) end_work(w);
     base_free(w);
     if (is_made) return INSITU_OK;

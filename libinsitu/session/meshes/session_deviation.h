@@ -15,7 +15,7 @@ typedef struct session_pixels {
 } session_pixels;
 
 /* What of a mesh is measured. */
-typedef struct session_deviation_wish {
+typedef struct session_deviation_request {
     /* a field whose isosurfaces are measured; NULL: the positions of the cells that the plane may cross or, if there is
      * none, of all cells */
     const session_node_values *values;
@@ -27,7 +27,7 @@ typedef struct session_deviation_wish {
     bool is_lobatto;      /* as in session_make_interpolation() */
     bool marks_only;      /* set if only marks are wanted */
     unsigned char *marks; /* one byte per cell, which is set if the cell may be crossed; NULL: not wanted */
-} session_deviation_wish;
+} session_deviation_request;
 
 /* Returns the caller's description of a mesh, which may be read as finer lattices. */
 static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
@@ -35,10 +35,10 @@ static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
     return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
 }
 
-/* Computes the wish's component of the field, or else the distance from its plane, at the `count` nodes of a cell.
- * rows: those of the caller's cells. tuple: room for all components of the field. */
-void session_read_wish(const session_rows *rows, const session_deviation_wish *wish, int64_t cell, int count,
-                       double *tuple, double *out);
+/* Computes the request's component of the field, or else the distance from its plane, at the `count` nodes of a cell.
+ * rows: those of the caller's cells. tuple: buffer for all components of the field. */
+void session_read_request_values(const session_rows *rows, const session_deviation_request *request, int64_t cell,
+                                 int count, double *tuple, double *out);
 
 typedef struct session_deviation {
     double error; /* largest bound in pixels if cells have one piece between two nodes */
@@ -51,7 +51,7 @@ typedef struct session_deviation {
 
 /* Measures the caller's cells of a mesh with cells of higher order, ghosts excepted, adds the result to *out, and sets
  * the marks. Parallel. Local. */
-insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_wish *wish, int threads,
+insitu_status session_measure_deviation(const session_mesh *mesh, const session_deviation_request *request, int threads,
                                         session_deviation *out, base_error *error);
 
 #endif

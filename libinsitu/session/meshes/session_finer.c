@@ -64,18 +64,18 @@ static int64_t find_first_node(const finer_work *w, int64_t cell)
 }
 
 /* Returns the number of doubles that the values of a cell need while they are computed. */
-static size_t find_room(const finer_work *w, int components)
+static size_t find_buffer_size(const finer_work *w, int components)
 {
     size_t most = 0;
     for (int i = 0; i < w->rows.kind_count; i++) {
         const size_t own = (size_t)w->kinds[i][0].of.count * (size_t)components;
-        const size_t all = own + session_interpolation_room(&w->kinds[i][0], components);
+        const size_t all = own + session_interpolation_work_size(&w->kinds[i][0], components);
         most = all > most ? all : most;
     }
     return most;
 }
 
-static void interpolate_cell(const finer_work *w, const session_node_values *values, int64_t cell, double *room,
+static void interpolate_cell(const finer_work *w, const session_node_values *values, int64_t cell, double *buffer,
                              double *out)
 {
     const session_interpolation *of = find_interpolation(w, cell);
@@ -88,8 +88,8 @@ static void interpolate_cell(const finer_work *w, const session_node_values *val
         values->read(values->of,
                      values->is_by_entry ? session_row_entry(&w->rows, cell, n)
                                          : session_row_vertex(&w->rows, first + n),
-                     room + n * size);
-    session_interpolate(of, (const double(*)[3])corners, size, room, room + of->of.count * size,
+                     buffer + n * size);
+    session_interpolate(of, (const double(*)[3])corners, size, buffer, buffer + of->of.count * size,
                         out + find_first_node(w, cell) * size);
 }
 
@@ -100,12 +100,12 @@ static bool interpolate_cells(const finer_work *w, const session_node_values *va
 #pragma omp parallel num_threads(session_region_threads(threads, w->node_count)) reduction(|| : is_lacking)
     {
         region_enter();
-        double *room = base_alloc((find_room(w, values->component_count) + 1) * sizeof *room);
-        is_lacking = !room;
+        double *buffer = base_alloc((find_buffer_size(w, values->component_count) + 1) * sizeof *buffer);
+        is_lacking = !buffer;
 #pragma omp for schedule(static)
         for (int64_t cell = 0; cell < cells; cell++)
-            if (room) interpolate_cell(w, values, cell, room, out);
-        base_free(room);
+            if (buffer) interpolate_cell(w, values, cell, buffer, out);
+        base_free(buffer);
         region_leave();
     }
     return !is_lacking;

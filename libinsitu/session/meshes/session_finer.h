@@ -34,7 +34,7 @@ typedef struct session_finer_choice {
     int64_t pyramid_count, serendipity_count, shell_count;
     bool is_lobatto; /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
     int parts; /* number of parts of each edge between two nodes, 1 .. FINER_MOST_PARTS; it is chosen by the caller */
-    bool is_completed; /* set by the caller if serendipity cells get all nodes of their order, for 1 part */
+    bool is_completed;         /* set by the caller if serendipity cells get all nodes of their order, for 1 part */
     int mark_count;            /* number of parts of the mesh on this rank; 0: all cells are refined */
     session_cell_marks *marks; /* for each of these parts */
 } session_finer_choice;

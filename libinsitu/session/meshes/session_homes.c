@@ -102,16 +102,16 @@ static bool assign_id_ranges(session_homes *homes, const rank_part *parts, int r
     id_share *shares = base_alloc((size_t)ranks * sizeof *shares);
     homes->first_ids = base_alloc((size_t)ranks * sizeof *homes->first_ids);
     homes->owners = base_alloc((size_t)ranks * sizeof *homes->owners);
-    const bool has_room = shares && homes->first_ids && homes->owners;
-    for (int rank = 0; rank < ranks && has_room; rank++)
+    const bool has_memory = shares && homes->first_ids && homes->owners;
+    for (int rank = 0; rank < ranks && has_memory; rank++)
         if (parts[rank].has_ids) shares[homes->share_count++] = (id_share){parts[rank].first_id, rank};
-    if (has_room) qsort(shares, (size_t)homes->share_count, sizeof *shares, compare_shares);
+    if (has_memory) qsort(shares, (size_t)homes->share_count, sizeof *shares, compare_shares);
     for (int i = 0; i < homes->share_count; i++) {
         homes->first_ids[i] = shares[i].first_id;
         homes->owners[i] = shares[i].owner;
     }
     base_free(shares);
-    return has_room;
+    return has_memory;
 }
 
 insitu_status session_homes_find(session_homes *homes, const session_mesh *const *meshes, int count, bool by_id,

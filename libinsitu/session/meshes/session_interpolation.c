@@ -134,7 +134,7 @@ typedef struct cell_job {
     double *out;
 } cell_job;
 
-size_t session_interpolation_room(const session_interpolation *of, int components)
+size_t session_interpolation_work_size(const session_interpolation *of, int components)
 {
     return ((size_t)of->complete.count + 2 * (size_t)of->fine.count) * (size_t)components;
 }
@@ -336,17 +336,17 @@ static void copy_corner(const cell_job *job, int corner)
 }
 
 void session_interpolate(const session_interpolation *of, const double (*corners)[3], int components,
-                         const double *tuples, double *room, double *out)
+                         const double *tuples, double *work, double *out)
 {
     cell_job job = {.of = of,
                     .shape = session_shape_of(of->of.type),
                     .corners = corners,
                     .size = components,
-                    .lattice = room,
+                    .lattice = work,
                     .out = out};
-    job.spare[0] = room + of->complete.count * components;
+    job.spare[0] = work + of->complete.count * components;
     job.spare[1] = job.spare[0] + of->fine.count * components;
-    session_complete_tuples(of, components, tuples, room);
+    session_complete_tuples(of, components, tuples, work);
     fill_inside(&job);
     for (int f = 0; f < job.shape->face_count; f++) {
         const face_axes axes = choose_axes(&job, job.shape->faces[f]);

@@ -31,12 +31,12 @@ void session_drop_interpolation(session_interpolation *interpolation);
 void session_complete_tuples(const session_interpolation *of, int components, const double *tuples, double *out);
 
 /* Returns the number of doubles that session_interpolate() needs as working memory. */
-size_t session_interpolation_room(const session_interpolation *of, int components);
+size_t session_interpolation_work_size(const session_interpolation *of, int components);
 
 /* Computes tuples at the fine nodes, in lexicographic order, from those at the cell's nodes, in the order of its row.
  * corners: the positions of the corners, by which a tuple on a face or an edge gets the same bits from all cells that
- * have the face or the edge. room: working memory. */
+ * have the face or the edge. work: working memory. */
 void session_interpolate(const session_interpolation *of, const double (*corners)[3], int components,
-                         const double *tuples, double *room, double *out);
+                         const double *tuples, double *work, double *out);
 
 #endif

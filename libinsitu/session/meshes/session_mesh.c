@@ -172,11 +172,11 @@ void session_drop_topology(session_topology *topology)
     *topology = (session_topology){0};
 }
 
-void session_drop_torn(session_torn *torn)
+void session_drop_discontinuous(session_discontinuous *discontinuous)
 {
-    session_drop_array(&torn->corners);
-    for (int axis = 0; axis < 3; axis++) session_drop_array(&torn->coordinates[axis]);
-    *torn = (session_torn){0};
+    session_drop_array(&discontinuous->corners);
+    for (int axis = 0; axis < 3; axis++) session_drop_array(&discontinuous->coordinates[axis]);
+    *discontinuous = (session_discontinuous){0};
 }
 
 void session_drop_piece_set(session_piece_set *set)
@@ -341,7 +341,7 @@ static void drop_derived_data(session_mesh *mesh)
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
     session_drop_topology(&mesh->topology);
-    session_drop_torn(&mesh->torn);
+    session_drop_discontinuous(&mesh->discontinuous);
     base_free(mesh->flat_cells);
     mesh->flat_cells = NULL;
 }
@@ -359,7 +359,7 @@ void session_mark_moved(session_meshes *meshes, session_mesh *mesh)
 {
     mesh->coordinates_stamp = ++meshes->stamp;
     mesh->is_check_stale = true;
-    mesh->torn.is_made = false;
+    mesh->discontinuous.is_made = false;
     session_drop_outers(mesh, false);
     mesh->is_geometry_stale = true;
     meshes->are_cells_changed = true;

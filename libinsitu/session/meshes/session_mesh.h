@@ -67,13 +67,13 @@ typedef struct session_plane {
 /* A scalar that a layer uses: a component or the magnitude of a field, as given or recentred to vertices; or the
  * vertices' signed distances from a plane. */
 typedef struct session_scalar {
-    int field;               /* index of the field in the mesh; -1: the scalar is the signed distance from a plane */
-    int component;           /* number of the component, in the format of grid_field.component */
-    bool is_recentred;       /* set if cell or corner values are averaged to vertices */
-    uint64_t joint_name;     /* value of scene_field.joint_name, if the values are recentred */
-    int64_t computed_count;  /* number of times that the values have been computed */
-    uint64_t positions_hash; /* session_joint.positions_hash at the time when the values were computed */
-    bool is_used;            /* set if an image of this step uses the scalar */
+    int field;                /* index of the field in the mesh; -1: the scalar is the signed distance from a plane */
+    int component;            /* number of the component, in the format of grid_field.component */
+    bool is_recentred;        /* set if cell or corner values are averaged to vertices */
+    uint64_t mesh_group_name; /* value of scene_field.mesh_group_name, if the values are recentred */
+    int64_t computed_count;   /* number of times that the values have been computed */
+    uint64_t positions_hash;  /* session_mesh_group.positions_hash at the time when the values were computed */
+    bool is_used;             /* set if an image of this step uses the scalar */
     /* set if an image of this step needs ranges of its values in the tree; scalars that only give colours need none */
     bool needs_ranges;
     bool needs_all_cells; /* set if an image of this step may show any cell, whatever its values are */
@@ -171,11 +171,11 @@ typedef struct session_topology {
 } session_topology;
 
 /* Separate vertices for each corner of each cell, which are read in place of the vertices that cells share
- * (session_torn.h). They are a copy reported to the user. Corners are numbered as in the caller's connectivity, without
- * the unused ends of rows. */
-typedef struct session_torn {
-    bool is_torn; /* set if vertices are separate; if not set, all other members are empty */
-    bool is_made; /* set if the coordinates are up to date */
+ * (session_discontinuous.h). They are a copy reported to the user. Corners are numbered as in the caller's
+ * connectivity, without the unused ends of rows. */
+typedef struct session_discontinuous {
+    bool is_active; /* set if vertices are separate; if not set, all other members are empty */
+    bool is_made;   /* set if the coordinates are up to date */
     /* set if cells are split into pieces: then `shared` is the caller's connectivity, whose entries are the corners */
     bool are_corners_entries;
     int64_t corner_count;
@@ -183,7 +183,7 @@ typedef struct session_torn {
     grid_array corners;             /* for each entry of `shared`, its corner; the permutation is its own inverse */
     grid_array coordinates[3];
     int64_t bytes;
-} session_torn;
+} session_discontinuous;
 
 /* Bounds and sizes of the drawn cells of a mesh (members of session_mesh with these names). */
 typedef struct session_sizes {
@@ -308,7 +308,7 @@ typedef struct session_mesh {
     insitu_mesh given;
     session_conformed conformed;
     session_topology topology;
-    session_torn torn;
+    session_discontinuous discontinuous;
     session_finer finer;
     session_lattice lattice;
     session_warp warp;
@@ -338,8 +338,8 @@ typedef struct session_mesh {
     double size_sum;      /* sum of the cube roots of the volumes of the drawn cells */
     uint64_t *flat_cells; /* one bit per cell, set if the cell is flat (grid.flat); NULL: no cell is flat */
 
-    /* name of the joint that contains only this mesh (session_catalogue_mesh.single_joint_name) */
-    uint64_t single_joint_name;
+    /* name of the mesh group that contains only this mesh (session_catalogue_mesh.single_group_name) */
+    uint64_t single_group_name;
     /* set if a block of the mesh, on any rank, has a level of refinement (session_catalogue_mesh.is_refined) */
     bool is_refined;
     bool is_needed; /* set if an image of this step draws the mesh */
@@ -485,7 +485,7 @@ void session_drop_scalar(session_mesh *mesh, int number);
 void session_drop_gradients(session_scalar *scalar);
 void session_drop_tree(session_mesh *mesh);
 void session_drop_topology(session_topology *topology);
-void session_drop_torn(session_torn *torn);
+void session_drop_discontinuous(session_discontinuous *discontinuous);
 void session_drop_piece_set(session_piece_set *set);
 void session_drop_finer(session_finer *finer);
 void session_drop_axes(session_lattice *lattice);
@@ -571,7 +571,7 @@ static inline int64_t session_whole_count(const session_mesh *mesh)
 /* Returns the number of vertices at which scalars have values. */
 static inline int64_t session_vertex_count(const session_mesh *mesh)
 {
-    return mesh->torn.is_torn ? mesh->torn.corner_count : mesh->cells.vertex_count;
+    return mesh->discontinuous.is_active ? mesh->discontinuous.corner_count : mesh->cells.vertex_count;
 }
 
 /* Returns the first error of a set call that no step has returned yet; NULL: there is none. */

@@ -24,7 +24,7 @@ typedef struct piece_kind {
 typedef struct piece_work {
     session_rows rows; /* of the caller's cells */
     piece_kind kinds[ROWS_MOST_KINDS];
-    const session_deviation_wish *wish;
+    const session_deviation_request *request;
     session_piece_set *set;
 } piece_work;
 
@@ -74,7 +74,7 @@ static insitu_status fail_for_memory(const session_mesh *mesh, base_error *error
 
 /* ---- pieces at nodes --------------------------------------------------------------------------------------------- */
 
-/* Finds a piece at each of the cell's own nodes. is_own: room for one flag per node of the finer lattice. */
+/* Finds a piece at each of the cell's own nodes. is_own: buffer of one flag per node of the finer lattice. */
 static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own, uint64_t *out)
 {
     const session_nodes *fine = &kind->nodes.fine;
@@ -137,12 +137,12 @@ insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned c
 
 /* ---- crossed pieces ---------------------------------------------------------------------------------------------- */
 
-static size_t find_room(const piece_work *w, int field_size)
+static size_t find_buffer_size(const piece_work *w, int field_size)
 {
     size_t most = 0;
     for (int i = 0; i < w->rows.kind_count; i++) {
         const session_interpolation *of = &w->kinds[i].nodes;
-        const size_t own = (size_t)of->of.count + (size_t)of->fine.count + session_interpolation_room(of, 1);
+        const size_t own = (size_t)of->of.count + (size_t)of->fine.count + session_interpolation_work_size(of, 1);
         most = own > most ? own : most;
     }
     return most + (size_t)field_size;
@@ -165,45 +165,45 @@ static void add_pieces(const piece_kind *kind, const session_isovalues *isovalue
     }
 }
 
-static void add_cell(const piece_work *w, int64_t cell, int field_size, double *room)
+static void add_cell(const piece_work *w, int64_t cell, int field_size, double *buffer)
 {
     const piece_kind *kind = kind_of(w, cell);
     const session_interpolation *of = &kind->nodes;
     const int64_t first = session_row_first(&w->rows, cell);
-    double corners[8][3], *own = room + field_size, *fine = own + of->of.count;
+    double corners[8][3], *own = buffer + field_size, *fine = own + of->of.count;
     for (int c = 0; c < grid_type_vertices(of->of.type); c++)
         grid_vertex(&w->rows.cells, session_row_vertex(&w->rows, first + of->corners[c]), corners[c]);
-    session_read_wish(&w->rows, w->wish, cell, of->of.count, room, own);
+    session_read_request_values(&w->rows, w->request, cell, of->of.count, buffer, own);
     session_interpolate(of, (const double(*)[3])corners, 1, own, fine + of->fine.count, fine);
-    add_pieces(kind, &w->wish->isovalues, fine, w->set->bits + w->set->first_words[cell]);
+    add_pieces(kind, &w->request->isovalues, fine, w->set->bits + w->set->first_words[cell]);
 }
 
 static bool add_cells(const piece_work *w, int threads)
 {
     const int64_t cells = w->rows.cells.cell_count, *first_words = w->set->first_words;
-    const int field_size = w->wish->values ? w->wish->values->component_count : 1;
-    const size_t room_size = find_room(w, field_size);
+    const int field_size = w->request->values ? w->request->values->component_count : 1;
+    const size_t buffer_size = find_buffer_size(w, field_size);
     bool is_lacking = false;
 #pragma omp parallel num_threads(session_region_threads(threads, first_words[cells])) reduction(|| : is_lacking)
     {
         region_enter();
-        double *room = base_alloc(room_size * sizeof *room);
-        is_lacking = !room;
+        double *buffer = base_alloc(buffer_size * sizeof *buffer);
+        is_lacking = !buffer;
 #pragma omp for schedule(dynamic, 16)
         for (int64_t cell = 0; cell < cells; cell++)
-            if (room && first_words[cell] < first_words[cell + 1]) add_cell(w, cell, field_size, room);
-        base_free(room);
+            if (buffer && first_words[cell] < first_words[cell + 1]) add_cell(w, cell, field_size, buffer);
+        base_free(buffer);
         region_leave();
     }
     return !is_lacking;
 }
 
-insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session_deviation_wish *wish, int parts,
+insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session_deviation_request *request, int parts,
                                          int threads, session_piece_set *set, base_error *error)
 {
     piece_work *w = base_alloc(sizeof *w);
-    bool is_made = w && begin_work(mesh, parts, wish->is_lobatto, set, w);
-    if (is_made) w->wish = wish;
+    bool is_made = w && begin_work(mesh, parts, request->is_lobatto, set, w);
+    if (is_made) w->request = request;
     is_made = is_made && add_cells(w, threads);
     if (w) end_work(w);
     base_free(w);

@@ -11,9 +11,9 @@
 insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned char *marks, int parts,
                                       session_piece_set *out, base_error *error);
 
-/* Adds the pieces of the marked cells that an isosurface of the wish, or its plane, may cross, also if values are
+/* Adds the pieces of the marked cells that an isosurface of the request, or its plane, may cross, also if values are
  * rounded to float32. Parallel. Local. */
-insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session_deviation_wish *wish, int parts,
+insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session_deviation_request *request, int parts,
                                          int threads, session_piece_set *set, base_error *error);
 
 /* Returns whether two sets for the same cells are equal. */

@@ -9,7 +9,7 @@ session_rows session_given_rows(const insitu_mesh *given)
 session_rows session_rows_of(const session_mesh *mesh)
 {
     session_rows rows = session_given_rows(&mesh->given);
-    rows.is_torn = mesh->torn.is_torn;
+    rows.is_discontinuous = mesh->discontinuous.is_active;
     return rows;
 }
 

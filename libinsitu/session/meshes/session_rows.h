@@ -17,15 +17,15 @@ typedef struct session_rows {
     grid cells; /* the caller's cells; if they have no connectivity, entry i is vertex i */
     /* if cells have no offsets: number of nodes of each cell, and number of entries from one cell to the next */
     int64_t nodes_per_cell, row_stride;
-    /* set if the mesh is torn (session_torn), so that each node has a vertex of its own */
-    bool is_torn;
+    /* set if the mesh is discontinuous (session_discontinuous), so that each node has a vertex of its own */
+    bool is_discontinuous;
     int kind_count;
     session_row_kind kinds[ROWS_MOST_KINDS];
 } session_rows;
 
 /* Describes the rows of a mesh, whose description must be valid. The list of kinds is empty. */
 session_rows session_rows_of(const session_mesh *mesh);
-/* Describes the rows of a valid description, as if the mesh were not torn. The list of kinds is empty. */
+/* Describes the rows of a valid description, as if the mesh were not discontinuous. The list of kinds is empty. */
 session_rows session_given_rows(const insitu_mesh *given);
 
 static inline int64_t session_row_first(const session_rows *rows, int64_t cell)
@@ -55,8 +55,8 @@ static inline int64_t session_row_entry(const session_rows *rows, int64_t cell, 
 /* Returns the vertex of session_mesh.cells at the given position of the cell's row. */
 static inline int64_t session_row_node(const session_rows *rows, int64_t cell, int node)
 {
-    return rows->is_torn ? session_row_entry(rows, cell, node)
-                         : session_row_vertex(rows, session_row_first(rows, cell) + node);
+    return rows->is_discontinuous ? session_row_entry(rows, cell, node)
+                                  : session_row_vertex(rows, session_row_first(rows, cell) + node);
 }
 
 /* Returns the index of the kind of cells of this type with so many nodes, or -1 if it is not listed. */

@@ -59,10 +59,10 @@ void session_read_topology(session_mesh *mesh)
     } else {
         t->face_connectivity_count = mesh->given.face_connectivity_count;
     }
-    if (mesh->torn.is_made) {
-        g.vertex_count = mesh->torn.corner_count;
-        g.connectivity = mesh->torn.corners;
-        for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = mesh->torn.coordinates[axis];
+    if (mesh->discontinuous.is_made) {
+        g.vertex_count = mesh->discontinuous.corner_count;
+        g.connectivity = mesh->discontinuous.corners;
+        for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = mesh->discontinuous.coordinates[axis];
     }
     if (mesh->covered) {
         g.ghosts = (const char *)mesh->covered;

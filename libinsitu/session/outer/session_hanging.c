@@ -96,13 +96,13 @@ static bool store_border(const session_mesh *mesh, session_outer *outer, const u
     return true;
 }
 
-bool session_has_twins(const session_joint *joint)
+bool session_has_twins(const session_mesh_group *mesh_group)
 {
-    return joint->count > 1 || (joint->meshes[0]->is_refined && !joint->by_id);
+    return mesh_group->count > 1 || (mesh_group->meshes[0]->is_refined && !mesh_group->by_id);
 }
 
 /* Stores the meshes of the parts, and allocates one byte per vertex for each part. Returns false if memory runs out. */
-static bool list_part_faces(const session_joint_parts *parts, int first, int count, session_face_part *out)
+static bool list_part_faces(const session_mesh_group_parts *parts, int first, int count, session_face_part *out)
 {
     bool is_done = true;
     for (int i = 0; i < count && is_done; i++) {
@@ -114,24 +114,25 @@ static bool list_part_faces(const session_joint_parts *parts, int first, int cou
     return is_done;
 }
 
-/* Finds the outer faces, and their vertices, of this rank's parts of one mesh of the joint. */
-static insitu_status update_mesh_borders(const session_joint *joint, int m, const session_joint_parts *parts,
-                                         const session_team *team, base_error *error)
+/* Finds the outer faces, and their vertices, of this rank's parts of one mesh of the mesh_group. */
+static insitu_status update_mesh_borders(const session_mesh_group *mesh_group, int m,
+                                         const session_mesh_group_parts *parts, const session_team *team,
+                                         base_error *error)
 {
     const int first = parts->first_parts[m], count = parts->first_parts[m + 1] - first;
-    session_border *borders = joint->hanging.borders + first;
+    session_border *borders = mesh_group->hanging.borders + first;
     session_outer *outers = base_calloc((size_t)count + 1, sizeof *outers);
     session_face_part *of = base_calloc((size_t)count + 1, sizeof *of);
     for (int i = 0; i < count && outers && of; i++) of[i].outer = &outers[i];
     if (!outers || !of || !list_part_faces(parts, first, count, of))
         session_fail_for_memory(error, count * 100LL, "hanging vertices");
     insitu_status status = session_agree(team->comm, error);
-    if (!status) status = session_find_outer_faces(of, count, &joint->meshes[m]->homes, team, error);
+    if (!status) status = session_find_outer_faces(of, count, &mesh_group->meshes[m]->homes, team, error);
     for (int i = 0; i < count && !status && !error->status; i++)
         if (!store_border(of[i].mesh, &outers[i], of[i].is_border, &borders[i]))
             session_fail_for_memory(error, of[i].mesh->cells.vertex_count * 8, "hanging vertices");
     if (!status) status = session_agree(team->comm, error);
-    for (int i = 0; i < count && !status; i++) borders[i].cells_hash = joint->meshes[m]->cells_hash;
+    for (int i = 0; i < count && !status; i++) borders[i].cells_hash = mesh_group->meshes[m]->cells_hash;
     for (int i = 0; i < count && of && outers; i++) {
         session_drop_outer(&outers[i], true);
         base_free(of[i].is_border);
@@ -153,31 +154,31 @@ static bool make_borders(session_hanging *hanging, int count)
 }
 
 /* Marks the meshes whose borders were computed for other cells on some rank. */
-static insitu_status find_stale_borders(const session_joint *joint, const session_joint_parts *parts,
+static insitu_status find_stale_borders(const session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
                                         const session_team *team, int *stale, base_error *error)
 {
-    for (int m = 0; m < joint->count; m++)
+    for (int m = 0; m < mesh_group->count; m++)
         for (int i = parts->first_parts[m]; i < parts->first_parts[m + 1]; i++)
-            if (joint->hanging.borders[i].cells_hash != joint->meshes[m]->cells_hash) stale[m] = 1;
-    return session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, joint->count, MPI_INT, MPI_MAX, team->comm),
+            if (mesh_group->hanging.borders[i].cells_hash != mesh_group->meshes[m]->cells_hash) stale[m] = 1;
+    return session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, mesh_group->count, MPI_INT, MPI_MAX, team->comm),
                              "MPI_Allreduce");
 }
 
-insitu_status session_update_borders(session_joint *joint, const session_joint_parts *parts, const session_team *team,
-                                     base_error *error)
+insitu_status session_update_borders(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
+                                     const session_team *team, base_error *error)
 {
-    session_hanging *hanging = &joint->hanging;
-    if (hanging->borders && hanging->twins_version == joint->positions_hash) return INSITU_OK;
-    int *stale = base_calloc((size_t)joint->count, sizeof *stale);
+    session_hanging *hanging = &mesh_group->hanging;
+    if (hanging->borders && hanging->twins_version == mesh_group->positions_hash) return INSITU_OK;
+    int *stale = base_calloc((size_t)mesh_group->count, sizeof *stale);
     if (!stale || !make_borders(hanging, parts->count))
         session_fail_for_memory(error, parts->count * (int64_t)sizeof *hanging->borders, "hanging vertices");
     insitu_status status = session_agree(team->comm, error);
-    if (!status) status = find_stale_borders(joint, parts, team, stale, error);
-    for (int m = 0; m < joint->count && !status; m++)
-        if (stale[m]) status = update_mesh_borders(joint, m, parts, team, error);
-    if (!status && session_has_twins(joint)) status = session_find_twins(joint, parts, team, error);
+    if (!status) status = find_stale_borders(mesh_group, parts, team, stale, error);
+    for (int m = 0; m < mesh_group->count && !status; m++)
+        if (stale[m]) status = update_mesh_borders(mesh_group, m, parts, team, error);
+    if (!status && session_has_twins(mesh_group)) status = session_find_twins(mesh_group, parts, team, error);
     if (!status) status = session_agree(team->comm, error);
-    if (!status) hanging->twins_version = joint->positions_hash;
+    if (!status) hanging->twins_version = mesh_group->positions_hash;
     base_free(stale);
     return status;
 }
@@ -187,7 +188,7 @@ insitu_status session_update_borders(session_joint *joint, const session_joint_p
 static bool list_candidates(hanging_search *s)
 {
     const session_hanging_basis *basis = s->basis;
-    const session_border *borders = basis->joint->hanging.borders;
+    const session_border *borders = basis->mesh_group->hanging.borders;
     int64_t most = 0;
     for (int m = 0; m < basis->part_count; m++) most += borders[m].vertex_count;
     unsigned char *is_listed = base_calloc((size_t)basis->group_count + 1, 1);
@@ -220,7 +221,7 @@ typedef enum face_state {
     FACE_UNREAD,
     /* the face must be read: a candidate that is not one of its corners is near it, or it intersects another rank's
      * box */
-    FACE_WANTED,
+    FACE_NEEDED,
     FACE_READ
 } face_state;
 
@@ -262,7 +263,7 @@ static bool has_candidate(const hanging_search *s, int m, const session_face_out
 
 static bool intersects_rank_box(const hanging_search *s, const session_box *box, double slack)
 {
-    const session_homes *homes = s->basis->joint->homes;
+    const session_homes *homes = s->basis->mesh_group->homes;
     for (int n = 0; n < homes->near_count; n++)
         if (homes->near_ranks[n] != s->team->rank && do_boxes_intersect(box, &homes->boxes[n], slack)) return true;
     return false;
@@ -282,11 +283,11 @@ static bool read_face(hanging_search *s, int m, const session_face *face)
 {
     int64_t vertices[4];
     if (s->face_count == s->face_capacity) {
-        const int64_t room = s->face_capacity * 2 + 64;
-        searched_face *faces = base_realloc(s->faces, (size_t)room * sizeof *faces);
+        const int64_t capacity = s->face_capacity * 2 + 64;
+        searched_face *faces = base_realloc(s->faces, (size_t)capacity * sizeof *faces);
         if (!faces) return false;
         s->faces = faces;
-        s->face_capacity = room;
+        s->face_capacity = capacity;
     }
     searched_face *f = &s->faces[s->face_count];
     if (!session_read_coarse_face(&s->basis->meshes[m]->cells, face, &f->face, vertices)) return true;
@@ -300,7 +301,7 @@ static bool read_face(hanging_search *s, int m, const session_face *face)
  * remaining faces that are near candidates which lie on faces. Returns false if memory runs out. */
 static bool read_faces(hanging_search *s, bool is_hit)
 {
-    const session_border *borders = s->basis->joint->hanging.borders;
+    const session_border *borders = s->basis->mesh_group->hanging.borders;
     unsigned char *states = s->face_states;
     bool is_done = true;
     for (int m = 0; m < s->basis->part_count; m++) {
@@ -311,11 +312,11 @@ static bool read_faces(hanging_search *s, bool is_hit)
 #pragma omp for schedule(dynamic, REGION_ITEMS) nowait
             for (int64_t i = 0; i < border->face_count; i++)
                 if (states[i] == FACE_UNREAD && is_face_needed(s, m, &border->faces[i], is_hit))
-                    states[i] = FACE_WANTED;
+                    states[i] = FACE_NEEDED;
             region_leave();
         }
         for (int64_t i = 0; i < border->face_count && is_done; i++) {
-            if (states[i] != FACE_WANTED) continue;
+            if (states[i] != FACE_NEEDED) continue;
             is_done = read_face(s, m, &border->faces[i]);
             states[i] = FACE_READ;
         }
@@ -329,7 +330,7 @@ static bool read_faces(hanging_search *s, bool is_hit)
 static bool read_own_faces(hanging_search *s)
 {
     int64_t count = 0;
-    for (int m = 0; m < s->basis->part_count; m++) count += s->basis->joint->hanging.borders[m].face_count;
+    for (int m = 0; m < s->basis->part_count; m++) count += s->basis->mesh_group->hanging.borders[m].face_count;
     s->face_states = base_calloc((size_t)count + 1, 1);
     if (!s->face_states || !read_faces(s, false)) return false;
     s->own_count = s->face_count;
@@ -345,7 +346,7 @@ static double find_face_slack(const hanging_search *s, const session_coarse_face
  * counted. */
 static void write_faces(const hanging_search *s, session_mail *mail, int64_t *sent)
 {
-    const session_homes *homes = s->basis->joint->homes;
+    const session_homes *homes = s->basis->mesh_group->homes;
     mail->total = 0;
     for (int n = 0; n < homes->near_count; n++) {
         const int64_t first = mail->total;
@@ -400,11 +401,11 @@ static bool receive_faces(hanging_search *s, const session_mail *in)
 static bool add_contact(hanging_search *s, int64_t number, const double weights[4], int64_t *last)
 {
     if (s->contact_count == s->contact_capacity) {
-        const int64_t room = s->contact_capacity * 2 + 256;
-        contact *contacts = base_realloc(s->contacts, (size_t)room * sizeof *contacts);
+        const int64_t capacity = s->contact_capacity * 2 + 256;
+        contact *contacts = base_realloc(s->contacts, (size_t)capacity * sizeof *contacts);
         if (!contacts) return false;
         s->contacts = contacts;
-        s->contact_capacity = room;
+        s->contact_capacity = capacity;
     }
     contact *c = &s->contacts[s->contact_count];
     *c = (contact){.face = number, .next_contact = *last};
@@ -484,21 +485,21 @@ static bool find_contacts(hanging_search *s)
 
 /* Requests those received faces on which vertices hang: packs their numbers for the ranks that sent them. *firsts
  * receives, for each such face, the index of its first value among the values that will be received. */
-static bool request_faces(const hanging_search *s, session_mail *wanted, int64_t **firsts)
+static bool request_faces(const hanging_search *s, session_mail *requested, int64_t **firsts)
 {
     int64_t *first = base_alloc((size_t)(s->face_count + 1) * sizeof *first);
-    wanted->counts = base_calloc((size_t)s->team->ranks, sizeof *wanted->counts);
-    wanted->words = base_alloc((size_t)(s->face_count + 1) * sizeof *wanted->words);
+    requested->counts = base_calloc((size_t)s->team->ranks, sizeof *requested->counts);
+    requested->words = base_alloc((size_t)(s->face_count + 1) * sizeof *requested->words);
     *firsts = first;
-    if (!first || !wanted->counts || !wanted->words) return false;
+    if (!first || !requested->counts || !requested->words) return false;
     for (int64_t i = 0; i < s->face_count; i++) first[i] = -1;
     for (int64_t i = 0; i < s->candidate_count; i++)
         if (s->candidates[i].face >= 0) first[s->candidates[i].face] = 0;
     for (int64_t i = s->own_count; i < s->face_count; i++) { /* these faces are sorted by rank */
         if (first[i] < 0) continue;
-        first[i] = 4 * wanted->total;
-        wanted->words[wanted->total++] = (uint64_t)s->faces[i].message_index;
-        wanted->counts[s->faces[i].source_rank]++;
+        first[i] = 4 * requested->total;
+        requested->words[requested->total++] = (uint64_t)s->faces[i].message_index;
+        requested->counts[s->faces[i].source_rank]++;
     }
     return true;
 }
@@ -549,22 +550,22 @@ static bool store_requests(const hanging_search *s, const session_mail *mail, co
  * and not returned. */
 static insitu_status find_hanging_vertices(hanging_search *s, session_hanging *out, base_error *error)
 {
-    session_mail faces = {0}, in = {0}, wanted = {0}, requests = {0};
+    session_mail faces = {0}, in = {0}, requested = {0}, requests = {0};
     int64_t *sent = NULL, *firsts = NULL;
     if (!error->status && !pack_faces(s, &faces, &sent))
         session_fail_for_memory(error, s->own_count * 96, "hanging vertices");
     insitu_status status = session_mail_deliver(s->team->comm, SESSION_MAIL_THERE, &faces, &in, error);
     if (!status && !error->status) {
-        const bool is_done = receive_faces(s, &in) && find_contacts(s) && request_faces(s, &wanted, &firsts) &&
+        const bool is_done = receive_faces(s, &in) && find_contacts(s) && request_faces(s, &requested, &firsts) &&
                              store_vertices(s, firsts, out);
         if (!is_done) session_fail_for_memory(error, s->face_count * 150, "hanging vertices");
     }
-    if (!status) status = session_mail_deliver(s->team->comm, SESSION_MAIL_BACK, &wanted, &requests, error);
+    if (!status) status = session_mail_deliver(s->team->comm, SESSION_MAIL_BACK, &requested, &requests, error);
     if (!status && !error->status && !store_requests(s, &faces, sent, &requests, out))
         session_fail_for_memory(error, requests.total * 32, "hanging vertices");
     session_mail_free(&faces);
     session_mail_free(&in);
-    session_mail_free(&wanted);
+    session_mail_free(&requested);
     session_mail_free(&requests);
     base_free(sent);
     base_free(firsts);
@@ -582,10 +583,10 @@ static insitu_status count_hanging_vertices(const session_team *team, session_ha
 
 insitu_status session_update_hanging(const session_hanging_basis *basis, const session_team *team, base_error *error)
 {
-    session_joint *joint = basis->joint;
+    session_mesh_group *mesh_group = basis->mesh_group;
     hanging_search search = {.basis = basis, .team = team};
-    session_hanging found = {.positions_hash = joint->positions_hash};
-    if (joint->hanging.positions_hash == joint->positions_hash) return INSITU_OK;
+    session_hanging found = {.positions_hash = mesh_group->positions_hash};
+    if (mesh_group->hanging.positions_hash == mesh_group->positions_hash) return INSITU_OK;
     for (int i = 0; i < basis->part_count; i++)
         search.rounding = fmax(search.rounding, session_position_rounding(basis->meshes[i]));
     if (!list_candidates(&search) || !bin_candidates(&search) || !read_own_faces(&search))
@@ -598,11 +599,11 @@ insitu_status session_update_hanging(const session_hanging_basis *basis, const s
         session_hanging_free(&found, false);
         return status;
     }
-    session_hanging_free(&joint->hanging, false);
-    found.borders = joint->hanging.borders;
-    found.border_count = joint->hanging.border_count;
-    found.twins_version = joint->hanging.twins_version;
-    joint->hanging = found;
+    session_hanging_free(&mesh_group->hanging, false);
+    found.borders = mesh_group->hanging.borders;
+    found.border_count = mesh_group->hanging.border_count;
+    found.twins_version = mesh_group->hanging.twins_version;
+    mesh_group->hanging = found;
     return INSITU_OK;
 }
 

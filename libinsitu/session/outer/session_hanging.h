@@ -11,35 +11,35 @@
  * ones, and not beside both, as it would on a wall along which two meshes overlap. If there are several such faces, the
  * largest one is used. Corners of a face may hang themselves, on still larger faces. The face, and the vertex's
  * position on it, are determined from coordinates alone, with the same result on all ranks, regardless of which mesh of
- * a joint has the face. */
+ * a mesh group has the face. */
 #ifndef SESSION_HANGING_H
 #define SESSION_HANGING_H
 
 #include "session_catalogue.h"
 #include "session_exchange.h"
 
-/* This rank's vertices, divided into groups of equal ones. The vertices of the joint's meshes are numbered
+/* This rank's vertices, divided into groups of equal ones. The vertices of the mesh group's meshes are numbered
  * consecutively, and so are the groups of the vertices of drawn cells. */
 typedef struct session_hanging_basis {
-    session_joint *joint;
+    session_mesh_group *mesh_group;
     int part_count;
-    const session_mesh *const *meshes; /* the parts of the joint's meshes on this rank */
+    const session_mesh *const *meshes; /* the parts of the mesh group's meshes on this rank */
     const int64_t *first_vertices;     /* for each part, the number of its first vertex */
     const int64_t *group_of_vertex;    /* for each vertex, its group; -1: it belongs to no drawn cell */
     int64_t group_count;
 } session_hanging_basis;
 
-/* Returns whether vertices of the joint that differ only by rounding count as equal. They do in joints of several
- * meshes, and in meshes with levels of refinement. */
-bool session_has_twins(const session_joint *joint);
+/* Returns whether vertices of the mesh group that differ only by rounding count as equal. They do in mesh groups of
+ * several meshes, and in meshes with levels of refinement. */
+bool session_has_twins(const session_mesh_group *mesh_group);
 
-/* Computes the joint's borders, and the twins of its vertices, unless they are up to date. `parts` are this rank's.
- * Collective; all ranks return the same status. */
-insitu_status session_update_borders(session_joint *joint, const session_joint_parts *parts, const session_team *team,
-                                     base_error *error);
+/* Computes the mesh group's borders, and the twins of its vertices, unless they are up to date. `parts` are this
+ * rank's. Collective; all ranks return the same status. */
+insitu_status session_update_borders(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
+                                     const session_team *team, base_error *error);
 
-/* Computes the joint's hanging vertices, unless they are up to date. Its borders must be up to date. Collective; all
- * ranks return the same status. */
+/* Computes the mesh group's hanging vertices, unless they are up to date. Its borders must be up to date. Collective;
+ * all ranks return the same status. */
 insitu_status session_update_hanging(const session_hanging_basis *basis, const session_team *team, base_error *error);
 
 /* Sets the values of the hanging vertices to those of their faces. means contains one value per group. If a face's own

@@ -268,13 +268,13 @@ static void face_list_free(face_list *list)
 static bool face_list_reserve(face_list *list)
 {
     if (list->count < list->capacity) return true;
-    const int64_t room = list->capacity * 2 + 1024;
-    found_face *faces = base_realloc(list->faces, (size_t)room * sizeof *faces);
+    const int64_t capacity = list->capacity * 2 + 1024;
+    found_face *faces = base_realloc(list->faces, (size_t)capacity * sizeof *faces);
     if (faces) list->faces = faces;
-    session_key *keys = base_realloc(list->keys, (size_t)room * sizeof *keys);
+    session_key *keys = base_realloc(list->keys, (size_t)capacity * sizeof *keys);
     if (keys) list->keys = keys;
     list->is_out_of_memory = !faces || !keys;
-    if (!list->is_out_of_memory) list->capacity = room;
+    if (!list->is_out_of_memory) list->capacity = capacity;
     return !list->is_out_of_memory;
 }
 

@@ -107,7 +107,7 @@ static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const
         const int64_t vertex = grid_array_index(&face->row.list, face->row.first + k);
         if (vertex < 0 || vertex >= count)
             return fail_range_at_face(p, patch, i, "has a vertex index outside", count, error);
-        groups[k] = p->mesh->torn.is_torn ? -1 : p->numbers->group_of_vertex[vertex];
+        groups[k] = p->mesh->discontinuous.is_active ? -1 : p->numbers->group_of_vertex[vertex];
         if (groups[k] >= 0) continue;
         const session_key key = session_given_vertex_key(p->mesh, vertex, p->numbers->by_id);
         groups[k] = session_keys_find(p->numbers->keys, &key);

@@ -24,9 +24,9 @@ static bool is_same_threshold(const session_threshold *a, const session_threshol
 
 session_outer *session_find_outer(const session_mesh *mesh, const scene_threshold *threshold)
 {
-    const session_threshold wanted = resolve_threshold(mesh, threshold);
+    const session_threshold resolved = resolve_threshold(mesh, threshold);
     for (int i = 0; i < mesh->outer_count; i++)
-        if (is_same_threshold(&mesh->outers[i]->threshold, &wanted)) return mesh->outers[i];
+        if (is_same_threshold(&mesh->outers[i]->threshold, &resolved)) return mesh->outers[i];
     return NULL;
 }
 

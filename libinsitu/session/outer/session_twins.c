@@ -26,8 +26,8 @@ typedef struct border_vertex {
 } border_vertex;
 
 typedef struct twin_search {
-    const session_joint *joint;
-    const session_joint_parts *parts;
+    const session_mesh_group *mesh_group;
+    const session_mesh_group_parts *parts;
     const session_team *team;
     int64_t corner_count, vertex_count;
     face_corner *corners;    /* this rank's corners, followed by the received ones */
@@ -75,7 +75,7 @@ static bool add_corners(twin_search *s, const session_mesh *mesh, const session_
 
 static bool list_own_corners(twin_search *s)
 {
-    const session_border *borders = s->joint->hanging.borders;
+    const session_border *borders = s->mesh_group->hanging.borders;
     int64_t count = 0;
     for (int m = 0; m < s->parts->count; m++) count += borders[m].vertex_count;
     s->vertices = base_alloc((size_t)(count + 1) * sizeof *s->vertices);
@@ -97,7 +97,7 @@ static bool list_own_corners(twin_search *s)
 /* Writes, for each rank, the corners that lie in the rank's box. If mail->words is NULL, the words are only counted. */
 static void write_corners(const twin_search *s, session_mail *mail)
 {
-    const session_homes *homes = s->joint->homes;
+    const session_homes *homes = s->mesh_group->homes;
     mail->total = 0;
     for (int n = 0; n < homes->near_count; n++) {
         const int64_t first = mail->total;
@@ -172,17 +172,17 @@ static bool store_all_twins(const twin_search *s)
     bool is_done = true;
     int64_t first = 0;
     for (int m = 0; m < s->parts->count && is_done; m++) {
-        session_border *border = &s->joint->hanging.borders[m];
+        session_border *border = &s->mesh_group->hanging.borders[m];
         is_done = store_twins(s->vertices + first, border);
         first += border->vertex_count;
     }
     return is_done;
 }
 
-insitu_status session_find_twins(session_joint *joint, const session_joint_parts *parts, const session_team *team,
-                                 base_error *error)
+insitu_status session_find_twins(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
+                                 const session_team *team, base_error *error)
 {
-    twin_search s = {.joint = joint, .parts = parts, .team = team};
+    twin_search s = {.mesh_group = mesh_group, .parts = parts, .team = team};
     session_mail out = {0}, in = {0};
     for (int i = 0; i < parts->count; i++) s.rounding = fmax(s.rounding, session_position_rounding(parts->items[i]));
     if (!error->status && (!list_own_corners(&s) || !pack_corners(&s, &out)))

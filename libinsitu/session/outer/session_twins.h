@@ -10,9 +10,9 @@
 #include "session_catalogue.h"
 #include "session_team.h"
 
-/* Finds the twins of the joint's vertices. Its borders and homes must be up to date, and `parts` are this rank's.
+/* Finds the twins of the mesh group's vertices. Its borders and homes must be up to date, and `parts` are this rank's.
  * Errors that occur only on this rank are stored in *error and not returned. Collective. */
-insitu_status session_find_twins(session_joint *joint, const session_joint_parts *parts, const session_team *team,
-                                 base_error *error);
+insitu_status session_find_twins(session_mesh_group *mesh_group, const session_mesh_group_parts *parts,
+                                 const session_team *team, base_error *error);
 
 #endif

@@ -155,7 +155,7 @@ bool session_find_candidates(const session_mesh *mesh, uint64_t *key)
         if (s->needs_all_cells) return false;
         const int names[4] = {s->field, s->component, s->is_recentred, s->interval_count};
         session_hash_bytes(key, names, sizeof names);
-        session_hash_bytes(key, &s->joint_name, sizeof s->joint_name);
+        session_hash_bytes(key, &s->mesh_group_name, sizeof s->mesh_group_name);
         session_hash_bytes(key, s->plane.normal, sizeof s->plane.normal);
         session_hash_bytes(key, s->plane.point, sizeof s->plane.point);
         session_hash_bytes(key, s->intervals, (size_t)s->interval_count * sizeof *s->intervals);
@@ -167,27 +167,27 @@ insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_s
 {
     const size_t most = (size_t)mesh->scalar_count;
     grid_field *fields = base_calloc(most, sizeof *fields);
-    mmbvh_query *wishes = base_calloc(most, sizeof *wishes);
+    mmbvh_query *queries = base_calloc(most, sizeof *queries);
     int64_t *unusable = base_calloc(most, sizeof *unusable);
     insitu_status status = INSITU_ERROR_MEMORY;
-    if (fields && wishes && unusable) {
+    if (fields && queries && unusable) {
         int count = 0;
         for (int i = 0; i < mesh->scalar_count; i++) {
             const session_scalar *s = &mesh->scalars[i];
             if (!s->needs_ranges) continue;
             fields[count] = session_scalar_field(mesh, s);
-            wishes[count] = (mmbvh_query){&fields[count], s->interval_count, s->intervals};
+            queries[count] = (mmbvh_query){&fields[count], s->interval_count, s->intervals};
             count++;
         }
         const mmbvh_options options = {.threads = threads};
-        status = mmbvh_select(&mesh->cells, wishes, count, &options, out, unusable, error);
-        for (int i = 0, wish = 0; i < mesh->scalar_count && !status; i++)
-            if (mesh->scalars[i].needs_ranges) mesh->scalars[i].unusable_count = unusable[wish++];
+        status = mmbvh_select(&mesh->cells, queries, count, &options, out, unusable, error);
+        for (int i = 0, query = 0; i < mesh->scalar_count && !status; i++)
+            if (mesh->scalars[i].needs_ranges) mesh->scalars[i].unusable_count = unusable[query++];
     } else {
         base_fail(error, status, "mesh \"%s\": no memory to plan its tree", mesh->label);
     }
     base_free(fields);
-    base_free(wishes);
+    base_free(queries);
     base_free(unusable);
     return status;
 }

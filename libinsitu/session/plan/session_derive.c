@@ -89,9 +89,9 @@ static bool is_recentred(const derive_work *w, const session_catalogue_mesh *mes
     return field && from && from->centring == INSITU_CELL && field->centring != INSITU_CELL;
 }
 
-static uint64_t find_joint_name(const session_catalogue_mesh *mesh, const scene_field *input)
+static uint64_t find_mesh_group_name(const session_catalogue_mesh *mesh, const scene_field *input)
 {
-    return session_joint_name(mesh, input->joint_name);
+    return session_mesh_group_name(mesh, input->mesh_group_name);
 }
 
 /* ---- cell values recentred to vertices ------------------------------------------------------------------------- */
@@ -100,14 +100,14 @@ static uint64_t find_joint_name(const session_catalogue_mesh *mesh, const scene_
 static bool add_to_part(const session_catalogue_mesh *mesh, session_mesh *part, const scene_field *input, int component)
 {
     const int index = part->is_given ? session_find_field(part, input->name) : -1;
-    const uint64_t joint = find_joint_name(mesh, input);
-    if (index < 0 || session_find_recentred(part, input->name, component, joint)) return true;
+    const uint64_t mesh_group = find_mesh_group_name(mesh, input);
+    if (index < 0 || session_find_recentred(part, input->name, component, mesh_group)) return true;
     session_scalar *scalar = session_add_scalar(part);
     if (!scalar) return false;
     scalar->field = index;
     scalar->component = component;
     scalar->is_recentred = true;
-    scalar->joint_name = joint;
+    scalar->mesh_group_name = mesh_group;
     scalar->original_values = session_given_field(part, index, component);
     return true;
 }
@@ -127,10 +127,10 @@ static bool recentre_input(derive_work *w, const session_catalogue_mesh *mesh, c
     const int count = session_catalogue_find(mesh, input->name)->component_count;
     const int first = session_needs_vector(w->derived) ? 0 : input_component(input, count);
     const int end = session_needs_vector(w->derived) ? count : first + 1;
-    session_joint *joint = session_find_joint(w->basis->catalogue, find_joint_name(mesh, input));
-    bool is_done = joint != NULL;
+    session_mesh_group *mesh_group = session_find_mesh_group(w->basis->catalogue, find_mesh_group_name(mesh, input));
+    bool is_done = mesh_group != NULL;
     for (int c = first; c < end && is_done; c++) {
-        const session_recentring item = {joint, input->name, c};
+        const session_recentring item = {mesh_group, input->name, c};
         is_done =
             session_add_recentring(&w->recentrings, &w->recentring_count, &item) && add_recentred(w, mesh, input, c);
     }
@@ -154,7 +154,7 @@ static session_scalar *find_recentred(const derive_work *w, const session_catalo
                                       const session_mesh *part, int input, int component)
 {
     const scene_field *of = &w->derived->inputs[input];
-    return is_recentred(w, mesh, of) ? session_find_recentred(part, of->name, component, find_joint_name(mesh, of))
+    return is_recentred(w, mesh, of) ? session_find_recentred(part, of->name, component, find_mesh_group_name(mesh, of))
                                      : NULL;
 }
 
@@ -285,41 +285,41 @@ typedef struct block_buffer {
 static bool block_buffers_create(const scene_derived *derived, int threads, block_buffer **out)
 {
     const size_t inputs = (size_t)derived->input_count, rows = inputs + (size_t)derived->expression.depth;
-    block_buffer *rooms = *out = base_calloc((size_t)threads, sizeof *rooms);
-    for (int t = 0; t < threads && rooms; t++) {
-        rooms[t].inputs = base_alloc(inputs * sizeof *rooms[t].inputs);
-        rooms[t].values = base_alloc(rows * SCENE_BLOCK * sizeof *rooms[t].values);
-        if (!rooms[t].inputs || !rooms[t].values) return false;
-        for (size_t k = 0; k < inputs; k++) rooms[t].inputs[k] = rooms[t].values + k * SCENE_BLOCK;
+    block_buffer *buffers = *out = base_calloc((size_t)threads, sizeof *buffers);
+    for (int t = 0; t < threads && buffers; t++) {
+        buffers[t].inputs = base_alloc(inputs * sizeof *buffers[t].inputs);
+        buffers[t].values = base_alloc(rows * SCENE_BLOCK * sizeof *buffers[t].values);
+        if (!buffers[t].inputs || !buffers[t].values) return false;
+        for (size_t k = 0; k < inputs; k++) buffers[t].inputs[k] = buffers[t].values + k * SCENE_BLOCK;
     }
-    return rooms != NULL;
+    return buffers != NULL;
 }
 
-static void block_buffers_free(block_buffer *rooms, int threads)
+static void block_buffers_free(block_buffer *buffers, int threads)
 {
-    for (int t = 0; t < threads && rooms; t++) {
-        base_free(rooms[t].inputs);
-        base_free(rooms[t].values);
+    for (int t = 0; t < threads && buffers; t++) {
+        base_free(buffers[t].inputs);
+        base_free(buffers[t].values);
     }
-    base_free(rooms);
+    base_free(buffers);
 }
 
-static void evaluate(const scene_derived *derived, const grid_field *inputs, const block_buffer *rooms,
+static void evaluate(const scene_derived *derived, const grid_field *inputs, const block_buffer *buffers,
                      const session_field *field, int64_t count, int threads)
 {
     const int64_t blocks = (count + SCENE_BLOCK - 1) / SCENE_BLOCK;
 #pragma omp parallel num_threads(session_region_threads(threads, count))
     {
         region_enter();
-        const block_buffer *room = &rooms[omp_get_thread_num()];
-        double *stack = room->values + (int64_t)derived->input_count * SCENE_BLOCK;
+        const block_buffer *buffer = &buffers[omp_get_thread_num()];
+        double *stack = buffer->values + (int64_t)derived->input_count * SCENE_BLOCK;
 #pragma omp for schedule(dynamic, REGION_ITEMS / SCENE_BLOCK) nowait
         for (int64_t block = 0; block < blocks; block++) {
             const int64_t first = block * SCENE_BLOCK;
             const int size = count - first < SCENE_BLOCK ? (int)(count - first) : SCENE_BLOCK;
             for (int k = 0; k < derived->input_count; k++)
-                load_block(&inputs[k], first, size, room->values + k * SCENE_BLOCK);
-            scene_evaluate(&derived->expression, room->inputs, size, stack);
+                load_block(&inputs[k], first, size, buffer->values + k * SCENE_BLOCK);
+            scene_evaluate(&derived->expression, buffer->inputs, size, stack);
             for (int i = 0; i < size; i++) store_values(field, first + i, stack + i);
         }
         region_leave();
@@ -330,16 +330,17 @@ static bool make_expression(const derive_work *w, const session_catalogue_mesh *
 {
     const int threads = w->basis->team->threads;
     session_field *field = &part->fields[index];
-    block_buffer *rooms = NULL;
+    block_buffer *buffers = NULL;
     grid_field *inputs = base_alloc((size_t)w->derived->input_count * sizeof *inputs);
-    const bool is_done = inputs && block_buffers_create(w->derived, threads, &rooms) && allocate_values(w, part, field);
+    const bool is_done =
+        inputs && block_buffers_create(w->derived, threads, &buffers) && allocate_values(w, part, field);
     for (int k = 0; k < w->derived->input_count && is_done; k++) {
         const scene_field *input = &w->derived->inputs[k];
         const int count = part->fields[session_find_field(part, input->name)].given.component_count;
         inputs[k] = input_values(w, mesh, part, k, input_component(input, count));
     }
-    if (is_done) evaluate(w->derived, inputs, rooms, field, count_values(part, field), threads);
-    block_buffers_free(rooms, threads);
+    if (is_done) evaluate(w->derived, inputs, buffers, field, count_values(part, field), threads);
+    block_buffers_free(buffers, threads);
     base_free(inputs);
     if (is_done) mark_values_new(w, mesh, part, index);
     return is_done;
@@ -422,76 +423,78 @@ static int list_scalars(const derive_work *w, const session_catalogue_mesh *mesh
     return count;
 }
 
-/* Returns the first of the joint's meshes on which the field has no fault. The vector has the same number of components
- * on all such meshes. */
-static const session_catalogue_mesh *find_first_faultless(const derive_work *w, const session_joint *joint)
+/* Returns the first of the mesh group's meshes on which the field has no fault. The vector has the same number of
+ * components on all such meshes. */
+static const session_catalogue_mesh *find_first_faultless(const derive_work *w, const session_mesh_group *mesh_group)
 {
     int i = 0;
-    while (i < joint->count && !find_field(w, joint->meshes[i])) i++;
-    return i < joint->count ? joint->meshes[i] : NULL;
+    while (i < mesh_group->count && !find_field(w, mesh_group->meshes[i])) i++;
+    return i < mesh_group->count ? mesh_group->meshes[i] : NULL;
 }
 
 /* Returns the number of scalars whose gradients are computed; ranks without a part of a mesh need it, too. */
-static int count_scalars(const derive_work *w, const session_joint *joint)
+static int count_scalars(const derive_work *w, const session_mesh_group *mesh_group)
 {
     if (!session_needs_vector(w->derived)) return w->derived->input_count;
-    return session_catalogue_find(find_first_faultless(w, joint), w->derived->inputs[0].name)->component_count;
+    return session_catalogue_find(find_first_faultless(w, mesh_group), w->derived->inputs[0].name)->component_count;
 }
 
-static insitu_status begin_sums(const derive_work *w, const session_joint *joint, session_vertex_sums *sums,
+static insitu_status begin_sums(const derive_work *w, const session_mesh_group *mesh_group, session_vertex_sums *sums,
                                 base_error *error)
 {
     sums->parts = base_calloc((size_t)w->basis->meshes->count + 1, sizeof *sums->parts);
     if (!sums->parts) return session_fail_for_memory(error, w->basis->meshes->count * 100LL, "gradients at vertices");
-    for (int m = 0; m < joint->count; m++)
-        for (part_visit v = visit_parts(w, joint->meshes[m]); next_visited_part(w, &v);) {
+    for (int m = 0; m < mesh_group->count; m++)
+        for (part_visit v = visit_parts(w, mesh_group->meshes[m]); next_visited_part(w, &v);) {
             session_sum_part *part = &sums->parts[sums->part_count++];
             part->mesh = v.part;
-            part->of_shells = joint->meshes[m]->has_shells_alone;
-            list_scalars(w, joint->meshes[m], v.part, part->fields);
+            part->of_shells = mesh_group->meshes[m]->has_shells_alone;
+            list_scalars(w, mesh_group->meshes[m], v.part, part->fields);
             if (!allocate_values(w, v.part, &v.part->fields[v.field_index]))
                 return session_fail_for_memory(error, v.part->cells.vertex_count * 8, "a derived field");
         }
     return session_key_all_vertices(sums, error);
 }
 
-/* Computes the gradients over the meshes of a joint. Collective; an error of this rank at the very end is stored only
- * in *error. */
-static insitu_status derive_joint(const derive_work *w, const session_joint *joint, base_error *error)
+/* Computes the gradients over the meshes of a mesh_group. Collective; an error of this rank at the very end is stored
+ * only in *error. */
+static insitu_status derive_mesh_group(const derive_work *w, const session_mesh_group *mesh_group, base_error *error)
 {
-    session_vertex_sums sums = {.by_id = joint->by_id, .field_count = count_scalars(w, joint)};
-    if (!error->status) begin_sums(w, joint, &sums, error);
-    const insitu_status status = session_find_sums(joint->homes, w->basis->team, w->basis->extent, &sums, error);
+    session_vertex_sums sums = {.by_id = mesh_group->by_id, .field_count = count_scalars(w, mesh_group)};
+    if (!error->status) begin_sums(w, mesh_group, &sums, error);
+    const insitu_status status = session_find_sums(mesh_group->homes, w->basis->team, w->basis->extent, &sums, error);
     int at = 0;
-    for (int m = 0; m < joint->count && !status && !error->status; m++)
-        for (part_visit v = visit_parts(w, joint->meshes[m]); next_visited_part(w, &v);) {
+    for (int m = 0; m < mesh_group->count && !status && !error->status; m++)
+        for (part_visit v = visit_parts(w, mesh_group->meshes[m]); next_visited_part(w, &v);) {
             store_gradients(w, &sums, &sums.parts[at++], &v.part->fields[v.field_index]);
-            mark_values_new(w, joint->meshes[m], v.part, v.field_index);
+            mark_values_new(w, mesh_group->meshes[m], v.part, v.field_index);
         }
     session_vertex_sums_free(&sums);
     return status;
 }
 
-static bool is_joint_stale(const derive_work *w, const session_joint *joint)
+static bool is_mesh_group_stale(const derive_work *w, const session_mesh_group *mesh_group)
 {
     const session_catalogue *catalogue = w->basis->catalogue;
     bool is_stale = false;
-    for (int i = 0; i < joint->count; i++) is_stale = is_stale || w->stale[joint->meshes[i] - catalogue->meshes];
+    for (int i = 0; i < mesh_group->count; i++)
+        is_stale = is_stale || w->stale[mesh_group->meshes[i] - catalogue->meshes];
     return is_stale;
 }
 
-/* Computes the gradients of each joint of the meshes with the field, unless they are up to date. */
-static insitu_status derive_joints(const derive_work *w, base_error *error)
+/* Computes the gradients of each mesh group of the meshes with the field, unless they are up to date. */
+static insitu_status derive_mesh_groups(const derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;
     insitu_status status = INSITU_OK;
     for (int m = 0; m < catalogue->mesh_count && !status; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
-        const session_joint *joint =
-            find_field(w, mesh) ? session_find_joint(catalogue, session_joint_name(mesh, w->derived->joint_name))
-                                : NULL;
-        if (joint && find_first_faultless(w, joint) == mesh && is_joint_stale(w, joint))
-            status = derive_joint(w, joint, error);
+        const session_mesh_group *mesh_group =
+            find_field(w, mesh)
+                ? session_find_mesh_group(catalogue, session_mesh_group_name(mesh, w->derived->mesh_group_name))
+                : NULL;
+        if (mesh_group && find_first_faultless(w, mesh_group) == mesh && is_mesh_group_stale(w, mesh_group))
+            status = derive_mesh_group(w, mesh_group, error);
     }
     return status;
 }
@@ -511,7 +514,7 @@ static insitu_status derive_field(derive_work *w, base_error *error)
     if (!status && is_expression)
         make_expressions(w, error);
     else if (!status)
-        status = derive_joints(w, error);
+        status = derive_mesh_groups(w, error);
     return status ? status : session_agree(b->team->comm, error);
 }
 

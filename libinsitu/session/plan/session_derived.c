@@ -101,7 +101,7 @@ static insitu_status refuse_components(const derived_place *at, const scene_fiel
                      OF(at), name, found->component_count, at->mesh->name, name, name);
 }
 
-/* Checks that a vector has the same number of components on all meshes of a joint. */
+/* Checks that a vector has the same number of components on all meshes of a mesh_group. */
 static insitu_status check_other_meshes(const derived_place *at, const scene_field *input,
                                         const session_catalogue_field *found, base_error *error)
 {
@@ -249,7 +249,7 @@ insitu_status session_name_derived(const scene *scene, const char *scene_path, s
         for (int i = 0; i < parts.count && is_done; i++)
             if (parts.items[i]->is_given) is_done = name_on_mesh(&catalogue->meshes[m], parts.items[i]);
     }
-    catalogue->are_joined = catalogue->are_joined && scene->derived_count == 0;
+    catalogue->are_meshes_grouped = catalogue->are_meshes_grouped && scene->derived_count == 0;
     if (!is_done) session_fail_for_memory(error, scene->derived_count * 100LL, "the names of derived fields");
     const insitu_status status = scene->derived_count ? session_agree(team->comm, error) : INSITU_OK;
     catalogue->are_derived = !status;

@@ -261,11 +261,14 @@ static bool add_recentrings(const session_catalogue *catalogue, session_plan *pl
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_catalogue_field *shown = find_drawn_field(mesh, field);
-        const bool is_wished = shown && session_is_recentred(field, shown->centring, mesh->is_refined);
-        session_joint *joint =
-            is_wished ? session_find_joint(catalogue, session_joint_name(mesh, field->joint_name)) : NULL;
-        if (!joint) continue;
-        const session_recentring item = {joint, field->name, session_resolve_component(field, shown->component_count)};
+        const bool is_shown_recentred = shown && session_is_recentred(field, shown->centring, mesh->is_refined);
+        session_mesh_group *mesh_group =
+            is_shown_recentred
+                ? session_find_mesh_group(catalogue, session_mesh_group_name(mesh, field->mesh_group_name))
+                : NULL;
+        if (!mesh_group) continue;
+        const session_recentring item = {mesh_group, field->name,
+                                         session_resolve_component(field, shown->component_count)};
         if (!session_add_recentring(&plan->recentrings, &plan->recentring_count, &item)) return false;
     }
     return true;
@@ -390,8 +393,8 @@ static void warn_of_shells(const session_catalogue *catalogue, const scene_image
 
 /* Warns of a mesh with global vertex ids if a layer shows it, by means at vertices, together with other meshes: its
  * vertices are not matched with those of the others. */
-static void warn_of_unjoined_mesh(const session_catalogue *catalogue, const scene_image *image, const char *layer,
-                                  const scene_field *field, session_report *report)
+static void warn_of_ungrouped_mesh(const session_catalogue *catalogue, const scene_image *image, const char *layer,
+                                   const scene_field *field, session_report *report)
 {
     const char *name = NULL;
     int count = 0;
@@ -399,7 +402,7 @@ static void warn_of_unjoined_mesh(const session_catalogue *catalogue, const scen
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_catalogue_field *shown = mesh->first_rank >= 0 ? find_drawn_field(mesh, field) : NULL;
         if (!shown || !session_is_recentred(field, shown->centring, mesh->is_refined)) continue;
-        if (mesh->single_joint_name && !name) name = mesh->name;
+        if (mesh->single_group_name && !name) name = mesh->name;
         count++;
     }
     const session_warning warning = {WARNING_APART, image->name, field->name, field->line};
@@ -416,7 +419,7 @@ static void warn_of_fields(const session_catalogue *catalogue, const scene_image
         const char *layer = scene_layer_word(walk.kind);
         if (walk.role == SCENE_SHOWN && walk.kind != SCENE_ISOSURFACE)
             warn_of_shells(catalogue, image, layer, field, report);
-        if (walk.role == SCENE_SHOWN) warn_of_unjoined_mesh(catalogue, image, layer, field, report);
+        if (walk.role == SCENE_SHOWN) warn_of_ungrouped_mesh(catalogue, image, layer, field, report);
     }
 }
 

@@ -10,7 +10,7 @@
 
 /* A request to average cell values at vertices. There is one for each combination of meshes, field and component. */
 typedef struct session_recentring {
-    session_joint *joint;
+    session_mesh_group *mesh_group;
     const char *field;
     int component; /* number of the component, in the format of grid_field.component */
 } session_recentring;

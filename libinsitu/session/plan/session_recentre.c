@@ -51,12 +51,13 @@ typedef struct mesh_part {
 
 /* The data of one recentring on this rank. */
 typedef struct recentring {
-    session_joint *joint;
-    session_joint_parts list;
+    session_mesh_group *mesh_group;
+    session_mesh_group_parts list;
     mesh_part *parts; /* for each part in the list, its field and the scalar that gets the means */
-    /* begin of each group's values if faces of the boundary have values; otherwise those in joint->groups are used */
+    /* begin of each group's values if faces of the boundary have values; otherwise those in mesh_group->groups are used
+     */
     int64_t *starts;
-    value_groups values; /* the values to be averaged, by group of joint->groups */
+    value_groups values; /* the values to be averaged, by group of mesh_group->groups */
 } recentring;
 
 /* ---- values by group ----------------------------------------------------------------------------------------- */
@@ -191,7 +192,7 @@ static inline void add_value(value_groups *values, int64_t group, double value, 
 static void add_cell_values(recentring *r, int part, int64_t cell, cell_groups *list, bool is_shared)
 {
     const grid_field *field = &r->parts[part].field;
-    const int64_t *of_vertex = r->joint->groups.group_of_vertex + r->joint->groups.first_vertices[part];
+    const int64_t *of_vertex = r->mesh_group->groups.group_of_vertex + r->mesh_group->groups.first_vertices[part];
     grid_walk walk = grid_walk_cell(&r->list.items[part]->cells, cell);
     double value = field->is_cell_centred ? grid_field_value(field, cell) : 0;
     int64_t vertex;
@@ -213,7 +214,7 @@ static void add_split_cell_values(recentring *r, int part, int64_t cell, cell_gr
 {
     const session_mesh *mesh = r->list.items[part];
     const grid_field *field = &r->parts[part].field;
-    const int64_t *of_vertex = r->joint->groups.group_of_vertex + r->joint->groups.first_vertices[part];
+    const int64_t *of_vertex = r->mesh_group->groups.group_of_vertex + r->mesh_group->groups.first_vertices[part];
     const int64_t first = session_first_piece(mesh, cell);
     double value = field->is_cell_centred ? grid_field_value(field, first) : 0;
     if (!isfinite(value)) return;
@@ -235,7 +236,7 @@ static void add_split_cell_values(recentring *r, int part, int64_t cell, cell_gr
 static void add_vertex_values(recentring *r, int part)
 {
     const grid_field *field = &r->parts[part].field;
-    const int64_t *of_vertex = r->joint->groups.group_of_vertex + r->joint->groups.first_vertices[part];
+    const int64_t *of_vertex = r->mesh_group->groups.group_of_vertex + r->mesh_group->groups.first_vertices[part];
     for (int64_t v = 0; v < r->list.items[part]->cells.vertex_count; v++) {
         const double value = of_vertex[v] < 0 ? NAN : grid_field_value(field, v);
         if (isfinite(value)) add_value(&r->values, of_vertex[v], value, false);
@@ -287,14 +288,14 @@ static void set_face_values(const session_patch_values *faces, value_groups *val
 /* Lists this rank's parts of the meshes of a recentring. */
 static bool list_parts(const session_recentring *item, const session_meshes *meshes, recentring *r)
 {
-    r->joint = item->joint;
-    if (!session_list_joint_parts(item->joint, meshes, &r->list)) return false;
+    r->mesh_group = item->mesh_group;
+    if (!session_list_mesh_group_parts(item->mesh_group, meshes, &r->list)) return false;
     r->parts = base_calloc((size_t)r->list.count + 1, sizeof *r->parts);
     if (!r->parts) return false;
     for (int i = 0; i < r->list.count; i++) {
         const session_mesh *mesh = r->list.items[i];
         mesh_part *part = &r->parts[i];
-        part->scalar = session_find_recentred(mesh, item->field, item->component, item->joint->name);
+        part->scalar = session_find_recentred(mesh, item->field, item->component, item->mesh_group->name);
         if (!part->scalar) continue;
         part->field = session_given_field(mesh, part->scalar->field, part->scalar->component);
         part->is_of_vertices = mesh->fields[part->scalar->field].given.centring == INSITU_VERTEX;
@@ -304,21 +305,21 @@ static bool list_parts(const session_recentring *item, const session_meshes *mes
 
 static bool update_groups(recentring *r, int ranks)
 {
-    session_joint *joint = r->joint;
-    const session_border *borders = session_has_twins(joint) ? joint->hanging.borders : NULL;
-    const session_vertex_groups_basis basis = {joint->positions_hash, r->list.count, r->list.items, borders,
-                                               joint->homes,          joint->by_id,  ranks};
-    return session_update_vertex_groups(&basis, &joint->groups);
+    session_mesh_group *mesh_group = r->mesh_group;
+    const session_border *borders = session_has_twins(mesh_group) ? mesh_group->hanging.borders : NULL;
+    const session_vertex_groups_basis basis = {mesh_group->positions_hash, r->list.count,     r->list.items, borders,
+                                               mesh_group->homes,          mesh_group->by_id, ranks};
+    return session_update_vertex_groups(&basis, &mesh_group->groups);
 }
 
 /* Reads the values of boundary faces, one list per part. */
 static void find_face_values(const recentring *r, session_patch_values *faces, base_error *error)
 {
-    const session_vertex_groups *groups = &r->joint->groups;
+    const session_vertex_groups *groups = &r->mesh_group->groups;
     for (int i = 0; i < r->list.count && !error->status; i++) {
         const mesh_part *part = &r->parts[i];
         const session_vertex_numbers numbers = {&groups->keys, groups->group_of_vertex + groups->first_vertices[i],
-                                                r->joint->by_id};
+                                                r->mesh_group->by_id};
         if (part->scalar)
             session_find_patch_values(r->list.items[i], part->scalar->field, part->scalar->component, &numbers,
                                       &faces[i], error);
@@ -328,7 +329,7 @@ static void find_face_values(const recentring *r, session_patch_values *faces, b
 /* Allocates memory for the values of cells and, if there are any, of faces. */
 static bool allocate_values(recentring *r, const session_patch_values *faces)
 {
-    const session_vertex_groups *groups = &r->joint->groups;
+    const session_vertex_groups *groups = &r->mesh_group->groups;
     int64_t count = 0, added = 0;
     for (int i = 0; i < r->list.count; i++) count += faces[i].count;
     if (count == 0) return groups_create(&r->values, groups->count, groups->corner_starts);
@@ -355,7 +356,7 @@ static void average_own_values(recentring *r, const session_team *team, base_err
     if (is_done && !error->status) is_done = allocate_values(r, faces);
     for (int i = 0; i < count && is_done && !error->status; i++)
         if (r->parts[i].scalar) is_done = add_part_values(r, i, team->threads);
-    if (!is_done) session_fail_for_memory(error, r->joint->groups.count * 100, "values recentred to vertices");
+    if (!is_done) session_fail_for_memory(error, r->mesh_group->groups.count * 100, "values recentred to vertices");
     if (!error->status) groups_average(&r->values, team->threads);
     for (int i = 0; i < count && faces; i++) session_patch_values_free(&faces[i]);
     base_free(faces);
@@ -375,7 +376,7 @@ static int64_t value_count(const value_groups *values, int64_t group)
 /* Packs the shared groups into records, sorted by the rank that is their home. */
 static bool pack_records(const recentring *r, int ranks, session_mail *mail)
 {
-    const session_vertex_groups *groups = &r->joint->groups;
+    const session_vertex_groups *groups = &r->mesh_group->groups;
     const value_groups *values = &r->values;
     mail->counts = base_calloc((size_t)ranks, sizeof *mail->counts);
     if (!mail->counts) return false;
@@ -482,7 +483,7 @@ static bool merge_records(const session_mail *in, int ranks, int threads, sessio
 /* Replaces the means of groups that other ranks share by the means over all ranks. */
 static insitu_status merge_shared(const session_team *team, recentring *r, base_error *error)
 {
-    const session_vertex_groups *groups = &r->joint->groups;
+    const session_vertex_groups *groups = &r->mesh_group->groups;
     session_mail out = {0}, in = {0}, reply = {0}, means = {0};
     if (!error->status && !pack_records(r, team->ranks, &out))
         session_fail_for_memory(error, groups->shared_count * 100, "values at vertices that ranks share");
@@ -506,7 +507,7 @@ static insitu_status merge_shared(const session_team *team, recentring *r, base_
  * drawn, as without means. For values of cells, grid_field.own serves this purpose instead. */
 static void copy_means_to_vertices(const recentring *r, int part, int threads)
 {
-    const int64_t *of_vertex = r->joint->groups.group_of_vertex + r->joint->groups.first_vertices[part];
+    const int64_t *of_vertex = r->mesh_group->groups.group_of_vertex + r->mesh_group->groups.first_vertices[part];
     const int64_t count = r->list.items[part]->cells.vertex_count;
     const grid_field *own = &r->parts[part].field;
     double *values = r->parts[part].scalar->vertex_values;
@@ -527,18 +528,18 @@ static void copy_means_to_vertices(const recentring *r, int part, int threads)
  * themselves. */
 static bool is_constrained(const session_recentring *item)
 {
-    for (int i = 0; i < item->joint->count; i++)
-        if (session_catalogue_find(item->joint->meshes[i], item->field)->centring != INSITU_CORNER) return true;
+    for (int i = 0; i < item->mesh_group->count; i++)
+        if (session_catalogue_find(item->mesh_group->meshes[i], item->field)->centring != INSITU_CORNER) return true;
     return false;
 }
 
 static insitu_status constrain_hanging(const recentring *r, const session_team *team, base_error *error)
 {
-    const session_vertex_groups *groups = &r->joint->groups;
-    const session_hanging_basis basis = {
-        r->joint, r->list.count, r->list.items, groups->first_vertices, groups->group_of_vertex, groups->count};
+    const session_vertex_groups *groups = &r->mesh_group->groups;
+    const session_hanging_basis basis = {r->mesh_group,          r->list.count,           r->list.items,
+                                         groups->first_vertices, groups->group_of_vertex, groups->count};
     const insitu_status status = session_update_hanging(&basis, team, error);
-    return status ? status : session_constrain_hanging(&r->joint->hanging, team, r->values.means, error);
+    return status ? status : session_constrain_hanging(&r->mesh_group->hanging, team, r->values.means, error);
 }
 
 /* Allocates memory for the recentred values of each part. */
@@ -561,7 +562,7 @@ static void store_means(const recentring *r, int threads)
         copy_means_to_vertices(r, i, threads);
         scalar->are_values_stale = false;
         scalar->computed_count++;
-        scalar->positions_hash = r->joint->positions_hash;
+        scalar->positions_hash = r->mesh_group->positions_hash;
         scalar->may_have_changed = true;
     }
 }
@@ -572,9 +573,9 @@ static insitu_status recentre_field(const session_recentring *item, const sessio
     recentring r = {0};
     insitu_status status = INSITU_OK;
     const bool is_listed = list_parts(item, meshes, &r);
-    if (!is_listed) session_fail_for_memory(error, item->joint->count * 64LL, "values recentred to vertices");
-    if (item->joint->count > 1 || is_constrained(item))
-        status = session_update_borders(item->joint, &r.list, team, error);
+    if (!is_listed) session_fail_for_memory(error, item->mesh_group->count * 64LL, "values recentred to vertices");
+    if (item->mesh_group->count > 1 || is_constrained(item))
+        status = session_update_borders(item->mesh_group, &r.list, team, error);
     if (!status && is_listed) average_own_values(&r, team, error);
     if (!status && !error->status) allocate_recentred(&r, error);
     if (!status) status = team->ranks > 1 ? merge_shared(team, &r, error) : session_agree(team->comm, error);
@@ -583,18 +584,18 @@ static insitu_status recentre_field(const session_recentring *item, const sessio
     groups_free(&r.values);
     base_free(r.starts);
     base_free(r.parts);
-    session_joint_parts_free(&r.list);
+    session_mesh_group_parts_free(&r.list);
     return status;
 }
 
 static bool is_stale(const session_recentring *item, const session_meshes *meshes)
 {
-    for (int m = 0; m < item->joint->count; m++) {
-        const session_parts parts = session_find_parts(meshes, item->joint->meshes[m]->name);
+    for (int m = 0; m < item->mesh_group->count; m++) {
+        const session_parts parts = session_find_parts(meshes, item->mesh_group->meshes[m]->name);
         for (int i = 0; i < parts.count; i++) {
             const session_scalar *scalar =
-                session_find_recentred(parts.items[i], item->field, item->component, item->joint->name);
-            if (scalar && (scalar->are_values_stale || scalar->positions_hash != item->joint->positions_hash))
+                session_find_recentred(parts.items[i], item->field, item->component, item->mesh_group->name);
+            if (scalar && (scalar->are_values_stale || scalar->positions_hash != item->mesh_group->positions_hash))
                 return true;
         }
     }
@@ -605,7 +606,7 @@ bool session_add_recentring(session_recentring **items, int *count, const sessio
 {
     for (int i = 0; i < *count; i++) {
         const session_recentring *other = &(*items)[i];
-        if (other->joint == item->joint && strcmp(other->field, item->field) == 0 &&
+        if (other->mesh_group == item->mesh_group && strcmp(other->field, item->field) == 0 &&
             other->component == item->component)
             return true;
     }

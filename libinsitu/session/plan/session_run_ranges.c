@@ -224,8 +224,8 @@ insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image
 {
     *out = find_ranges(all, image);
     if (*out || count_layers(image) == 0) return INSITU_OK;
-    const bool has_room = prepare_ranges(all, image, error);
-    session_image_ranges *ranges = has_room ? &all->items[all->count] : NULL;
+    const bool is_prepared = prepare_ranges(all, image, error);
+    session_image_ranges *ranges = is_prepared ? &all->items[all->count] : NULL;
     insitu_status status = session_agree(team->comm, error);
     if (!status && ranges) status = fill_ranges(ranges, team, error);
     if (status && ranges) free_ranges(ranges);

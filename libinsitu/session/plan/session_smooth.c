@@ -11,13 +11,14 @@
 #include "session_scalars.h"
 #include "session_vertex_sums.h"
 
-/* A field on a mesh, or on joined meshes, that needs gradients at vertices. */
+/* A field on a mesh, or on mesh_group_name meshes, that needs gradients at vertices. */
 typedef struct smooth_item {
     const session_catalogue_mesh *mesh;
     const session_catalogue_field *field;
     const scene_field *scene_field; /* the field as described in the first layer that shows it */
-    /* name of the joint over which values are recentred (session_joint_name()); unused if values are not recentred */
-    uint64_t joint_name;
+    /* name of the mesh group over which values are recentred (session_mesh_group_name()); unused if values are not
+     * recentred */
+    uint64_t mesh_group_name;
     int component;
     int value_count;
     mmbvh_interval *values; /* isovalues of all layers that show the field */
@@ -42,7 +43,7 @@ static smooth_item *find_item(smooth_items *items, const smooth_item *like)
     for (int i = 0; i < items->count; i++) {
         smooth_item *item = &items->items[i];
         if (item->mesh == like->mesh && item->field == like->field && item->component == like->component &&
-            item->joint_name == like->joint_name)
+            item->mesh_group_name == like->mesh_group_name)
             return item;
     }
     smooth_item *more = base_realloc(items->items, (size_t)(items->count + 1) * sizeof *more);
@@ -71,8 +72,9 @@ static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, c
     if (!field || !scene_field_is_on(&layer->field, mesh->name)) return true;
     const int component = session_resolve_component(&layer->field, field->component_count);
     const bool is_recentred = session_is_recentred(&layer->field, field->centring, mesh->is_refined);
-    const uint64_t joined = is_recentred ? session_joint_name(mesh, layer->field.joint_name) : 0;
-    smooth_item *item = find_item(items, &(smooth_item){mesh, field, &layer->field, joined, component, 0, NULL});
+    const uint64_t mesh_group_name = is_recentred ? session_mesh_group_name(mesh, layer->field.mesh_group_name) : 0;
+    smooth_item *item =
+        find_item(items, &(smooth_item){mesh, field, &layer->field, mesh_group_name, component, 0, NULL});
     if (!item) return false;
     const size_t count = (size_t)item->value_count + (size_t)layer->value_count;
     mmbvh_interval *values = base_realloc(item->values, count * sizeof *values);
@@ -154,12 +156,12 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_
     int64_t most = 0;
     for (int i = 0; i < sums->part_count; i++) {
         session_sum_part *part = &sums->parts[i];
-        const mmbvh_query wish = {part->fields, item->value_count, item->values};
+        const mmbvh_query query = {part->fields, item->value_count, item->values};
         const int64_t vertices = part->mesh->cells.vertex_count;
         int64_t unusable;
         part->key_indices = base_alloc((size_t)(vertices ? vertices : 1) * sizeof *part->key_indices);
         if (!part->key_indices) return session_fail_for_memory(error, vertices * 4, "gradients at vertices");
-        if (mmbvh_select(&part->mesh->cells, &wish, 1, &options, &work->crossed[i], &unusable, error))
+        if (mmbvh_select(&part->mesh->cells, &query, 1, &options, &work->crossed[i], &unusable, error))
             return error->status;
         most += mark_crossed_vertices(&work->crossed[i], part);
     }
@@ -172,12 +174,12 @@ static insitu_status create_work(const smooth_item *item, const session_meshes *
                                  base_error *error)
 {
     const session_parts parts = session_find_parts(meshes, item->mesh->name);
-    const size_t room = (size_t)parts.count + 1;
+    const size_t capacity = (size_t)parts.count + 1;
     session_vertex_sums *sums = &work->sums;
     *work = (smooth_work){.sums = {.by_id = item->mesh->has_ids, .field_count = 1}};
-    sums->parts = base_calloc(room, sizeof *sums->parts);
-    work->scalars = base_calloc(room, sizeof *work->scalars);
-    work->crossed = base_calloc(room, sizeof *work->crossed);
+    sums->parts = base_calloc(capacity, sizeof *sums->parts);
+    work->scalars = base_calloc(capacity, sizeof *work->scalars);
+    work->crossed = base_calloc(capacity, sizeof *work->crossed);
     if (!sums->parts || !work->scalars || !work->crossed)
         return session_fail_for_memory(error, parts.count * 100LL, "gradients at vertices");
     for (int i = 0; i < parts.count; i++) {

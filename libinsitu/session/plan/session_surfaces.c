@@ -16,17 +16,17 @@ typedef struct surface_request {
 } surface_request;
 
 /* Returns the part's outer faces for the requested surface; NULL if it has none. */
-static session_outer *find_own_outer(const session_mesh *part, const surface_request *wish)
+static session_outer *find_own_outer(const session_mesh *part, const surface_request *request)
 {
-    return part->is_given ? session_find_outer(part, wish->threshold) : NULL;
+    return part->is_given ? session_find_outer(part, request->threshold) : NULL;
 }
 
 /* Returns whether the outer faces of any of this rank's parts are out of date. */
-static bool are_faces_stale(const session_meshes *meshes, const surface_request *wish)
+static bool are_faces_stale(const session_meshes *meshes, const surface_request *request)
 {
-    const session_parts parts = session_find_parts(meshes, wish->mesh->name);
+    const session_parts parts = session_find_parts(meshes, request->mesh->name);
     for (int i = 0; i < parts.count; i++) {
-        const session_outer *outer = find_own_outer(parts.items[i], wish);
+        const session_outer *outer = find_own_outer(parts.items[i], request);
         if (outer && session_is_outer_stale(parts.items[i], outer)) return true;
     }
     return false;
@@ -39,54 +39,56 @@ static bool is_same_threshold(const scene_threshold *a, const scene_threshold *b
            a->high == b->high;
 }
 
-static int add_surface_request(surface_request *wishes, int count, const surface_request *wish)
+static int add_surface_request(surface_request *requests, int count, const surface_request *request)
 {
     for (int i = 0; i < count; i++)
-        if (wishes[i].mesh == wish->mesh && is_same_threshold(wishes[i].threshold, wish->threshold)) return count;
-    wishes[count] = *wish;
+        if (requests[i].mesh == request->mesh && is_same_threshold(requests[i].threshold, request->threshold))
+            return count;
+    requests[count] = *request;
     return count + 1;
 }
 
 /* Lists the outer surfaces that an image's layers show, with their meshes. Returns the new length of the list. */
-static int list_image_wishes(const scene_image *image, const session_catalogue *catalogue, surface_request *wishes,
-                             int count)
+static int list_image_requests(const scene_image *image, const session_catalogue *catalogue, surface_request *requests,
+                               int count)
 {
     static const scene_threshold none = {.is_given = false};
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         for (int n = 0; n < image->surface_count; n++) {
-            const surface_request wish = {mesh, &image->surfaces[n].threshold};
+            const surface_request request = {mesh, &image->surfaces[n].threshold};
             if (scene_field_is_on(&image->surfaces[n].meshes_field, mesh->name))
-                count = add_surface_request(wishes, count, &wish);
+                count = add_surface_request(requests, count, &request);
         }
         for (int n = 0; n < image->isosurface_count && mesh->has_shells_alone; n++) {
             const scene_field *field = &image->isosurfaces[n].field;
             const bool is_on = scene_field_is_on(field, mesh->name) && session_catalogue_find(mesh, field->name);
-            if (is_on) count = add_surface_request(wishes, count, &(surface_request){mesh, &none});
+            if (is_on) count = add_surface_request(requests, count, &(surface_request){mesh, &none});
         }
     }
     return count;
 }
 
 /* Lists the outer surfaces of all images, in the same order on all ranks. Returns their number. */
-static int list_wishes(const session_plan *plan, const session_catalogue *catalogue, surface_request *wishes)
+static int list_requests(const session_plan *plan, const session_catalogue *catalogue, surface_request *requests)
 {
     int count = 0;
     for (int i = 0; i < plan->image_count; i++)
-        if (plan->images[i]->variant.view == 0) count = list_image_wishes(plan->images[i], catalogue, wishes, count);
+        if (plan->images[i]->variant.view == 0)
+            count = list_image_requests(plan->images[i], catalogue, requests, count);
     return count;
 }
 
 /* Determines which outer faces are out of date on some rank. If a rank has failed before, all return its error.
  * Collective. */
-static insitu_status find_stale_surfaces(const session_meshes *meshes, const surface_request *wishes, int count,
+static insitu_status find_stale_surfaces(const session_meshes *meshes, const surface_request *requests, int count,
                                          const session_team *team, int *stale, bool *is_any, base_error *error)
 {
     /* first entry: nonzero if this rank has failed; the others: nonzero if its outer faces of a surface are out of
      * date */
     int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0};
     for (int i = 0; i < count; i++) {
-        stale[i] = are_faces_stale(meshes, &wishes[i]);
+        stale[i] = are_faces_stale(meshes, &requests[i]);
         own[1] = own[1] || stale[i];
     }
     insitu_status status =
@@ -98,19 +100,19 @@ static insitu_status find_stale_surfaces(const session_meshes *meshes, const sur
                              "MPI_Allreduce");
 }
 
-static insitu_status find_faces(const session_meshes *meshes, const surface_request *wish, const session_team *team,
+static insitu_status find_faces(const session_meshes *meshes, const surface_request *request, const session_team *team,
                                 base_error *error)
 {
-    const session_parts parts = session_find_parts(meshes, wish->mesh->name);
+    const session_parts parts = session_find_parts(meshes, request->mesh->name);
     int count = 0;
     session_face_part *of = base_calloc((size_t)parts.count + 1, sizeof *of);
     if (!of) session_fail_for_memory(error, parts.count * (int64_t)sizeof *of, "surfaces");
     for (int i = 0; i < parts.count && of; i++) {
-        session_outer *outer = find_own_outer(parts.items[i], wish);
+        session_outer *outer = find_own_outer(parts.items[i], request);
         if (outer) of[count++] = (session_face_part){parts.items[i], outer, NULL};
     }
     insitu_status status = session_agree(team->comm, error);
-    if (!status) status = session_find_outer_faces(of, count, &wish->mesh->homes, team, error);
+    if (!status) status = session_find_outer_faces(of, count, &request->mesh->homes, team, error);
     if (!status && !error->status) session_drop_faces_between_levels(meshes, of, count, error);
     for (int i = 0; i < count && !status && !error->status; i++) session_set_outer_fresh(of[i].mesh, of[i].outer);
     base_free(of);
@@ -143,17 +145,17 @@ insitu_status session_update_surfaces(const session_plan *plan, const session_ca
 {
     const size_t most = (size_t)plan->surface_count * (size_t)catalogue->mesh_count;
     int count = 0, *stale = base_calloc(most, sizeof *stale);
-    surface_request *wishes = base_calloc(most, sizeof *wishes);
+    surface_request *requests = base_calloc(most, sizeof *requests);
     bool is_any = false;
-    if (!stale || !wishes)
-        session_fail_for_memory(error, (int64_t)(most * (sizeof *stale + sizeof *wishes)), "surfaces");
+    if (!stale || !requests)
+        session_fail_for_memory(error, (int64_t)(most * (sizeof *stale + sizeof *requests)), "surfaces");
     else
-        count = list_wishes(plan, catalogue, wishes);
-    insitu_status status = find_stale_surfaces(meshes, wishes, count, team, stale, &is_any, error);
+        count = list_requests(plan, catalogue, requests);
+    insitu_status status = find_stale_surfaces(meshes, requests, count, team, stale, &is_any, error);
     for (int i = 0; i < count && !status && is_any; i++)
-        if (stale[i]) status = find_faces(meshes, &wishes[i], team, error);
+        if (stale[i]) status = find_faces(meshes, &requests[i], team, error);
     base_free(stale);
-    base_free(wishes);
+    base_free(requests);
     if (!status) make_meshes(meshes, error);
     return status;
 }

@@ -2,22 +2,22 @@
  *
  * Vertices with equal keys count as one vertex. The keys are global ids if all ranks give them, else the bits of the
  * coordinates, with -0 as +0. That also holds on a single rank: otherwise a mesh that doubles its vertices along a
- * crack would look different on one rank and on two. It also holds for all meshes of a joint (session_joints.h), but
- * only by coordinates, because ids belong to one mesh. */
+ * crack would look different on one rank and on two. It also holds for all meshes of a mesh group
+ * (session_mesh_groups.h), but only by coordinates, because ids belong to one mesh. */
 #ifndef SESSION_VERTEX_GROUPS_H
 #define SESSION_VERTEX_GROUPS_H
 
 #include "session_catalogue.h"
 
-/* Input for grouping the vertices of a joint's meshes. */
+/* Input for grouping the vertices of a mesh group's meshes. */
 typedef struct session_vertex_groups_basis {
     uint64_t positions_hash;
     int part_count;
-    const session_mesh *const *parts; /* this rank's parts of all meshes of the joint */
+    const session_mesh *const *parts; /* this rank's parts of all meshes of the mesh group */
     /* borders of the parts, which contain the twins of vertices; NULL: vertices have no twins */
     const session_border *borders;
     const session_homes *homes;
-    bool by_id; /* set if the joint is a single mesh whose vertices are equal if their global ids are */
+    bool by_id; /* set if the mesh group is a single mesh whose vertices are equal if their global ids are */
     int ranks;
 } session_vertex_groups_basis;
 

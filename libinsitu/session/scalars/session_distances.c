@@ -48,10 +48,10 @@ static bool is_same_plane(const session_plane *a, const session_plane *b)
 
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane)
 {
-    const session_plane wanted = plane_of_scene(plane);
+    const session_plane given = plane_of_scene(plane);
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
-        if (session_is_distance(scalar) && is_same_plane(&scalar->plane, &wanted)) return scalar;
+        if (session_is_distance(scalar) && is_same_plane(&scalar->plane, &given)) return scalar;
     }
     return NULL;
 }

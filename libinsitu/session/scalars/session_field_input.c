@@ -80,7 +80,7 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
 }
 
 /* Checks a field that has values at the corners of cells. For meshes of mixed cells, the cells' types are checked
- * later, when the mesh is torn. */
+ * later, when the mesh is discontinuous. */
 static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
 {
     const long long row = field->corner_row, vertices = session_cell_nodes(mesh);

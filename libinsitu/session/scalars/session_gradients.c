@@ -462,13 +462,13 @@ done:
 
 /* ---- all cells of a grid --------------------------------------------------------------------------------------- */
 
-static void add_linear_cell(target *to, int64_t cell, node_list *room)
+static void add_linear_cell(target *to, int64_t cell, node_list *buffer)
 {
     const int type = grid_cell_type(to->basis->cells, cell);
     if (type == GRID_POLYHEDRON)
-        add_polyhedron(to, cell, room);
+        add_polyhedron(to, cell, buffer);
     else if (to->basis->of_shells)
-        add_shell(to, cell, room);
+        add_shell(to, cell, buffer);
     else
         add_solid_cell(to, cell, type);
 }
@@ -550,12 +550,12 @@ static void add_row(target *to, int64_t cell, node_list *row)
         if (is_summed(to->basis, piece)) add_linear_cell(to, piece, row);
 }
 
-static void add_cell(target *to, int64_t cell, node_list *room)
+static void add_cell(target *to, int64_t cell, node_list *buffer)
 {
     if (to->basis->polynomials)
-        add_row(to, cell, room);
+        add_row(to, cell, buffer);
     else
-        add_linear_cell(to, cell, room);
+        add_linear_cell(to, cell, buffer);
 }
 
 enum { NO_OWNER = 254, SHARED = 255 };

@@ -1,6 +1,6 @@
 /* Values that have an index are copied once, in the order of the vertices, cells or corners; values at the vertices of
- * a torn mesh are copied in the order of its corners. Without the copy, each tree and layer would read the index at
- * each vertex of each cell, and vectorized code could not be used. */
+ * a discontinuous mesh are copied in the order of its corners. Without the copy, each tree and layer would read the
+ * index at each vertex of each cell, and vectorized code could not be used. */
 #include "session_indexed.h"
 
 #include <string.h>
@@ -12,9 +12,9 @@
 #include "session_finer.h"
 #include "session_nodes.h"
 #include "session_scalars.h"
-#include "session_torn.h"
+#include "session_discontinuous.h"
 
-void session_want_field(const session_meshes *meshes, const scene_field *field)
+void session_request_field(const session_meshes *meshes, const scene_field *field)
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
@@ -23,14 +23,14 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
     }
 }
 
-void session_want_no_fields(const session_meshes *meshes)
+void session_clear_requested_fields(const session_meshes *meshes)
 {
     for (int m = 0; m < meshes->count; m++)
         for (int f = 0; f < meshes->items[m]->field_count; f++) meshes->items[m]->fields[f].is_in_statistics = false;
 }
 
 typedef struct indexed_values {
-    /* the mesh, if it is torn and values at vertices are read once per corner; else NULL */
+    /* the mesh, if it is discontinuous and values at vertices are read once per corner; else NULL */
     const session_mesh *mesh;
     const uint32_t *parents;         /* if positions are pieces of split cells, the cell of each; else NULL */
     grid_array index;                /* tuple of each position; if it has no data, position i has tuple i */
@@ -55,7 +55,7 @@ static indexed_values make_indexed_values(const session_mesh *mesh, const sessio
                           .position_count =
                               given->centring == INSITU_CELL ? mesh->cells.cell_count : session_vertex_count(mesh)};
     out.index.base = mesh->original.index_base;
-    if (given->centring == INSITU_VERTEX && mesh->torn.is_torn) out.mesh = mesh;
+    if (given->centring == INSITU_VERTEX && mesh->discontinuous.is_active) out.mesh = mesh;
     if (given->centring == INSITU_CELL) out.parents = mesh->topology.parents;
     if (given->corner_row) {
         out.row_length = given->corner_row;
@@ -68,7 +68,7 @@ static indexed_values make_indexed_values(const session_mesh *mesh, const sessio
  * corner. */
 static int64_t find_value_entry(const indexed_values *v, int64_t place)
 {
-    if (v->mesh) return session_torn_origin(v->mesh, place);
+    if (v->mesh) return session_vertex_of_corner(v->mesh, place);
     if (v->parents) return v->parents[place];
     return v->row_length == v->used_length ? place : place / v->used_length * v->row_length + place % v->used_length;
 }
@@ -202,14 +202,14 @@ static insitu_status update_copy(session_mesh *mesh, int index, int threads, bas
     return status;
 }
 
-insitu_status session_copy_wanted(const session_meshes *meshes, int threads, base_error *error)
+insitu_status session_copy_requested(const session_meshes *meshes, int threads, base_error *error)
 {
     insitu_status status = INSITU_OK;
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
         for (int f = 0; f < mesh->field_count; f++) {
-            const bool is_wanted = mesh->fields[f].is_in_statistics || mesh->fields[f].is_source;
-            if (is_wanted && !status) status = update_copy(mesh, f, threads, error);
+            const bool is_needed = mesh->fields[f].is_in_statistics || mesh->fields[f].is_source;
+            if (is_needed && !status) status = update_copy(mesh, f, threads, error);
             mesh->fields[f].is_in_statistics = false;
         }
     }

@@ -7,14 +7,14 @@
 #include "session_mesh.h"
 
 /* Marks the field as needed by statistics of this step, on all meshes that have it. Local. */
-void session_want_field(const session_meshes *meshes, const scene_field *field);
+void session_request_field(const session_meshes *meshes, const scene_field *field);
 /* Removes all of these marks. Local. */
-void session_want_no_fields(const session_meshes *meshes);
+void session_clear_requested_fields(const session_meshes *meshes);
 
-/* Copies values according to their index, unless the copy is up to date. session_copy_wanted() copies the fields that
- * statistics need, and clears their marks; session_copy_used() copies those of scalars in use, and the fields from
+/* Copies values according to their index, unless the copy is up to date. session_copy_requested() copies the fields
+ * that statistics need, and clears their marks; session_copy_used() copies those of scalars in use, and the fields from
  * which derived ones are computed. Must be called before the values are read. Local. */
-insitu_status session_copy_wanted(const session_meshes *meshes, int threads, base_error *error);
+insitu_status session_copy_requested(const session_meshes *meshes, int threads, base_error *error);
 insitu_status session_copy_used(const session_meshes *meshes, int threads, base_error *error);
 
 /* Passes the caller's values at the nodes of cells of higher order to a function, unless the field has no values there

@@ -115,9 +115,9 @@ void session_share_derived(const session_meshes *meshes, const char *name)
 static void update_image(const scene_mirror *mirror, session_meshes *meshes, session_mesh *source, int axes,
                          int threads, base_error *error)
 {
-    const bool is_wanted = mirror && source->is_given && (axes & ~mirror->axes) == 0;
+    const bool is_drawn = mirror && source->is_given && (axes & ~mirror->axes) == 0;
     session_mesh *image = session_find_image(meshes, source, axes);
-    if (!is_wanted) {
+    if (!is_drawn) {
         if (image) session_remove_image(meshes, image);
         return;
     }

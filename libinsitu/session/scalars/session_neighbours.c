@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "session_torn.h"
+#include "session_discontinuous.h"
 
 static double given_coordinate(const session_mesh *mesh, int axis, int64_t vertex)
 {
@@ -42,7 +42,7 @@ static session_key key_of_position(const grid_array coordinates[3], int64_t vert
 
 session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
 {
-    if (by_id) return key_of_id(mesh, mesh->torn.is_made ? session_torn_origin(mesh, vertex) : vertex);
+    if (by_id) return key_of_id(mesh, mesh->discontinuous.is_made ? session_vertex_of_corner(mesh, vertex) : vertex);
     return key_of_position(mesh->cells.coordinates, vertex);
 }
 

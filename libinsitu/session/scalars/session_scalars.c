@@ -23,29 +23,30 @@ const char *session_scalar_name(const session_mesh *mesh, const session_scalar *
     return session_is_distance(scalar) ? "distance from a slice" : mesh->fields[scalar->field].given.name;
 }
 
-static uint64_t find_joint_name(const session_mesh *mesh, const scene_field *field)
+static uint64_t find_mesh_group_name(const session_mesh *mesh, const scene_field *field)
 {
-    return mesh->single_joint_name ? mesh->single_joint_name : field->joint_name;
+    return mesh->single_group_name ? mesh->single_group_name : field->mesh_group_name;
 }
 
-/* Returns the scalar of the mesh with these properties; NULL if there is none. joined: for a recentred scalar, the hash
- * of the meshes over which it is averaged. */
+/* Returns the scalar of the mesh with these properties; NULL if there is none. mesh_group_name: for a recentred scalar,
+ * the hash of the meshes over which it is averaged. */
 static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred,
-                                   uint64_t joined)
+                                   uint64_t mesh_group_name)
 {
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
         if (scalar->field == field && scalar->component == component && scalar->is_recentred == is_recentred &&
-            (!is_recentred || scalar->joint_name == joined))
+            (!is_recentred || scalar->mesh_group_name == mesh_group_name))
             return scalar;
     }
     return NULL;
 }
 
-session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component, uint64_t joined)
+session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component,
+                                       uint64_t mesh_group_name)
 {
     const int index = session_find_field(mesh, field);
-    return index < 0 ? NULL : find_scalar(mesh, index, component, true, joined);
+    return index < 0 ? NULL : find_scalar(mesh, index, component, true, mesh_group_name);
 }
 
 /* Returns the field's index on the mesh; -1 if the layer is not drawn on the mesh or the mesh lacks the field. */
@@ -67,7 +68,7 @@ bool session_is_copied(const session_mesh *mesh, const session_field *field)
 {
     if (field->has_index || field->is_derived) return true;
     if (mesh->finer.parts) return true;
-    if (field->given.centring == INSITU_VERTEX) return mesh->torn.is_torn;
+    if (field->given.centring == INSITU_VERTEX) return mesh->discontinuous.is_active;
     if (field->given.centring == INSITU_CELL) return mesh->topology.is_split;
     return field->given.corner_row && field->given.corner_row != session_cell_nodes(&mesh->given);
 }
@@ -88,7 +89,8 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
     if (index < 0) return NULL;
     const insitu_field *given = &mesh->fields[index].given;
     return find_scalar(mesh, index, session_resolve_component(field, given->component_count),
-                       session_is_recentred(field, given->centring, mesh->is_refined), find_joint_name(mesh, field));
+                       session_is_recentred(field, given->centring, mesh->is_refined),
+                       find_mesh_group_name(mesh, field));
 }
 
 grid_field session_given_field(const session_mesh *mesh, int index, int component)
@@ -148,7 +150,7 @@ session_scalar *session_add_scalar(session_mesh *mesh)
     return &scalars[mesh->scalar_count++];
 }
 
-bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool wants_ranges, session_scalar **marked)
+bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool needs_ranges, session_scalar **marked)
 {
     const int index = find_field(mesh, field);
     *marked = NULL;
@@ -161,12 +163,12 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
         scalar->field = index;
         scalar->component = session_resolve_component(field, given->component_count);
         scalar->is_recentred = session_is_recentred(field, given->centring, mesh->is_refined);
-        scalar->joint_name = find_joint_name(mesh, field);
+        scalar->mesh_group_name = find_mesh_group_name(mesh, field);
     }
     scalar->is_used = true;
     scalar->original_values = session_given_field(mesh, index, scalar->component);
-    scalar->needs_ranges = scalar->needs_ranges || wants_ranges;
-    mesh->is_needed = mesh->is_needed || wants_ranges;
+    scalar->needs_ranges = scalar->needs_ranges || needs_ranges;
+    mesh->is_needed = mesh->is_needed || needs_ranges;
     *marked = scalar;
     return true;
 }

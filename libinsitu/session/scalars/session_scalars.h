@@ -16,14 +16,15 @@ bool session_is_recentred(const scene_field *field, insitu_centring centring, bo
 
 /* Marks the scalar of a layer's field on the mesh as used by an image of this step. *marked receives the scalar, or
  * NULL if the mesh does not have the field. Returns false if memory runs out. Local. */
-bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool wants_ranges, session_scalar **marked);
+bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool needs_ranges, session_scalar **marked);
 
 /* Returns the scalar of a layer's field on this rank's mesh; NULL if the mesh does not have the field. */
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
 
-/* Returns the scalar whose values are means at vertices over the meshes with the hash `joined`
- * (scene_field.joint_name); NULL if there is none. */
-session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component, uint64_t joined);
+/* Returns the scalar whose values are means at vertices over the meshes with the hash `mesh_group_name`
+ * (scene_field.mesh_group_name); NULL if there is none. */
+session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component,
+                                       uint64_t mesh_group_name);
 
 /* Returns the mesh's field, or a component of it, with the values given by the caller, in the order of the vertices or
  * cells. */

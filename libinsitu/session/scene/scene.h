@@ -31,8 +31,9 @@ typedef struct scene_field {
     int mesh_count;     /* number of names in `meshes`; 0: the field is shown on all meshes that have it */
     char **meshes;      /* names of meshes; "a" also selects the meshes whose names begin with "a/" */
     int meshes_line;    /* line of `meshes` in the scene file, for messages */
-    /* hash of the set of meshes over which values are averaged at vertices; set by the session (session_joints.h) */
-    uint64_t joint_name;
+    /* hash of the set of meshes over which values are averaged at vertices; set by the session (session_mesh_groups.h)
+     */
+    uint64_t mesh_group_name;
 } scene_field;
 
 /* Returns whether the layer's list of meshes includes a mesh of this name, which may still lack the field. */
@@ -68,8 +69,8 @@ typedef struct scene_derived {
      * vector field, or its two or three components */
     scene_field *inputs;
     int *derived_indices; /* for each input, the index of the derived field that it is, or -1 */
-    /* hash of the set of meshes over which gradients are averaged; set by the session (session_joints.h) */
-    uint64_t joint_name;
+    /* hash of the set of meshes over which gradients are averaged; set by the session (session_mesh_groups.h) */
+    uint64_t mesh_group_name;
 } scene_derived;
 
 /* How a range that is not fixed is computed, in each step that draws, from the values on all ranks. */

@@ -90,19 +90,19 @@ static grid_field make_absent_field(void)
                         .component_count = 1};
 }
 
-/* Stores a part's field for a layer at index `at`, and its ranges if wants_ranges is set. scalar is NULL if the part
+/* Stores a part's field for a layer at index `at`, and its ranges if needs_ranges is set. scalar is NULL if the part
  * lacks the field. */
 static void set_scalar_field(session_layers *layers, ptrdiff_t at, const session_mesh *mesh,
-                             const session_scalar *scalar, bool wants_ranges)
+                             const session_scalar *scalar, bool needs_ranges)
 {
     layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : make_absent_field();
-    if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
+    if (scalar && needs_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
 }
 
 /* Stores the fields of all parts for a layer in section `slot` of the array of fields; a section consists of part_count
  * fields. If plane is not NULL, the distances from the plane take the place of the field's values. */
 static render_field set_layer_field(const session_meshes *meshes, session_layers *layers, int slot,
-                                    const scene_field *field, const scene_plane *plane, bool wants_ranges)
+                                    const scene_field *field, const scene_plane *plane, bool needs_ranges)
 {
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     const render_field out = {layers->fields + first, layers->ranges + first};
@@ -112,7 +112,7 @@ static render_field set_layer_field(const session_meshes *meshes, session_layers
         if (!is_part(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field);
         if (scalar && plane) scalar = session_find_distance(mesh, plane);
-        set_scalar_field(layers, at++, mesh, scalar, wants_ranges);
+        set_scalar_field(layers, at++, mesh, scalar, needs_ranges);
     }
     return out;
 }

@@ -60,7 +60,7 @@ typedef struct mesh_work {
 typedef struct part_work {
     const mesh_work *of;
     const session_mesh *mesh;
-    session_deviation_wish wish;
+    session_deviation_request wish;
     session_piece_set *pieces; /* NULL: the wish is measured */
     volume_error *volume;      /* of a volume */
 } part_work;
@@ -195,12 +195,12 @@ static void fill_fields(const session_pieces_basis *basis, const session_wish_vi
     for (int i = 0; i < views->count; i++) {
         const scene_image *image = &basis->scene->images[i];
         for (int layer = 0; views->are_due[i] && layer < image->isosurface_count; layer++)
-            session_want_field(basis->meshes, &image->isosurfaces[layer].field);
+            session_request_field(basis->meshes, &image->isosurfaces[layer].field);
         for (int layer = 0; views->are_due[i] && layer < image->volume_count; layer++)
-            session_want_field(basis->meshes, &image->volumes[layer].field);
+            session_request_field(basis->meshes, &image->volumes[layer].field);
     }
     session_fill_fields(basis->meshes, basis->catalogue, false, &unheard);
-    session_want_no_fields(basis->meshes);
+    session_clear_requested_fields(basis->meshes);
 }
 
 /* Values of one mesh that are summed over the ranks. */

@@ -6,20 +6,20 @@
  * layers of the mesh are drawn in this form, so that fields at corners, vertices and cells can be combined. Code that
  * must find equal vertices (for means at vertices, or for outer faces) compares ids or coordinates across ranks anyway,
  * and so works for corners too. */
-#ifndef SESSION_TORN_H
-#define SESSION_TORN_H
+#ifndef SESSION_DISCONTINUOUS_H
+#define SESSION_DISCONTINUOUS_H
 
 #include "scene.h"
 #include "session_catalogue.h"
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Tears the meshes that have a field at corners which the scene uses, unless they are already torn with the current
- * coordinates, and restores the others. Cells must have been checked. Collective. */
-insitu_status session_tear_meshes(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
-                                  const session_team *team, base_error *error);
+/* Tears the meshes that have a field at corners which the scene uses, unless they are already discontinuous with the
+ * current coordinates, and restores the others. Cells must have been checked. Collective. */
+insitu_status session_make_discontinuous(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
+                                         const session_team *team, base_error *error);
 
-/* Returns the caller's number of the vertex at a corner of a torn mesh. */
-int64_t session_torn_origin(const session_mesh *mesh, int64_t corner);
+/* Returns the caller's number of the vertex at a corner of a discontinuous mesh. */
+int64_t session_vertex_of_corner(const session_mesh *mesh, int64_t corner);
 
 #endif

@@ -1,4 +1,4 @@
-#include "session_torn.h"
+#include "session_discontinuous.h"
 
 #include <string.h>
 
@@ -41,16 +41,16 @@ static bool is_named_in_scene(const session_mesh *mesh, const scene *scene)
 
 /* ---- one mesh ------------------------------------------------------------------------------------------------- */
 
-static int64_t origin_of(const session_torn *torn, const insitu_mesh *given, int64_t corner)
+static int64_t origin_of(const session_discontinuous *vertices, const insitu_mesh *given, int64_t corner)
 {
-    if (torn->are_corners_entries)
-        return grid_array_index(&torn->shared_connectivity, session_entry_place(given, corner));
-    return grid_array_index(&torn->shared_connectivity, grid_array_index(&torn->corners, corner));
+    if (vertices->are_corners_entries)
+        return grid_array_index(&vertices->shared_connectivity, session_entry_place(given, corner));
+    return grid_array_index(&vertices->shared_connectivity, grid_array_index(&vertices->corners, corner));
 }
 
-int64_t session_torn_origin(const session_mesh *mesh, int64_t corner)
+int64_t session_vertex_of_corner(const session_mesh *mesh, int64_t corner)
 {
-    return origin_of(&mesh->torn, &mesh->given, corner);
+    return origin_of(&mesh->discontinuous, &mesh->given, corner);
 }
 
 static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *error)
@@ -67,22 +67,22 @@ static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *erro
 
 /* Copies the vertex positions to all corners, packed and in their own type. Entries of the connectivity that belong to
  * no cell may be invalid indices; they get the first vertex's position. */
-static bool copy_coordinates(const session_mesh *mesh, int threads, session_torn *torn)
+static bool copy_coordinates(const session_mesh *mesh, int threads, session_discontinuous *vertices)
 {
     const grid *shared = &mesh->cells;
     for (int axis = 0; axis < 3; axis++) {
         const grid_array from = shared->coordinates[axis];
         const size_t size = from.is_wide ? 8 : 4;
-        char *to = base_alloc((size_t)(torn->corner_count + 1) * size);
+        char *to = base_alloc((size_t)(vertices->corner_count + 1) * size);
         if (!to) return false;
-        torn->coordinates[axis] = (grid_array){.data = to, .stride = (int64_t)size, .is_wide = from.is_wide};
-        torn->bytes += torn->corner_count * (int64_t)size;
+        vertices->coordinates[axis] = (grid_array){.data = to, .stride = (int64_t)size, .is_wide = from.is_wide};
+        vertices->bytes += vertices->corner_count * (int64_t)size;
 #pragma omp parallel num_threads(threads)
         {
             region_enter();
 #pragma omp for schedule(static) nowait
-            for (int64_t corner = 0; corner < torn->corner_count; corner++) {
-                const int64_t vertex = origin_of(torn, &mesh->given, corner);
+            for (int64_t corner = 0; corner < vertices->corner_count; corner++) {
+                const int64_t vertex = origin_of(vertices, &mesh->given, corner);
                 const bool is_vertex = vertex >= 0 && vertex < shared->vertex_count;
                 memcpy(to + corner * (int64_t)size, from.data + (is_vertex ? vertex : 0) * from.stride, size);
             }
@@ -92,38 +92,41 @@ static bool copy_coordinates(const session_mesh *mesh, int threads, session_torn
     return true;
 }
 
-/* Creates the connectivity of the torn mesh, in which each corner of a cell is a vertex. */
-static insitu_status number_corners(const session_mesh *mesh, int threads, session_torn *torn, base_error *error)
+/* Creates the connectivity of the discontinuous mesh, in which each corner of a cell is a vertex. */
+static insitu_status number_corners(const session_mesh *mesh, int threads, session_discontinuous *vertices,
+                                    base_error *error)
 {
-    torn->are_corners_entries = mesh->topology.is_split;
-    torn->shared_connectivity = torn->are_corners_entries ? session_index_array(&mesh->given, &mesh->given.connectivity)
-                                                          : mesh->cells.connectivity;
-    if (torn->are_corners_entries) {
-        torn->bytes = mesh->topology.connectivity_count * mesh->topology.connectivity.stride;
-        return session_split_entries(mesh, threads, &torn->corners, error);
+    vertices->are_corners_entries = mesh->topology.is_split;
+    vertices->shared_connectivity = vertices->are_corners_entries
+                                        ? session_index_array(&mesh->given, &mesh->given.connectivity)
+                                        : mesh->cells.connectivity;
+    if (vertices->are_corners_entries) {
+        vertices->bytes = mesh->topology.connectivity_count * mesh->topology.connectivity.stride;
+        return session_split_entries(mesh, threads, &vertices->corners, error);
     }
-    if (!session_make_indices(mesh, "cells' corners", torn->corner_count, torn->corner_count, &torn->corners, error))
+    if (!session_make_indices(mesh, "cells' corners", vertices->corner_count, vertices->corner_count,
+                              &vertices->corners, error))
         return error->status;
-    for (int64_t i = 0; i < torn->corner_count; i++) session_store_index(&torn->corners, i, i);
-    session_permute_cells(mesh, torn->corner_count, threads, &torn->corners);
-    torn->bytes = torn->corner_count * torn->corners.stride;
+    for (int64_t i = 0; i < vertices->corner_count; i++) session_store_index(&vertices->corners, i, i);
+    session_permute_cells(mesh, vertices->corner_count, threads, &vertices->corners);
+    vertices->bytes = vertices->corner_count * vertices->corners.stride;
     return INSITU_OK;
 }
 
-static insitu_status tear_mesh(session_mesh *mesh, int threads, base_error *error)
+static insitu_status make_discontinuous(session_mesh *mesh, int threads, base_error *error)
 {
-    session_torn torn = {.is_torn = true, .corner_count = session_corner_count(&mesh->given)};
+    session_discontinuous vertices = {.is_active = true, .corner_count = session_corner_count(&mesh->given)};
     insitu_status status = refuse_polyhedra(mesh, error);
     if (status) return status;
-    status = number_corners(mesh, threads, &torn, error);
+    status = number_corners(mesh, threads, &vertices, error);
     if (status) return status;
-    torn.is_made = copy_coordinates(mesh, threads, &torn);
-    if (!torn.is_made) {
-        session_drop_torn(&torn);
+    vertices.is_made = copy_coordinates(mesh, threads, &vertices);
+    if (!vertices.is_made) {
+        session_drop_discontinuous(&vertices);
         return session_fail_for_memory(error, session_corner_count(&mesh->given) * 24, "corners' coordinates");
     }
-    session_drop_torn(&mesh->torn);
-    mesh->torn = torn;
+    session_drop_discontinuous(&mesh->discontinuous);
+    mesh->discontinuous = vertices;
     session_read_topology(mesh);
     return INSITU_OK;
 }
@@ -138,16 +141,16 @@ static void drop_vertex_data(session_meshes *meshes, session_mesh *mesh)
     for (int i = 0; i < mesh->field_count; i++) session_drop_copy(&mesh->fields[i]);
 }
 
-static insitu_status update_torn_mesh(session_meshes *meshes, session_mesh *mesh, bool is_torn, int threads,
-                                      base_error *error)
+static insitu_status update_discontinuous_mesh(session_meshes *meshes, session_mesh *mesh, bool is_discontinuous,
+                                               int threads, base_error *error)
 {
-    const bool was_torn = mesh->torn.is_torn;
-    if (!is_torn && was_torn) {
-        session_drop_torn(&mesh->torn);
+    const bool was_discontinuous = mesh->discontinuous.is_active;
+    if (!is_discontinuous && was_discontinuous) {
+        session_drop_discontinuous(&mesh->discontinuous);
         session_read_topology(mesh);
     }
-    if (is_torn != was_torn) drop_vertex_data(meshes, mesh);
-    return is_torn && !mesh->torn.is_made ? tear_mesh(mesh, threads, error) : INSITU_OK;
+    if (is_discontinuous != was_discontinuous) drop_vertex_data(meshes, mesh);
+    return is_discontinuous && !mesh->discontinuous.is_made ? make_discontinuous(mesh, threads, error) : INSITU_OK;
 }
 
 /* ---- all meshes ------------------------------------------------------------------------------------------------ */
@@ -160,14 +163,14 @@ static bool has_corners(const session_catalogue *catalogue)
     return false;
 }
 
-insitu_status session_tear_meshes(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
-                                  const session_team *team, base_error *error)
+insitu_status session_make_discontinuous(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
+                                         const session_team *team, base_error *error)
 {
     for (int m = 0; m < meshes->count && !error->status; m++) {
         session_mesh *mesh = meshes->items[m];
         /* a mesh with finer lattices needs no tearing, because each cell has its own nodes */
-        const bool is_torn = !mesh->finer.parts && is_named_in_scene(mesh, scene);
-        if (mesh->is_given) update_torn_mesh(meshes, mesh, is_torn, team->threads, error);
+        const bool is_discontinuous = !mesh->finer.parts && is_named_in_scene(mesh, scene);
+        if (mesh->is_given) update_discontinuous_mesh(meshes, mesh, is_discontinuous, team->threads, error);
     }
     return has_corners(catalogue) ? session_agree(team->comm, error) : INSITU_OK;
 }
