@@ -177,35 +177,35 @@ typedef struct folder_and_name {
 } folder_and_name;
 
 /* Returns false if the file is of a kind that a rename must not replace, such as a folder, pipe or device. */
-static bool check_place(const folder_and_name *place, file_failure *failure)
+static bool check_file_type(const folder_and_name *target, file_failure *failure)
 {
     struct stat found;
-    if (*place->name == '\0') return fail_for_file_type(failure, S_IFDIR);
-    if (fstatat(place->folder, place->name, &found, AT_SYMLINK_NOFOLLOW) != 0)
+    if (*target->name == '\0') return fail_for_file_type(failure, S_IFDIR);
+    if (fstatat(target->folder, target->name, &found, AT_SYMLINK_NOFOLLOW) != 0)
         return errno == ENOENT || fail_with_errno(failure, errno);
     return S_ISREG(found.st_mode) || S_ISLNK(found.st_mode) || fail_for_file_type(failure, found.st_mode);
 }
 
-static bool open_parent_folder(const char *path, folder_and_name *place, file_failure *failure)
+static bool open_parent_folder(const char *path, folder_and_name *target, file_failure *failure)
 {
-    place->folder = -1;
-    place->path = base_strdup(path);
-    if (!place->path) return fail_with_errno(failure, ENOMEM);
-    char *slash = strrchr(place->path, '/');
-    place->name = slash ? slash + 1 : place->path;
-    if (slash && !make_folders(place->path)) return fail_with_errno(failure, errno);
+    target->folder = -1;
+    target->path = base_strdup(path);
+    if (!target->path) return fail_with_errno(failure, ENOMEM);
+    char *slash = strrchr(target->path, '/');
+    target->name = slash ? slash + 1 : target->path;
+    if (slash && !make_folders(target->path)) return fail_with_errno(failure, errno);
     if (slash) *slash = '\0';
-    const char *folder = !slash ? "." : slash == place->path ? "/" : place->path;
-    place->folder = open(folder, O_PATH | O_DIRECTORY | O_CLOEXEC);
-    return (place->folder >= 0 || fail_with_errno(failure, errno)) && check_place(place, failure);
+    const char *folder = !slash ? "." : slash == target->path ? "/" : target->path;
+    target->folder = open(folder, O_PATH | O_DIRECTORY | O_CLOEXEC);
+    return (target->folder >= 0 || fail_with_errno(failure, errno)) && check_file_type(target, failure);
 }
 
 enum { TEMPORARY_NAME = 40, TRIES = 8 };
 
 /* Writes a new file with the temporary name, and renames it to its final name. */
-static bool try_to_replace(const folder_and_name *place, const char *temporary, const char *bytes, size_t size)
+static bool try_to_replace(const folder_and_name *target, const char *temporary, const char *bytes, size_t size)
 {
-    const int file = openat(place->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    const int file = openat(target->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (file < 0) return false;
     /* the lock prevents other writers of pictures from deleting the file as one that a killed run has left */
     flock(file, LOCK_EX | LOCK_NB);
@@ -215,23 +215,23 @@ static bool try_to_replace(const folder_and_name *place, const char *temporary, 
         is_written = false;
         code = errno;
     }
-    if (is_written && renameat(place->folder, temporary, place->folder, place->name) == 0) return true;
+    if (is_written && renameat(target->folder, temporary, target->folder, target->name) == 0) return true;
     if (is_written) code = errno;
-    unlinkat(place->folder, temporary, 0);
+    unlinkat(target->folder, temporary, 0);
     errno = code;
     return false;
 }
 
 /* Replaces the file; tries again if another process has deleted the temporary file because it took it for one that a
  * killed run has left. */
-static bool replace_file(const folder_and_name *place, const char *bytes, size_t size, file_failure *failure)
+static bool replace_file(const folder_and_name *target, const char *bytes, size_t size, file_failure *failure)
 {
     for (int i = 0; i < TRIES; i++) {
         uint64_t random;
         char temporary[TEMPORARY_NAME];
         if (getrandom(&random, sizeof random, GRND_NONBLOCK) != sizeof random) return fail_with_errno(failure, errno);
         snprintf(temporary, sizeof temporary, ".insitu-%016llx.part", (unsigned long long)random);
-        if (try_to_replace(place, temporary, bytes, size)) return true;
+        if (try_to_replace(target, temporary, bytes, size)) return true;
         if (errno != ENOENT && errno != EEXIST) break;
     }
     return fail_with_errno(failure, errno);
@@ -239,9 +239,9 @@ static bool replace_file(const folder_and_name *place, const char *bytes, size_t
 
 bool file_replace(const char *path, const char *bytes, size_t size, file_failure *failure)
 {
-    folder_and_name place;
-    const bool is_replaced = open_parent_folder(path, &place, failure) && replace_file(&place, bytes, size, failure);
-    if (place.folder >= 0) close(place.folder);
-    base_free(place.path);
+    folder_and_name target;
+    const bool is_replaced = open_parent_folder(path, &target, failure) && replace_file(&target, bytes, size, failure);
+    if (target.folder >= 0) close(target.folder);
+    base_free(target.path);
     return is_replaced;
 }

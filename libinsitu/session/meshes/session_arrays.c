@@ -38,9 +38,9 @@ static const uint64_t most_bytes = (uint64_t)1 << 48;
 /* Checks a stride in bytes. A negative stride is valid: the elements then lie before the first one. A stride of 0 means
  * that the elements are packed. */
 static insitu_status check_stride(const void *data, const char *name, int64_t count, int64_t stride, int64_t size,
-                                  bool is_anywhere, insitu_status bad, base_error *error)
+                                  bool is_any_stride, insitu_status bad, base_error *error)
 {
-    if (stride % size != 0 && !is_anywhere)
+    if (stride % size != 0 && !is_any_stride)
         return base_fail(error, bad, "%s have a stride of %lld bytes, no multiple of their %lld", name,
                          (long long)stride, (long long)size);
     const uint64_t step = stride < 0 ? 0 - (uint64_t)stride : (uint64_t)stride;
@@ -53,7 +53,8 @@ static insitu_status check_stride(const void *data, const char *name, int64_t co
     return INSITU_OK;
 }
 
-static insitu_status check_place(const void *data, const char *name, int64_t size, insitu_status bad, base_error *error)
+static insitu_status check_alignment(const void *data, const char *name, int64_t size, insitu_status bad,
+                                     base_error *error)
 {
     if ((uintptr_t)data % (uintptr_t)size == 0) return INSITU_OK;
     return base_fail(error, bad, "%s are not aligned to their %lld bytes", name, (long long)size);
@@ -70,19 +71,19 @@ insitu_status session_check_array(const insitu_array *array, const session_array
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
                          (int)array->type, describe_allowed_types(rule->flags));
     const int64_t size = session_type_size(array->type), count = rule->count + (rule->flags & SESSION_HAS_END ? 1 : 0);
-    const bool is_anywhere = rule->flags & SESSION_ALLOW_ANY;
-    const insitu_status status = is_anywhere ? INSITU_OK : check_place(array->data, rule->name, size, bad, error);
+    const bool is_any_stride = rule->flags & SESSION_ALLOW_ANY;
+    const insitu_status status = is_any_stride ? INSITU_OK : check_alignment(array->data, rule->name, size, bad, error);
     if (status) return status;
     const int64_t stride = array->stride_bytes ? array->stride_bytes : size * rule->per_tuple;
-    return check_stride(array->data, rule->name, count, stride, size, is_anywhere, bad, error);
+    return check_stride(array->data, rule->name, count, stride, size, is_any_stride, bad, error);
 }
 
-insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, bool is_anywhere,
+insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, bool is_any_stride,
                                        const char *name, base_error *error)
 {
     if (!data->data) return INSITU_OK;
-    return check_stride(data->data, name, count, stride, session_type_size(data->type), is_anywhere, INSITU_ERROR_FIELD,
-                        error);
+    return check_stride(data->data, name, count, stride, session_type_size(data->type), is_any_stride,
+                        INSITU_ERROR_FIELD, error);
 }
 
 insitu_status session_check_pointers(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
@@ -92,7 +93,7 @@ insitu_status session_check_pointers(const insitu_array *array, const session_ar
     if (!is_allowed_type(array->type, rule->flags))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
                          (int)array->type, describe_allowed_types(rule->flags));
-    const insitu_status status = check_place(array->data, rule->name, size, bad, error);
+    const insitu_status status = check_alignment(array->data, rule->name, size, bad, error);
     if (status) return status;
     return check_stride(array->data, rule->name, rule->count, array->stride_bytes ? array->stride_bytes : size, size,
                         false, bad, error);

@@ -137,13 +137,13 @@ static void multiply(const double *matrix, int rows, int columns, int outer, int
  * cell's lattice or of the finer one. */
 static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *out)
 {
-    const int rows = is_fine ? lists->fine_count : lists->count, places = is_fine ? lists->fine_order : lists->order;
+    const int rows = is_fine ? lists->fine_count : lists->count, order = is_fine ? lists->fine_order : lists->order;
     double line[NODES_MOST_ORDER + 1];
     session_place_nodes(lists->order, lists->is_lobatto, line);
     for (int r = 0; r < rows; r++) {
         const int *node = is_fine ? lists->fine[r] : lists->nodes[r];
         double at[4];
-        for (int c = 0; c < 4; c++) at[c] = (double)node[c] / places;
+        for (int c = 0; c < 4; c++) at[c] = (double)node[c] / order;
         if (lists->dimensions == 1 && !is_fine) at[1] = line[node[1]];
         if (lists->dimensions == 1 && !is_fine) at[0] = 1 - at[1];
         for (int n = 0; n < lists->count; n++)
@@ -339,7 +339,7 @@ size_t session_bound_work_size(const session_bound *of)
     return SIZE * (2 * nodes + 6 * fine) + 3 * fine;
 }
 
-static void place_arrays(bound_job *job, double *work)
+static void divide_work(bound_job *job, double *work)
 {
     const size_t nodes = SIZE * (size_t)job->of->nodes.complete.count,
                  fine = SIZE * (size_t)job->of->levels[job->level].count;
@@ -585,7 +585,7 @@ bool session_may_cross(const session_bound *of, const double *values, const sess
 {
     bound_job job = {.of = of};
     double low = INFINITY, high = -INFINITY, zero = 0;
-    place_arrays(&job, work);
+    divide_work(&job, work);
     find_coefficients(&job, 1, values);
     for (int i = 0; i < of->nodes.complete.count; i++) {
         zero += 0 * job.coefficients[i]; /* NaN if a coefficient is not finite */
@@ -602,7 +602,7 @@ session_cell_bound session_bound_cell(const session_bound *of, const double *tup
     bound_job job = {.of = of, .isovalues = isovalues, .level = level};
     session_cell_bound out = {.node_distance = find_node_distance(of, tuples)};
     const int p = of->nodes.of.order;
-    place_arrays(&job, work);
+    divide_work(&job, work);
     find_coefficients(&job, SIZE, tuples);
     find_sphere(&job, &out);
     out.is_crossed = isfinite(out.radius);

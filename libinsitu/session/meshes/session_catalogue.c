@@ -641,13 +641,12 @@ void session_mesh_group_parts_free(session_mesh_group_parts *parts)
 static insitu_status update_mesh_group(session_mesh_group *mesh_group, const session_meshes *meshes,
                                        double half_diagonal, const session_team *team, base_error *error)
 {
-    uint64_t places = SESSION_HASH_BEGIN;
+    uint64_t hash = SESSION_HASH_BEGIN;
     for (int i = 0; i < mesh_group->count; i++)
-        session_hash_bytes(&places, &mesh_group->meshes[i]->positions_hash,
-                           sizeof mesh_group->meshes[i]->positions_hash);
+        session_hash_bytes(&hash, &mesh_group->meshes[i]->positions_hash, sizeof mesh_group->meshes[i]->positions_hash);
     const bool is_known =
-        (places | 1) == mesh_group->positions_hash && mesh_group->homes && mesh_group->homes->is_computed;
-    mesh_group->positions_hash = places | 1;
+        (hash | 1) == mesh_group->positions_hash && mesh_group->homes && mesh_group->homes->is_computed;
+    mesh_group->positions_hash = hash | 1;
     mesh_group->homes = mesh_group->count == 1 ? &mesh_group->meshes[0]->homes : &mesh_group->own_homes;
     if (is_known || mesh_group->count == 1) return INSITU_OK;
     session_mesh_group_parts parts;

@@ -50,14 +50,14 @@ typedef enum face_fault {
     FACES_OPEN           /* some edge does not belong to exactly two faces */
 } face_fault;
 
-typedef struct face_place {
+typedef struct face_fault_details {
     int64_t count;         /* number of the cell's faces */
     int64_t face;          /* number of the faulty face, as stored in the connectivity */
     int64_t first, end;    /* begin and end of the face in the list of faces' vertices */
     int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
     int sharing;           /* number of faces that have the edge */
     double position[3];    /* coordinates of the faulty vertex */
-} face_place;
+} face_fault_details;
 
 static void free_edge_buffer(edge_buffer *buffer)
 {
@@ -82,28 +82,28 @@ static bool is_finite_vertex(const grid *g, int64_t vertex, double position[3])
     return isfinite(position[0]) && isfinite(position[1]) && isfinite(position[2]);
 }
 
-static face_fault check_face(const session_mesh *mesh, bool is_ghost, face_place *place)
+static face_fault check_face(const session_mesh *mesh, bool is_ghost, face_fault_details *details)
 {
     const grid *g = &mesh->cells;
-    if (place->face < 0 || place->face >= g->face_count) return FACE_BAD_INDEX;
-    grid_face_vertices(g, place->face, &place->first, &place->end);
-    if (place->first < 0 || place->end < place->first || place->end > mesh->topology.face_connectivity_count)
+    if (details->face < 0 || details->face >= g->face_count) return FACE_BAD_INDEX;
+    grid_face_vertices(g, details->face, &details->first, &details->end);
+    if (details->first < 0 || details->end < details->first || details->end > mesh->topology.face_connectivity_count)
         return FACE_BAD_OFFSETS;
-    if (place->end - place->first < 3) return FACE_TOO_SMALL;
-    for (int64_t i = place->first; i < place->end; i++) {
-        place->vertex = grid_array_index(&g->face_connectivity, i);
-        if (place->vertex < 0 || place->vertex >= g->vertex_count) return FACE_BAD_VERTEX;
-        if (!is_ghost && !is_finite_vertex(g, place->vertex, place->position)) return FACE_BAD_COORDINATE;
+    if (details->end - details->first < 3) return FACE_TOO_SMALL;
+    for (int64_t i = details->first; i < details->end; i++) {
+        details->vertex = grid_array_index(&g->face_connectivity, i);
+        if (details->vertex < 0 || details->vertex >= g->vertex_count) return FACE_BAD_VERTEX;
+        if (!is_ghost && !is_finite_vertex(g, details->vertex, details->position)) return FACE_BAD_COORDINATE;
     }
     return FACES_GOOD;
 }
 
-static int64_t add_edges(const grid *g, const face_place *place, face_edge *edges, int64_t count)
+static int64_t add_edges(const grid *g, const face_fault_details *details, face_edge *edges, int64_t count)
 {
-    int64_t from = grid_array_index(&g->face_connectivity, place->end - 1);
-    for (int64_t i = place->first; i < place->end; i++) {
+    int64_t from = grid_array_index(&g->face_connectivity, details->end - 1);
+    for (int64_t i = details->first; i < details->end; i++) {
         const int64_t to = grid_array_index(&g->face_connectivity, i);
-        if (from != to) edges[count++] = (face_edge){from < to ? from : to, from < to ? to : from, place->face};
+        if (from != to) edges[count++] = (face_edge){from < to ? from : to, from < to ? to : from, details->face};
         from = to;
     }
     return count;
@@ -117,52 +117,52 @@ static int compare_edges(const void *left, const void *right)
     return a->face < b->face ? -1 : a->face > b->face;
 }
 
-static face_fault check_edges(face_edge *edges, int64_t count, face_place *place)
+static face_fault check_edges(face_edge *edges, int64_t count, face_fault_details *details)
 {
     if (count) qsort(edges, (size_t)count, sizeof *edges, compare_edges);
     for (int64_t i = 0; i < count; i += 2) {
         int64_t end = i;
         while (end < count && edges[end].low == edges[i].low && edges[end].high == edges[i].high) end++;
         if (end - i == 2 && edges[i].face != edges[i + 1].face) continue;
-        place->face = edges[i].face;
-        place->vertex = edges[i].low;
-        place->other = edges[i].high;
-        place->sharing = end - i < 1000 ? (int)(end - i) : 1000;
+        details->face = edges[i].face;
+        details->vertex = edges[i].low;
+        details->other = edges[i].high;
+        details->sharing = end - i < 1000 ? (int)(end - i) : 1000;
         return FACES_OPEN;
     }
     return FACES_GOOD;
 }
 
-static face_fault check_faces(const session_mesh *mesh, int64_t cell, edge_buffer *buffer, face_place *place)
+static face_fault check_faces(const session_mesh *mesh, int64_t cell, edge_buffer *buffer, face_fault_details *details)
 {
     const grid *g = &mesh->cells;
     int64_t first, end, edges = 0;
     grid_cell_faces(g, cell, &first, &end);
-    place->count = end - first;
-    if (place->count < 4) return FACES_TOO_FEW;
+    details->count = end - first;
+    if (details->count < 4) return FACES_TOO_FEW;
     for (int64_t i = first; i < end; i++) {
-        place->face = grid_array_index(&g->connectivity, i);
-        const face_fault fault = check_face(mesh, grid_is_ghost(g, cell), place);
+        details->face = grid_array_index(&g->connectivity, i);
+        const face_fault fault = check_face(mesh, grid_is_ghost(g, cell), details);
         if (fault) return fault;
-        if (!reserve_edges(buffer, edges + place->end - place->first)) return FACES_NO_MEMORY;
-        edges = add_edges(g, place, buffer->edges, edges);
+        if (!reserve_edges(buffer, edges + details->end - details->first)) return FACES_NO_MEMORY;
+        edges = add_edges(g, details, buffer->edges, edges);
     }
-    return check_edges(buffer->edges, edges, place);
+    return check_edges(buffer->edges, edges, details);
 }
 
-static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face_fault fault, const face_place *place,
-                                    base_error *error)
+static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face_fault fault,
+                                    const face_fault_details *details, base_error *error)
 {
     const char *name = mesh->label;
     const long long base = mesh->given.index_base; /* indices and offsets are reported in the caller's numbering */
-    const long long at = cell, face = place->face + base, vertex = place->vertex + base;
+    const long long at = cell, face = details->face + base, vertex = details->vertex + base;
     switch (fault) {
     case FACES_NO_MEMORY:
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory to check cell %lld", name, at);
     case FACES_TOO_FEW:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): %lld faces, a closed surface has at least 4", name, at,
-                         (long long)place->count);
+                         (long long)details->count);
     case FACE_BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face index %lld is outside %lld..%lld", name, at, face,
@@ -171,12 +171,12 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: offsets %lld and %lld do not rise within "
                          "%lld..%lld",
-                         name, at, face, place->first + base, place->end + base, base,
+                         name, at, face, details->first + base, details->end + base, base,
                          mesh->topology.face_connectivity_count + base);
     case FACE_TOO_SMALL:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld has %lld vertices, at least 3 are needed",
-                         name, at, face, (long long)(place->end - place->first));
+                         name, at, face, (long long)(details->end - details->first));
     case FACE_BAD_VERTEX:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: vertex index %lld is outside %lld..%lld",
@@ -185,12 +185,12 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: vertex %lld has a coordinate that is not "
                          "finite: (%g, %g, %g)",
-                         name, at, face, vertex, place->position[0], place->position[1], place->position[2]);
+                         name, at, face, vertex, details->position[0], details->position[1], details->position[2]);
     case FACES_OPEN:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: the edge from vertex %lld to %lld occurs %d "
                          "times, not once in each of two faces: the surface is not closed",
-                         name, at, face, vertex, place->other + base, place->sharing);
+                         name, at, face, vertex, details->other + base, details->sharing);
     case FACES_GOOD: break;
     }
     return INSITU_OK;
@@ -202,80 +202,80 @@ enum { BLOCK_CELLS = 4096 };
 
 typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORDINATE, BAD_FACES } cell_fault;
 
-typedef struct fault_place {
+typedef struct fault_details {
     int type;
     int64_t first, end; /* begin and end offset of the cell */
     int64_t vertex;     /* number of the faulty vertex, as stored in the connectivity */
     double position[3];
     face_fault fault_of_faces;
-    face_place faces;
-} fault_place;
+    face_fault_details faces;
+} fault_details;
 
-static cell_fault check_coordinates(const grid *g, const int64_t *vertices, int count, fault_place *place)
+static cell_fault check_coordinates(const grid *g, const int64_t *vertices, int count, fault_details *details)
 {
     for (int i = 0; i < count; i++) {
-        grid_vertex(g, vertices[i], place->position);
-        place->vertex = vertices[i];
+        grid_vertex(g, vertices[i], details->position);
+        details->vertex = vertices[i];
         for (int axis = 0; axis < 3; axis++)
-            if (!isfinite(place->position[axis])) return BAD_COORDINATE;
+            if (!isfinite(details->position[axis])) return BAD_COORDINATE;
     }
     return CELL_GOOD;
 }
 
-static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, edge_buffer *buffer, fault_place *place)
+static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, edge_buffer *buffer, fault_details *details)
 {
     const grid *g = &mesh->cells;
     if (!grid_has_faces(g) || !g->offsets.data) return BAD_TYPE;
-    place->first = grid_array_index(&g->offsets, cell);
-    place->end = grid_offset_end(&g->offsets, cell);
-    if (place->first < 0 || place->end > mesh->topology.connectivity_count || place->end < place->first)
+    details->first = grid_array_index(&g->offsets, cell);
+    details->end = grid_offset_end(&g->offsets, cell);
+    if (details->first < 0 || details->end > mesh->topology.connectivity_count || details->end < details->first)
         return BAD_OFFSETS;
-    place->fault_of_faces = check_faces(mesh, cell, buffer, &place->faces);
-    return place->fault_of_faces ? BAD_FACES : CELL_GOOD;
+    details->fault_of_faces = check_faces(mesh, cell, buffer, &details->faces);
+    return details->fault_of_faces ? BAD_FACES : CELL_GOOD;
 }
 
 /* Checks a polygon. Polygons are the only type whose number of vertices differs from cell to cell. */
-static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_place *place)
+static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_details *details)
 {
     const grid *g = &mesh->cells;
     if (!g->offsets.data) return BAD_TYPE;
-    place->first = grid_array_index(&g->offsets, cell);
-    place->end = grid_offset_end(&g->offsets, cell);
-    if (place->first < 0 || place->end < place->first || place->end > mesh->given.connectivity_count ||
-        place->end - place->first < 3)
+    details->first = grid_array_index(&g->offsets, cell);
+    details->end = grid_offset_end(&g->offsets, cell);
+    if (details->first < 0 || details->end < details->first || details->end > mesh->given.connectivity_count ||
+        details->end - details->first < 3)
         return BAD_OFFSETS;
-    for (int64_t i = place->first; i < place->end; i++) {
-        place->vertex = grid_array_index(&g->connectivity, i);
-        if (place->vertex < 0 || place->vertex >= g->vertex_count) return BAD_INDEX;
-        if (!grid_is_ghost(g, cell) && !is_finite_vertex(g, place->vertex, place->position)) return BAD_COORDINATE;
+    for (int64_t i = details->first; i < details->end; i++) {
+        details->vertex = grid_array_index(&g->connectivity, i);
+        if (details->vertex < 0 || details->vertex >= g->vertex_count) return BAD_INDEX;
+        if (!grid_is_ghost(g, cell) && !is_finite_vertex(g, details->vertex, details->position)) return BAD_COORDINATE;
     }
     return CELL_GOOD;
 }
 
-static cell_fault check_cell(const session_mesh *mesh, int64_t cell, edge_buffer *buffer, fault_place *place)
+static cell_fault check_cell(const session_mesh *mesh, int64_t cell, edge_buffer *buffer, fault_details *details)
 {
     const grid *g = &mesh->cells;
-    place->type = grid_cell_type(g, cell);
-    if (place->type == GRID_POLYHEDRON) return check_polyhedron(mesh, cell, buffer, place);
-    if (place->type == GRID_POLYGON) return check_polygon(mesh, cell, place);
-    const int count = grid_type_vertices(place->type);
+    details->type = grid_cell_type(g, cell);
+    if (details->type == GRID_POLYHEDRON) return check_polyhedron(mesh, cell, buffer, details);
+    if (details->type == GRID_POLYGON) return check_polygon(mesh, cell, details);
+    const int count = grid_type_vertices(details->type);
     if (count == 0) return BAD_TYPE;
     /* the padding contains no vertices, and the vertices of all other cells are in range */
     if (g->lattice && grid_is_ghost(g, cell)) return CELL_GOOD;
     if (g->offsets.data) {
-        place->first = grid_array_index(&g->offsets, cell);
-        place->end = grid_offset_end(&g->offsets, cell);
-        if (place->first < 0 || place->end > mesh->topology.connectivity_count || place->end < place->first ||
-            place->end - place->first != count)
+        details->first = grid_array_index(&g->offsets, cell);
+        details->end = grid_offset_end(&g->offsets, cell);
+        if (details->first < 0 || details->end > mesh->topology.connectivity_count || details->end < details->first ||
+            details->end - details->first != count)
             return BAD_OFFSETS;
     }
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     grid_cell_vertices(g, cell, vertices);
     for (int i = 0; i < count; i++) {
-        place->vertex = vertices[i];
+        details->vertex = vertices[i];
         if (vertices[i] < 0 || vertices[i] >= g->vertex_count) return BAD_INDEX;
     }
-    return grid_is_ghost(g, cell) ? CELL_GOOD : check_coordinates(g, vertices, count, place);
+    return grid_is_ghost(g, cell) ? CELL_GOOD : check_coordinates(g, vertices, count, details);
 }
 
 /* Returns the type as stored in the caller's array, which may contain integers of 64 bits. */
@@ -322,32 +322,32 @@ static const char *original_type_name(const session_mesh *mesh, int64_t cell)
     return type_name(session_given_type(mesh, cell));
 }
 
-static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, const fault_place *place,
+static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, const fault_details *details,
                                       base_error *error)
 {
-    const long long base = mesh->given.index_base, first = place->first + base, next = place->end + base;
-    if (place->type == GRID_POLYGON && place->first >= 0 && place->end <= mesh->given.connectivity_count)
+    const long long base = mesh->given.index_base, first = details->first + base, next = details->end + base;
+    if (details->type == GRID_POLYGON && details->first >= 0 && details->end <= mesh->given.connectivity_count)
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polygon): offsets %lld and %lld; a polygon has at least 3 vertices",
                          mesh->label, (long long)cell, first, next);
-    if (place->type == GRID_POLYHEDRON && next < first)
+    if (details->type == GRID_POLYHEDRON && next < first)
         return base_fail(
             error, INSITU_ERROR_MESH,
             "mesh \"%s\": cell %lld (polyhedron): offsets fall from %lld to %lld; a polyhedron has at least 4 faces",
             mesh->label, (long long)cell, first, next);
     const char *format =
-        place->end < place->first
+        details->end < details->first
             ? "mesh \"%s\": cell %lld (%s): offsets fall from %lld to %lld; a cell of its type has %d vertices"
             : "mesh \"%s\": cell %lld (%s): offsets %lld and %lld do not lie %d apart, the vertices of its type";
-    if (place->first < 0 || (next >= first && place->end > mesh->topology.connectivity_count))
+    if (details->first < 0 || (next >= first && details->end > mesh->topology.connectivity_count))
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (%s): offsets %lld and %lld are outside %lld..%lld", mesh->label,
-                         (long long)cell, type_name(place->type), first, next, base,
+                         (long long)cell, type_name(details->type), first, next, base,
                          mesh->topology.connectivity_count + base);
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wformat-nonliteral"
-    return base_fail(error, INSITU_ERROR_MESH, format, mesh->label, (long long)cell, type_name(place->type), first,
-                     next, grid_type_vertices(place->type));
+    return base_fail(error, INSITU_ERROR_MESH, format, mesh->label, (long long)cell, type_name(details->type), first,
+                     next, grid_type_vertices(details->type));
 #pragma GCC diagnostic pop
 }
 
@@ -355,16 +355,16 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
  * time. */
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
-    fault_place place = {0};
+    fault_details details = {0};
     edge_buffer buffer = {0};
-    const cell_fault fault = check_cell(mesh, cell, &buffer, &place);
+    const cell_fault fault = check_cell(mesh, cell, &buffer, &details);
     free_edge_buffer(&buffer);
-    const long long base = mesh->given.index_base, at = session_given_cell(mesh, cell), vertex = place.vertex + base;
+    const long long base = mesh->given.index_base, at = session_given_cell(mesh, cell), vertex = details.vertex + base;
     const char *type = original_type_name(mesh, cell);
     switch (fault) {
-    case BAD_FACES: return describe_faces(mesh, cell, place.fault_of_faces, &place.faces, error);
+    case BAD_FACES: return describe_faces(mesh, cell, details.fault_of_faces, &details.faces, error);
     case BAD_TYPE:
-        if (place.type == GRID_POLYHEDRON)
+        if (details.type == GRID_POLYHEDRON)
             return base_fail(error, INSITU_ERROR_MESH,
                              "mesh \"%s\": cell %lld is a polyhedron, and face_offsets are not given", mesh->label, at);
         return base_fail(
@@ -372,7 +372,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
             "mesh \"%s\": cell %lld: unknown cell type %lld (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 "
             "triangle, 9 quad, 7 polygon)",
             mesh->label, at, original_type(mesh, cell));
-    case BAD_OFFSETS: return describe_offsets(mesh, cell, &place, error);
+    case BAD_OFFSETS: return describe_offsets(mesh, cell, &details, error);
     case BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (%s): vertex index %lld is outside %lld..%lld (index_base is %lld)",
@@ -380,10 +380,10 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     case BAD_COORDINATE:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (%s): vertex %lld has a coordinate that is not finite: (%g, %g, %g)",
-                         mesh->label, at, type, vertex, place.position[0], place.position[1], place.position[2]);
+                         mesh->label, at, type, vertex, details.position[0], details.position[1], details.position[2]);
     case CELL_GOOD: break;
     }
-    return describe_faces(mesh, cell, FACES_NO_MEMORY, &place.faces, error);
+    return describe_faces(mesh, cell, FACES_NO_MEMORY, &details.faces, error);
 }
 
 /* Checks cells of any layout one by one. */
@@ -391,9 +391,9 @@ static int64_t check_cells_one_by_one(const session_mesh *mesh, int64_t begin, i
                                       mesh_tally *tally)
 {
     mesh_tally own = tally_empty();
-    fault_place place;
+    fault_details details;
     int64_t cell = begin;
-    for (; cell < end && check_cell(mesh, cell, buffer, &place) == CELL_GOOD; cell++)
+    for (; cell < end && check_cell(mesh, cell, buffer, &details) == CELL_GOOD; cell++)
         tally_cell(&mesh->cells, cell, &own);
     tally_merge(tally, &own);
     return cell;

@@ -11,7 +11,7 @@
 #include "session_agree.h"
 
 /* The meaning of the numbers in an array. */
-typedef enum conform_role { OF_PLACES, OF_INDICES, OF_TYPES, OF_FLAGS } conform_role;
+typedef enum conform_role { OF_COORDINATES, OF_INDICES, OF_TYPES, OF_FLAGS } conform_role;
 
 /* An array of a mesh that may have to be copied. */
 typedef struct conform_array {
@@ -28,7 +28,7 @@ static conform_array find_array(insitu_mesh *m, int number)
     switch (number) {
     case 0:
     case 1:
-    case 2: return (conform_array){&m->coordinates[number], OF_PLACES, m->vertex_count, 0};
+    case 2: return (conform_array){&m->coordinates[number], OF_COORDINATES, m->vertex_count, 0};
     case 3: return (conform_array){&m->cell_types, OF_TYPES, m->cell_count, 0};
     case 4: return (conform_array){&m->connectivity, OF_INDICES, m->connectivity_count, most};
     case 5: return (conform_array){&m->offsets, OF_INDICES, m->cell_count + open, m->connectivity_count + 1};
@@ -52,7 +52,7 @@ static insitu_type read_type(const conform_array *of, bool has_map, bool *is_cop
     const bool is_float = type == INSITU_FLOAT32 || type == INSITU_FLOAT64;
     insitu_type as = is_float ? type : INSITU_FLOAT64;
     switch (of->role) {
-    case OF_PLACES: break;
+    case OF_COORDINATES: break;
     case OF_INDICES: as = index_type(type, of->index_limit); break;
     case OF_TYPES: as = session_type_size(type) == 1 || has_map ? INSITU_UINT8 : index_type(type, 0); break;
     case OF_FLAGS:
@@ -61,7 +61,7 @@ static insitu_type read_type(const conform_array *of, bool has_map, bool *is_cop
     }
     const bool is_same_size = session_type_size(as) == session_type_size(type);
     *is_copied = !is_same_size || !session_is_aligned(of->array) || (of->role == OF_TYPES && has_map) ||
-                 (of->role == OF_PLACES && as != type);
+                 (of->role == OF_COORDINATES && as != type);
     return as;
 }
 
@@ -101,7 +101,7 @@ static void convert_element(const session_conformed *conformed, const conform_ar
     const insitu_type type = of->array->type;
     if (as == type && (of->role != OF_TYPES || !conformed->types)) {
         memcpy(out, p, (size_t)session_type_size(type));
-    } else if (of->role == OF_PLACES) {
+    } else if (of->role == OF_COORDINATES) {
         const double number = grid_array_number(from, i);
         memcpy(out, &number, sizeof number);
     } else {

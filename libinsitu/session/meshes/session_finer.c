@@ -181,11 +181,11 @@ static bool make_cells(session_finer *finer, const unsigned char *marks, int thr
     finer_work *w = base_alloc(sizeof *w);
     bool is_made = w && begin_work(finer, marks, w) && number_nodes(w, finer);
     if (is_made) {
-        const session_node_values places = {&w->rows.cells, false, 3, read_vertex};
+        const session_node_values positions = {&w->rows.cells, false, 3, read_vertex};
         const size_t bytes = 3 * (size_t)w->node_count * sizeof *finer->coordinates;
         finer->coordinates = base_alloc(bytes);
         finer->bytes += (int64_t)bytes;
-        is_made = finer->coordinates && interpolate_cells(w, &places, threads, finer->coordinates);
+        is_made = finer->coordinates && interpolate_cells(w, &positions, threads, finer->coordinates);
     }
     if (is_made) describe_cells(w, finer);
     if (w) end_work(w);
@@ -278,7 +278,7 @@ void session_drop_ids(const session_meshes *meshes)
     }
 }
 
-static void count_spacings(const session_polynomials *of, int64_t counts[SESSION_FINER_COUNTS], double (*places)[3],
+static void count_spacings(const session_polynomials *of, int64_t counts[SESSION_FINER_COUNTS], double (*positions)[3],
                            int64_t cells[ROWS_MOST_KINDS])
 {
     for (int64_t cell = 0; cell < of->cell_count; cell++) {
@@ -288,8 +288,8 @@ static void count_spacings(const session_polynomials *of, int64_t counts[SESSION
         cells[kind]++;
         if (!session_has_two_spacings(nodes)) continue;
         for (int n = 0; n < nodes->count; n++)
-            grid_vertex(&of->rows.cells, session_row_vertex(&of->rows, first + n), places[n]);
-        counts[session_derivatives_of(of, cell, places[0], 3) == &of->kinds[2 * kind] ? EQUISPACED : LOBATTO]++;
+            grid_vertex(&of->rows.cells, session_row_vertex(&of->rows, first + n), positions[n]);
+        counts[session_derivatives_of(of, cell, positions[0], 3) == &of->kinds[2 * kind] ? EQUISPACED : LOBATTO]++;
     }
 }
 
@@ -307,9 +307,9 @@ static bool count_mesh(session_mesh *mesh)
         nodes = of->count > nodes ? of->count : nodes;
     }
     int64_t cells[ROWS_MOST_KINDS] = {0};
-    double(*places)[3] = base_alloc((size_t)nodes * sizeof *places);
-    is_made = is_made && places;
-    if (is_made) count_spacings(&polynomials, counts, places, cells);
+    double(*positions)[3] = base_alloc((size_t)nodes * sizeof *positions);
+    is_made = is_made && positions;
+    if (is_made) count_spacings(&polynomials, counts, positions, cells);
     for (int i = 0; i < polynomials.rows.kind_count; i++) {
         const session_nodes *of = &polynomials.rows.kinds[i].nodes;
         counts[PYRAMIDS] += of->type == GRID_PYRAMID ? cells[i] : 0;
@@ -317,7 +317,7 @@ static bool count_mesh(session_mesh *mesh)
         counts[SHELLS] += grid_is_shell_type(of->type) ? cells[i] : 0;
     }
     if (is_made) counts[order]++;
-    base_free(places);
+    base_free(positions);
     session_polynomials_free(&polynomials);
     mesh->finer.is_counted = is_made;
     return is_made;

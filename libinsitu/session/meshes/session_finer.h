@@ -1,7 +1,7 @@
 /* Evaluates the polynomials of cells of higher order between their nodes.
  *
  * A cell of order p each of whose edges between two nodes is cut into n parts is read as a cell of order n p whose
- * nodes have the polynomial's values and places. Cells that are not refined have n = 1. All other code reads these
+ * nodes have the polynomial's values and positions. Cells that are not refined have n = 1. All other code reads these
  * cells in place of the caller's: it splits them into linear pieces, finds their gradients, and counts them by the same
  * numbers. Each cell has its nodes for itself. Nodes on common faces have the same bits in all cells
  * (session_interpolation.h), so that they are found by their coordinates. */

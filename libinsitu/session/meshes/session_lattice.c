@@ -350,19 +350,19 @@ insitu_status session_make_axes(session_mesh *mesh, base_error *error)
     const insitu_lattice *l = &own->given;
     for (int axis = 0; axis < 3; axis++) {
         const int64_t count = count_vertices_along(l, axis);
-        double *places = base_alloc((size_t)count * sizeof *places);
-        if (!places)
+        double *coordinates = base_alloc((size_t)count * sizeof *coordinates);
+        if (!coordinates)
             return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld coordinates along %c",
                              mesh->label, (long long)count, axis_name[axis]);
-        session_fill_axis(l, axis, places);
-        own->axis_coordinates[axis] = places;
-        own->cells.axes[axis].axis_coordinates = places;
-        own->bytes += count * (int64_t)sizeof *places;
+        session_fill_axis(l, axis, coordinates);
+        own->axis_coordinates[axis] = coordinates;
+        own->cells.axes[axis].axis_coordinates = coordinates;
+        own->bytes += count * (int64_t)sizeof *coordinates;
         for (int64_t n = 0; n < count; n++)
-            if (!isfinite(places[n]))
+            if (!isfinite(coordinates[n]))
                 return base_fail(error, INSITU_ERROR_MESH,
                                  "mesh \"%s\": lattice: coordinate %lld along %c is not finite: %g", mesh->label,
-                                 (long long)n, axis_name[axis], places[n]);
+                                 (long long)n, axis_name[axis], coordinates[n]);
     }
     return INSITU_OK;
 }

@@ -368,13 +368,13 @@ void session_mark_moved(session_meshes *meshes, session_mesh *mesh)
 
 void session_drop_warp(session_mesh *mesh)
 {
-    base_free(mesh->warp.places);
+    base_free(mesh->warp.coordinate_memory);
     mesh->warp = (session_warp){0};
 }
 
 void session_drop_mirrored(session_mirrored *mirrored)
 {
-    base_free(mirrored->places);
+    base_free(mirrored->coordinate_memory);
     for (int axis = 0; axis < 3; axis++) base_free(mirrored->axes[axis]);
     *mirrored = (session_mirrored){0};
 }

@@ -241,7 +241,7 @@ typedef struct session_warp {
     bool is_applied;             /* set if the moved coordinates are read */
     bool is_stale;               /* set if the caller's coordinates may have changed since they were moved */
     uint64_t key;                /* hash that identifies the displacements by which they were moved */
-    char *places;                /* memory of the moved coordinates (session_places.h) */
+    char *coordinate_memory;     /* memory of the moved coordinates (session_own_coordinates.h) */
     insitu_array coordinates[3]; /* the moved coordinates; no data along an axis if they are the caller's */
     insitu_array unmoved[3];     /* values of session_mesh.given before the vertices were moved */
     /* the caller's lattice without its coordinates along the axes, because moved coordinates are given by vertex */
@@ -253,7 +253,7 @@ typedef struct session_warp {
 /* Coordinates of a mirror image (session_mirror.h). Those that are computed are reported to the user as a copy. */
 typedef struct session_mirrored {
     double planes[3];            /* coordinate of the mirror plane of each axis along which the image is mirrored */
-    char *places;                /* memory of the mirrored coordinates (session_places.h) */
+    char *coordinate_memory;     /* memory of the mirrored coordinates (session_own_coordinates.h) */
     insitu_array coordinates[3]; /* the mirrored coordinates; no data along an axis if they are those of the source */
     double *axes[3];             /* coordinates along a lattice's axes, owned; NULL: coordinates are given by vertex */
     insitu_lattice lattice;      /* lattice in the image's description */

@@ -10,7 +10,7 @@
 #include "session_conform.h"
 #include "session_lattice.h"
 #include "session_mesh_input.h"
-#include "session_places.h"
+#include "session_own_coordinates.h"
 #include "session_region.h"
 
 static bool is_mirrored(const session_mesh *image, int axis)
@@ -48,8 +48,8 @@ static void mirror_numbers(const session_mesh *image, int axis, int threads)
         region_enter();
 #pragma omp for schedule(static) nowait
         for (int64_t v = 0; v < count; v++) {
-            const double place = grid_array_number(&from, v);
-            session_store_place(to, v, is_copied ? place : 2 * plane - place);
+            const double coordinate = grid_array_number(&from, v);
+            session_store_coordinate(to, v, is_copied ? coordinate : 2 * plane - coordinate);
         }
         region_leave();
     }
@@ -65,7 +65,8 @@ static bool mirror_vertices(session_mesh *image, int threads)
     bool is_new = false;
     for (int axis = 0; axis < 3; axis++)
         types[axis] = given->coordinates[given->coordinates[axis].data ? axis : 0].type;
-    if (!session_reserve_places(&m->places, m->coordinates, given->vertex_count, axes, types, &m->bytes, &is_new))
+    if (!session_reserve_coordinates(&m->coordinate_memory, m->coordinates, given->vertex_count, axes, types, &m->bytes,
+                                     &is_new))
         return false;
     for (int axis = 0; axis < 3; axis++)
         if (axes >> axis & 1) mirror_numbers(image, axis, threads);
@@ -81,11 +82,12 @@ static bool mirror_lattice(session_mesh *image)
     for (int axis = 0; axis < 3; axis++) {
         const int64_t count = given->cells[axis] + 1;
         if (!m->axes[axis]) m->axes[axis] = base_alloc((size_t)count * sizeof *m->axes[axis]);
-        double *places = m->axes[axis];
-        if (!places) return false;
-        session_fill_axis(given, axis, places);
-        for (int64_t n = 0; n < count && is_mirrored(image, axis); n++) places[n] = 2 * m->planes[axis] - places[n];
-        m->bytes += count * (int64_t)sizeof *places;
+        double *coordinates = m->axes[axis];
+        if (!coordinates) return false;
+        session_fill_axis(given, axis, coordinates);
+        for (int64_t n = 0; n < count && is_mirrored(image, axis); n++)
+            coordinates[n] = 2 * m->planes[axis] - coordinates[n];
+        m->bytes += count * (int64_t)sizeof *coordinates;
     }
     return true;
 }

@@ -218,23 +218,23 @@ static bool has_node(const pattern_polygon *p, int node)
     return has;
 }
 
-static int split_quad(const session_pattern *of, const int *ranks, int places[][4])
+static int split_quad(const session_pattern *of, const int *ranks, int pieces[][4])
 {
     int count = 0, triangles[2][3];
     for (int i = 0; i < of->polygon_count; i++) {
         const pattern_polygon *p = &of->polygons[i];
-        for (int n = 0; n < p->count && p->corner >= 0; n++) places[count][n] = p->nodes[n];
-        if (p->corner >= 0) places[count++][2] = p->corner;
+        for (int n = 0; n < p->count && p->corner >= 0; n++) pieces[count][n] = p->nodes[n];
+        if (p->corner >= 0) pieces[count++][2] = p->corner;
         const int cut = p->corner < 0 ? split_into_triangles(p, ranks, triangles) : 0;
-        for (int t = 0; t < cut; t++) memcpy(places[count++], triangles[t], sizeof triangles[t]);
+        for (int t = 0; t < cut; t++) memcpy(pieces[count++], triangles[t], sizeof triangles[t]);
     }
     return count;
 }
 
-int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int places[PATTERN_MOST_LOOSE][4])
+int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int pieces[PATTERN_MOST_LOOSE][4])
 {
     int count = 0, apex = pattern->midpoints[0], triangles[2][3];
-    if (pattern->nodes.type == GRID_QUAD) return split_quad(pattern, ranks, places);
+    if (pattern->nodes.type == GRID_QUAD) return split_quad(pattern, ranks, pieces);
     for (int n = 1; n < pattern->midpoint_count; n++)
         if (ranks[pattern->midpoints[n]] < ranks[apex]) apex = pattern->midpoints[n];
     for (int i = 0; i < pattern->polygon_count; i++) {
@@ -242,8 +242,8 @@ int session_cut_serendipity(const session_pattern *pattern, const int *ranks, in
         const int cut = split_into_triangles(p, ranks, triangles);
         for (int t = 0; t < cut; t++) {
             const int *of = triangles[t];
-            if (p->corner >= 0) memcpy(places[count++], (const int[]){of[0], of[1], of[2], p->corner}, 4 * sizeof *of);
-            if (!has_node(p, apex)) memcpy(places[count++], (const int[]){of[0], of[2], of[1], apex}, 4 * sizeof *of);
+            if (p->corner >= 0) memcpy(pieces[count++], (const int[]){of[0], of[1], of[2], p->corner}, 4 * sizeof *of);
+            if (!has_node(p, apex)) memcpy(pieces[count++], (const int[]){of[0], of[2], of[1], apex}, 4 * sizeof *of);
         }
     }
     return count;

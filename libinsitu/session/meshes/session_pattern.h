@@ -35,6 +35,6 @@ void session_drop_pattern(session_pattern *pattern);
 /* Stores the positions of the vertices of a serendipity cell's pieces: 4 for each tet, or 3 for each triangle of a
  * quad. ranks: indexed by position, the rank of each midpoint in the order of coordinates. Returns the number of
  * pieces. */
-int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int places[PATTERN_MOST_LOOSE][4]);
+int session_cut_serendipity(const session_pattern *pattern, const int *ranks, int pieces[PATTERN_MOST_LOOSE][4]);
 
 #endif

@@ -44,7 +44,7 @@ bool session_has_higher_order(const insitu_mesh *given)
     return cell < given->cell_count;
 }
 
-int64_t session_entry_place(const insitu_mesh *given, int64_t entry)
+int64_t session_entry_index(const insitu_mesh *given, int64_t entry)
 {
     const int64_t used = session_cell_nodes(given), row = given->connectivity_row;
     return !row || given->offsets.data || row == used ? entry : entry / used * row + entry % used;
@@ -233,11 +233,11 @@ static int count_made(const split_work *w, const session_pattern *of, int64_t ce
     return walk.words ? count : of->piece_count;
 }
 
-static int cut_cell(const split_work *w, const session_pattern *of, int64_t cell, int places[PATTERN_MOST_LOOSE][4])
+static int cut_cell(const split_work *w, const session_pattern *of, int64_t cell, int pieces[PATTERN_MOST_LOOSE][4])
 {
     int ranks[27] = {0};
     rank_midpoints(w, of, session_row_first(&w->rows, cell), ranks);
-    return session_cut_serendipity(of, ranks, places);
+    return session_cut_serendipity(of, ranks, pieces);
 }
 
 static void count_pieces(const split_work *w, int64_t cell)
@@ -290,12 +290,12 @@ static int64_t entry_count(const split_work *w)
 
 /* Stores a corner of a piece, which is given by its position in the cell's row: as a vertex, or as an entry of the
  * caller's connectivity. */
-static void store_corner(const split_work *w, int64_t cell, int64_t at, int place)
+static void store_corner(const split_work *w, int64_t cell, int64_t at, int node)
 {
     const int64_t first = session_row_first(&w->rows, cell);
     session_store_index(&w->piece_entries, at,
-                        w->stores_entries ? session_row_entry(&w->rows, cell, place)
-                                          : session_row_vertex(&w->rows, first + place));
+                        w->stores_entries ? session_row_entry(&w->rows, cell, node)
+                                          : session_row_vertex(&w->rows, first + node));
 }
 
 static void store_cell(const split_work *w, int64_t cell)

@@ -16,7 +16,7 @@ insitu_status session_split_cells(session_mesh *mesh, int threads, base_error *e
 insitu_status session_split_entries(const session_mesh *mesh, int threads, grid_array *out, base_error *error);
 
 /* Returns the position in the caller's connectivity of an entry that is counted without the unused ends of rows. */
-int64_t session_entry_place(const insitu_mesh *given, int64_t entry);
+int64_t session_entry_index(const insitu_mesh *given, int64_t entry);
 
 /* Counts the caller's cells of a mesh whose cells are split. A cell is inverted if one of its pieces is, which is
  * tested only if any_inverted is set, and flat if all its pieces are. Local. */

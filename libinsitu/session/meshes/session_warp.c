@@ -9,7 +9,7 @@
 #include "session_agree.h"
 #include "session_conform.h"
 #include "session_lattice.h"
-#include "session_places.h"
+#include "session_own_coordinates.h"
 #include "session_region.h"
 #include "session_topology.h"
 
@@ -79,8 +79,8 @@ static bool reserve_coordinates(session_mesh *mesh, int component_count, bool *i
     const bool has_z = component_count == 3 || given->coordinates[2].data || session_has_axes(given);
     const insitu_type types[3] = {moved_type(given, 0), moved_type(given, 1), moved_type(given, 2)};
     session_warp *warp = &mesh->warp;
-    return session_reserve_places(&warp->places, warp->coordinates, given->vertex_count, has_z ? ALL : IN_PLANE, types,
-                                  &warp->bytes, is_new);
+    return session_reserve_coordinates(&warp->coordinate_memory, warp->coordinates, given->vertex_count,
+                                       has_z ? ALL : IN_PLANE, types, &warp->bytes, is_new);
 }
 
 /* The coordinates along one axis before and after the move. */
@@ -93,9 +93,9 @@ typedef struct moved_axis {
 /* Stores a vertex's moved coordinate. Returns whether it differs from the one stored before. */
 static bool move_coordinate(const moved_axis *axis, double scale, int64_t vertex, int64_t tuple)
 {
-    double place = grid_array_number(&axis->from, vertex);
-    if (axis->by.data) place += scale * grid_array_number(&axis->by, tuple);
-    return session_store_place(axis->to, vertex, place);
+    double coordinate = grid_array_number(&axis->from, vertex);
+    if (axis->by.data) coordinate += scale * grid_array_number(&axis->by, tuple);
+    return session_store_coordinate(axis->to, vertex, coordinate);
 }
 
 /* Moves all vertices. *bad becomes the first vertex whose index is out of range, or the number of vertices if there is

@@ -5,33 +5,33 @@
 
 #include "memory.h"
 
-static int64_t bin_index_along(const session_bins *b, double place, int axis)
+static int64_t bin_index_along(const session_bins *b, double position, int axis)
 {
-    const double at = (place - b->lower[axis]) * b->bins_per_length;
+    const double at = (position - b->lower[axis]) * b->bins_per_length;
     return at < 0 ? 0 : at >= (double)b->counts[axis] ? b->counts[axis] - 1 : (int64_t)at;
 }
 
-static int64_t bin_index(const session_bins *b, const double place[3])
+static int64_t bin_index(const session_bins *b, const double position[3])
 {
-    return bin_index_along(b, place[0], 0) +
-           b->counts[0] * (bin_index_along(b, place[1], 1) + b->counts[1] * bin_index_along(b, place[2], 2));
+    return bin_index_along(b, position[0], 0) +
+           b->counts[0] * (bin_index_along(b, position[1], 1) + b->counts[1] * bin_index_along(b, position[2], 2));
 }
 
-static const double *position_at(const double *places, int64_t stride, int64_t i)
+static const double *position_at(const double *positions, int64_t stride, int64_t i)
 {
-    return (const double *)(const void *)((const char *)places + i * stride);
+    return (const double *)(const void *)((const char *)positions + i * stride);
 }
 
 /* Computes the size of the bins and their number along each axis. Returns the total number of bins. */
-static int64_t choose_bin_size(session_bins *b, const double *places, int64_t stride, int64_t count)
+static int64_t choose_bin_size(session_bins *b, const double *positions, int64_t stride, int64_t count)
 {
     double upper[3], widest = 0;
     for (int axis = 0; axis < 3; axis++) {
         b->lower[axis] = (double)INFINITY;
         upper[axis] = -(double)INFINITY;
         for (int64_t i = 0; i < count; i++) {
-            b->lower[axis] = fmin(b->lower[axis], position_at(places, stride, i)[axis]);
-            upper[axis] = fmax(upper[axis], position_at(places, stride, i)[axis]);
+            b->lower[axis] = fmin(b->lower[axis], position_at(positions, stride, i)[axis]);
+            upper[axis] = fmax(upper[axis], position_at(positions, stride, i)[axis]);
         }
         widest = fmax(widest, upper[axis] - b->lower[axis]);
     }
@@ -45,15 +45,15 @@ static int64_t choose_bin_size(session_bins *b, const double *places, int64_t st
     return bins;
 }
 
-bool session_bins_create(session_bins *b, const double *places, int64_t stride, int64_t count)
+bool session_bins_create(session_bins *b, const double *positions, int64_t stride, int64_t count)
 {
-    const int64_t bins = choose_bin_size(b, places, stride, count);
+    const int64_t bins = choose_bin_size(b, positions, stride, count);
     b->starts = base_calloc((size_t)bins + 2, sizeof *b->starts);
     b->items = base_alloc((size_t)(count + 1) * sizeof *b->items);
     if (!b->starts || !b->items) return false;
-    for (int64_t i = 0; i < count; i++) b->starts[bin_index(b, position_at(places, stride, i)) + 2]++;
+    for (int64_t i = 0; i < count; i++) b->starts[bin_index(b, position_at(positions, stride, i)) + 2]++;
     for (int64_t n = 0; n < bins; n++) b->starts[n + 2] += b->starts[n + 1];
-    for (int64_t i = 0; i < count; i++) b->items[b->starts[bin_index(b, position_at(places, stride, i)) + 1]++] = i;
+    for (int64_t i = 0; i < count; i++) b->items[b->starts[bin_index(b, position_at(positions, stride, i)) + 1]++] = i;
     return true;
 }
 

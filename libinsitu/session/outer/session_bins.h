@@ -11,9 +11,9 @@ typedef struct session_bins {
     int64_t *starts, *items;          /* bin b contains the points items[starts[b]] .. items[starts[b + 1] - 1] */
 } session_bins;
 
-/* Sorts `count` points into bins. Their positions begin at `places` and are `stride` bytes apart. Returns false if
+/* Sorts `count` points into bins. Their positions begin at `positions` and are `stride` bytes apart. Returns false if
  * memory runs out. */
-bool session_bins_create(session_bins *bins, const double *places, int64_t stride, int64_t count);
+bool session_bins_create(session_bins *bins, const double *positions, int64_t stride, int64_t count);
 void session_bins_free(session_bins *bins);
 
 /* Iterator over the points near a box. It visits all points inside the box, and some outside.

@@ -30,15 +30,15 @@ double session_point_distance(const double a[3], const double b[3])
 }
 
 /* Returns the bounding box of the positions. There must be at least one. */
-static session_box find_bounding_box(const double places[][3], int count)
+static session_box find_bounding_box(const double positions[][3], int count)
 {
     session_box box;
-    memcpy(box.lower, places[0], sizeof box.lower);
-    memcpy(box.upper, places[0], sizeof box.upper);
+    memcpy(box.lower, positions[0], sizeof box.lower);
+    memcpy(box.upper, positions[0], sizeof box.upper);
     for (int i = 1; i < count; i++)
         for (int axis = 0; axis < 3; axis++) {
-            box.lower[axis] = places[i][axis] < box.lower[axis] ? places[i][axis] : box.lower[axis];
-            box.upper[axis] = places[i][axis] > box.upper[axis] ? places[i][axis] : box.upper[axis];
+            box.lower[axis] = positions[i][axis] < box.lower[axis] ? positions[i][axis] : box.lower[axis];
+            box.upper[axis] = positions[i][axis] > box.upper[axis] ? positions[i][axis] : box.upper[axis];
         }
     return box;
 }
@@ -62,12 +62,12 @@ static void measure_face(session_coarse_face *f, double side)
 /* Returns on which side of the face its cell lies: 1 if it is behind the face, -1 if it is in front. */
 static double find_cell_side(const grid *g, int64_t cell, const session_coarse_face *f)
 {
-    double sums[3] = {0, 0, 0}, off[3], place[3];
+    double sums[3] = {0, 0, 0}, off[3], position[3];
     int64_t vertex, count = 0;
     grid_walk walk = grid_walk_cell(g, cell);
     while (grid_walk_next(&walk, &vertex)) {
-        grid_vertex(g, vertex, place);
-        for (int axis = 0; axis < 3; axis++) sums[axis] += place[axis];
+        grid_vertex(g, vertex, position);
+        for (int axis = 0; axis < 3; axis++) sums[axis] += position[axis];
         count++;
     }
     for (int axis = 0; axis < 3; axis++) {
@@ -94,9 +94,9 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
 }
 
 /* Returns whether the position lies, along the direction, more than `slack` above all corners or below all corners. */
-static bool is_beyond(const session_face_outline *f, const double place[3], const double direction[3], double slack)
+static bool is_beyond(const session_face_outline *f, const double position[3], const double direction[3], double slack)
 {
-    const double at = vector3_dot(direction, place), most = slack * sqrt(vector3_dot(direction, direction));
+    const double at = vector3_dot(direction, position), most = slack * sqrt(vector3_dot(direction, direction));
     double low = vector3_dot(direction, f->corner_positions[0]), high = low;
     for (int i = 1; i < f->count; i++) {
         const double corner = vector3_dot(direction, f->corner_positions[i]);
@@ -106,17 +106,17 @@ static bool is_beyond(const session_face_outline *f, const double place[3], cons
     return at < low - most || at > high + most;
 }
 
-bool session_may_contain(const session_face_outline *f, const double place[3], double slack)
+bool session_may_contain(const session_face_outline *f, const double position[3], double slack)
 {
     double edges[4][3], normal[3], across[3];
     for (int i = 0; i < f->count; i++)
         for (int axis = 0; axis < 3; axis++)
             edges[i][axis] = f->corner_positions[(i + 1) % f->count][axis] - f->corner_positions[i][axis];
     vector3_cross(edges[0], edges[1], normal);
-    if (is_beyond(f, place, normal, slack)) return false;
+    if (is_beyond(f, position, normal, slack)) return false;
     for (int i = 0; i < f->count; i++) {
         vector3_cross(normal, edges[i], across);
-        if (is_beyond(f, place, across, slack)) return false;
+        if (is_beyond(f, position, across, slack)) return false;
     }
     return true;
 }
@@ -127,18 +127,18 @@ bool session_read_coarse_face(const grid *g, const session_face *face, session_c
     int least = 0;
     if (!session_read_outline(g, face, &outline)) return false;
     const int count = outline.count;
-    const double(*places)[3] = (const double(*)[3])outline.corner_positions;
+    const double(*positions)[3] = (const double(*)[3])outline.corner_positions;
     for (int i = 0; i < count; i++) {
         for (int k = 0; k < i; k++)
-            if (vector3_compare(places[k], places[i]) == 0) return false;
-        if (vector3_compare(places[i], places[least]) < 0) least = i;
+            if (vector3_compare(positions[k], positions[i]) == 0) return false;
+        if (vector3_compare(positions[i], positions[least]) < 0) least = i;
     }
     const int step =
-        vector3_compare(places[(least + count - 1) % count], places[(least + 1) % count]) < 0 ? count - 1 : 1;
+        vector3_compare(positions[(least + count - 1) % count], positions[(least + 1) % count]) < 0 ? count - 1 : 1;
     out->count = count;
     for (int i = 0; i < 4; i++) {
         const int from = (least + step * (i < count ? i : count - 1)) % count;
-        memcpy(out->corner_positions[i], places[from], sizeof places[from]);
+        memcpy(out->corner_positions[i], positions[from], sizeof positions[from]);
         vertices[i] = outline.vertices[from];
     }
     measure_face(out, 1);
@@ -176,10 +176,10 @@ bool session_is_larger_face(const session_coarse_face *a, const session_coarse_f
 
 /* ---- positions on faces --------------------------------------------------------------------------------------- */
 
-bool session_is_at_corner(const session_coarse_face *face, const double place[3], double slack)
+bool session_is_at_corner(const session_coarse_face *face, const double position[3], double slack)
 {
     for (int i = 0; i < face->count; i++)
-        if (session_point_distance(face->corner_positions[i], place) <= slack) return true;
+        if (session_point_distance(face->corner_positions[i], position) <= slack) return true;
     return false;
 }
 
@@ -205,13 +205,13 @@ static void evaluate_face(const session_coarse_face *f, const double at[2], doub
 
 /* Computes the coordinates of a position on the face by Newton's method, starting from the face's centre. A triangle is
  * treated as half of a parallelogram. */
-static bool solve_face_coordinates(const session_coarse_face *f, const double place[3], double at[2])
+static bool solve_face_coordinates(const session_coarse_face *f, const double position[3], double at[2])
 {
     double on[3], slopes[2][3], off[3];
     at[0] = at[1] = 0.5;
     for (int step = 0; step < (f->count == 4 ? 12 : 2); step++) {
         evaluate_face(f, at, on, slopes);
-        for (int axis = 0; axis < 3; axis++) off[axis] = place[axis] - on[axis];
+        for (int axis = 0; axis < 3; axis++) off[axis] = position[axis] - on[axis];
         const double aa = vector3_dot(slopes[0], slopes[0]), ab = vector3_dot(slopes[0], slopes[1]),
                      bb = vector3_dot(slopes[1], slopes[1]);
         const double a = vector3_dot(slopes[0], off), b = vector3_dot(slopes[1], off), det = aa * bb - ab * ab;
@@ -223,16 +223,17 @@ static bool solve_face_coordinates(const session_coarse_face *f, const double pl
     return true;
 }
 
-bool session_find_weights(const session_coarse_face *f, const double place[3], double slack, double weights[4])
+bool session_find_weights(const session_coarse_face *f, const double position[3], double slack, double weights[4])
 {
     double at[2], on[3], slopes[2][3];
     for (int axis = 0; axis < 3; axis++)
-        if (!(f->box.lower[axis] - slack <= place[axis] && place[axis] <= f->box.upper[axis] + slack)) return false;
-    if (!solve_face_coordinates(f, place, at)) return false;
+        if (!(f->box.lower[axis] - slack <= position[axis] && position[axis] <= f->box.upper[axis] + slack))
+            return false;
+    if (!solve_face_coordinates(f, position, at)) return false;
     for (int k = 0; k < 2; k++) at[k] = round_coordinate(at[k]);
     const double u = at[0], w = at[1];
     evaluate_face(f, at, on, slopes);
-    if (!(u >= 0 && u <= 1 && w >= 0 && w <= 1 && session_point_distance(on, place) <= slack)) return false;
+    if (!(u >= 0 && u <= 1 && w >= 0 && w <= 1 && session_point_distance(on, position) <= slack)) return false;
     if (f->count == 4) {
         const double bilinear[4] = {(1 - u) * (1 - w), u * (1 - w), u * w, (1 - u) * w};
         memcpy(weights, bilinear, sizeof bilinear);

@@ -31,10 +31,10 @@ typedef struct session_face_outline {
 bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out);
 /* Returns whether a position in the outline's box may be within `slack` of the face. It returns false if the position
  * is beyond all corners of the face, either along its normal or across one of its edges. */
-bool session_may_contain(const session_face_outline *outline, const double place[3], double slack);
+bool session_may_contain(const session_face_outline *outline, const double position[3], double slack);
 
-/* Reads a face. *vertices receives its vertices in the order of out->places. Returns false if the face is not a
- * triangle or quad of a cell with volume, or if its area is 0. */
+/* Reads a face. *vertices receives its vertices in the order of out->corner_positions. Returns false if the face is not
+ * a triangle or quad of a cell with volume, or if its area is 0. */
 bool session_read_coarse_face(const grid *g, const session_face *face, session_coarse_face *out, int64_t vertices[4]);
 
 /* Writes the face as 64-bit words for another rank; the second function reads it from them. */
@@ -42,11 +42,11 @@ void session_pack_coarse_face(const session_coarse_face *face, uint64_t words[SE
 void session_unpack_coarse_face(const uint64_t words[SESSION_FACE_WORDS], session_coarse_face *out);
 
 /* Returns whether the position is within slack of a corner. */
-bool session_is_at_corner(const session_coarse_face *face, const double place[3], double slack);
+bool session_is_at_corner(const session_coarse_face *face, const double position[3], double slack);
 
 /* Computes the corners' weights at a position on the face; the fourth weight of a triangle is 0. Returns false if the
  * position is farther than `slack` from the face. */
-bool session_find_weights(const session_coarse_face *face, const double place[3], double slack, double weights[4]);
+bool session_find_weights(const session_coarse_face *face, const double position[3], double slack, double weights[4]);
 
 /* Returns an upper bound of the rounding errors of the mesh's coordinates; 0 if mesh is NULL. */
 double session_position_rounding(const session_mesh *mesh);

@@ -15,7 +15,7 @@
 /* Distance, as a fraction of a face's width, within which a vertex counts as lying on the face. It covers the rounding
  * errors of codes that compute hanging vertices in other ways. Hanging vertices are at least an eighth of the width
  * apart. The ranks' boxes are extended by the same fraction (session_homes.h). */
-static const double place_slack = 1e-5;
+static const double relative_slack = 1e-5;
 
 /* A vertex hangs on a face only if the face's area is larger by this factor than those of the faces that have the
  * vertex as a corner. A face that is divided into two parts has twice the area of each part, the smallest ratio that
@@ -239,10 +239,10 @@ static bool is_own(const hanging_search *s, int m, const session_face_outline *f
     return false;
 }
 
-static bool is_in_box(const session_box *box, const double place[3], double slack)
+static bool is_in_box(const session_box *box, const double position[3], double slack)
 {
     for (int axis = 0; axis < 3; axis++)
-        if (!(box->lower[axis] - slack <= place[axis] && place[axis] <= box->upper[axis] + slack)) return false;
+        if (!(box->lower[axis] - slack <= position[axis] && position[axis] <= box->upper[axis] + slack)) return false;
     return true;
 }
 
@@ -274,7 +274,7 @@ static bool is_face_needed(const hanging_search *s, int m, const session_face *f
     session_face_outline f;
     if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
     /* a bound that is at least as large as the result of find_face_slack() */
-    const double slack = place_slack * f.diameter + s->rounding;
+    const double slack = relative_slack * f.diameter + s->rounding;
     return has_candidate(s, m, &f, slack, is_hit) || (!is_hit && intersects_rank_box(s, &f.box, slack));
 }
 
@@ -339,7 +339,7 @@ static bool read_own_faces(hanging_search *s)
 
 static double find_face_slack(const hanging_search *s, const session_coarse_face *f)
 {
-    return place_slack * f->width + s->rounding;
+    return relative_slack * f->width + s->rounding;
 }
 
 /* Writes, for each rank, the faces that intersect the rank's box. If mail->words is NULL, the words are only

@@ -187,12 +187,12 @@ static inline bool add_cell(const xor_table *x, const session_face_table *table,
     }
     if (has_twins) return false;
     for (int f = 0; f < table->count; f++) {
-        const signed char *places = table->vertices[f];
-        const bool is_quad = places[3] >= 0;
-        const uint64_t sum = hashes[(int)places[0]] + hashes[(int)places[1]] + hashes[(int)places[2]];
-        const uint64_t hash = session_mix_bits(is_quad ? sum + hashes[(int)places[3]] : sum);
-        for (int i = 0; i < 3; i++) sums[(int)places[i]] ^= hash;
-        if (is_quad) sums[(int)places[3]] ^= hash;
+        const signed char *corners = table->vertices[f];
+        const bool is_quad = corners[3] >= 0;
+        const uint64_t sum = hashes[(int)corners[0]] + hashes[(int)corners[1]] + hashes[(int)corners[2]];
+        const uint64_t hash = session_mix_bits(is_quad ? sum + hashes[(int)corners[3]] : sum);
+        for (int i = 0; i < 3; i++) sums[(int)corners[i]] ^= hash;
+        if (is_quad) sums[(int)corners[3]] ^= hash;
     }
     for (int i = 0; i < count; i++) add_xor(&x->vertex_sums[vertices[i]], sums[i], x->is_shared);
     return true;
@@ -481,29 +481,29 @@ static int find_face_home(const face_search *s, const session_homes *homes, int6
  * each key. Returns false if memory runs out. */
 static bool pack_keys(const face_search *s, const session_homes *homes, int ranks, session_mail *mail, int64_t **order)
 {
-    int64_t *places = base_calloc((size_t)ranks + 1, sizeof *places);
+    int64_t *next = base_calloc((size_t)ranks + 1, sizeof *next);
     int *home = base_alloc((size_t)(s->count + 1) * sizeof *home);
     mail->counts = base_calloc((size_t)ranks, sizeof *mail->counts);
-    bool is_done = places && home && mail->counts;
+    bool is_done = next && home && mail->counts;
     for (int64_t i = 0; i < s->count && is_done; i++) {
         home[i] = find_face_home(s, homes, i);
-        if (home[i] >= 0) places[home[i] + 1]++;
+        if (home[i] >= 0) next[home[i] + 1]++;
     }
     for (int rank = 0; rank < ranks && is_done; rank++) {
-        mail->counts[rank] = KEY_WORDS * places[rank + 1];
+        mail->counts[rank] = KEY_WORDS * next[rank + 1];
         mail->total += mail->counts[rank];
-        places[rank + 1] += places[rank];
+        next[rank + 1] += next[rank];
     }
     mail->words = base_alloc((size_t)mail->total * sizeof *mail->words);
     *order = base_alloc((size_t)mail->total * sizeof **order);
     is_done = is_done && mail->words && *order;
     for (int64_t i = 0; i < s->count && is_done; i++) {
         if (home[i] < 0) continue;
-        const int64_t place = places[home[i]]++;
-        memcpy(mail->words + KEY_WORDS * place, s->keys[i].words, KEY_WORDS * sizeof *mail->words);
-        (*order)[place] = i;
+        const int64_t index = next[home[i]]++;
+        memcpy(mail->words + KEY_WORDS * index, s->keys[i].words, KEY_WORDS * sizeof *mail->words);
+        (*order)[index] = i;
     }
-    base_free(places);
+    base_free(next);
     base_free(home);
     return is_done;
 }

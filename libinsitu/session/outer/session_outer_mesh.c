@@ -21,11 +21,11 @@ typedef struct corner_loop {
     double positions[4][3];
 } corner_loop;
 
-static void add_corner(corner_loop *loop, int64_t vertex, const double place[3])
+static void add_corner(corner_loop *loop, int64_t vertex, const double position[3])
 {
     for (int i = 0; i < loop->count; i++)
-        if (vector3_compare(loop->positions[i], place) == 0) return;
-    memcpy(loop->positions[loop->count], place, 3 * sizeof *place);
+        if (vector3_compare(loop->positions[i], position) == 0) return;
+    memcpy(loop->positions[loop->count], position, 3 * sizeof *position);
     loop->vertices[loop->count++] = vertex;
 }
 
@@ -99,10 +99,10 @@ static void find_inside(const grid *g, int64_t cell, double out[3])
 {
     grid_walk walk = grid_walk_cell(g, cell);
     int64_t vertex, count = 0;
-    double sum[3] = {0, 0, 0}, place[3];
+    double sum[3] = {0, 0, 0}, position[3];
     while (grid_walk_next(&walk, &vertex)) {
-        grid_vertex(g, vertex, place);
-        for (int axis = 0; axis < 3; axis++) sum[axis] += place[axis];
+        grid_vertex(g, vertex, position);
+        for (int axis = 0; axis < 3; axis++) sum[axis] += position[axis];
         count++;
     }
     for (int axis = 0; axis < 3; axis++) out[axis] = sum[axis] / (double)(count ? count : 1);
@@ -139,18 +139,18 @@ typedef struct outer_work {
     int64_t rim_loops[RIMS_MOST_FACES];
 } outer_work;
 
-static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, float height)
+static int64_t add_vertex(outer_work *w, const double position[3], int64_t origin, float height)
 {
-    memcpy(w->out->coordinates + 3 * w->vertex_count, place, 3 * sizeof *place);
+    memcpy(w->out->coordinates + 3 * w->vertex_count, position, 3 * sizeof *position);
     w->out->vertex_origins[w->vertex_count] = origin;
     w->heights[w->vertex_count] = height;
     return w->vertex_count++;
 }
 
-static int64_t add_copied_vertex(outer_work *w, int64_t origin, const double place[3])
+static int64_t add_copied_vertex(outer_work *w, int64_t origin, const double position[3])
 {
     int64_t *out = &w->vertex_map[origin];
-    if (*out < 0) *out = add_vertex(w, place, origin, 0);
+    if (*out < 0) *out = add_vertex(w, position, origin, 0);
     return *out;
 }
 
@@ -261,9 +261,9 @@ static int64_t add_rim(outer_work *w, int64_t cell, int face)
     w->out->loops[w->loop_end++] = w->rims.rows.kinds[session_kind_of(&w->rims.rows, cell)].nodes.order;
     for (int i = 0; i < of->counts[face]; i++) {
         const int64_t vertex = session_row_node(&w->rims.rows, cell, of->nodes[face][i]);
-        double place[3];
-        grid_vertex(w->cells, vertex, place);
-        w->out->loops[w->loop_end++] = add_copied_vertex(w, vertex, place);
+        double position[3];
+        grid_vertex(w->cells, vertex, position);
+        w->out->loops[w->loop_end++] = add_copied_vertex(w, vertex, position);
     }
     return loop;
 }
@@ -298,9 +298,9 @@ static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], 
 
 /* Returns whether a face is a concave quad. Faces of hexes, wedges and pyramids are bilinear patches, whatever their
  * shape. */
-static bool is_concave(const session_face_loop *face, const double (*places)[3], int count)
+static bool is_concave(const session_face_loop *face, const double (*positions)[3], int count)
 {
-    return count == 4 && !face->corners && polygon_is_concave_quad(places);
+    return count == 4 && !face->corners && polygon_is_concave_quad(positions);
 }
 
 /* Reads the corners of a face. */
@@ -350,9 +350,9 @@ static outer_counts find_count_bounds(const grid *g, const session_outer *outer)
         const session_cell_faces faces = session_faces_of_cell(g, face->cell);
         const session_face_loop loop = session_face_of(&faces, face->face);
         const int64_t size = loop.size;
-        double places[4][3];
-        for (int k = 0; k < 4 && k < size; k++) grid_vertex(g, session_face_vertex(&loop, k), places[k]);
-        const bool is_polygon = size > 4 || is_concave(&loop, (const double(*)[3])places, (int)size);
+        double positions[4][3];
+        for (int k = 0; k < 4 && k < size; k++) grid_vertex(g, session_face_vertex(&loop, k), positions[k]);
+        const bool is_polygon = size > 4 || is_concave(&loop, (const double(*)[3])positions, (int)size);
         most.cell_count += is_polygon ? size - 2 : 1;
         most.loop_entry_count += is_polygon ? size + 2 : 0;
         most.entry_count += is_polygon ? 4 * (size - 2) : size + 1;

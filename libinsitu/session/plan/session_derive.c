@@ -238,14 +238,14 @@ static bool allocate_values(const derive_work *w, session_mesh *part, session_fi
     return true;
 }
 
-static void store_values(const session_field *field, int64_t place, const double *values)
+static void store_values(const session_field *field, int64_t tuple, const double *values)
 {
     const int count = field->given.component_count;
     for (int c = 0; c < count; c++)
         if (field->values.is_wide)
-            ((double *)(void *)field->copy)[place * count + c] = values[c];
+            ((double *)(void *)field->copy)[tuple * count + c] = values[c];
         else
-            ((float *)(void *)field->copy)[place * count + c] = (float)values[c];
+            ((float *)(void *)field->copy)[tuple * count + c] = (float)values[c];
 }
 
 /* Records that the derived values have changed, so that scalars and fields that depend on them are computed again. */

@@ -74,20 +74,19 @@ void session_mark_sources(const scene *scene, uint64_t needed, const session_mes
 
 /* ---- faults of a derived field on a mesh ---------------------------------------------------------------------- */
 
-typedef struct derived_place {
+typedef struct derived_on_mesh {
     const char *scene_path;
     const scene_derived *derived;
     /* first_mesh: the first mesh of the catalogue on which the field exists */
     const session_catalogue_mesh *mesh, *first_mesh;
-} derived_place;
+} derived_on_mesh;
 
 /* Begins a message with the derived field's position in the scene, such as "scene.yaml:3: fields.q.vorticity". */
 #define AT "%s:%d: fields.%.200s%s%s: "
-#define OF(place)                                                                                                      \
-    (place)->scene_path, (place)->derived->line, (place)->derived->name, *(place)->derived->key ? "." : "",            \
-        (place)->derived->key
+#define OF(at)                                                                                                         \
+    (at)->scene_path, (at)->derived->line, (at)->derived->name, *(at)->derived->key ? "." : "", (at)->derived->key
 
-static insitu_status refuse_components(const derived_place *at, const scene_field *input,
+static insitu_status refuse_components(const derived_on_mesh *at, const scene_field *input,
                                        const session_catalogue_field *found, base_error *error)
 {
     const char *name = input->name;
@@ -102,7 +101,7 @@ static insitu_status refuse_components(const derived_place *at, const scene_fiel
 }
 
 /* Checks that a vector has the same number of components on all meshes of a mesh_group. */
-static insitu_status check_other_meshes(const derived_place *at, const scene_field *input,
+static insitu_status check_other_meshes(const derived_on_mesh *at, const scene_field *input,
                                         const session_catalogue_field *found, base_error *error)
 {
     for (const session_catalogue_mesh *other = at->first_mesh; other < at->mesh; other++) {
@@ -116,7 +115,7 @@ static insitu_status check_other_meshes(const derived_place *at, const scene_fie
     return INSITU_OK;
 }
 
-static insitu_status check_components(const derived_place *at, const scene_field *input,
+static insitu_status check_components(const derived_on_mesh *at, const scene_field *input,
                                       const session_catalogue_field *found, base_error *error)
 {
     const int count = found->component_count;
@@ -134,7 +133,7 @@ static insitu_status check_components(const derived_place *at, const scene_field
                      input->component, input->name, at->mesh->name, count, count - 1);
 }
 
-static insitu_status check_input(const derived_place *at, const scene_field *input,
+static insitu_status check_input(const derived_on_mesh *at, const scene_field *input,
                                  const session_catalogue_field *found, base_error *error)
 {
     if (found->fault) {
@@ -167,7 +166,7 @@ static bool add_to_mesh(const char *scene_path, const scene *scene, int number, 
                         session_catalogue_mesh *mesh)
 {
     const scene_derived *derived = &scene->derived[number];
-    const derived_place at = {scene_path, derived, mesh, catalogue->meshes};
+    const derived_on_mesh at = {scene_path, derived, mesh, catalogue->meshes};
     bool is_of_cells = derived->kind == SCENE_EXPRESSION;
     base_error error = {.status = INSITU_OK};
     for (int k = 0; k < derived->input_count; k++) {

@@ -72,12 +72,12 @@ static bool make_range_usable(const scene_colour_map *map, double *low, double *
 
 /* ---- colours --------------------------------------------------------------------------------------------------- */
 
-static double scale_value_at(const render_transfer *t, double place)
+static double scale_value_at(const render_transfer *t, double fraction)
 {
-    if (t->scale == RENDER_LINEAR) return t->low + place * (t->high - t->low);
+    if (t->scale == RENDER_LINEAR) return t->low + fraction * (t->high - t->low);
     const double low = render_scaled(t->scale, t->threshold, t->low);
     const double high = render_scaled(t->scale, t->threshold, t->high);
-    return render_unscaled(t->scale, t->threshold, low + place * (high - low));
+    return render_unscaled(t->scale, t->threshold, low + fraction * (high - low));
 }
 
 static void copy_colour(float *to, const float *from)

@@ -9,11 +9,11 @@ typedef session_vertex_groups_basis groups_basis;
 
 /* ---- groups --------------------------------------------------------------------------------------------------- */
 
-static session_key key_of_point(const double place[3])
+static session_key key_of_point(const double position[3])
 {
     session_key key;
     for (int axis = 0; axis < 3; axis++) {
-        const double unsigned_zero = place[axis] + 0.0;
+        const double unsigned_zero = position[axis] + 0.0;
         memcpy(&key.words[axis], &unsigned_zero, sizeof unsigned_zero);
     }
     return key;
@@ -71,7 +71,7 @@ static bool group_vertices(const groups_basis *basis, session_vertex_groups *out
 /* ---- groups that other ranks may have, too --------------------------------------------------------------------- */
 
 static void find_vertex_position(const groups_basis *basis, const session_vertex_groups *groups, int64_t number,
-                                 double place[3])
+                                 double position[3])
 {
     int part = 0, end = basis->part_count;
     while (end - part > 1) {
@@ -81,16 +81,16 @@ static void find_vertex_position(const groups_basis *basis, const session_vertex
         else
             end = middle;
     }
-    grid_vertex(&basis->parts[part]->cells, number - groups->first_vertices[part], place);
+    grid_vertex(&basis->parts[part]->cells, number - groups->first_vertices[part], position);
 }
 
 static void find_group_position(const groups_basis *basis, const session_vertex_groups *groups,
-                                const int64_t *one_vertex, int64_t group, double place[3])
+                                const int64_t *one_vertex, int64_t group, double position[3])
 {
     if (one_vertex)
-        find_vertex_position(basis, groups, one_vertex[group], place);
+        find_vertex_position(basis, groups, one_vertex[group], position);
     else
-        memcpy(place, groups->keys.keys[group].words, 3 * sizeof *place);
+        memcpy(position, groups->keys.keys[group].words, 3 * sizeof *position);
 }
 
 /* Finds the home rank of each group that lies in another rank's box, and counts the groups per home. The home is -1 if
@@ -99,11 +99,11 @@ static void find_homes(const groups_basis *basis, const int64_t *one_vertex, ses
 {
     for (int64_t group = 0; group < out->count; group++) {
         const session_key *key = &out->keys.keys[group];
-        double place[1][3];
-        find_group_position(basis, out, one_vertex, group, place[0]);
+        double position[1][3];
+        find_group_position(basis, out, one_vertex, group, position[0]);
         home[group] = -1;
-        if (!session_homes_share(basis->homes, place[0])) continue;
-        home[group] = session_find_home(basis->homes, (const double(*)[3])place, 1, session_key_hash(key),
+        if (!session_homes_share(basis->homes, position[0])) continue;
+        home[group] = session_find_home(basis->homes, (const double(*)[3])position, 1, session_key_hash(key),
                                         (int64_t)key->words[0]);
         out->shared_counts[home[group]]++;
         out->shared_count++;
@@ -114,25 +114,24 @@ static void find_homes(const groups_basis *basis, const int64_t *one_vertex, ses
 static bool list_shared(const groups_basis *basis, const int64_t *one_vertex, session_vertex_groups *out)
 {
     int *home = base_alloc((size_t)out->count * sizeof *home);
-    int64_t *places = base_calloc((size_t)basis->ranks + 1, sizeof *places);
+    int64_t *next = base_calloc((size_t)basis->ranks + 1, sizeof *next);
     out->shared_counts = base_calloc((size_t)basis->ranks, sizeof *out->shared_counts);
-    bool is_done = home && places && out->shared_counts;
+    bool is_done = home && next && out->shared_counts;
     if (is_done) {
         find_homes(basis, one_vertex, out, home);
         out->shared_groups = base_alloc((size_t)out->shared_count * sizeof *out->shared_groups);
         out->shared_keys = base_alloc((size_t)out->shared_count * sizeof *out->shared_keys);
         is_done = out->shared_groups && out->shared_keys;
     }
-    for (int rank = 0; rank < basis->ranks && is_done; rank++)
-        places[rank + 1] = places[rank] + out->shared_counts[rank];
+    for (int rank = 0; rank < basis->ranks && is_done; rank++) next[rank + 1] = next[rank] + out->shared_counts[rank];
     for (int64_t group = 0; group < out->count && is_done; group++) {
         if (home[group] < 0) continue;
-        const int64_t at = places[home[group]]++;
+        const int64_t at = next[home[group]]++;
         out->shared_groups[at] = group;
         out->shared_keys[at] = out->keys.keys[group];
     }
     base_free(home);
-    base_free(places);
+    base_free(next);
     return is_done;
 }
 

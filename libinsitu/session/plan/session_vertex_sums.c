@@ -115,14 +115,14 @@ static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3
 /* Packs the keys that lie in each other rank's box into messages. *numbers: the index of each key, in the order of the
  * messages. */
 static bool write_requests(const session_vertex_sums *sums, const session_team *team, const session_homes *homes,
-                           const double (*places)[3], session_mail *out, int64_t **numbers)
+                           const double (*positions)[3], session_mail *out, int64_t **numbers)
 {
     int64_t total = 0, at = 0;
     out->counts = base_calloc((size_t)team->ranks, sizeof *out->counts);
     if (!out->counts) return false;
     for (int n = 0; n < homes->near_count; n++)
         for (int64_t i = 0; i < sums->own_count && homes->near_ranks[n] != team->rank; i++)
-            out->counts[homes->near_ranks[n]] += session_is_in_box(&homes->boxes[n], places[i]);
+            out->counts[homes->near_ranks[n]] += session_is_in_box(&homes->boxes[n], positions[i]);
     for (int rank = 0; rank < team->ranks; rank++) total += out->counts[rank];
     out->words = base_alloc((size_t)(total ? total : 1) * KEY_WORDS * sizeof *out->words);
     *numbers = base_alloc((size_t)(total ? total : 1) * sizeof **numbers);
@@ -130,7 +130,7 @@ static bool write_requests(const session_vertex_sums *sums, const session_team *
     for (int n = 0; n < homes->near_count; n++) {
         const int rank = homes->near_ranks[n];
         for (int64_t i = 0; i < sums->own_count && out->counts[rank]; i++) {
-            if (!session_is_in_box(&homes->boxes[n], places[i])) continue;
+            if (!session_is_in_box(&homes->boxes[n], positions[i])) continue;
             memcpy(out->words + at * KEY_WORDS, sums->keys.keys[i].words, KEY_WORDS * sizeof *out->words);
             (*numbers)[at++] = i;
         }

@@ -44,7 +44,7 @@ static bool is_named_in_scene(const session_mesh *mesh, const scene *scene)
 static int64_t origin_of(const session_discontinuous *vertices, const insitu_mesh *given, int64_t corner)
 {
     if (vertices->are_corners_entries)
-        return grid_array_index(&vertices->shared_connectivity, session_entry_place(given, corner));
+        return grid_array_index(&vertices->shared_connectivity, session_entry_index(given, corner));
     return grid_array_index(&vertices->shared_connectivity, grid_array_index(&vertices->corners, corner));
 }
 

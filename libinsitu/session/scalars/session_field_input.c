@@ -62,15 +62,16 @@ static insitu_status check_component_arrays(const insitu_field *field, int64_t c
 
 static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_field *field, base_error *error)
 {
-    const int64_t places = session_count_field_positions(&mesh->original, field);
+    const int64_t position_count = session_count_field_positions(&mesh->original, field);
     const bool has_index = is_by_index(mesh, field), has_rows = field->corner_row != 0;
-    if (field->count < 0 || (!has_index && (has_rows ? field->count < places : field->count != places)))
+    if (field->count < 0 || (!has_index && (has_rows ? field->count < position_count : field->count != position_count)))
         return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,
-                         (long long)places, describe_centring(field->centring),
+                         (long long)position_count, describe_centring(field->centring),
                          has_rows ? ", rows' rests counted" : "");
-    const session_array_rule values = {"values", has_index && !places ? 0 : field->count,
+    const session_array_rule values = {"values", has_index && !position_count ? 0 : field->count,
                                        SESSION_ALLOW_FLOATS | SESSION_ALLOW_ANY, field->component_count};
-    const session_array_rule index = {"entries of index", places, SESSION_ALLOW_INTEGERS | SESSION_IS_OPTIONAL, 1};
+    const session_array_rule index = {"entries of index", position_count, SESSION_ALLOW_INTEGERS | SESSION_IS_OPTIONAL,
+                                      1};
     insitu_status status = session_check_array(&field->index, &index, INSITU_ERROR_FIELD, error);
     if (!status && field->components) return check_component_arrays(field, values.count, error);
     if (!status) status = session_check_array(&field->values, &values, INSITU_ERROR_FIELD, error);
@@ -240,7 +241,7 @@ static bool are_same_components(const insitu_field *a, const insitu_field *b)
 }
 
 /* Returns whether the new description has the same addresses and layout of values as the stored one. */
-static bool is_same_place(const insitu_field *a, const insitu_field *b)
+static bool is_same_layout(const insitu_field *a, const insitu_field *b)
 {
     return session_is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes &&
            session_is_same_array(&a->index, &b->index) && a->count == b->count && a->corner_row == b->corner_row &&
@@ -348,7 +349,7 @@ insitu_status session_set_part_field(session_meshes *meshes, session_mesh *mesh,
         *field = (session_field){.given = {.name = field->given.name}};
     }
     if (check_field(mesh, given, &what) == INSITU_OK) {
-        const bool is_same = is_same_place(&field->given, given);
+        const bool is_same = is_same_layout(&field->given, given);
         if (is_same || copy_tables(field, given, &what)) {
             store_field(meshes, mesh, index, given, is_same);
             return INSITU_OK;

@@ -66,22 +66,23 @@ static indexed_values make_indexed_values(const session_mesh *mesh, const sessio
 
 /* Returns the index, in the caller's arrays, of the value at a position of the copy: the number of a vertex, cell or
  * corner. */
-static int64_t find_value_entry(const indexed_values *v, int64_t place)
+static int64_t find_value_entry(const indexed_values *v, int64_t position)
 {
-    if (v->mesh) return session_vertex_of_corner(v->mesh, place);
-    if (v->parents) return v->parents[place];
-    return v->row_length == v->used_length ? place : place / v->used_length * v->row_length + place % v->used_length;
+    if (v->mesh) return session_vertex_of_corner(v->mesh, position);
+    if (v->parents) return v->parents[position];
+    return v->row_length == v->used_length ? position
+                                           : position / v->used_length * v->row_length + position % v->used_length;
 }
 
 /* Copies one tuple. Returns false if the index is out of range. */
-static bool copy_tuple(const indexed_values *v, int64_t place, char *out)
+static bool copy_tuple(const indexed_values *v, int64_t position, char *out)
 {
-    const int64_t entry = find_value_entry(v, place);
+    const int64_t entry = find_value_entry(v, position);
     const int64_t at = v->index.data ? grid_array_index(&v->index, entry) : entry;
     if (at < 0 || at >= v->count) return false;
     const int count = v->values.component_count;
     const size_t size = !v->keeps_type || v->values.values.is_wide ? 8 : 4;
-    out += place * count * (int64_t)size;
+    out += position * count * (int64_t)size;
     for (int i = 0; i < count; i++, out += size) {
         const grid_array from = grid_field_component(&v->values, i);
         const double number = v->keeps_type ? 0 : grid_array_number(&from, at);
@@ -121,8 +122,8 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : bad) nowait
-        for (int64_t place = 0; place < v.position_count; place++)
-            if (!copy_tuple(&v, place, field->copy) && place < bad) bad = place;
+        for (int64_t position = 0; position < v.position_count; position++)
+            if (!copy_tuple(&v, position, field->copy) && position < bad) bad = position;
         region_leave();
     }
     if (bad < v.position_count) return describe_fault(mesh, field, &v, find_value_entry(&v, bad), error);
@@ -148,8 +149,8 @@ static insitu_status check_index(const session_mesh *mesh, const session_field *
 {
     const bool at_vertices = field->given.centring == INSITU_VERTEX;
     const int64_t count = at_vertices ? mesh->original.vertex_count : session_corner_count(&mesh->original);
-    for (int64_t place = 0; place < count && v->index.data; place++) {
-        const int64_t entry = find_value_entry(v, place), at = grid_array_index(&v->index, entry);
+    for (int64_t position = 0; position < count && v->index.data; position++) {
+        const int64_t entry = find_value_entry(v, position), at = grid_array_index(&v->index, entry);
         if (at < 0 || at >= v->count) return describe_fault(mesh, field, v, entry, error);
     }
     return INSITU_OK;

@@ -6,9 +6,9 @@
 
 static double given_coordinate(const session_mesh *mesh, int axis, int64_t vertex)
 {
-    const grid_array places =
+    const grid_array coordinates =
         mesh->cells.lattice ? mesh->cells.coordinates[axis] : session_coordinates(&mesh->given, axis);
-    return grid_array_number(&places, vertex);
+    return grid_array_number(&coordinates, vertex);
 }
 
 /* Returns the axes along which a vertex of a mirror image differs in position from its source's vertex, one bit each. A

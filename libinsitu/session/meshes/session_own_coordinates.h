@@ -1,21 +1,21 @@
 /* Memory for vertex coordinates that the session computes and that replace the caller's. The coordinates of a vertex
  * are interleaved, because loops that read coordinates are fastest if all three have one stride. */
-#ifndef SESSION_PLACES_H
-#define SESSION_PLACES_H
+#ifndef SESSION_OWN_COORDINATES_H
+#define SESSION_OWN_COORDINATES_H
 
 #include <string.h>
 
 #include "session_mesh.h"
 
 /* Allocates memory for the coordinates of `count` vertices, in these types, along the axes whose bits are set in
- * `axes`, and makes `coordinates` refer to it; coordinates along other axes get no data. The memory, *places, is reused
+ * `axes`, and makes `coordinates` refer to it; coordinates along other axes get no data. The memory, *memory, is reused
  * if it already has the same axes and types, and then must also have the same count; otherwise *is_new is set. *bytes
- * receives its size. Returns false if memory runs out; then *places is NULL and no coordinates have data. Local. */
-bool session_reserve_places(char **places, insitu_array coordinates[3], int64_t count, int axes,
-                            const insitu_type types[3], int64_t *bytes, bool *is_new);
+ * receives its size. Returns false if memory runs out; then *memory is NULL and no coordinates have data. Local. */
+bool session_reserve_coordinates(char **memory, insitu_array coordinates[3], int64_t count, int axes,
+                                 const insitu_type types[3], int64_t *bytes, bool *is_new);
 
 /* Stores a coordinate. Returns whether it differs from the one that was stored before. */
-static inline bool session_store_place(const insitu_array *array, int64_t vertex, double number)
+static inline bool session_store_coordinate(const insitu_array *array, int64_t vertex, double number)
 {
     char *to = (char *)(uintptr_t)array->data + vertex * array->stride_bytes;
     if (array->type == INSITU_FLOAT64) {

@@ -1,4 +1,4 @@
-#include "session_places.h"
+#include "session_own_coordinates.h"
 
 #include "memory.h"
 
@@ -17,8 +17,8 @@ static bool have_axes_and_types(const insitu_array coordinates[3], int axes, con
     return are_so;
 }
 
-bool session_reserve_places(char **places, insitu_array coordinates[3], int64_t count, int axes,
-                            const insitu_type types[3], int64_t *bytes, bool *is_new)
+bool session_reserve_coordinates(char **memory, insitu_array coordinates[3], int64_t count, int axes,
+                                 const insitu_type types[3], int64_t *bytes, bool *is_new)
 {
     int64_t largest = 0, offset = 0, used = 0;
     bool has_one_type = true;
@@ -30,17 +30,17 @@ bool session_reserve_places(char **places, insitu_array coordinates[3], int64_t 
         used++;
     }
     *bytes = used * count * largest;
-    if (*places && have_axes_and_types(coordinates, axes, types)) return true;
-    base_free(*places);
-    *places = base_calloc((size_t)*bytes + 1, 1);
+    if (*memory && have_axes_and_types(coordinates, axes, types)) return true;
+    base_free(*memory);
+    *memory = base_calloc((size_t)*bytes + 1, 1);
     *is_new = true;
     for (int axis = 0; axis < 3; axis++) {
         coordinates[axis] = (insitu_array){0};
-        if (!*places || !has_axis(axes, axis)) continue;
+        if (!*memory || !has_axis(axes, axis)) continue;
         /* coordinates whose types differ in size are not interleaved: each axis has an array of its own */
-        coordinates[axis] = (insitu_array){*places + offset, types[axis],
+        coordinates[axis] = (insitu_array){*memory + offset, types[axis],
                                            has_one_type ? used * largest : session_type_size(types[axis])};
         offset += has_one_type ? largest : count * largest;
     }
-    return *places != NULL;
+    return *memory != NULL;
 }
