@@ -49,9 +49,9 @@ static bool find_file_status(const char *path, int flags, struct stat *stamp, fi
     return S_ISREG(stamp->st_mode) || fail_for_file_type(failure, stamp->st_mode);
 }
 
-/* Opens a regular file and returns its descriptor, or -1 on a failure. The file type is checked before opening, because
- * opening a device may have effects. O_NONBLOCK and the second check cover the case that another file is put in its
- * place in between. */
+/* Opens a regular file and returns its descriptor, or -1 on a failure. The file type is checked before opening,
+ * because opening a device may have effects. Another file may replace the checked one before it is opened, so
+ * O_NONBLOCK is set and the type is checked again. */
 static int open_regular(const char *path, int flags, struct stat *stamp, file_failure *failure)
 {
     if (!find_file_status(path, flags, stamp, failure)) return -1;
@@ -83,7 +83,7 @@ bool file_exists(const char *path)
 
 /* ---- reading --------------------------------------------------------------------------------------------------- */
 
-/* Reads to the end of the file, which may grow meanwhile up to the limit. */
+/* Reads to the end of the file, which may grow up to `limit` bytes while it is read. */
 static bool read_all(int file, size_t limit, file_content *out, file_failure *failure)
 {
     size_t capacity = (size_t)out->stamp.st_size + 1;
@@ -207,7 +207,7 @@ static bool try_to_replace(const folder_and_name *target, const char *temporary,
 {
     const int file = openat(target->folder, temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (file < 0) return false;
-    /* the lock prevents other writers of pictures from deleting the file as one that a killed run has left */
+    /* locked, because other writers of pictures delete unlocked temporary files, which killed runs have left */
     flock(file, LOCK_EX | LOCK_NB);
     bool is_written = write_all(file, bytes, size);
     int code = errno;
@@ -222,8 +222,8 @@ static bool try_to_replace(const folder_and_name *target, const char *temporary,
     return false;
 }
 
-/* Replaces the file; tries again if another process has deleted the temporary file because it took it for one that a
- * killed run has left. */
+/* Replaces the file. Tries again if another process has deleted the temporary file in the belief that a killed run
+ * had left it. */
 static bool replace_file(const folder_and_name *target, const char *bytes, size_t size, file_failure *failure)
 {
     for (int i = 0; i < TRIES; i++) {

@@ -21,14 +21,14 @@ typedef struct fragment {
 } fragment;
 
 /* Kinds of fragments. A single sample has FRAGMENT_VOLUME + FRAGMENT_LAYER times the number of the volume (0 .. 3).
- * FRAGMENT_EARLY or FRAGMENT_LATE is added to a sample within rounding of the begin or end of its cell, because the
- * cell before or behind may have the same sample. Fragments that join several samples or segments of a volume have kind
- * FRAGMENT_VOLUME. Hits have FRAGMENT_SURFACE + surface id (0, 1, ...). */
+ * FRAGMENT_EARLY or FRAGMENT_LATE is added if the sample lies within rounding of the start or end of its cell,
+ * because the cell before or behind may have the same sample. Fragments that combine several samples or segments of
+ * a volume have the kind FRAGMENT_VOLUME. Hits have FRAGMENT_SURFACE + surface id (0, 1, ...). */
 enum { FRAGMENT_VOLUME = 0, FRAGMENT_EARLY = 1, FRAGMENT_LATE = 2, FRAGMENT_LAYER = 4, FRAGMENT_SURFACE = 16 };
 
-/* Returns whether a fragment changes the picture. The transmittance of a faint fragment rounds to 1, but its light is
- * still visible: a rank that omitted such a fragment would draw a different picture from a rank that had folded it with
- * others. */
+/* Returns whether a fragment changes the picture. The transmittance of a faint fragment rounds to 1, but its light
+ * is still visible. If a rank dropped such a fragment, its picture would differ from that of a rank that has folded
+ * it with others (fragment_fold.h). */
 static inline bool fragment_shows(const fragment *f)
 {
     return f->transmittance < 1 || f->colour[0] != 0 || f->colour[1] != 0 || f->colour[2] != 0;

@@ -17,8 +17,9 @@ static int find_common_height(int32_t a, int32_t b)
     return a == b ? 0 : 32 - __builtin_clz((uint32_t)(a ^ b));
 }
 
-/* Folds with a stack of open nodes, each with the height at which it joins the node before it. Heights decrease from
- * the second node on, so that there is at most one node per halving. */
+/* Folds with a stack of nodes that may still get further fragments. heights[d] is the height of the lowest node that
+ * contains both open[d] and open[d - 1]. These heights decrease from the second entry on, so that there is at most
+ * one entry per halving. */
 fragment fragment_fold(const fragment *sorted, int64_t count)
 {
     fragment open[FRAGMENT_HALVINGS + 2];
@@ -41,16 +42,16 @@ fragment fragment_fold(const fragment *sorted, int64_t count)
     return open[0];
 }
 
-/* ---- folding of the parts that a rank has ------------------------------------------------------------------------ */
+/* ---- folding on one rank ----------------------------------------------------------------------------------------- */
 
-/* The range of t within which a rank has all fragments, and the list of folded fragments. */
+/* The state of folding a rank's fragments of one interval. */
 typedef struct fold_part {
     float begin, end; /* range of t in which the rank has all fragments */
     fragment *out;    /* the folded fragments */
     int64_t count;    /* number of folded fragments */
 } fold_part;
 
-/* Returns the t at which a leaf begins. The result is exact, because it is a product with a power of two. */
+/* Returns the t at which a leaf starts. The result is exact, because the divisor is a power of two. */
 static double find_leaf_begin(int32_t leaf)
 {
     return (double)leaf / (FRAGMENT_INTERVALS << FRAGMENT_HALVINGS);
@@ -62,7 +63,8 @@ static bool has_all_of(const fold_part *part, int32_t first_leaf, int height)
            find_leaf_begin(first_leaf + (1 << height)) <= (double)part->end;
 }
 
-/* Appends the fragments of a node to out, and folds every node of which the rank has all fragments. */
+/* Appends the fragments of a node of the tree to part->out. Every descendant of which the rank has all fragments is
+ * folded to one fragment. */
 static void fold_node(fold_part *part, const fragment *sorted, int64_t count, int32_t first_leaf, int height)
 {
     while (count > 1 && height > 0 && !has_all_of(part, first_leaf, height)) {

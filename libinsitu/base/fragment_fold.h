@@ -1,15 +1,16 @@
-/* Blends a volume's fragments in an order that depends only on the ray, so that the bits are the same on any partition.
+/* Blends a volume's fragments in an order that depends only on the ray, so that the bits are the same on any
+ * partition. Folding means to blend several fragments into one.
  *
  * "Over" is associative, but its roundings are not. The positions of the fragments therefore determine the order of
  * blending: the ray is cut into intervals of a fixed length in t, these into halves, and so on. The fragments of an
- * interval are folded along the binary tree of its halves. Surfaces divide an interval, and the parts are folded
- * separately. An empty half does not change any bit.
+ * interval are folded along the binary tree of its halves, whose leaves are the smallest halves. If surfaces divide
+ * an interval, the parts between them are folded separately. An empty half does not change any bit.
  *
  *     |       |       |   x   |   x   |  x    |       |   x   |       |      ((x (x)) (x))  (x)
  *
- * A rank that has all fragments of a half may therefore send the folded fragment instead of them, and the rank that has
- * the remaining fragments continues from there. Intervals are blended front to back, until almost no light is left at
- * the end of one. */
+ * A rank that has all fragments of a half may therefore send the folded fragment instead of them, and the rank that
+ * has the remaining fragments continues from there. Intervals are blended front to back, until almost no light is
+ * left at the end of one. */
 #ifndef BASE_FRAGMENT_FOLD_H
 #define BASE_FRAGMENT_FOLD_H
 
@@ -18,14 +19,14 @@
 
 #include "fragment.h"
 
-/* The number of intervals per unit of t, and of halvings per interval. t is near 1 in the scene (render.h), so that a
- * ray has about ten intervals and a leaf is 4e-6 of the scene. Fragments that begin in the same leaf are folded front
- * to back. */
+/* The number of intervals per unit of t, and the number of times that an interval is halved. t is near 1 in the
+ * scene (render.h), so that a ray has about ten intervals and a leaf is 4e-6 of the scene. Fragments that start in
+ * the same leaf are folded front to back. */
 enum { FRAGMENT_INTERVALS = 8, FRAGMENT_HALVINGS = 15 };
 
-/* A rank may omit the intervals behind one at whose end its own fragments leave less light than FRAGMENT_DARK_OF_RANK.
- * The pixel omits the intervals behind FRAGMENT_DARK, which is larger by more than the sum of possible rounding
- * errors. */
+/* If the transmittance of a rank's own fragments up to the end of an interval is below FRAGMENT_DARK_OF_RANK, the
+ * rank may omit all intervals behind it. The pixel omits the intervals behind one at whose end the transmittance is
+ * below FRAGMENT_DARK. This limit is larger by more than the sum of possible rounding errors. */
 #define FRAGMENT_DARK_OF_RANK 1e-7f
 #define FRAGMENT_DARK 1.01e-7f
 
@@ -46,8 +47,9 @@ static inline int32_t fragment_interval_number(float t)
  * 1. */
 fragment fragment_fold(const fragment *sorted, int64_t count);
 
-/* Folds on a rank that has all of the pixel's fragments from depth begin to depth end: only halves that lie between
- * these depths are folded. out may be the same as sorted. Returns the number of fragments in out. */
+/* Folds the fragments of one interval on a rank that has all of the pixel's fragments from depth `begin` to depth
+ * `end`. Only halves between these depths are folded. out may be the same as sorted. Returns the number of fragments
+ * in out. */
 int64_t fragment_fold_between(const fragment *sorted, int64_t count, float begin, float end, fragment *out);
 
 #endif

@@ -1,8 +1,9 @@
-/* A rank's cells and values as the modules below the session access them: the caller's own arrays behind inline
- * accessors that handle each array's element type and stride. No data is copied.
+/* A rank's cells and values in the form that all modules below the session read: the caller's own arrays, with
+ * inline accessors that handle each array's element type and stride. No data is copied.
  *
- * The code that makes a grid has validated it (indices in range, types known, coordinates finite); the accessors check
- * nothing. They return all geometry in double: the modules convert to float32 only after subtracting an origin. */
+ * The code that makes a grid has validated it (indices in range, types known, coordinates finite); the accessors
+ * check nothing. They return all geometry in double: other modules convert to float32 only after subtracting an
+ * origin. */
 #ifndef BASE_GRID_H
 #define BASE_GRID_H
 
@@ -76,12 +77,13 @@ typedef enum grid_unusual_type {
     GRID_UNUSUAL_UINT64
 } grid_unusual_type;
 
-/* A strided array. is_wide: its elements have 8 bytes (double or int64), else 4 bytes (float or int32). */
+/* A strided array. */
 typedef struct grid_array {
     const char *data;
     int64_t stride; /* distance between elements in bytes; if it is 0, all elements are read from the first one */
-    bool is_wide;
-    bool is_integer;            /* elements must not be read as float or double: they are integers or odd */
+    bool is_wide;   /* elements have 8 bytes (double or int64); otherwise 4 bytes (float or int32) */
+    /* set if elements must not be read as float or double: they are integers or of an unusual type */
+    bool is_integer;
     unsigned char unusual_type; /* one of the values of grid_unusual_type */
     int64_t base;               /* in an array of indices or offsets, the number that stands for 0 */
     /* if the last entry of an array of offsets is omitted, the number of the others; else 0 */
@@ -91,7 +93,7 @@ typedef struct grid_array {
     const grid_axis *axis;
 } grid_array;
 
-/* A lattice, whose cells are given by three indices instead of connectivity. */
+/* A structured grid (lattice), whose cells are given by three indices instead of connectivity. */
 typedef struct grid_lattice {
     int64_t cells[3]; /* number of cells along each axis; if it is 0 along one axis, the cells are quads */
     grid_numbering vertex_numbering, cell_numbering;
@@ -108,8 +110,8 @@ typedef struct grid {
     int64_t cell_count;
     grid_array coordinates[3];
     grid_array connectivity; /* vertex indices of the cells; for a polyhedron indices of its faces */
-    /* begin of each cell in connectivity. It has no data if all cells have the type cell_type, and always has data if
-     * there are polyhedra. */
+    /* index of each cell's first entry in connectivity. It has no data if all cells have the type cell_type, and
+     * always has data if there are polyhedra. */
     grid_array offsets;
     const char *cell_types; /* type of each cell; NULL: all cells have the type cell_type */
     int64_t cell_types_stride;
@@ -122,7 +124,7 @@ typedef struct grid {
     const uint64_t *flat;
     /* The faces of polyhedra, which cells share. face_count is 0 if there are no polyhedra. */
     int64_t face_count;
-    grid_array face_offsets;      /* begin of each face in face_connectivity; face_count + 1 entries */
+    grid_array face_offsets;      /* index of each face's first entry in face_connectivity; face_count + 1 entries */
     grid_array face_connectivity; /* vertex indices of the faces, in cyclic order */
     int ghosts_bytes;             /* size of a flag in ghosts in bytes: 1, 4 or 8 */
 } grid;
@@ -136,8 +138,8 @@ typedef struct grid_field {
     int component_count;
     int component; /* number of the component, from 0, or -1 for the magnitude */
     bool is_cell_centred;
-    /* the cell values from which the values at vertices were computed: a cell whose own value is not finite then has no
-     * value; NULL if there are none */
+    /* the cell values from which the values at vertices were computed; NULL: the values were not computed from
+     * cells. A cell whose own value is not finite has no value. */
     const struct grid_field *source_cells;
 } grid_field;
 
@@ -193,7 +195,7 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
     return (int64_t)((uint64_t)index - (uint64_t)a->base);
 }
 
-/* Returns the end of the i-th cell or face, by an array of offsets. */
+/* Returns the index after the last entry of the i-th cell or face, by an array of offsets. */
 static inline int64_t grid_offset_end(const grid_array *offsets, int64_t i)
 {
     return i + 1 == offsets->implied_end_count ? offsets->implied_end : grid_array_index(offsets, i + 1);

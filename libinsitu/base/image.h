@@ -23,7 +23,7 @@ typedef struct image {
      * not requested. */
     float *depth;
     deep_image *deep; /* samples of the image, only on rank 0; NULL on every rank if samples were not requested */
-    bool is_folded;   /* set if the image is made from fragments that ranks have folded (fragment_fold.h) */
+    bool is_folded;   /* set if ranks have folded the fragments from which the image is made (fragment_fold.h) */
 } image;
 
 #endif

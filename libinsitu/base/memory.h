@@ -13,9 +13,9 @@ void *base_alloc(size_t bytes);
 /* Returns memory for count × size bytes, all 0, aligned to 64 bytes; NULL on failure. */
 void *base_calloc(size_t count, size_t size);
 
-/* base_reserve() reserves address space for bytes that are not counted yet, because memory that has not been written to
- * is not used. base_set_used_bytes() sets the number of bytes in use and counts them. base_realloc() before
- * base_set_used_bytes() does not keep the contents. */
+/* base_reserve() allocates a block without counting its bytes, because memory that has not been written to is not
+ * used. base_set_used_bytes() then states how many of its bytes are in use, and counts these. base_realloc() of the
+ * block does not keep its contents before base_set_used_bytes() has been called. */
 void *base_reserve(size_t bytes);
 void base_set_used_bytes(void *block, size_t bytes);
 
@@ -26,10 +26,10 @@ void *base_realloc(void *block, size_t bytes);
 /* Frees a block from these functions; NULL is allowed. */
 void base_free(void *block);
 
-/* A block that is divided into pieces aligned to 64 bytes. If begin is NULL, the sizes of the pieces are only added
- * up. */
+/* Divides a block into pieces that are aligned to 64 bytes. If `begin` is NULL, only the total size of the pieces is
+ * computed. */
 typedef struct base_arena {
-    char *begin; /* begin of the block; NULL: sizes are only added up */
+    char *begin; /* start of the block; NULL: only sizes are added up */
     size_t used; /* number of bytes of all pieces so far */
 } base_arena;
 

@@ -18,8 +18,8 @@
 #include <stdbool.h>
 
 static _Thread_local fenv_t environment;
-/* The core of the thread that opened the most recent region. If it is that of another session, workers only move
- * unnecessarily. */
+/* The core of the thread that opened the most recent region. If another session opened that region, workers may be
+ * moved needlessly, which does no harm. */
 static atomic_int first_core = -1;
 static atomic_llong regions;
 

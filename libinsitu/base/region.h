@@ -1,4 +1,4 @@
-/* Functions that every thread calls at the begin and at the end of a parallel region. A region is written as
+/* Functions that every thread calls at the start and at the end of a parallel region. A region is written as
  *
  *     #pragma omp parallel num_threads(threads)
  *         {
@@ -8,10 +8,10 @@
  *             region_leave();
  *         }
  *
- * with reductions of floating-point numbers on the loop, so that they end before region_leave(). Regions are expensive
- * if another process uses a core: at the end of each region, and at each barrier, the team waits about 4 ms until the
- * thread that has lost its core gets it back. The code therefore has few regions, none without work, and schedules
- * their loops dynamically. */
+ * with reductions of floating-point numbers on the loop, so that they end before region_leave(). Regions are
+ * expensive if another process uses a core: at the end of each region, and at each barrier, the team waits about 4
+ * ms until the thread that has lost its core gets it back. The code therefore has few regions, none without work,
+ * and schedules their loops dynamically. */
 #ifndef BASE_REGION_H
 #define BASE_REGION_H
 

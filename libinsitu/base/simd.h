@@ -110,10 +110,11 @@ SIMD_INLINE vm vm_xor(vm a, vm b)
 {
     return (vm)(a ^ b);
 }
+/* Returns the lanes in a that are not in b. */
 SIMD_INLINE vm vm_andnot(vm a, vm b)
 {
     return (vm)(a & ~b);
-} /* returns the lanes in a that are not in b */
+}
 SIMD_INLINE vm vm_none(void)
 {
     return 0;
@@ -287,10 +288,11 @@ SIMD_INLINE vf vf_select(vm m, vf a, vf b)
 {
     return (vf)(((vi)a & m) | ((vi)b & ~m));
 }
+/* Return b if either value is NaN, as on x86. */
 SIMD_INLINE vf vf_min(vf a, vf b)
 {
     return vf_select(vf_lt(a, b), a, b);
-} /* returns b if either value is NaN, as on x86 */
+}
 SIMD_INLINE vf vf_max(vf a, vf b)
 {
     return vf_select(vf_lt(b, a), a, b);

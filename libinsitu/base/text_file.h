@@ -16,8 +16,8 @@ typedef struct c_locale {
 bool c_locale_enter(c_locale *numbers);
 void c_locale_leave(c_locale *numbers);
 
-/* A text that is being written in memory; it begins as {0}. A stream of the C library (open_memstream) would not do,
- * because it drops what it has no memory for without an error. */
+/* A text that is being written in memory. It must be initialized with {0}. open_memstream() is not used, because it
+ * silently drops text if memory runs out. */
 typedef struct text_output {
     char *bytes; /* the text and a NUL, allocated by base_alloc(); NULL: nothing has been added */
     size_t size, capacity;
@@ -35,7 +35,7 @@ bool text_file_replace(const char *path, text_writer *write, const void *what, f
 /* Appends the output of write() to a file, like file_append(), with numbers in the C locale. */
 bool text_file_append(const char *path, text_writer *write, const void *what, file_failure *failure);
 
-/* Removes all lines except those that begin with a whole number below `number`, and moves these to the begin of the
+/* Removes all lines except those that start with a whole number below `number`, and moves these to the start of the
  * text. Returns the number of bytes that they take. An incomplete last line is removed. */
 size_t text_keep_below(char *text, long long number);
 

@@ -196,7 +196,8 @@ bool closed_face_is_patch(const closed_faces *c, int face, const double (*positi
 
 /* ---- outward orientation ----------------------------------------------------------------------------------------- */
 
-/* Returns six times the volume of the tet with the centre, whose sign follows from the order a, b, c. */
+/* Returns six times the volume of the tet of the triangle v and the centre. The sign depends on the direction in
+ * which the three vertices run. */
 static double tet_volume(const double (*p)[3], const int *v, const double *centre)
 {
     double d[3][3];
@@ -206,8 +207,8 @@ static double tet_volume(const double (*p)[3], const int *v, const double *centr
            d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
 }
 
-/* Returns whether the ray from p in the negative x direction crosses the triangle. A corner at the same height as p
- * counts as above it. If the projection of the triangle is a line, the ray does not cross it. */
+/* Returns whether the ray from p in the negative x direction crosses the triangle. A corner with the same z as p
+ * counts as below p. If the projection of the triangle along x is a line, the ray does not cross it. */
 static bool is_crossed_below(const double *const t[3], const double *p)
 {
     bool inside = false;
@@ -255,7 +256,7 @@ void closed_faces_orient_outward(closed_faces *c, const double (*positions)[3], 
     }
     for (int piece = 0; piece < c->piece_count; piece++) {
         const bool is_turned = c->piece_count > 1 && is_cavity(c, positions, piece);
-        /* replaces the volume by the sign with which the piece is oriented */
+        /* from here on, piece_volume is 1, or -1 if the orientation of the piece's faces must be reversed */
         c->piece_volume[piece] = (c->piece_volume[piece] < 0) != is_turned ? -1 : 1;
     }
     for (int face = 0; face < c->face_count; face++) c->orientation[face] *= (int)c->piece_volume[c->piece[face]];

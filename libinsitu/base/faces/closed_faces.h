@@ -16,10 +16,12 @@ typedef struct closed_triangle {
     int vertex[3]; /* numbers of the vertices, in increasing order */
     int face;
     int orientation; /* 1 if the three vertices run in the direction of the face's vertices, else -1 */
-    double volume;   /* six times the volume of the tet with the centre; positive if the triangle is seen from inside */
+    /* six times the volume of the tet of the triangle and the centre; after closed_faces_orient_outward(), positive
+     * if the outward normal points away from the centre */
+    double volume;
 } closed_triangle;
 
-/* An edge of the faces, with the sides that run along it. */
+/* An edge of the polyhedron, with the sides (see closed_faces) that run along it. */
 typedef struct closed_edge {
     int low, high; /* numbers of the two vertices; low is -1 in an unused entry */
     int side[2];   /* entries at which the sides along the edge begin; -1: there is none */

@@ -14,10 +14,10 @@ static const double fan_slack = 0x1p-20;
  * few 2^-53; areas have errors of about ten times as much. */
 static const double line_slack = 0x1p-46;
 
-/* The corners of a polygon, numbered in the order in which they are cut off. */
+/* The corners of a polygon, numbered in the order that polygon.h defines. */
 typedef struct polygon_work {
     int count;
-    int step; /* 1 if that order runs in the direction of the caller's list, else -1 */
+    int step; /* 1 if this order has the direction of the caller's list, -1 if it has the opposite one */
     int *order;
     double (*positions)[3];  /* positions relative to the smallest corner, scaled to a width of about 1 */
     double (*projection)[2]; /* projection of the corners along the normal, in which the order runs counterclockwise */
@@ -173,8 +173,8 @@ static bool are_coincident(const polygon_work *w, int a, int b)
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* Returns whether the polygon, if it passes the position of the tip a second time, enters or leaves the corner at the
- * tip there. */
+/* Corner `again` has the same position as the corner `tip`, whose neighbours are a and c. Returns whether an edge at
+ * `again` leads into the angle between the edges at `tip`. */
 static bool enters_corner(const polygon_work *w, int a, int tip, int c, int again)
 {
     const int ends[2] = {w->previous[again], w->next[again]};
@@ -201,7 +201,8 @@ static bool is_ear(const polygon_work *w, int tip)
     return true;
 }
 
-/* Returns the first ear in the order of corners after the first corner, which is tested last; -1 if there is none. */
+/* Returns the first corner after `first` at which there is an ear. `first` itself is tested last. Returns -1 if
+ * there is no ear. */
 static int find_ear(const polygon_work *w, int first)
 {
     int i = first;
