@@ -32,13 +32,13 @@ static void divide_by_zero_on(int threads)
 /* As the session does before its first region of so many threads. */
 static void start_threads(const session_guard *guard, int threads)
 {
-    session_guard_lend(guard);
+    session_guard_suspend(guard);
 #pragma omp parallel num_threads(threads)
     {
         region_enter();
         region_leave();
     }
-    session_guard_return();
+    session_guard_resume();
 }
 
 static void enable_traps(void)

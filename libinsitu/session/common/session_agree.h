@@ -25,7 +25,7 @@ insitu_status session_share_error(MPI_Comm comm, int root, base_error *error);
  * Local. */
 insitu_status session_check_mpi(base_error *error, int code, const char *what);
 
-/* Stores an error that memory ran out for `bytes` bytes of `what`, and returns its status. Local. */
+/* Stores the error that there was no memory for `bytes` bytes of `what`, and returns its status. Local. */
 insitu_status session_fail_for_memory(base_error *error, int64_t bytes, const char *what);
 
 #endif

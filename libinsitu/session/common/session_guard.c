@@ -23,12 +23,12 @@ void session_guard_end(const session_guard *guard)
     fesetenv(&guard->caller_environment);
 }
 
-void session_guard_lend(const session_guard *guard)
+void session_guard_suspend(const session_guard *guard)
 {
     fesetenv(&guard->caller_environment);
 }
 
-void session_guard_return(void)
+void session_guard_resume(void)
 {
     fesetenv(FE_DFL_ENV);
 }

@@ -7,7 +7,7 @@
 
 typedef struct session_guard {
     fenv_t caller_environment; /* floating-point environment of the caller, which is restored at the end of the call */
-    int is_dynamic;            /* result of omp_get_dynamic() at the begin of the call */
+    int is_dynamic;            /* result of omp_get_dynamic() at the start of the call */
 } session_guard;
 
 /* Saves the calling thread's settings, then sets the default floating-point environment and fixed team sizes. */
@@ -16,10 +16,11 @@ void session_guard_begin(session_guard *guard);
 /* Restores the saved settings, including exception flags. */
 void session_guard_end(const session_guard *guard);
 
-/* Restores the calling thread's environment for the parallel region in which OpenMP starts threads;
- * session_guard_return() ends this. The new threads begin with the caller's own environment, as if the caller had
- * started them. Both must be called between session_guard_begin() and session_guard_end(). */
-void session_guard_lend(const session_guard *guard);
-void session_guard_return(void);
+/* Between session_guard_suspend() and session_guard_resume(), the calling thread has the caller's own environment.
+ * The parallel region in which OpenMP starts threads runs in between, so that the new threads inherit this
+ * environment, as if the caller had started them. Both must be called between session_guard_begin() and
+ * session_guard_end(). */
+void session_guard_suspend(const session_guard *guard);
+void session_guard_resume(void);
 
 #endif

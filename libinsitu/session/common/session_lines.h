@@ -6,10 +6,10 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Returns this rank's input of an MPI reduction by maximum. session_reporting_rank() computes, from the result of the
- * reduction, the lowest rank that has warnings. Local. */
+/* Returns this rank's operand of a reduction by maximum, from whose result session_reporting_rank() determines the
+ * lowest rank that has warnings. Local. */
 int session_reporting_word(const session_report *report, const session_team *team);
-/* Returns the lowest rank that has warnings, given the result of the reduction; -1 if no rank has any. Local. */
+/* Returns the lowest rank that has warnings, given the result of that reduction; -1 if no rank has any. Local. */
 int session_reporting_rank(int word, const session_team *team);
 
 /* Adds the warnings of the rank `root`, possibly none, to the reports of all ranks. Warnings of other ranks, which are

@@ -1,4 +1,4 @@
-/* A warning that has been reported is stored as a hash of its subject, so that it is not reported again. */
+/* A warning that has been reported is stored as a hash of its subject, so that it is not reported a second time. */
 #include "session_report.h"
 
 #include <stdarg.h>

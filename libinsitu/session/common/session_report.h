@@ -48,37 +48,38 @@ void session_report_end(session_report *report);
 void session_report_free(session_report *report);
 
 typedef enum session_warning_kind {
-    WARNING_ORDER,       /* the vertices of cells seem not to be in VTK's order, judged by the cells' volumes */
+    WARNING_ORDER,       /* the cells' volumes suggest that their vertices are not in VTK's order */
     WARNING_PIECES,      /* an isosurface is not within surface_error of a polynomial */
-    WARNING_FINER,       /* cells of higher order are not split as finely as the scene says */
-    WARNING_ISOVALUE,    /* an isovalue lies outside of the range of its field */
+    WARNING_FINER,       /* cells of higher order are split into fewer pieces than the scene requests */
+    WARNING_ISOVALUE,    /* an isovalue lies outside the range of its field */
     WARNING_TRANSPARENT, /* a volume layer is transparent for all values of its field */
     WARNING_THRESHOLD,   /* no cell is within a threshold */
-    WARNING_PLANE,       /* a plane lies outside of the meshes that it is drawn on */
+    WARNING_PLANE,       /* a plane lies outside the meshes on which it is drawn */
     WARNING_UNUSABLE,    /* values of cells are not finite */
     WARNING_CLIP,        /* clips remove all of a layer */
     WARNING_NO_CELLS,    /* no mesh contains cells that can be drawn */
-    WARNING_APART,       /* a layer is drawn on several meshes, of which one has vertex ids */
-    WARNING_NO_LINES,    /* a mesh lacks the field of a layer's contour lines */
-    WARNING_SHELLS,      /* a layer that needs cells with volume is drawn on a mesh that has only shells */
-    WARNING_SAMPLES,     /* several volumes are sampled by default, without an error bound */
-    WARNING_SCALE,       /* a field has no value that its logarithmic scale can show */
-    WARNING_NARROW,      /* values are too close to each other for the colours of their range */
-    WARNING_REPLACED,    /* a picture overwrites an earlier one */
-    WARNING_VIEW,        /* a camera sees no cell */
-    WARNING_GREY,        /* a surface lacks the field that colours it */
-    WARNING_OVERLAP,     /* cells overlap in some pixels */
-    WARNING_WORDS,       /* a text of a picture cannot be drawn as written */
-    WARNING_BARS,        /* pictures that are to share their colour bars have different ones */
-    WARNING_UNSAID,      /* values have changed although the caller declared them unchanged */
-    WARNING_OUTPUTS,     /* an image has no outputs */
-    WARNING_PARAMETER,   /* a parameter of the scene is not used */
-    WARNING_MESH,        /* no mesh has a name that the scene gives at `meshes` */
-    WARNING_WARP,        /* gradients are those of a warped mesh */
-    WARNING_MIRROR,      /* a mesh lies on both sides of its mirror plane */
-    WARNING_WRITER,      /* rank 0 has no thread that writes pictures */
-    WARNING_THREADS,     /* the scene or OpenMP requests more threads than can be started */
-    WARNING_ISA          /* INSITU_ISA in this rank's environment is ignored */
+    /* a layer is drawn on several meshes, one of which has vertex ids and is not matched with the others */
+    WARNING_APART,
+    WARNING_NO_LINES,  /* a mesh lacks the field of a layer's contour lines */
+    WARNING_SHELLS,    /* a layer that needs cells with volume is drawn on a mesh that has only shells */
+    WARNING_SAMPLES,   /* several volumes are sampled at the default distance, without an error bound */
+    WARNING_SCALE,     /* a field has no value that its logarithmic scale can show */
+    WARNING_NARROW,    /* values are too close to each other for the colours of their range */
+    WARNING_REPLACED,  /* a picture overwrites an earlier one */
+    WARNING_VIEW,      /* a camera sees no cell */
+    WARNING_GREY,      /* a surface lacks the field that colours it */
+    WARNING_OVERLAP,   /* cells overlap in some pixels */
+    WARNING_WORDS,     /* a text of a picture cannot be drawn as written */
+    WARNING_BARS,      /* pictures that should share their colour bars have different ones */
+    WARNING_UNSAID,    /* values have changed although the caller declared them unchanged */
+    WARNING_OUTPUTS,   /* an image has no outputs */
+    WARNING_PARAMETER, /* a parameter of the scene is not used */
+    WARNING_MESH,      /* no mesh has a name that the scene gives at `meshes` */
+    WARNING_WARP,      /* gradients are those of a warped mesh */
+    WARNING_MIRROR,    /* a mesh lies on both sides of its mirror plane */
+    WARNING_WRITER,    /* rank 0 has no thread that writes pictures */
+    WARNING_THREADS,   /* the scene or OpenMP requests more threads than can be started */
+    WARNING_ISA        /* INSITU_ISA in this rank's environment is ignored */
 } session_warning_kind;
 
 /* The subject of a warning. Two warnings are the same if all members are equal. */

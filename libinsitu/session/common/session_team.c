@@ -13,7 +13,7 @@ static insitu_status duplicate_comm(MPI_Comm comm, MPI_Comm *out, base_error *er
 insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *error)
 {
     *out = (session_team){
-        .comm = MPI_COMM_NULL, .compositing_comm = MPI_COMM_NULL, .node_ranks = 1, .cores = 1, .each_node_ranks = 1};
+        .comm = MPI_COMM_NULL, .compositing_comm = MPI_COMM_NULL, .node_ranks = 1, .cores = 1, .ranks_per_node = 1};
     insitu_status status = duplicate_comm(comm, &out->comm, error);
     if (!status) status = duplicate_comm(out->comm, &out->compositing_comm, error);
     if (status) return status;
@@ -22,8 +22,8 @@ insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *
     return INSITU_OK;
 }
 
-/* Determines whether all nodes have the same number of ranks, and whether ranks are placed node by node or round-robin.
- * The result is used only if it is the same on all ranks. */
+/* Determines whether all nodes have the same number of ranks, and whether ranks are placed node by node or
+ * round-robin. The results are stored only if they are the same on all ranks. */
 static void find_rank_placement(session_team *team, MPI_Comm node)
 {
     int within = 0, first = team->rank, all[4];
@@ -35,8 +35,8 @@ static void find_rank_placement(session_team *team, MPI_Comm node)
     const int own[4] = {size, -size, !is_after, !is_round};
     if (MPI_Allreduce(own, all, 4, MPI_INT, MPI_MAX, team->comm) != MPI_SUCCESS) return;
     if (all[0] != -all[1] || team->ranks % size || (all[2] && all[3])) return;
-    team->each_node_ranks = size;
-    team->is_round_nodes = all[2];
+    team->ranks_per_node = size;
+    team->is_round_robin = all[2];
 }
 
 void session_team_count_node(session_team *team)

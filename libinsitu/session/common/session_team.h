@@ -15,10 +15,10 @@ typedef struct session_team {
     int rank, ranks;
     int node_ranks; /* number of ranks on this rank's node, including itself */
     int cores;      /* this rank's share of the node's cores (session_cores.h) */
-    /* number of ranks on every node, if it is the same on all nodes and ranks are placed node by node or round-robin;
-     * else 1 */
-    int each_node_ranks;
-    bool is_round_nodes; /* set if ranks are placed round-robin, so that consecutive ranks are on different nodes */
+    /* number of ranks on every node, if it is the same on all nodes and ranks are placed node by node or
+     * round-robin; otherwise 1 */
+    int ranks_per_node;
+    bool is_round_robin; /* set if ranks are placed round-robin, so that consecutive ranks are on different nodes */
     int threads;         /* number of this rank's threads in this step; 0 before the first step */
 } session_team;
 

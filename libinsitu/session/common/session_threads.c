@@ -1,11 +1,12 @@
-/* OpenMP's runtimes end the process if they cannot start a thread. So threads are first started here, where a failure
- * only reduces their number: as many as the step needs and SPARE_THREADS more, with the stack size that OpenMP would
- * use. They are kept until every rank has tried, since the ranks of a node share limits (processes of a user or a
- * container, memory, address space). OpenMP then gets the number that could be started; the spare threads, and some
- * memory, are left for other needs.
+/* OpenMP's runtimes end the process if they cannot start a thread. Threads are therefore started here first, as a
+ * trial: a failure then only reduces their number. The trial starts the threads that the step needs and
+ * SPARE_THREADS more, with the stack size that OpenMP would use. They exist until every rank has finished its trial,
+ * since the ranks of a node share limits (processes of a user or a container, memory, address space). OpenMP then
+ * gets the number that could be started. The spare threads, and some memory, remain available for other purposes.
  *
- * OpenMP keeps its threads for later regions. So threads are tried again only if more are needed, or if threads have
- * ended, as GNU's do if a region of the caller uses fewer. A destructor in each thread counts those that end.
+ * OpenMP keeps its threads for later regions. So the trial is repeated only if more threads are needed, or if
+ * threads have ended, as GNU's do if a region of the caller uses fewer. A destructor in each thread counts those
+ * that end.
  *
  * OpenMP has no function that returns the stack size of workers, so it is measured in the workers. */
 #define _GNU_SOURCE 1
@@ -73,7 +74,7 @@ static void create_exit_key(void)
     has_key = pthread_key_create(&key, count_thread_end) == 0;
 }
 
-/* Returns the number of threads that are known to exist. */
+/* Returns the number of threads that are known to exist for the calling thread. */
 static int count_living_threads(const session_threads *threads)
 {
     const bool is_same = threads->count > 0 && pthread_equal(threads->caller, pthread_self());
@@ -145,10 +146,10 @@ static void start_trial_threads(trial *t, int requested)
     pthread_mutex_lock(&t->exit_mutex);
     if (!t->threads || !t->spare_memory || pthread_attr_init(&attributes) != 0) return;
     const size_t stack = stack_of_environment();
-    /* OpenMP ignores a stack size that is refused here, too */
+    /* OpenMP, too, ignores a stack size that the system rejects */
     if (stack) pthread_attr_setstacksize(&attributes, stack);
     sigfillset(&all);
-    /* signals are blocked while threads are started, so that these never receive the caller's signals */
+    /* new threads inherit the blocked signals, so that they never receive the caller's */
     pthread_sigmask(SIG_SETMASK, &all, &old);
     while (t->count < requested &&
            pthread_create(&t->threads[t->count], &attributes, wait_at_gate, &t->exit_mutex) == 0)
@@ -236,22 +237,22 @@ static thread_stack least_worker_stack(int threads)
     return (thread_stack){left, size};
 }
 
-/* Returns the stack size in kB with which `needed` bytes are free. It includes what is in use now, and a few pages for
- * the operating system. */
+/* Returns the stack size in kB with which `needed` bytes are free: the bytes in use now, `needed` bytes, and some kB
+ * for the operating system. */
 static long long needed_stack_kilobytes(const thread_stack *stack, int64_t needed)
 {
-    enum { OF_SYSTEMS = 16 };
-    return ((needed + stack->total_bytes - stack->free_bytes) >> 10) + OF_SYSTEMS;
+    enum { SYSTEM_KILOBYTES = 16 };
+    return ((needed + stack->total_bytes - stack->free_bytes) >> 10) + SYSTEM_KILOBYTES;
 }
 
-/* Stores an error if a stack is too small. Must be called before any other parallel region. Collective. */
+/* Stores an error if a thread's stack is too small. Must be called before any other parallel region. Collective. */
 static insitu_status check_stacks(session_threads *threads, const session_team *team, const session_guard *guard,
                                   base_error *error)
 {
     const thread_stack own = find_own_stack();
-    session_guard_lend(guard);
+    session_guard_suspend(guard);
     const thread_stack least = least_worker_stack(team->threads);
-    session_guard_return();
+    session_guard_resume();
     if (own.free_bytes < SESSION_CALLER_STACK)
         base_fail(error, INSITU_ERROR_ARGUMENT,
                   "the thread that calls insitu_step() has %lld kB of its stack left, a step needs %d kB: expected a "

@@ -17,15 +17,16 @@
  * quarter larger. */
 enum { SESSION_WORKER_STACK = 256 << 10, SESSION_CALLER_STACK = 320 << 10 };
 
-/* The number of threads that exist or have been found to be startable, for the thread that made the last call. */
+/* The number of threads that exist or that a trial could start, for the thread that made the last call. */
 typedef struct session_threads {
     int count; /* number of threads; 0: not tried yet */
     pthread_t caller;
     int64_t ended_count; /* number of threads of any team that had ended when `count` was determined */
 } session_threads;
 
-/* Returns whether this rank requests more threads than it is known to be able to start. scene_threads is the number set
- * in the scene. If it is 0, the rank requests its share of the cores, or OpenMP's maximum if that is lower. Local. */
+/* Returns whether this rank requests more threads than it is known to be able to start. scene_threads is the number
+ * set in the scene; if it is 0, the rank requests its share of the cores, or OpenMP's maximum if that is lower.
+ * Local. */
 bool session_lacks_threads(const session_threads *threads, int scene_threads, int cores);
 
 /* Determines how many threads can be started, and sets team->threads. Warns if there are fewer than requested. If

@@ -327,7 +327,7 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
      * drawn without a background */
     static const float no_background[4] = {0, 0, 0, 0};
     const float *background = image->decorations.is_given ? no_background : image->background;
-    const comp_nodes nodes = {d->team->each_node_ranks, d->team->is_round_nodes};
+    const comp_nodes nodes = {d->team->ranks_per_node, d->team->is_round_robin};
     _Static_assert((int)SCENE_SCHEDULE_BINARY == (int)COMP_BINARY, "a scene's schedules are those of compositing");
     const comp_group compositing = {d->team->compositing_comm, nodes, (comp_schedule)d->scene->schedule, 0,
                                     d->team->claims};
