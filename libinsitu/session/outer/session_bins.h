@@ -18,8 +18,8 @@ void session_bins_free(session_bins *bins);
 
 /* Iterator over the points near a box. It visits all points inside the box, and some outside.
  *
- *     for (session_bin_walk walk = session_walk_bins(&bins, lower, upper, margin); session_next_binned(&walk,
- * &point);) */
+ *     session_bin_walk walk = session_walk_bins(&bins, lower, upper, margin);
+ *     while (session_next_binned(&walk, &point)) ... */
 typedef struct session_bin_walk {
     const session_bins *bins;
     int64_t first_bin[3], last_bin[3]; /* range of bins that the box touches, along each axis */

@@ -71,7 +71,7 @@ static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t ce
     return out;
 }
 
-/* The vertices of a face in loop order. session_face_vertex() returns the vertex with a number from 0 to size - 1. */
+/* The vertices of a face in cyclic order. session_face_vertex() returns the i-th of them, i = 0 .. size - 1. */
 typedef struct session_face_loop {
     const session_cell_faces *faces;
     /* corner numbers within the cell; NULL: the vertices are the entries of the list from `first` on */

@@ -43,8 +43,8 @@ static session_box find_bounding_box(const double positions[][3], int count)
     return box;
 }
 
-/* Computes the face's normal, box, area and width. side: 1 if the cell is behind the face as seen along the normal of
- * its loop of vertices, and -1 if it is in front. */
+/* Computes the face's normal, box, area and width. side: 1 if the cell is behind the face, as seen by a viewer towards
+ * whom the right-hand normal of the vertex loop points; -1 if it is in front. */
 static void measure_face(session_coarse_face *f, double side)
 {
     double a[3], b[3];
@@ -59,7 +59,8 @@ static void measure_face(session_coarse_face *f, double side)
     for (int axis = 0; axis < 3 && f->area > 0; axis++) f->normal[axis] *= side / (2 * f->area);
 }
 
-/* Returns on which side of the face its cell lies: 1 if it is behind the face, -1 if it is in front. */
+/* Returns the side of the face on which its cell lies, in the form of measure_face(): 1 if it is behind the face, -1 if
+ * it is in front. */
 static double find_cell_side(const grid *g, int64_t cell, const session_coarse_face *f)
 {
     double sums[3] = {0, 0, 0}, off[3], position[3];
@@ -93,7 +94,8 @@ bool session_read_outline(const grid *g, const session_face *face, session_face_
     return true;
 }
 
-/* Returns whether the position lies, along the direction, more than `slack` above all corners or below all corners. */
+/* Returns whether the position, projected on the direction, lies above all corners, or below all corners, by more than
+ * `slack`. */
 static bool is_beyond(const session_face_outline *f, const double position[3], const double direction[3], double slack)
 {
     const double at = vector3_dot(direction, position), most = slack * sqrt(vector3_dot(direction, direction));

@@ -12,13 +12,13 @@ typedef struct session_coarse_face {
     double corner_positions[4][3];
     double normal[3]; /* unit vector that points away from the cell */
     session_box box;
-    double area,
-        width; /* area of the face, and length of its longest diagonal or, for a triangle, of the longer of two edges */
+    double area;  /* area of the face */
+    double width; /* length of the longest diagonal or, for a triangle, of the longer of two edges */
 } session_coarse_face;
 
 enum { SESSION_FACE_WORDS = 13 };
 
-/* An outline of a triangle or quad that contains all data needed to exclude most positions from it. */
+/* The data of a triangle or quad that is needed to exclude most positions quickly, before the whole face is read. */
 typedef struct session_face_outline {
     int count;
     int64_t vertices[4]; /* vertices in the cell's own order */
@@ -27,14 +27,14 @@ typedef struct session_face_outline {
     double diameter; /* upper bound of the distance between any two corners */
 } session_face_outline;
 
-/* Reads the outline of a face. Returns false if the face is not a triangle or quad of a cell with volume. */
+/* Reads the outline of a face. Returns false if the face is not a triangle or quad of a cell with a volume. */
 bool session_read_outline(const grid *g, const session_face *face, session_face_outline *out);
 /* Returns whether a position in the outline's box may be within `slack` of the face. It returns false if the position
  * is beyond all corners of the face, either along its normal or across one of its edges. */
 bool session_may_contain(const session_face_outline *outline, const double position[3], double slack);
 
-/* Reads a face. *vertices receives its vertices in the order of out->corner_positions. Returns false if the face is not
- * a triangle or quad of a cell with volume, or if its area is 0. */
+/* Reads a face. vertices: receives its vertices, in the order of out->corner_positions. Returns false if the face is
+ * not a triangle or quad of a cell with a volume, or if its area is 0. */
 bool session_read_coarse_face(const grid *g, const session_face *face, session_coarse_face *out, int64_t vertices[4]);
 
 /* Writes the face as 64-bit words for another rank; the second function reads it from them. */
@@ -54,7 +54,7 @@ double session_position_rounding(const session_mesh *mesh);
 /* Returns the distance between two points. */
 double session_point_distance(const double a[3], const double b[3]);
 
-/* Defines an order of faces by area and then by the positions of their corners. */
+/* Returns whether face a has the larger area or, if the areas are equal, the lexicographically smaller corners. */
 bool session_is_larger_face(const session_coarse_face *a, const session_coarse_face *b);
 
 #endif

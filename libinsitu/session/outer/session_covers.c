@@ -1,7 +1,7 @@
-/* Each rank sends the boxes of its blocks to the ranks near it. These are the ranks for which the bounding box of all
- * their own blocks intersects the block's box; boxes are compared in units of cells of the coarsest level. The boxes
- * are sorted into bins by their centres, so that the work grows only with the number of blocks and the number of blocks
- * that cover each. The boxes are kept, because the faces between levels are found from them later. */
+/* Each rank sends the box of each of its blocks to all ranks near the block: those whose own blocks have a common
+ * bounding box that intersects the block's box. Boxes are compared in units of cells of the coarsest level. They are
+ * sorted into bins by their centres, so that the work grows only with the number of blocks and the number of blocks
+ * that cover each. The boxes are kept, because session_drop_faces_between_levels() uses them later. */
 #include "session_covers.h"
 
 #include <math.h>
@@ -58,7 +58,7 @@ static session_level_box make_level_box(const session_mesh *mesh, int rank)
     session_level_box out = {SESSION_HASH_BEGIN, mesh->block, rank, {0, 0, 0}, {1, 1, 1}, {1, 1, 1}};
     session_hash_text(&out.mesh, mesh->name);
     for (int axis = 0; axis < 3; axis++) {
-        /* along the axis without cells, the quads of all blocks count as lying in the same place */
+        /* all quads count as lying at the same index along the axis without cells */
         if (!l->cells[axis]) continue;
         out.lower[axis] = l->first[axis] + cells->drawn_first[axis];
         out.upper[axis] = l->first[axis] + cells->drawn_end[axis];
@@ -124,7 +124,7 @@ static bool list_own_boxes(const session_meshes *meshes, cover_search *s)
     return s->boxes != NULL;
 }
 
-/* ---- what ranks tell each other --------------------------------------------------------------------------------- */
+/* exchange of boxes -------------------------------------------------------------------------------------------- */
 
 static bool intersects_box(const session_level_box *box, const session_box *common)
 {
@@ -193,7 +193,7 @@ static insitu_status exchange_boxes(cover_search *s, const session_meshes *meshe
     return status;
 }
 
-/* ---- which cells ------------------------------------------------------------------------------------------------ */
+/* covered cells ------------------------------------------------------------------------------------------------ */
 
 /* Sorts boxes into bins. Unless with_coarsest is set, the boxes of the coarsest level are left out, because they cover
  * no cells. Returns false if memory runs out. */
@@ -222,21 +222,21 @@ static int64_t floor_quotient(int64_t a, int64_t b)
     return a % b < 0 ? q - 1 : q;
 }
 
-/* Ranges of cells of a coarse box that a fine one overlaps. */
+/* The cells of a coarse box that a fine box overlaps, as index ranges of the coarse level. */
 typedef struct overlap {
-    int64_t lower[3], upper[3];             /* cells that it covers wholly or in part */
-    int64_t whole_lower[3], whole_upper[3]; /* cells that it covers wholly along each axis */
-    int cut_axis;                           /* an axis along which it covers some only in part, or -1 */
+    int64_t lower[3], upper[3];             /* cells that the fine box covers wholly or in part */
+    int64_t whole_lower[3], whole_upper[3]; /* cells that the fine box covers wholly along each axis */
+    /* an axis along which it covers some cells only in part; -1: there is none */
+    int cut_axis;
 } overlap;
 
-/* Computes which cells of the coarse box the fine one covers, as index ranges of the coarse level. Returns false if it
- * covers none. */
+/* Computes the overlap of a coarse box with a fine one. Returns false if they have no cell in common. */
 static bool find_overlap(const session_level_box *coarse, const session_level_box *fine, overlap *out)
 {
     out->cut_axis = -1;
     for (int axis = 0; axis < 3; axis++) {
         const int64_t of = fine->refinement[axis], by = coarse->refinement[axis];
-        /* in units of 1 / (of * by) of a cell of the coarsest level */
+        /* ends of the fine box, in units of 1 / (of * by) of a cell of the coarsest level */
         const int64_t begin = fine->lower[axis] * by, end = fine->upper[axis] * by;
         const int64_t first = coarse->lower[axis], last = coarse->upper[axis];
         const int64_t lower = floor_quotient(begin, of), upper = -floor_quotient(-end, of);
@@ -252,10 +252,11 @@ static bool find_overlap(const session_level_box *coarse, const session_level_bo
     return true;
 }
 
-/* Bits of the bytes of covered cells, until cut cells have been resolved. */
+/* Bits of the bytes in the array of covered cells. IS_CUT: a finer block covers the cell only in part; resolve_cuts()
+ * removes this bit. */
 enum { IS_HIDDEN = 1, IS_CUT = 2 };
 
-/* Iterates over the rows of cells along i of an overlap. */
+/* Iterates over the rows of an overlap's cells along the axis i. */
 typedef struct row_walk {
     const session_mesh *mesh;
     const overlap *cells;
@@ -350,8 +351,8 @@ static bool find_covered_cells(const cover_search *s, const session_mesh *mesh, 
     return true;
 }
 
-/* Resolves the cells that a finer block covers in part. This is an error, unless another block covers them wholly: a
- * block two levels finer may begin within a cell if the level between them lies there too. */
+/* Removes the marks of cells that a finer block covers in part. Such a cell is an error, unless another block covers it
+ * wholly: a block two levels finer may start within a cell if the level between them lies there too. */
 static void resolve_cuts(const cover_search *s, session_mesh *mesh, unsigned char *covered)
 {
     for (finer_walk w = walk_finer(s, mesh); next_finer(&w) && !mesh->misfit.exists;) {
@@ -362,8 +363,8 @@ static void resolve_cuts(const cover_search *s, session_mesh *mesh, unsigned cha
     for (int64_t cell = 0; cell < mesh->given.cell_count; cell++) covered[cell] = covered[cell] != 0;
 }
 
-/* Adds the caller's own ghost flags. They may have to be read from a copy, which is filled here because it is not
- * filled yet. */
+/* Adds the caller's own ghost flags. If they have to be read from a copy, the copy is filled here, because otherwise it
+ * would be filled later. */
 static void add_caller_ghosts(session_mesh *mesh, int threads, unsigned char *covered)
 {
     const insitu_array *ghosts = &mesh->given.ghosts;

@@ -215,7 +215,7 @@ static bool bin_candidates(hanging_search *s)
     return session_bins_create(&s->bins, s->candidates->position, (int64_t)sizeof *s->candidates, s->candidate_count);
 }
 
-/* ---- faces: outlines rule most of them out, so that few are read ------------------------------------------------- */
+/* faces, most of which are excluded by their outlines --------------------------------------------------------- */
 
 typedef enum face_state {
     FACE_UNREAD,
@@ -246,16 +246,16 @@ static bool is_in_box(const session_box *box, const double position[3], double s
     return true;
 }
 
-/* Returns whether a candidate may be on the face. If is_hit, only candidates that lie on some face are considered;
- * otherwise only those that are not corners of this face. */
-static bool has_candidate(const hanging_search *s, int m, const session_face_outline *f, double slack, bool is_hit)
+/* Returns whether a candidate may lie on the face. If needs_hit is set, only candidates that are known to lie on some
+ * face are considered; otherwise all candidates that are not corners of this face. */
+static bool has_candidate(const hanging_search *s, int m, const session_face_outline *f, double slack, bool needs_hit)
 {
     session_bin_walk walk = session_walk_bins(&s->bins, f->box.lower, f->box.upper, slack);
     int64_t near;
     while (session_next_binned(&walk, &near)) {
         const candidate *c = &s->candidates[near];
         if (!is_in_box(&f->box, c->position, slack)) continue;
-        if ((is_hit ? c->hit_list >= 0 : !is_own(s, m, f, c)) && session_may_contain(f, c->position, slack))
+        if ((needs_hit ? c->hit_list >= 0 : !is_own(s, m, f, c)) && session_may_contain(f, c->position, slack))
             return true;
     }
     return false;
@@ -269,13 +269,13 @@ static bool intersects_rank_box(const hanging_search *s, const session_box *box,
     return false;
 }
 
-static bool is_face_needed(const hanging_search *s, int m, const session_face *face, bool is_hit)
+static bool is_face_needed(const hanging_search *s, int m, const session_face *face, bool needs_hit)
 {
     session_face_outline f;
     if (!session_read_outline(&s->basis->meshes[m]->cells, face, &f)) return false;
     /* a bound that is at least as large as the result of find_face_slack() */
     const double slack = relative_slack * f.diameter + s->rounding;
-    return has_candidate(s, m, &f, slack, is_hit) || (!is_hit && intersects_rank_box(s, &f.box, slack));
+    return has_candidate(s, m, &f, slack, needs_hit) || (!needs_hit && intersects_rank_box(s, &f.box, slack));
 }
 
 /* Appends a face to the list of faces if it is a triangle or quad. Returns false if memory runs out. */
@@ -297,9 +297,10 @@ static bool read_face(hanging_search *s, int m, const session_face *face)
     return true;
 }
 
-/* Reads the faces of this rank that a candidate may lie on, or that are near other ranks. If is_hit, it reads the
- * remaining faces that are near candidates which lie on faces. Returns false if memory runs out. */
-static bool read_faces(hanging_search *s, bool is_hit)
+/* Reads those faces of this rank that have not been read. In the first pass (needs_hit is false), it reads faces on
+ * which a candidate may lie, and those near other ranks. In the second pass (needs_hit is true), it reads faces near
+ * candidates that lie on some face. Returns false if memory runs out. */
+static bool read_faces(hanging_search *s, bool needs_hit)
 {
     const session_border *borders = s->basis->mesh_group->hanging.borders;
     unsigned char *states = s->face_states;
@@ -311,7 +312,7 @@ static bool read_faces(hanging_search *s, bool is_hit)
             region_enter();
 #pragma omp for schedule(dynamic, REGION_ITEMS) nowait
             for (int64_t i = 0; i < border->face_count; i++)
-                if (states[i] == FACE_UNREAD && is_face_needed(s, m, &border->faces[i], is_hit))
+                if (states[i] == FACE_UNREAD && is_face_needed(s, m, &border->faces[i], needs_hit))
                     states[i] = FACE_NEEDED;
             region_leave();
         }
@@ -325,8 +326,7 @@ static bool read_faces(hanging_search *s, bool is_hit)
     return is_done;
 }
 
-/* Reads the faces of this rank that a candidate may lie on, or that are near other ranks. Returns false if memory runs
- * out. */
+/* Reads this rank's faces of the first pass (read_faces()). Returns false if memory runs out. */
 static bool read_own_faces(hanging_search *s)
 {
     int64_t count = 0;
@@ -397,8 +397,9 @@ static bool receive_faces(hanging_search *s, const session_mail *in)
 
 /* ---- contacts ------------------------------------------------------------------------------------------------- */
 
-/* Adds the face to one of the candidate's lists, whose head is *last. Returns false if memory runs out. */
-static bool add_contact(hanging_search *s, int64_t number, const double weights[4], int64_t *last)
+/* Prepends the face with this number to one of a candidate's linked lists, whose first element is *head. Returns false
+ * if memory runs out. */
+static bool add_contact(hanging_search *s, int64_t number, const double weights[4], int64_t *head)
 {
     if (s->contact_count == s->contact_capacity) {
         const int64_t capacity = s->contact_capacity * 2 + 256;
@@ -408,9 +409,9 @@ static bool add_contact(hanging_search *s, int64_t number, const double weights[
         s->contact_capacity = capacity;
     }
     contact *c = &s->contacts[s->contact_count];
-    *c = (contact){.face = number, .next_contact = *last};
+    *c = (contact){.face = number, .next_contact = *head};
     if (weights) memcpy(c->weights, weights, sizeof c->weights);
-    *last = s->contact_count++;
+    *head = s->contact_count++;
     return true;
 }
 
@@ -495,7 +496,7 @@ static bool request_faces(const hanging_search *s, session_mail *requested, int6
     for (int64_t i = 0; i < s->face_count; i++) first[i] = -1;
     for (int64_t i = 0; i < s->candidate_count; i++)
         if (s->candidates[i].face >= 0) first[s->candidates[i].face] = 0;
-    for (int64_t i = s->own_count; i < s->face_count; i++) { /* these faces are sorted by rank */
+    for (int64_t i = s->own_count; i < s->face_count; i++) { /* received faces, sorted by the rank that sent them */
         if (first[i] < 0) continue;
         first[i] = 4 * requested->total;
         requested->words[requested->total++] = (uint64_t)s->faces[i].message_index;

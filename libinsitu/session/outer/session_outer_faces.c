@@ -23,7 +23,8 @@
 #include "session_neighbours.h"
 #include "session_thresholds.h"
 
-/* Maximum number of threads that have their own table of sums. A table has one 64-bit word per vertex. */
+/* Maximum number of tables of sums. If there are more threads, they share tables. A table has one 64-bit word per
+ * vertex. */
 enum { MOST_TABLES = 4 };
 
 /* The data that the search stores for one part of the mesh. */
@@ -285,7 +286,7 @@ static bool is_open_face(const part_cells *p, const session_face_loop *loop)
     return true;
 }
 
-/* Returns whether the cell may have an outer face, judged by its vertices alone. */
+/* Returns whether the cell may have an outer face, according to the marks of its vertices. */
 static bool has_open_vertices(const part_cells *p, int64_t cell)
 {
     const grid *g = p->grid;

@@ -131,11 +131,12 @@ typedef struct outer_work {
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
     face_polygon polygon; /* buffer with space for the largest polygon */
     int64_t loop_end;     /* number of entries of the stored loops */
-    /* If cells are split into pieces, the loop of a piece's face is the rim of the caller's face that contains it;
-     * `rim_loops` has the index of the loop of each face of the current cell; 0: the loop is not stored yet. */
+    /* set if cells are split into pieces. The loop of a piece's face is then the rim of the caller's face that contains
+     * it (session_rims.h). */
     bool has_rims;
     session_rims rims;
     const uint32_t *parents; /* for each piece of a split cell, the caller's cell (session_topology.parents) */
+    /* for each face of the current cell, the index of its rim's loop; 0: the loop is not stored yet */
     int64_t rim_loops[RIMS_MOST_FACES];
 } outer_work;
 
@@ -303,7 +304,7 @@ static bool is_concave(const session_face_loop *face, const double (*positions)[
     return count == 4 && !face->corners && polygon_is_concave_quad(positions);
 }
 
-/* Reads the corners of a face. */
+/* Reads the corners of a face into the polygon. */
 static void read_polygon(const grid *g, const session_face_loop *face, face_polygon *p)
 {
     p->count = 0;

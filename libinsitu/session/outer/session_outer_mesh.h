@@ -1,11 +1,11 @@
-/* Builds a mesh on the outer faces of another mesh, such that an isosurface of the new mesh is the other one's outer
- * surface.
+/* Builds a mesh on the outer faces of another mesh (the whole mesh), such that an isosurface of the new mesh is the
+ * outer surface of the whole mesh.
  *
  * On each face there is a pyramid, or on a triangle a tet, that extends into the cell. Polygons with more corners are
- * divided into fans of triangles that begin at their least vertex, as in polyhedra. The scalar of the mesh is 0 at the
- * face's vertices and -1 at the apex, so that the face is the isosurface 0. It is therefore found in the same way as
- * other isosurfaces, and at the same depth as from the cell to which the face belongs, because a ray's intersection
- * with a face is computed from the face's vertices alone. */
+ * divided into fans of triangles that start at their least vertex, as in polyhedra. The scalar of the mesh is 0 at the
+ * face's vertices and -1 at the apex, so that the face is the isosurface 0. It is found in the same way as other
+ * isosurfaces. Its depth is the same as if it were computed from the cell to which the face belongs, because a ray's
+ * intersection with a face is computed from the face's vertices alone. */
 #ifndef SESSION_OUTER_MESH_H
 #define SESSION_OUTER_MESH_H
 

@@ -141,7 +141,7 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
     return INSITU_OK;
 }
 
-/* ---- the cells behind them, by owner and neighbour --------------------------------------------------------------- */
+/* cells of the faces, by owner and neighbour ------------------------------------------------------------------- */
 
 static insitu_status check_owner(patch_faces *p, int patch, int64_t i, int64_t f, unsigned char *is_taken,
                                  base_error *error)
@@ -181,7 +181,7 @@ static insitu_status check_owners(patch_faces *p, base_error *error)
     return error->status;
 }
 
-/* ---- the cells behind them, by a search of all cells ------------------------------------------------------------- */
+/* cells of the faces, by a search of all cells ----------------------------------------------------------------- */
 
 typedef struct cell_search {
     session_key_table keys; /* keys of those faces all of whose vertices have groups */

@@ -11,14 +11,14 @@ enum { RIMS_MOST_FACES = 6, RIMS_MOST_NODES = 4 * NODES_MOST_ORDER };
 typedef struct session_rim_kind {
     int counts[RIMS_MOST_FACES]; /* number of nodes of each face's rim; 0: the cell does not have this face */
     int nodes[RIMS_MOST_FACES][RIMS_MOST_NODES];
-    unsigned char *faces_of_node; /* for each node, the faces on which it lies, one bit per face */
+    unsigned char *faces_of_node; /* for each node, a bit mask of the faces on which it lies */
 } session_rim_kind;
 
 typedef struct session_rims {
     session_rows rows;
     session_rim_kind *kinds;
     int64_t cell; /* the caller's cell to which faces_of_vertex refers; -1: none */
-    /* for each vertex of session_mesh.cells, the faces of the cell on which it lies, one bit per face */
+    /* for each vertex of session_mesh.cells, a bit mask of the faces of `cell` on which it lies */
     unsigned char *faces_of_vertex;
 } session_rims;
 

@@ -1,5 +1,5 @@
-/* Draws isosurfaces on triangles, quads and polygons. These are the contour lines of the isovalues on the outer surface
- * of meshes that contain no other cells. */
+/* Draws isosurfaces on shells (triangles, quads and polygons) as contour lines of the isovalues. They are drawn on the
+ * outer surface of meshes that contain no other cells. */
 #ifndef SESSION_SHELLS_H
 #define SESSION_SHELLS_H
 
