@@ -15,10 +15,10 @@ _Static_assert((int)SCENE_MAX_SURFACES == (int)RENDER_MAX_ISOVALUES &&
                    (int)SCENE_MAX_VOLUMES == (int)RENDER_MAX_VOLUMES,
                "a scene may have as many surfaces and volumes as can be drawn");
 
-/* ---- visible values --------------------------------------------------------------------------------------------- */
+/* visible values -------------------------------------------------------------------------------------------- */
 
-/* Returns whether the scalar already has the interval, which it may because the images of a sweep over fields share
- * their isosurfaces. */
+/* Returns whether the scalar already has the interval. Images of a sweep over fields share their isosurfaces, so that
+ * an interval may be added several times. */
 static bool has_interval(const session_scalar *scalar, const mmbvh_interval *interval)
 {
     for (int i = 0; i < scalar->interval_count; i++)
@@ -54,8 +54,8 @@ static bool add_visible_intervals(session_scalar *scalar, const scene_volume *la
 {
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
     const int count = session_visible_intervals(layer, intervals);
-    /* A colour range computed from the data requires a reduction over all ranks, so that it is not known here; all
-     * cells are then kept as candidates. */
+    /* A colour range that is computed from the data requires a reduction over all ranks. It is not known yet, so all
+     * cells are kept as candidates. */
     if (!layer->colour_map.range.is_fixed) scalar->needs_all_cells = true;
     return scalar->needs_all_cells || add_intervals(scalar, intervals, count);
 }
@@ -67,8 +67,8 @@ static bool mark_volume(session_mesh *mesh, const scene_volume *layer)
     return !scalar || add_visible_intervals(scalar, layer);
 }
 
-/* Marks the scalar of distances from a plane as used, with the isovalue at which the slice is drawn: 0 or a very small
- * number (session_slice_distance()). */
+/* Marks the scalar of distances from a plane as used. Its interval contains the distance at which the slice is drawn,
+ * which is 0 or close to it (session_slice_distance()). */
 static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
 {
     const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);

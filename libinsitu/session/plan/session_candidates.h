@@ -12,11 +12,11 @@
 bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count,
                         const session_extent *extent);
 
-/* Returns whether values alone determine which cells may be visible. If so, *key becomes a hash of all that selects the
- * candidates apart from the values themselves, namely the scalars and their intervals. If not, any cell may be
- * visible. */
+/* Returns whether values alone determine which cells may be visible. If so, *key becomes a hash of the scalars and
+ * their intervals, which select the candidates by their values. Otherwise any cell may be visible. */
 bool session_find_candidates(const session_mesh *mesh, uint64_t *key);
-/* Selects the candidates and counts, per scalar, the cells whose values are not finite. Parallel. Local. */
+/* Selects the candidates, and counts for each scalar the cells that have a value which is not finite. Parallel.
+ * Local. */
 insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_selection *out, base_error *error);
 
 #endif

@@ -39,8 +39,8 @@ typedef struct derive_work {
 
 /* ---- meshes and inputs of a derived field ---------------------------------------------------------------------- */
 
-/* Returns the catalogue's entry for the derived field on the mesh; NULL if the mesh does not have the field, or has a
- * fault in it. */
+/* Returns the catalogue's entry for the derived field on the mesh; NULL if the field does not exist there or has a
+ * fault. */
 static const session_catalogue_field *find_field(const derive_work *w, const session_catalogue_mesh *mesh)
 {
     for (int f = 0; f < mesh->field_count; f++)
@@ -179,7 +179,7 @@ static uint64_t hash_sources(const derive_work *w, const session_catalogue_mesh 
 }
 
 /* Finds the meshes on which the values are out of date on some rank. *error may hold an earlier error of this rank.
- * Collective, agreed. */
+ * Collective; all ranks return the same status. */
 static insitu_status find_stale(derive_work *w, base_error *error)
 {
     const session_catalogue *catalogue = w->basis->catalogue;

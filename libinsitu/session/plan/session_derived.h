@@ -9,13 +9,14 @@
 
 /* Adds the scene's derived fields to the catalogue, for the meshes that have all fields on which they depend, and to
  * this rank's meshes, unless they have been added before. A derived field's error is stored as its fault in the
- * catalogue. Must be called whenever the catalogue or the scene may be new. Collective, agreed. */
+ * catalogue. Must be called whenever the catalogue or the scene may be new. Collective; all ranks return the same
+ * status. */
 insitu_status session_name_derived(const scene *scene, const char *scene_path, session_catalogue *catalogue,
                                    session_meshes *meshes, const session_team *team, base_error *error);
 
-/* Return the sets of derived fields, one bit each, that the images of the plan need, or that the statistics and
- * conditions of a step need, including the fields on which they depend. images: whether conditions count. Local, the
- * same on all ranks. */
+/* Return sets of derived fields, one bit each, including the fields on which they depend. session_derived_of_plan()
+ * returns those that the images of the plan need; session_derived_of_events() those that the statistics of a step and,
+ * if `images` is set, the conditions of images need. Local, the same on all ranks. */
 uint64_t session_derived_of_plan(const scene *scene, const session_plan *plan);
 uint64_t session_derived_of_events(const scene *scene, int64_t cycle, bool images);
 

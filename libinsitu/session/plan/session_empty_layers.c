@@ -14,21 +14,22 @@
 #include "session_transfer.h"
 #include "session_unusable.h"
 
-/* The minimum and the negated maximum of a range, so that a single reduction by minimum yields both. */
+/* The minimum and the negated maximum of a range, so that one reduction by minimum computes both ends. */
 typedef struct field_range {
     double low, negated_high;
 } field_range;
 
 static const field_range no_range = {INFINITY, INFINITY};
 
-/* A layer of the plan that may be empty. One of its three pointers to layers is set. */
+/* A layer of the plan that may be empty. Exactly one of `isosurface`, `volume` and `surface` is set. */
 typedef struct planned_layer {
     const scene_image *image;
     const scene_isosurface *isosurface;
     const scene_volume *volume;
     const scene_surface *surface; /* an outer surface with a threshold */
     int number;                   /* number of the layer's first warning */
-    /* range of the layer's values; for a surface, low is 0 if some cell is within the threshold */
+    /* range of the layer's values. In the first reduction the range of a surface is [0, 0] if some cell is within the
+     * threshold, and otherwise empty (low > high). */
     field_range range;
     bool is_empty; /* set if no cell is within the surface's threshold */
     /* set if the layer shows nothing according to the trees, and no warning has been reported yet */
@@ -114,7 +115,7 @@ static void add_root_range(const session_mesh *mesh, const session_scalar *scala
     widen_range((double)*(const float *)(const void *)root.low, (double)*(const float *)(const void *)root.high, range);
 }
 
-/* Widens the range by the values of this set of cells, which are computed if necessary. */
+/* Widens the range by that of the scalar over this kind of cells, which is computed if necessary. */
 static void add_extent_range(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                              field_range *range)
 {
@@ -151,22 +152,22 @@ static field_range find_own_range(const session_meshes *meshes, const planned_la
     return range;
 }
 
-/* Data beyond the layers' ranges that the same reduction combines. */
-typedef struct layer_news {
+/* Further data that is reduced together with the layers' ranges. */
+typedef struct reduced_extras {
     bool has_other_cells; /* set if some rank has cells that are not shown (session_unusable.h) */
     int reporting_word;   /* maximum of all ranks' session_reporting_word() */
-} layer_news;
+} reduced_extras;
 
-/* Combines the layers' ranges, earlier errors and the further data over all ranks in one reduction. The ranges are
+/* Combines the layers' ranges, earlier errors and the extra data over all ranks in one reduction. The ranges are
  * undefined after an error. Collective. */
 static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, layer_batch *batch,
-                                   bool of_all_cells, layer_news *news, base_error *error)
+                                   bool of_all_cells, reduced_extras *extras, base_error *error)
 {
     double lows[2 * BATCH + 3];
     const int last = 2 * batch->count;
     lows[last] = error->status ? -1 : 0;
-    lows[last + 1] = news->has_other_cells ? -1 : 0;
-    lows[last + 2] = -news->reporting_word;
+    lows[last + 1] = extras->has_other_cells ? -1 : 0;
+    lows[last + 2] = -extras->reporting_word;
     for (int i = 0; i < batch->count && !error->status; i++) {
         planned_layer *layer = &batch->layers[i];
         if (!of_all_cells || layer->is_unreported)
@@ -181,14 +182,14 @@ static insitu_status reduce_ranges(const session_meshes *meshes, const session_t
                                      ? session_agree(team->comm, error)
                                      : session_check_mpi(error, code, "MPI_Allreduce");
     for (int i = 0; i < batch->count; i++) batch->layers[i].range = (field_range){lows[2 * i], lows[2 * i + 1]};
-    *news = (layer_news){lows[last + 1] < 0, (int)-lows[last + 2]};
+    *extras = (reduced_extras){lows[last + 1] < 0, (int)-lows[last + 2]};
     return status;
 }
 
 /* ---- empty layers ---------------------------------------------------------------------------------------------- */
 
-/* Returns the identity of the layer's warning. In a sweep over isovalues each picture has one isovalue; its number is
- * the one in the file's list. */
+/* Returns the subject of the layer's warning. In a sweep over isovalues each picture has one isovalue, whose number is
+ * its index in the file's list. */
 static session_warning make_warning(const planned_layer *layer, int value)
 {
     const session_warning_kind kind = layer->isosurface ? WARNING_ISOVALUE
@@ -213,8 +214,8 @@ static bool is_transparent(const scene_volume *volume, const field_range *range)
     return true;
 }
 
-/* Returns the range from the trees with its minimum raised by the rounding to float32, because the true minimum may be
- * larger by that. */
+/* The true minimum may exceed the trees' minimum by the rounding to float32. Returns the trees' range with the minimum
+ * raised by that much. */
 static field_range least_of_trees(const field_range *range)
 {
     const double low = range->low < INFINITY ? (double)nextafterf((float)range->low, INFINITY) : INFINITY;
@@ -226,7 +227,7 @@ static int count_values(const planned_layer *layer)
     return layer->isosurface ? layer->isosurface->value_count : 1;
 }
 
-/* Returns whether the layer shows no value of the range. For an isosurface only its isovalue number `value` is
+/* Returns whether the layer shows no value of the range. For an isosurface, only the isovalue with index `value` is
  * tested. */
 static bool is_layer_empty(const planned_layer *layer, int value, const field_range *range)
 {
@@ -301,20 +302,20 @@ insitu_status session_check_layers(const session_plan *plan, const session_catal
                                    base_error *error)
 {
     const int count = plan->cell_count ? list_layers(plan, &(layer_batch){.first = 0}) : 0;
-    layer_news news = {false, session_reporting_word(report, team)};
-    if (count && !error->status) news.has_other_cells = session_unusable_key(plan, meshes) != report->unusable_key;
+    reduced_extras extras = {false, session_reporting_word(report, team)};
+    if (count && !error->status) extras.has_other_cells = session_unusable_key(plan, meshes) != report->unusable_key;
     insitu_status status = INSITU_OK;
     for (int first = 0; (first == 0 || first < count) && !status; first += BATCH) {
         layer_batch batch = {.first = first};
         if (count) list_layers(plan, &batch);
-        status = reduce_ranges(meshes, team, &batch, false, &news, error);
+        status = reduce_ranges(meshes, team, &batch, false, &extras, error);
         if (!status && find_new_warnings(report, &batch))
-            status = reduce_ranges(meshes, team, &batch, true, &news, error);
+            status = reduce_ranges(meshes, team, &batch, true, &extras, error);
         for (int i = 0; i < batch.count && !status; i++) warn_of_layer(report, &batch.layers[i]);
     }
-    if (!status && news.reporting_word)
-        status = session_share_lines(report, session_reporting_rank(news.reporting_word, team), team, error);
-    if (!status && news.has_other_cells)
+    if (!status && extras.reporting_word)
+        status = session_share_lines(report, session_reporting_rank(extras.reporting_word, team), team, error);
+    if (!status && extras.has_other_cells)
         status = session_warn_of_unusable(plan, catalogue, meshes, team, report, error);
     return status;
 }

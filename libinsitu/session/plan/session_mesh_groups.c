@@ -5,10 +5,11 @@
 #include "session_hash.h"
 #include "session_scalars.h"
 
-/* The purpose for which meshes are mesh_group_name: either a layer's field, or the gradients of a derived field. */
+/* The purpose for which meshes are grouped: to average the values of a layer's field, or the gradients of a derived
+ * field. */
 typedef struct group_purpose {
-    const scene_field *field; /* field of a layer; NULL if `derived` is set */
-    int derived_index;
+    const scene_field *field; /* field of a layer; NULL if the meshes are those of a derived field */
+    int derived_index;        /* index of the derived field; -1: none */
 } group_purpose;
 
 static bool is_group_member(const session_catalogue_mesh *mesh, const group_purpose *purpose)
@@ -24,7 +25,7 @@ static bool is_group_member(const session_catalogue_mesh *mesh, const group_purp
     return found && session_is_recentred(field, found->centring, mesh->is_refined);
 }
 
-/* Adds a mesh group without meshes, with space for `count` of them. Returns NULL if memory runs out. */
+/* Adds a mesh group without meshes, with space for `count` meshes. Returns NULL if memory runs out. */
 static session_mesh_group *add_mesh_group(session_catalogue *catalogue, uint64_t name, int count)
 {
     session_mesh_group **mesh_groups =
@@ -51,8 +52,8 @@ static bool add_single_group(session_catalogue *catalogue, session_catalogue_mes
     return true;
 }
 
-/* Computes the name of the mesh group that consists of all requested meshes without global ids, and adds the mesh group
- * if it is new. */
+/* Computes the name of the group of all meshes without global ids for this purpose; it is 0 if there are none. Adds the
+ * group if it is new. Meshes with ids get groups of their own. Returns false if memory runs out. */
 static bool group_meshes(session_catalogue *catalogue, const group_purpose *purpose, uint64_t *mesh_group_name)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -96,8 +97,8 @@ static bool group_meshes_of_derived(session_catalogue *catalogue, scene *scene, 
     return is_done;
 }
 
-/* Adds each mesh with global ids as a mesh group by itself. Stores in each part whether any block of its mesh is
- * refined. */
+/* Computes the name of the group that each mesh with global ids forms by itself, and stores it in the mesh and its
+ * parts. Also stores in each part whether any block of its mesh is refined. */
 static void add_single_groups(session_catalogue *catalogue, const session_meshes *meshes)
 {
     for (int m = 0; m < catalogue->mesh_count; m++) {

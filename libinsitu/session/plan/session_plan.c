@@ -124,15 +124,15 @@ static insitu_status check_named_mesh(const session_plan_basis *basis, const sce
                                       base_error *error)
 {
     char names[NAMES_SIZE];
-    bool is_there = false, is_well = false;
+    bool is_there = false, is_drawable = false;
     for (int m = 0; m < basis->catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
         if (!scene_name_stands_for(name, mesh->name)) continue;
         if (refuse_fault(mesh->fault, error)) return error->status;
         is_there = true;
-        is_well = is_well || !field->name || mesh->first_rank < 0 || session_catalogue_find(mesh, field->name);
+        is_drawable = is_drawable || !field->name || mesh->first_rank < 0 || session_catalogue_find(mesh, field->name);
     }
-    if (is_well) return INSITU_OK;
+    if (is_drawable) return INSITU_OK;
     if (is_there) {
         list_fields(basis->catalogue, names);
         return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: mesh \"%s\" does not have the field \"%s\"; there are: %s",
@@ -216,7 +216,7 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
     }
 }
 
-/* Checks the field of a layer's contour lines. on: a field whose list of meshes is that of the layer. */
+/* Checks the field of a layer's contour lines on the meshes of the layer, which are those listed in the field `on`. */
 static insitu_status check_lines(const session_plan_basis *basis, const scene_lines *lines, const scene_field *on,
                                  base_error *error)
 {
@@ -306,8 +306,8 @@ bool session_is_due(const scene_image *image, const session_moment *m)
     return image->cycle_interval <= 1 || m->cycle % image->cycle_interval == 0;
 }
 
-/* Returns whether any rank has cells, or any mesh has a fault. If neither is the case, a picture shows only its
- * background, so that missing fields are no error. */
+/* Returns whether any rank has cells, or any mesh has a fault. Otherwise a picture shows only its background, so that
+ * missing fields are no error. */
 static bool has_cells_or_faults(const session_plan_basis *basis)
 {
     return basis->extent->cell_count > 0 || basis->catalogue->has_faults;
@@ -356,8 +356,9 @@ static void warn_of_grey_surface(const session_catalogue *catalogue, const scene
     }
 }
 
-/* Warns of meshes that have the layer but lack the field of its contour lines. on: a field whose list of meshes is that
- * of the layer; only meshes that have this field are considered, unless the layer is an outer surface. */
+/* Warns of meshes on which the layer is drawn but which lack the field of its contour lines. `on` lists the meshes of
+ * the layer. Only meshes that have the field `on` are considered, unless the layer is an outer surface, for which `on`
+ * has no name. */
 static void warn_of_no_lines(const session_catalogue *catalogue, const scene_image *image, const scene_field *on,
                              const scene_lines *lines, session_report *report)
 {
@@ -455,28 +456,29 @@ void session_plan_free(session_plan *plan)
     *plan = (session_plan){0};
 }
 
-/* Returns whether an image has no outputs although pictures are not kept in memory; warns if so. */
-static bool is_for_nobody(const session_plan_basis *basis, const scene_image *image, session_report *report)
+/* Returns whether an image has no outputs and pictures are not kept in memory, so that nobody would see it; warns if
+ * so. */
+static bool lacks_outputs(const session_plan_basis *basis, const scene_image *image, session_report *report)
 {
-    const bool is_for_none = image->output_count == 0 && !basis->keeps_pictures;
+    const bool is_lacking = image->output_count == 0 && !basis->keeps_pictures;
     session_warn(
-        report, &(session_warning){WARNING_OUTPUTS, image->name, NULL, 0}, is_for_none,
+        report, &(session_warning){WARNING_OUTPUTS, image->name, NULL, 0}, is_lacking,
         "image \"%s\": it has no outputs, and pictures are not kept in memory (insitu_keep_pictures): it is not "
         "drawn; outputs: \"%s_{cycle:06}.png\" would write them",
         image->name, image->name);
-    return is_for_none;
+    return is_lacking;
 }
 
 /* Selects the images that are due and can be drawn. Views of an orbit share their layers, and therefore the layers'
  * warnings. */
 static void select_images(const session_plan_basis *basis, session_report *report, session_plan *plan)
 {
-    bool is_well = false;
+    bool is_drawable = false;
     for (int i = 0; i < basis->scene->image_count; i++) {
         const scene_image *image = &basis->scene->images[i];
         if (!(basis->allowed_images >> image->variant.source & 1) || !session_is_due(image, basis->moment)) continue;
-        if (image->variant.view == 0) is_well = can_be_drawn(basis, image, report, &plan->refusal);
-        if (!is_well || is_for_nobody(basis, image, report)) continue;
+        if (image->variant.view == 0) is_drawable = can_be_drawn(basis, image, report, &plan->refusal);
+        if (!is_drawable || lacks_outputs(basis, image, report)) continue;
         plan->images[plan->image_count++] = image;
         if (image->variant.view > 0) continue;
         plan->slice_count += image->slice_count;

@@ -1,12 +1,12 @@
-/* Percentiles are computed digit by digit. Values are doubles, mapped to integers in the same order. A pass considers
- * the values whose leading bits are those found so far, and adds up their weights by the next 11 bits; the sum of all
- * ranks' weights determines the digit of the wanted value. Six passes find all 64 bits, and so the exact value instead
- * of an estimate, for any partition. From the third pass on few values are left: a pass stores them, and the next ones
- * do not read cells.
+/* Percentiles are computed digit by digit. Values are doubles, mapped to 64-bit integers in the same order. A pass
+ * considers the values whose leading bits are those already determined, and adds up their weights by their next 11
+ * bits. The sum of these weights over all ranks determines the next digit of the percentile. Six passes find all 64
+ * bits, and so the exact value instead of an estimate, for any partition. From the third pass on few values are left: a
+ * pass stores them, and the next ones do not read cells.
  *
- * Each cell with a volume has the weight 1. If only shells count, their weights are their areas. Weights are integers,
- * so that their sums are the same in any order: an area is a fraction of the largest one, times 2^28 and rounded, so
- * that 2^35 cells can be added and the error of each cell is at most 2^-29 of the largest one. */
+ * Each cell with a volume has the weight 1. If all cells are shells, their weights are their areas. Weights are
+ * integers, so that their sums are the same in any order: an area is a fraction of the largest one, times 2^28 and
+ * rounded, so that 2^35 cells can be added and the error of each cell is at most 2^-29 of the largest one. */
 #include "session_ranges.h"
 
 #include <math.h>
@@ -65,7 +65,7 @@ static double value_from_order(uint64_t order)
     return value;
 }
 
-/* Returns the position of the lowest bit by which a pass counts. The last pass has 9 bits left. */
+/* Returns the position of the lowest bit of the digit that a pass determines. The last pass has only 9 bits left. */
 static int pass_shift(int pass)
 {
     return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
@@ -77,7 +77,7 @@ static uint64_t known_bits_mask(int pass)
     return pass ? ~UINT64_C(0) << pass_shift(pass - 1) : 0;
 }
 
-/* This rank's values that the last pass has considered, unsorted; they are stored if there are at most MOST_KEPT. */
+/* Maximum number of values that a pass stores for the next ones, and the first pass that may store values. */
 enum { MOST_KEPT = 4096, FIRST_KEPT = 2 };
 
 typedef struct weighted_value {
@@ -86,7 +86,7 @@ typedef struct weighted_value {
 } weighted_value;
 
 typedef struct kept_values {
-    int count; /* number of values; MOST_KEPT + 1: there are more */
+    int count; /* number of values; if it exceeds MOST_KEPT, not all of them are stored */
     weighted_value values[MOST_KEPT];
 } kept_values;
 
@@ -111,8 +111,8 @@ static void keep_value(const weighted_value *value, kept_values *kept)
     if (at < MOST_KEPT) kept->values[at] = *value;
 }
 
-/* Adds the weight of a value by its next digit, for each percentile whose known leading bits it has. Returns whether it
- * was added for any. */
+/* For each of the two percentiles whose known leading bits the value has, adds the value's weight to the sum of its
+ * next digit. Returns whether it was added for any. */
 static bool count_value(const digit_count *of, const weighted_value *value, int64_t counts[2 * DIGITS])
 {
     const uint64_t known = known_bits_mask(of->pass);
@@ -125,7 +125,8 @@ static bool count_value(const digit_count *of, const weighted_value *value, int6
     return is_counted;
 }
 
-/* Stores the middle of a cell's values. Returns false if the cell is not seen or its values do not count. */
+/* Computes the mean of a cell's minimum and maximum. Returns false if the cell is not seen or its values do not
+ * count. */
 static bool find_middle(const digit_count *of, const grid *g, const grid_field *field, int64_t cell, double *middle)
 {
     if (!grid_is_seen(g, cell)) return false;
@@ -182,8 +183,9 @@ static insitu_status count_digits(const session_meshes *meshes, const session_te
                              "MPI_Allreduce");
 }
 
-/* Entries of the reduction by minimum that finds which cells count: -1 if a cell with a volume does, otherwise 0; and
- * the negated area of the largest shell, which is not looked for if a cell with a volume was found before. */
+/* Entries of the reduction by minimum that determines which cells count. SOLID: -1 if a cell with a volume counts,
+ * otherwise 0. AREA: the negated area of the largest shell; it is not computed any more after a cell with a volume has
+ * been found. */
 enum { SOLID, AREA, KINDS };
 
 static void find_own_kind(const session_mesh *mesh, const session_scalar *scalar, int threads, const digit_count *of,
@@ -207,7 +209,7 @@ static void find_own_kind(const session_mesh *mesh, const session_scalar *scalar
     }
 }
 
-/* Finds whether cells with a volume count or only shells. */
+/* Determines whether cells with a volume count, or only shells. */
 static insitu_status find_kind(const session_meshes *meshes, const session_team *team, const scene_field *field,
                                digit_count *of, base_error *error)
 {
@@ -224,8 +226,8 @@ static insitu_status find_kind(const session_meshes *meshes, const session_team 
     return status;
 }
 
-/* Returns the digit of the value with this rank in the order, in units of weight; *rank becomes its rank among the
- * values with this digit. */
+/* Returns the digit of the value with the given rank (a sum of weights, counted from 0). *rank becomes its rank among
+ * the values with this digit. */
 static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
 {
     int digit = 0;
@@ -233,8 +235,8 @@ static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
     return digit;
 }
 
-/* Returns the rank of the value that is not exceeded by percent of the total weight. The total may be larger than the
- * integers that a double can represent. */
+/* Returns the rank of a percentile, in units of weight. The total may exceed the integers that a double can
+ * represent. */
 static int64_t find_rank(double percent, int64_t total)
 {
     const int64_t rank = (int64_t)fmax(ceil(percent / 100 * (double)total), 1) - 1;

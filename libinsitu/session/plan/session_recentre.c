@@ -1,7 +1,7 @@
-/* Recentring: the value at a vertex is the mean over the caller's cells there (or, for values at corners, over the
- * corners there; for values at vertices of refined blocks, over the vertices there) on all ranks, with the same bits
- * for any partition. If the field has values on faces of the boundary, a vertex of such faces gets the mean over these
- * instead, even if all of them are on other ranks than its cells.
+/* Recentring computes values at vertices. The value at a vertex is the mean over the caller's cells there, on all
+ * ranks, with the same bits for any partition. (For values at corners, the mean is over the corners there; for values
+ * at vertices of refined blocks, over the vertices there.) If the field has values on faces of the boundary, a vertex
+ * of such faces gets the mean over these instead, even if all of them are on other ranks than its cells.
  *
  * Sums depend on their order, so sums of ranks' partial sums would depend on the partition. Instead all ranks' single
  * values are gathered, and summed so that their order does not matter (sum_values()).
@@ -12,8 +12,8 @@
  *
  * Then vertices that hang on larger cells take those cells' values (outer/session_hanging.h).
  *
- * Each field takes two collective deliveries. The first passes errors to all ranks; errors in receiving the means are
- * passed by the next phase. */
+ * Each field takes two collective deliveries of messages. The first one also sends errors to all ranks. An error in
+ * receiving the means is sent to the other ranks in the next phase of the step. */
 #include "session_recentre.h"
 
 #include <omp.h>
@@ -33,8 +33,8 @@
  * because a cell whose value is not finite contributes none. */
 typedef struct value_groups {
     int64_t count;
-    const int64_t *starts; /* begin of each group's values; count + 1 entries */
-    int64_t *ends;         /* end of each group's values; count entries */
+    const int64_t *starts; /* index of each group's first value; count + 1 entries */
+    int64_t *ends;         /* index after each group's last value; count entries */
     double *values;
     double *means; /* mean of each group; count entries */
     /* for each group, nonzero if its values are those of boundary faces, and 0 if those of cells or corners; count
@@ -54,8 +54,8 @@ typedef struct recentring {
     session_mesh_group *mesh_group;
     session_mesh_group_parts list;
     mesh_part *parts; /* for each part in the list, its field and the scalar that gets the means */
-    /* begin of each group's values if faces of the boundary have values; otherwise those in mesh_group->groups are used
-     */
+    /* index of each group's first value if faces of the boundary have values; otherwise those in mesh_group->groups are
+     * used */
     int64_t *starts;
     value_groups values; /* the values to be averaged, by group of mesh_group->groups */
 } recentring;
@@ -132,7 +132,8 @@ static void groups_average(value_groups *groups, int threads)
 
 /* ---- this rank's values ---------------------------------------------------------------------------------------- */
 
-/* The groups of a cell's vertices without duplicates. For vertex values of split cells, the vertices themselves. */
+/* The groups of a cell's vertices without duplicates. For vertex values of split cells, it contains the vertices
+ * instead of their groups. */
 typedef struct cell_groups {
     int64_t count, capacity;
     int64_t *groups;

@@ -11,7 +11,7 @@
 #include "session_scalars.h"
 #include "session_vertex_sums.h"
 
-/* A field on a mesh, or on mesh_group_name meshes, that needs gradients at vertices. */
+/* A field on a mesh, or on a mesh group, that needs gradients at vertices. */
 typedef struct smooth_item {
     const session_catalogue_mesh *mesh;
     const session_catalogue_field *field;
@@ -203,8 +203,9 @@ static void free_work(smooth_work *work)
 
 /* ---- one item ------------------------------------------------------------------------------------------------ */
 
-/* Numbers the part's vertices whose gradients this rank needs. All other vertices have sums for other ranks only, or no
- * sums. sum_of[n] becomes the index of the sum of vertex number n. */
+/* Numbers the part's vertices whose gradients this rank needs; all other vertices have a sum for other ranks only, or
+ * none. key_indices of a vertex becomes its number or -1, and sum_of[n] the index of the sum of vertex number n.
+ * Returns the number of these vertices. */
 static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32_t *sum_of)
 {
     int64_t count = 0;
@@ -218,8 +219,8 @@ static int64_t number_gradients(session_sum_part *part, int64_t own_count, int32
     return count;
 }
 
-/* Stores the gradients of a part's vertices. They are scaled to the size of the scene, so that they fit into a float
- * whatever the unit of the values is; their length does not matter. */
+/* Stores the gradients of a part's vertices as floats. They are computed in units that do not depend on the unit of the
+ * values, so that they fit into a float; only their direction matters. */
 static bool store_gradients(const session_vertex_sums *sums, session_sum_part *part, session_scalar *scalar)
 {
     const int64_t vertices = part->mesh->cells.vertex_count, words = session_sum_words(1);

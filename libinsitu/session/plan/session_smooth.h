@@ -9,17 +9,17 @@
  * they cross. Each is computed over the cells around the vertex on all ranks, with the same bits on any partition.
  * Vertices are matched by the same keys as in recentring. extent: the global bounds. The homes of the catalogue's
  * meshes must be up to date. An error that occurs on this rank at the very end is stored only in *error, and is shared
- * in the next phase. Collective, otherwise agreed. */
+ * in the next phase. Collective; apart from that, all ranks return the same status. */
 insitu_status session_smooth(const session_plan *plan, const session_catalogue *catalogue, const session_meshes *meshes,
                              const session_team *team, const session_extent *extent, base_error *error);
 
 /* Returns whether an isosurface of the plan has smooth normals. */
 bool session_is_smooth(const session_plan *plan, const session_catalogue *catalogue);
 
-/* Returns whether the normals of the isosurface are interpolated between vertices. They are if the scene asks for
- * smooth normals. They also are if it asks for gradients and one of the layer's meshes has cells of higher order with
- * values at nodes, because the gradient in a linear piece is not that of the cell's polynomial, while gradients at
- * nodes are. The result is the same on all ranks. */
+/* Returns whether the normals of the isosurface are interpolated between vertices. This is the case if the scene
+ * requests smooth normals. It is also the case if the scene requests gradients, and one of the layer's meshes has cells
+ * of higher order with values at nodes: the gradient in a linear piece is not that of the cell's polynomial, while
+ * gradients at nodes are. The result is the same on all ranks. */
 bool session_has_smooth_normals(const scene_isosurface *layer, const session_catalogue *catalogue);
 
 #endif

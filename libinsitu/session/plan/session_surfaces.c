@@ -15,7 +15,7 @@ typedef struct surface_request {
     const scene_threshold *threshold;
 } surface_request;
 
-/* Returns the part's outer faces for the requested surface; NULL if it has none. */
+/* Returns the part's outer faces of the requested surface; NULL if it has none. */
 static session_outer *find_own_outer(const session_mesh *part, const surface_request *request)
 {
     return part->is_given ? session_find_outer(part, request->threshold) : NULL;

@@ -1,7 +1,8 @@
-/* Converts colour maps to transfer functions. A surface is coloured directly by the map. A volume is integrated over
- * transfer functions whose colours are linear between entries, so other maps are converted to such: each band gets 16
- * entries of a table, so that colours change within 1/16 of a band; colours outside the range are one more entry at an
- * end. Opacity is linear along the map's scale, as the renderer requires. */
+/* Converts colour maps to transfer functions. A surface is coloured by the map itself. A volume is integrated over
+ * transfer functions whose colours are linear between entries of a table. Other maps are therefore converted to such a
+ * table: each band gets 16 entries, so that the colour changes from one band to the next within 1/16 of a band, and
+ * each colour outside the range becomes one more entry at an end. Opacity is linear along the map's scale, as the
+ * renderer requires. */
 #include "session_transfer.h"
 
 #include <float.h>
@@ -20,9 +21,9 @@ static const double least_of_data = 64 * DBL_EPSILON, widest_log = 1e30;
 /* Width of the range that a constant field gets, as a share of its value. */
 static const double constant_linear = 1e-6, constant_scaled = 1e-3;
 
-/* With a logarithmic scale, values are relative to 0 in float32, whose rounding would be visible in a range narrower
- * than this share of its larger end. In such a range the scale is replaced by a linear one: the error is at most an
- * eighth of the share, 1.3e-4 of the map. */
+/* With a logarithmic scale, values are stored relative to 0 in float32. In a range narrower than this share of its
+ * larger end, their rounding would be visible. Such a range gets a linear scale instead: the error is at most an eighth
+ * of the share, 1.3e-4 of the map. */
 static const double straight = 1e-3;
 
 static double larger_magnitude(double low, double high)

@@ -25,9 +25,9 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
 bool session_transfer_allocates(const scene_colour_map *map, const scene_volume *volume);
 void session_transfer_free(session_transfer *transfer);
 
-/* Computes the intervals of values in which a volume is not transparent. If the colour map's range is to be computed
- * from the data, they are not known yet, and are all values or none. Returns their number. Local, the same on every
- * rank. */
+/* Computes the intervals of values in which a volume is not transparent, and returns their number. If the colour map's
+ * range is yet to be computed from the data, the result is all values, or none if the volume is transparent everywhere.
+ * Local, the same on every rank. */
 int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 
 /* Returns whether the values of a range are so close to each other that their rounding is visible in float32, even

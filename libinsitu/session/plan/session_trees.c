@@ -169,8 +169,8 @@ static insitu_status build_and_refit(const tree_update *u, session_mesh *mesh, b
     return status ? status : refit_ranges(u, mesh, error);
 }
 
-/* Returns whether the tree's cost, relative to that of its mesh, has grown so much that it should be rebuilt. Boxes
- * that were not refitted count as unchanged. */
+/* Returns whether the tree's cost, relative to the area of its mesh's box, has grown so much that it should be rebuilt.
+ * Boxes of nodes that were not refitted count as unchanged. */
 static bool is_decayed(const session_mesh *mesh)
 {
     const double tree = mesh->tree.area * mesh->built_surface, built = mesh->tree.built_area * half_box_area(mesh);

@@ -19,8 +19,9 @@ static session_key key_of_point(const double position[3])
     return key;
 }
 
-/* Assigns groups to the vertices of a part's drawn cells. Before that, group_of_vertex is -2 - i for the i-th twin.
- * one_vertex, which is NULL unless vertices are equal by id, gets the number of one vertex of each group. */
+/* Assigns groups to the vertices of a part's drawn cells. While this runs, the i-th twin has the preliminary value -2 -
+ * i in group_of_vertex. If vertices are equal by id, one_vertex receives the number of one vertex of each group;
+ * otherwise it is NULL. */
 static void group_part(const groups_basis *basis, int part, session_vertex_groups *out, int64_t *one_vertex)
 {
     const session_mesh *mesh = basis->parts[part];

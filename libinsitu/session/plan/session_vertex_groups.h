@@ -1,9 +1,9 @@
 /* Groups this rank's equal vertices.
  *
  * Vertices with equal keys count as one vertex. The keys are global ids if all ranks give them, else the bits of the
- * coordinates, with -0 as +0. That also holds on a single rank: otherwise a mesh that doubles its vertices along a
- * crack would look different on one rank and on two. It also holds for all meshes of a mesh group
- * (session_mesh_groups.h), but only by coordinates, because ids belong to one mesh. */
+ * coordinates, with -0 as +0. Vertices are also grouped if there is only one rank: otherwise a mesh that doubles its
+ * vertices along a crack would look different on one rank and on two. The meshes of a mesh group
+ * (session_mesh_groups.h) share the groups of vertices, but only by coordinates, because ids belong to one mesh. */
 #ifndef SESSION_VERTEX_GROUPS_H
 #define SESSION_VERTEX_GROUPS_H
 

@@ -21,7 +21,7 @@ enum { KEY_WORDS = 3 };
 
 /* ---- keys of all vertices ------------------------------------------------------------------------------------- */
 
-/* Marks the vertices of cells that are not ghosts by 0, and all others by -1. */
+/* Marks the vertices of cells that are not ghosts by 0 in key_indices, and all others by -1. */
 static void mark_vertices(session_sum_part *part)
 {
     const grid *g = &part->mesh->cells;
@@ -92,7 +92,7 @@ static void mail_free(sums_messages *mail)
     base_free(mail->requested_numbers);
 }
 
-/* For each of this rank's keys, finds the position of a vertex that has it. */
+/* Finds, for each of this rank's keys, the position of a vertex that has it. */
 static bool find_key_positions(const session_vertex_sums *sums, double (**out)[3])
 {
     *out = base_alloc((size_t)(sums->own_count ? sums->own_count : 1) * sizeof **out);
@@ -242,9 +242,9 @@ static bool filter_create(const session_key_table *keys, key_filter *out)
     return out->bits != NULL;
 }
 
-/* Finds all vertices with one of the keys: this rank's own keys, several of whose vertices may be doubled along a
- * crack, and the requested ones. In cells of higher order, few of whose pieces are made, most vertices belong to none
- * and need no search. */
+/* Finds the key of each vertex that has one: one of this rank's own keys, which several vertices along a crack may
+ * share, or a requested key. If only some pieces of cells of higher order are made, most vertices belong to no piece and
+ * are not searched. */
 static void find_entries(const session_vertex_sums *sums, session_sum_part *part, const key_filter *filter, int threads)
 {
     const bool is_marked = part->mesh->finer.pieces.first_words != NULL;
@@ -286,8 +286,8 @@ static session_gradient_basis make_gradient_basis(const session_vertex_sums *sum
                                     .polynomials = part->polynomials};
 }
 
-/* Finds the polynomials of a part whose cells are split, unless a field is recentred from cells: the means at nodes are
- * not values of a polynomial. */
+/* Finds the polynomials of a part whose cells are split. It does nothing if a field is recentred from cells, because
+ * the means at nodes are not values of a polynomial. */
 static bool make_polynomials(const session_vertex_sums *sums, session_sum_part *part)
 {
     bool is_polynomial = part->mesh->topology.is_split;

@@ -39,8 +39,8 @@ typedef struct session_vertex_sums {
 insitu_status session_key_all_vertices(session_vertex_sums *sums, base_error *error);
 
 /* Computes the sums of this rank's keys over all ranks. Keys and entries must be set. A rank that has failed before
- * calls this with its error in *error. An error at the very end is stored only in *error. Collective, otherwise
- * agreed. */
+ * calls this with its error in *error. An error at the very end is stored only in *error. Collective; apart from that,
+ * all ranks return the same status. */
 insitu_status session_find_sums(const session_homes *homes, const session_team *team, const session_extent *extent,
                                 session_vertex_sums *sums, base_error *error);
 
