@@ -15,8 +15,8 @@ static uint64_t mix_bits(uint64_t sum, uint64_t bits)
     return product ^ product >> 29;
 }
 
-/* Computes the checksum in several independent sums, because within one sum each multiplication must wait for the
- * previous one. */
+/* Computes the checksum in several independent sums, which a CPU computes in parallel: within one sum, each
+ * multiplication depends on the previous one. */
 static uint64_t sum_words(const char *data, int64_t bytes)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
@@ -104,8 +104,8 @@ static uint64_t find_sample(const session_mesh *mesh, const session_scalar *scal
     return field.source_cells ? sample_field(sum, mesh, field.source_cells) : sum;
 }
 
-/* Warns if values have changed in place although the caller declared them unchanged: trees then contain ranges of the
- * old values while rays read the new ones. */
+/* Warns if the caller has changed values in place but declared them unchanged: trees then contain ranges of the old
+ * values, while rays read the new ones. */
 static void warn_of_change(const session_mesh *mesh, session_scalar *scalar, session_report *report)
 {
     if (session_is_distance(scalar)) return;
@@ -137,8 +137,9 @@ static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, i
     return false;
 }
 
-/* Compares the checksums of a part's fields. Returns the number of a block's fields that have the values of the last
- * picture; those of a mesh without blocks are reported instead. */
+/* Compares the checksums of a part's fields. For a block, returns the number of fields that have the values of the last
+ * picture. For a mesh without blocks, adds these fields to the report and returns 0. The fields of mirror images are
+ * not counted. */
 static int64_t compare_part(const session_mesh *mesh, int threads, session_report *report)
 {
     int64_t unchanged = 0;

@@ -65,8 +65,8 @@ static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *erro
     return INSITU_OK;
 }
 
-/* Copies the vertex positions to all corners, packed and in their own type. Entries of the connectivity that belong to
- * no cell may be invalid indices; they get the first vertex's position. */
+/* Copies the vertex positions to all corners, packed and without changing their type. Entries of the connectivity that
+ * belong to no cell may be invalid indices; they get the first vertex's position. */
 static bool copy_coordinates(const session_mesh *mesh, int threads, session_discontinuous *vertices)
 {
     const grid *shared = &mesh->cells;
@@ -168,7 +168,7 @@ insitu_status session_make_discontinuous(session_meshes *meshes, const session_c
 {
     for (int m = 0; m < meshes->count && !error->status; m++) {
         session_mesh *mesh = meshes->items[m];
-        /* a mesh with finer lattices needs no tearing, because each cell has its own nodes */
+        /* in a mesh with finer lattices each cell has its own nodes already */
         const bool is_discontinuous = !mesh->finer.parts && is_named_in_scene(mesh, scene);
         if (mesh->is_given) update_discontinuous_mesh(meshes, mesh, is_discontinuous, team->threads, error);
     }

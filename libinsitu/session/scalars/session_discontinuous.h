@@ -1,5 +1,5 @@
-/* Torn meshes, in which every cell has its own vertices. They are used for fields with a value at each corner of each
- * cell.
+/* Discontinuous meshes, in which every cell has its own vertices. They are used for fields with a value at each corner
+ * of each cell.
  *
  * All other code finds values by the number of a vertex. So a mesh with a field at corners is read as one in which
  * every corner is a vertex: its coordinates are copied corner by corner, and its connectivity is 0, 1, 2, .... All
@@ -14,12 +14,13 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Tears the meshes that have a field at corners which the scene uses, unless they are already discontinuous with the
- * current coordinates, and restores the others. Cells must have been checked. Collective. */
+/* Makes the meshes discontinuous that have a field at corners which the scene uses, unless they are already
+ * discontinuous with the current coordinates. All other meshes are read with the caller's vertices again. Cells must
+ * have been checked. Collective. */
 insitu_status session_make_discontinuous(session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                          const session_team *team, base_error *error);
 
-/* Returns the caller's number of the vertex at a corner of a discontinuous mesh. */
+/* Returns the index, in the caller's arrays, of the vertex at a corner of a discontinuous mesh. */
 int64_t session_vertex_of_corner(const session_mesh *mesh, int64_t corner);
 
 #endif

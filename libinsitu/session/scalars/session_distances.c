@@ -17,7 +17,7 @@ static void offset_point(const double from[3], const double normal[3], double of
 
 void session_find_plane_point(const scene_plane *plane, const session_extent *extent, double point[3])
 {
-    double middle[3], half = 0; /* centre of the bounds, and half of their extent along the normal */
+    double middle[3], half = 0; /* centre of the bounds, and half of the bounds' extent along the normal */
     for (int axis = 0; axis < 3; axis++) {
         middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
         half += fabs(plane->normal[axis]) * (0.5 * extent->upper[axis] - 0.5 * extent->lower[axis]);
@@ -134,8 +134,8 @@ void session_update_distances(const session_meshes *meshes, const session_team *
 }
 
 /* Returns the isovalue of a slice. A crossing belongs to the cell that reaches the isovalue from below, so that the
- * minimum of all distances has no crossing. So if the minimum is 0 up to the tolerance, the isovalue is a tenth of the
- * tolerance above the minimum: it differs from it in float32, but not visibly. */
+ * minimum of all distances has no crossing. If the minimum is 0 up to the tolerance, the isovalue is therefore a tenth
+ * of the tolerance above it. This shift is large enough for float32, but not visible. */
 double session_slice_distance(double low, double high, double half_diagonal)
 {
     const double tolerance = SESSION_BORDER_SHARE * half_diagonal;

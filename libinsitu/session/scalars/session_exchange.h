@@ -24,9 +24,9 @@ typedef enum session_mail_tag { SESSION_MAIL_THERE = 1, SESSION_MAIL_BACK } sess
 
 /* Sends the words in every rank's `out` to the ranks for which they are intended. *in receives the words for this rank,
  * and owns its memory. Messages are sent only to ranks for which there are words, and one reduction determines when all
- * have been received. If an error has occurred on a rank before, the rank passes it in *error, and its `out` is not
- * read; then all ranks return that error. An error in receiving is stored only in this rank's *error, with *in empty,
- * and must be shared by the next phase. Collective. */
+ * have been received. A rank on which an error has occurred before passes it in *error, and its `out` is not read; then
+ * all ranks return that error. An error in receiving is stored only in this rank's *error, with *in empty, and must be
+ * shared by the next phase. Collective. */
 insitu_status session_mail_deliver(MPI_Comm comm, session_mail_tag tag, const session_mail *out, session_mail *in,
                                    base_error *error);
 
@@ -34,9 +34,9 @@ insitu_status session_mail_deliver(MPI_Comm comm, session_mail_tag tag, const se
  * ranks return the same status. */
 insitu_status session_mail_exchange(MPI_Comm comm, const session_mail *out, session_mail *in, base_error *error);
 
-/* Returns how many items a rank processes in a round, if each item may cause a message to every rank. It is at most
- * `most`, and smaller for more ranks, so that the memory for a round's messages is bounded. The result is the same on
- * all ranks. */
+/* Returns the number of items that a rank processes in one round of messages, if each item may cause a message to every
+ * rank. It is at most `most`, and smaller for more ranks, so that the memory for a round's messages is bounded. The
+ * result is the same on all ranks. */
 int64_t session_mail_round(int ranks, int64_t most);
 
 #endif

@@ -46,7 +46,7 @@ static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
     return field->index.data || (field->index.type && session_count_field_positions(&mesh->original, field) == 0);
 }
 
-/* Checks a field each of whose components is given as a separate array. */
+/* Checks a field whose components are given as separate arrays. */
 static insitu_status check_component_arrays(const insitu_field *field, int64_t count, base_error *error)
 {
     if (field->values.data)
@@ -276,7 +276,7 @@ static bool copy_tables(session_field *field, const insitu_field *given, base_er
     return true;
 }
 
-/* Sets the array from which the values are read. Its elements are the first components of all tuples. */
+/* Sets the array from which the values are read: element i is the first component of tuple i. */
 static void set_value_array(session_field *field, const insitu_field *given)
 {
     const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
@@ -285,7 +285,7 @@ static void set_value_array(session_field *field, const insitu_field *given)
     if (!values.stride_bytes) values.stride_bytes = size * given->component_count;
     field->values = field->component_arrays ? field->component_arrays[0] : session_grid_array(&values);
     if (!values.data || field->component_arrays || field->component_stride % size == 0) return;
-    /* only the first component is aligned, so that all must be read as unaligned values */
+    /* only the first component is known to be aligned, so that all are read as unaligned values */
     values.stride_bytes = field->component_stride;
     const grid_array other = session_grid_array(&values);
     field->values.unusual_type = other.unusual_type;
@@ -344,7 +344,7 @@ insitu_status session_set_part_field(session_meshes *meshes, session_mesh *mesh,
     base_error what = {0};
     session_field *field = &mesh->fields[index];
     if (field->is_derived) {
-        /* the caller uses the name of a derived field, an error that session_name_derived() reports later */
+        /* the caller uses the name of a derived field; session_name_derived() reports this error later */
         session_drop_copy(field);
         *field = (session_field){.given = {.name = field->given.name}};
     }
@@ -434,7 +434,7 @@ insitu_status session_store_filled(session_mesh *mesh, int index, const insitu_f
     set_value_arrays(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
     field->given.fill = promised.fill;
     field->given.fill_data = promised.fill_data;
-    /* new components also make scalars stale, because scalars may refer to the previous table */
+    /* scalars may refer to the previous table of components */
     if (filled->changed & INSITU_CHANGED_VALUES || filled->components) session_mark_scalars_stale(mesh, index);
     return INSITU_OK;
 }

@@ -33,7 +33,7 @@
 #include "vector3.h"
 
 enum { HIGH_BITS = 43, MOST_NUMBERS = 10 };
-#define LOW_UNIT 0x1p44      /* number of units of a low word that make one unit of a high word */
+#define LOW_UNIT 0x1p44      /* value of one unit of a high word, in units of a low word */
 #define LEAST_SQUARE 0x1p-64 /* least sum of the squares of a corner's edges, in units of length squared */
 #define ROUNDING_SHIFT                                                                                                 \
     0x1.8p52 /* when this is added to a number below 2^51, the last bits of the result contain the nearest integer */
@@ -43,7 +43,7 @@ typedef struct node {
     int64_t vertex;
 } node;
 
-/* Pairs of numbers that are rounded and summed together. */
+/* Two numbers, which are rounded and summed together in one vector register. */
 typedef double number_pair __attribute__((vector_size(16)));
 typedef int64_t word_pair __attribute__((vector_size(16)));
 
@@ -61,8 +61,8 @@ typedef struct target {
 
 /* ---- integers ------------------------------------------------------------------------------------------------ */
 
-/* Returns the power of two by which numbers up to `largest` are multiplied so that they fit into HIGH_BITS bits.
- * Returns 0 if there is no such power, so that all scaled numbers are 0. */
+/* Returns the power of two by which numbers up to `largest` are multiplied, so that they fit into HIGH_BITS bits.
+ * Returns 0 if `largest` is 0 or too small; all products are then 0. */
 static double find_power_of_two(double largest)
 {
     int exponent = 0;
@@ -415,8 +415,8 @@ static bool has_entry(const session_gradient_basis *basis, int64_t cell)
     return false;
 }
 
-/* Lists the cells that have a vertex with a sum. Cells are counted first, so that the list does not grow while threads
- * fill it. */
+/* Lists the cells that have a vertex with a sum. The cells are counted first, so that threads can fill a list of fixed
+ * size. */
 bool session_list_cells(const session_gradient_basis *basis, session_cell_list *out)
 {
     enum { BLOCK = 4096 };
@@ -473,7 +473,7 @@ static void add_linear_cell(target *to, int64_t cell, node_list *buffer)
         add_solid_cell(to, cell, type);
 }
 
-/* Adds the gradient of a cell's polynomial at its n-th node to that node's sum. */
+/* Adds the gradient of a cell's polynomial at the n-th node to that node's sum, if the node has one. */
 static void add_row_node(target *to, const session_derivatives *d, const node_list *row, int n)
 {
     const int field_count = to->basis->field_count;

@@ -1,4 +1,4 @@
-/* Values that have an index are copied once, in the order of the vertices, cells or corners; values at the vertices of
+/* Values that have an index are copied once, in the order of the vertices, cells or corners. Values at the vertices of
  * a discontinuous mesh are copied in the order of its corners. Without the copy, each tree and layer would read the
  * index at each vertex of each cell, and vectorized code could not be used. */
 #include "session_indexed.h"
@@ -30,9 +30,10 @@ void session_clear_requested_fields(const session_meshes *meshes)
 }
 
 typedef struct indexed_values {
-    /* the mesh, if it is discontinuous and values at vertices are read once per corner; else NULL */
+    /* the mesh, if it is discontinuous and has values at vertices, which are copied once per corner; otherwise NULL */
     const session_mesh *mesh;
-    const uint32_t *parents;         /* if positions are pieces of split cells, the cell of each; else NULL */
+    /* if there is one value per piece of the split cells, the caller's cell of each piece; otherwise NULL */
+    const uint32_t *parents;
     grid_array index;                /* tuple of each position; if it has no data, position i has tuple i */
     grid_field values;               /* the caller's tuples */
     int64_t row_length, used_length; /* number of positions in a row, and how many of them are read */
@@ -156,7 +157,7 @@ static insitu_status check_index(const session_mesh *mesh, const session_field *
     return INSITU_OK;
 }
 
-/* Computes the values of the cells' polynomials at the nodes of finer lattices. */
+/* Computes the values of the cells' polynomials at the nodes of finer lattices, in the copy. */
 static insitu_status interpolate_values(const session_mesh *mesh, session_field *field, int threads, base_error *error)
 {
     const indexed_values v = make_indexed_values(mesh, field);

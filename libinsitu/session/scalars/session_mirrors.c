@@ -125,7 +125,7 @@ static void update_image(const scene_mirror *mirror, session_meshes *meshes, ses
     if (image) share_fields(meshes, image, error);
 }
 
-/* Mirror images have the names of their meshes and fields, so that the catalogue does not change. */
+/* Mirror images have the names of their source meshes and fields, so that the catalogue does not change. */
 void session_update_mirrors(const scene *scene, session_meshes *meshes, int threads, base_error *error)
 {
     const bool are_names_changed = meshes->are_names_changed;

@@ -10,8 +10,8 @@
 int session_resolve_component(const scene_field *field, int component_count);
 
 /* Returns whether a field of this centring is drawn with values at vertices that the session computes. For cell fields
- * these are means; for vertex fields on a mesh with levels of refinement they are the given values except at hanging
- * vertices. */
+ * these are means over cells. For vertex fields on a mesh with levels of refinement they are the given values, except
+ * at hanging vertices. */
 bool session_is_recentred(const scene_field *field, insitu_centring centring, bool is_refined);
 
 /* Marks the scalar of a layer's field on the mesh as used by an image of this step. *marked receives the scalar, or
@@ -21,8 +21,8 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool need
 /* Returns the scalar of a layer's field on this rank's mesh; NULL if the mesh does not have the field. */
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
 
-/* Returns the scalar whose values are means at vertices over the meshes with the hash `mesh_group_name`
- * (scene_field.mesh_group_name); NULL if there is none. */
+/* Returns the scalar that holds the field's values averaged at vertices over a mesh group; NULL if there is none.
+ * mesh_group_name: the group's name, as in scene_field.mesh_group_name. */
 session_scalar *session_find_recentred(const session_mesh *mesh, const char *field, int component,
                                        uint64_t mesh_group_name);
 
@@ -60,14 +60,14 @@ grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *
 /* Returns the number of the caller's drawn cells that have a value which is not finite. Local. */
 int64_t session_count_unusable(const session_mesh *mesh, const session_scalar *scalar);
 
-/* Returns the ranges, in the nodes of the tree, of a scalar that is in use. */
+/* Returns the ranges of a used scalar's values in the nodes of the tree. */
 mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar);
 
 /* Computes the minimum and maximum over those drawn cells all of whose values are finite; low > high if there are none.
  * Parallel. Local. */
 void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                            double *low, double *high);
-/* Drops the stored minima and maxima, because the values have changed. */
+/* Marks the stored minima and maxima as unknown, because the values have changed. */
 void session_forget_extents(session_scalar *scalar);
 
 #endif

@@ -7,7 +7,7 @@
 #include "session_mesh_input.h"
 #include "session_warp.h"
 
-/* The data of a step that warping its meshes requires. */
+/* The data of a step with which its meshes are warped. */
 typedef struct warp_step {
     const scene *scene;
     const char *scene_path;
@@ -22,7 +22,8 @@ typedef struct warp_step {
     base_fail((error), INSITU_ERROR_FIELD, "%s:%d: meshes.%.200s.warp.field: " format, (step)->scene_path,             \
               (warp)->field_line, (warp)->mesh, __VA_ARGS__)
 
-/* Returns whether displacements along x and y suffice, because the mesh lies in a plane z = 0. */
+/* Returns whether displacements along x and y suffice, which is the case if all cells are shells of one type, or if no
+ * z coordinates are given. */
 static bool is_of_shells(const insitu_mesh *mesh)
 {
     return session_may_be_plane(mesh) && (!mesh->coordinates[2].data || !mesh->cell_types.data);
