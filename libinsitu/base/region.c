@@ -1,5 +1,5 @@
 /* Floating-point traps and flushing to zero are settings of a thread, and a worker may have the settings of the
- * simulation (session_guard.h). A worker therefore gets the default settings at the begin of each region, and its own
+ * simulation (session_guard.h). A worker therefore gets the default settings at the start of each region, and its own
  * settings back at the end; each change takes about 50 ns. A thread that OpenMP starts for a region begins with the
  * settings of the thread that opened the region.
  *

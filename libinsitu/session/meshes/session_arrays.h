@@ -18,7 +18,7 @@ enum {
 /* The requirements of an array. */
 typedef struct session_array_rule {
     const char *name; /* name of the elements in messages, in the plural */
-    int64_t count;    /* number of the array's elements */
+    int64_t count;    /* number of the array's elements, without the end that SESSION_HAS_END adds */
     int flags;        /* a combination of the SESSION_* bits above */
     int per_tuple;    /* distance from one element to the next, in elements, if no stride is given */
 } session_array_rule;

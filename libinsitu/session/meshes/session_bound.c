@@ -1,27 +1,33 @@
-/* A reference cell is a product of simplices: a hex of three lines, a wedge of a triangle and a line, a tet of itself.
- * In each simplex, polynomials are written in Bernstein's form, whose coefficients bound them: a second derivative
- * along an edge e is p (p - 1) times a second difference of coefficients, and at most the largest of these, M.
+/* This file bounds how far polynomials differ from their linear pieces.
  *
- * Let u be the difference between a polynomial and its linear interpolation in a simplex with edges of 1 / m. Let B_ij
- * be at least -m^2 times its second derivative along the edge from corner i to j. Half the sum of B_ij l_i l_j / m^2
- * over all pairs of barycentric coordinates is q. Then q - u has second derivatives of at most 0 along edges, and is 0
- * at the corners. So it is not negative on edges, then on faces, which lines parallel to an edge cross from edge to
- * edge, and then inside. So u is at most the largest value of q, and -u that with the opposite signs. If all B_ij are
- * M, these are K M / m^2, K = 1/8 on a line, 1/6 in a triangle and 3/16 in a tet. For polynomials of order 2 they are
- * exact.
+ * A reference cell is a product of simplices: a hex of three lines, a wedge of a triangle and a line; a tet is a single
+ * simplex. In each simplex, polynomials of order p are written in Bernstein form. The second derivative along an edge
+ * of the simplex is then a weighted mean of p (p - 1) times the second differences of the coefficients along that edge.
+ * So it is at most the largest of these, M.
  *
- * A tet is cut into smaller ones and octahedra, which are split into tets along a diagonal. So the pieces of a tet have
- * five shapes, whose edges have seven directions.
+ * A piece is a simplex whose edges are 1 / m of those of the cell. Let u be the difference between the polynomial and
+ * its linear interpolation in a piece, l_i the barycentric coordinates in the piece, and e_ij the edge of the cell that
+ * is parallel to the piece's edge from corner i to corner j. Let B_ij be a number that is at least minus the second
+ * derivative of u along e_ij. Let q be half the sum of B_ij l_i l_j / m^2 over all pairs of corners. Then q - u has
+ * second derivatives of at most 0 along all edges, and is 0 at the corners. So it is not negative on the edges. It is
+ * then not negative on the faces, because lines parallel to an edge cross them from edge to edge, and likewise not
+ * inside. So u is at most the largest value of q. The same holds for -u with B_ij of the opposite sign. If all B_ij are
+ * M, the largest value of q is K M / m^2, with K = 1/8 on a line, 1/6 in a triangle and 3/16 in a tet. For polynomials
+ * of order 2 the bounds are exact.
  *
- * In a product, interpolation in one factor does not increase what is interpolated in the others, so that the bounds of
- * all factors add up.
+ * A tet is cut into smaller tets and octahedra, and each octahedron into tets along a diagonal. So the pieces of a tet
+ * have five shapes, whose edges have seven directions.
  *
- * An isosurface of pieces is at x_m(a) with f_m(a) = v, where x_m and f_m are the interpolated position and field. At
- * x(a), which is at most the positions' bound away, the polynomial f differs from v by at most the field's bound. So
- * its isosurface is at most that, divided by the gradient's length, away from x(a). The gradient's length is taken from
- * the corners of the pieces that may be crossed: it is the least component along their mean, which is a bound for all
- * means of the gradients at the corners. How far the gradient differs from such a mean depends on third derivatives and
- * the square of the size of pieces, and is neglected. */
+ * In a product of simplices, interpolation in one factor does not increase the differences in the others, so that the
+ * bounds of all factors are added up.
+ *
+ * The isosurface of the pieces is at x_m(a) with f_m(a) = v. Here a is a point of the reference cell, v the isovalue,
+ * x_m and f_m the interpolated position and field, and x and f their polynomials. x(a) differs from x_m(a) by at most
+ * the positions' bound. There f differs from v by at most the field's bound. So the isosurface of f is at most the
+ * field's bound, divided by the length of the gradient, away from x(a). The length of the gradient is computed at the
+ * corners of the pieces that may be crossed: it is the least component of these gradients along their mean, and no mean
+ * of these gradients is shorter. The difference between the gradient in a piece and such a mean depends on third
+ * derivatives and the square of the size of pieces, and is neglected. */
 #include "session_bound.h"
 
 #include <math.h>
@@ -33,16 +39,17 @@
 #include "vector3.h"
 
 enum {
-    SIZE = 4,            /* numbers of a tuple: a position and a value */
-    COARSE = 4,          /* the first lattice has at least this order */
-    FINE = 16,           /* no other lattice is above this order */
-    MOST_DIRECTIONS = 7, /* along edges of pieces in one simplex */
+    SIZE = 4,            /* number of doubles of a tuple: x, y, z and a value */
+    COARSE = 4,          /* minimum order of the first lattice */
+    FINE = 16,           /* maximum order of all further lattices */
+    MOST_DIRECTIONS = 7, /* number of directions of the edges of pieces in one simplex */
     TET_SHAPES = 5
 };
 
 /* ---- one simplex ----------------------------------------------------------------------------------------------- */
 
-/* Lists the nodes of the lattice of the order, by barycentric coordinates times the order. Returns their number. */
+/* Lists the nodes of a simplex's lattice of this order, each by its barycentric coordinates times the order. If out is
+ * NULL, the nodes are only counted. Returns their number. */
 static int list_nodes(int dimensions, int order, int (*out)[4])
 {
     int count = 0;
@@ -53,12 +60,13 @@ static int list_nodes(int dimensions, int order, int (*out)[4])
     return count;
 }
 
-/* The nodes of a simplex, as list_nodes() lists them. */
+/* Lists of nodes of a simplex, in the form of list_nodes(). */
 typedef struct node_lists {
     int dimensions, order, count;
-    int fine_order, fine_count;               /* of a finer lattice */
-    bool is_lobatto;                          /* set if the nodes of a line are Gauss-Lobatto points */
-    int (*nodes)[4], (*fine)[4], (*lower)[4]; /* of the cell, of the finer lattice, and of the order lower by 2 */
+    int fine_order, fine_count; /* order of the finer lattice, and its number of nodes */
+    bool is_lobatto;            /* set if the nodes of a line are Gauss-Lobatto points */
+    /* nodes of the cell, of the finer lattice, and of the lattice whose order is lower by 2 */
+    int (*nodes)[4], (*fine)[4], (*lower)[4];
 } node_lists;
 
 /* Returns the number of a node in the list. */
@@ -70,7 +78,7 @@ static int find_node(int dimensions, int order, const int node[4])
     return at;
 }
 
-/* Computes Bernstein's polynomial of these exponents at barycentric coordinates; 0 if an exponent is negative. */
+/* Computes the Bernstein polynomial with these exponents at barycentric coordinates; 0 if an exponent is negative. */
 static double bernstein_value(const int exponents[4], const double at[4])
 {
     double value = 1;
@@ -82,7 +90,7 @@ static double bernstein_value(const int exponents[4], const double at[4])
     return value;
 }
 
-/* Computes the derivative of Bernstein's polynomial along an axis, from corner 0 to corner axis + 1. */
+/* Computes the derivative of the Bernstein polynomial along the edge from corner 0 to corner axis + 1. */
 static double bernstein_slope(int order, const int exponents[4], int axis, const double at[4])
 {
     int raised[4], lowered[4];
@@ -93,7 +101,8 @@ static double bernstein_slope(int order, const int exponents[4], int axis, const
     return order * (bernstein_value(raised, at) - bernstein_value(lowered, at));
 }
 
-/* Replaces a matrix of count x count by its inverse, by elimination with pivots. `inverse` holds the unit matrix. */
+/* Inverts a matrix of count x count by elimination with pivots. The matrix is overwritten; `inverse` must contain the
+ * unit matrix and receives the result. */
 static void invert(int count, double *matrix, double *inverse)
 {
     for (int c = 0; c < count; c++) {
@@ -133,8 +142,8 @@ static void multiply(const double *matrix, int rows, int columns, int outer, int
         }
 }
 
-/* Computes Bernstein's polynomials, or their derivatives along an axis if it is not negative, at the nodes of the
- * cell's lattice or of the finer one. */
+/* Computes the values of all Bernstein polynomials (if axis is negative) or their derivatives along an axis, at the
+ * nodes of the cell's lattice or, if is_fine is set, of the finer one. out: a row per node, a column per polynomial. */
 static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *out)
 {
     const int rows = is_fine ? lists->fine_count : lists->count, order = is_fine ? lists->fine_order : lists->order;
@@ -152,7 +161,8 @@ static void fill_basis(const node_lists *lists, int axis, bool is_fine, double *
     }
 }
 
-/* Adds the second difference of the coefficients at a node of the list `lower` along a direction. */
+/* Adds a second difference of coefficients along a direction. lower: index, in lists->lower, of the node from which it
+ * is taken. number: number of the direction. */
 static void add_difference(const node_lists *lists, int lower, int number, const int direction[4],
                            session_bound_factor *out)
 {
@@ -170,8 +180,8 @@ static void add_difference(const node_lists *lists, int lower, int number, const
         }
 }
 
-/* Lists the second differences along all edges of pieces. In a tet the last direction is that of the octahedra's
- * diagonals (session_pattern.c). */
+/* Lists the second differences along all directions of pieces' edges. In a tet the last direction is that of the
+ * diagonals along which octahedra are cut (session_pattern.c). */
 static void list_differences(const node_lists *lists, session_bound_factor *out)
 {
     static const int directions[MOST_DIRECTIONS][4] = {{-1, 1, 0, 0}, {-1, 0, 1, 0}, {0, -1, 1, 0}, {-1, 0, 0, 1},
@@ -187,7 +197,8 @@ static double *make_matrix(int rows, int columns)
     return base_calloc((size_t)rows * (size_t)columns, sizeof(double));
 }
 
-/* Replaces the columns for Bernstein coefficients by those for values at nodes. spare: as many doubles. */
+/* Converts a matrix that is applied to Bernstein coefficients into one that is applied to values at nodes. spare:
+ * working memory of the matrix's size. */
 static void convert_columns(const session_bound_factor *of, int level, double *matrix, double *spare)
 {
     const int rows = of->fine_counts[level], columns = of->node_count;
@@ -200,7 +211,8 @@ static void convert_columns(const session_bound_factor *of, int level, double *m
     memcpy(matrix, spare, (size_t)rows * (size_t)columns * sizeof *matrix);
 }
 
-/* Computes the matrices of one level. */
+/* Computes the matrices from values at the cell's nodes to values and derivatives at the nodes of one level's
+ * lattice. */
 static bool fill_level(node_lists *lists, int level, int order, session_bound_factor *out)
 {
     const int dimensions = lists->dimensions, count = lists->count;
@@ -321,16 +333,19 @@ void session_drop_bound(session_bound *bound)
 
 /* ---- one cell -------------------------------------------------------------------------------------------------- */
 
-/* A cell in the making. */
+/* The data with which the bounds of one cell are computed. */
 typedef struct bound_job {
     const session_bound *of;
     const session_isovalues *isovalues;
     int level;
-    double *nodes, *coefficients;       /* tuples: at the equispaced nodes, and in Bernstein's form */
-    double *fine, *slopes[3];           /* tuples at the fine nodes, and their derivatives along the axes */
-    double (*gradients)[3];             /* of the field at the fine nodes; not finite where the cell is flat */
-    double *work;                       /* for products */
-    double position_bound, value_bound; /* of the differences from interpolation in the whole cell */
+    /* tuples at the nodes of the complete lattice, and their Bernstein coefficients */
+    double *nodes, *coefficients;
+    /* tuples at the nodes of the level's lattice, and their derivatives along the axes */
+    double *fine, *slopes[3];
+    double (*gradients)[3]; /* gradient of the field at these nodes; not finite where the cell is flat */
+    double *work;           /* working memory of apply() */
+    /* bounds of u if the whole cell is one piece (m = 1): length for positions, and for the field */
+    double position_bound, value_bound;
 } bound_job;
 
 size_t session_bound_work_size(const session_bound *of)
@@ -352,7 +367,8 @@ static void divide_work(bound_job *job, double *work)
     job->work = work + 3 * job->of->levels[job->level].count;
 }
 
-/* Multiplies each factor of a product with its matrix. size: number of numbers of a tuple. */
+/* Multiplies the tuples, of `size` doubles each, with one matrix for each factor of the reference cell. The matrices
+ * lead to the nodes of the level's lattice if is_fine is set, and otherwise to those of the cell. */
 static void apply(const bound_job *job, int size, const double *const matrices[3], bool is_fine, const double *in,
                   double *out)
 {
@@ -370,14 +386,16 @@ static void apply(const bound_job *job, int size, const double *const matrices[3
     }
 }
 
-/* Returns the largest value of q in a triangle, or 0 if it is not inside (top of the file). */
+/* Returns the largest value of q (top of the file, with m = 1) inside a triangle whose B_ij are a, b and c; 0 if the
+ * maximum is not inside. */
 static double largest_in_triangle(double a, double b, double c)
 {
     const double x = a * (b + c - a), y = b * (c + a - b), z = c * (a + b - c);
     return a > 0 && b > 0 && c > 0 && x >= 0 && y >= 0 && z >= 0 ? 0.5 * a * b * c / (x + y + z) : 0;
 }
 
-/* As above, in a tet. The numbers are those of the pairs of corners 01, 02, 03, 12, 13 and 23. */
+/* Returns the largest value of q inside a tet; 0 if the maximum is not inside. b: B_ij for the pairs of corners 01, 02,
+ * 03, 12, 13 and 23. */
 static double largest_in_tet(const double b[6])
 {
     double matrix[16] = {0, b[0], b[1], b[2], b[0], 0, b[3], b[4], b[1], b[3], 0, b[5], b[2], b[4], b[5], 0};
@@ -405,7 +423,8 @@ static double largest_in_shape(const double b[6])
     return least > 0 ? fmax(out, largest_in_tet(b)) : out;
 }
 
-/* Returns the bound of u in the pieces of a factor by B, which is given by direction. */
+/* Returns the bound of u in the pieces of a factor, for m = 1. b: B_ij for each direction of edges, in the order of
+ * list_differences(). */
 static double bound_factor(int dimensions, const double b[MOST_DIRECTIONS])
 {
     static const signed char tets[TET_SHAPES][6] = {
@@ -421,13 +440,13 @@ static double bound_factor(int dimensions, const double b[MOST_DIRECTIONS])
     return out;
 }
 
-/* The largest values of u and of -u, for each number of a tuple. */
+/* Upper bounds of u and of -u for each number of a tuple, for m = 1. */
 typedef struct bound_sums {
     double above[SIZE], below[SIZE];
 } bound_sums;
 
-/* Adds the bounds of the differences from interpolation in one factor. inner: number of doubles from one coefficient of
- * the factor to the next. */
+/* Adds the bounds of u for one factor of the reference cell. inner: number of doubles from one coefficient of the
+ * factor to the next. */
 static void add_factor(const bound_job *job, const session_bound_factor *factor, int inner, bound_sums *sums)
 {
     const int p = job->of->nodes.of.order, all = SIZE * job->of->nodes.complete.count;
@@ -452,7 +471,8 @@ static void add_factor(const bound_job *job, const session_bound_factor *factor,
     }
 }
 
-/* Completes the tuples of `size` numbers at the cell's nodes, and computes their Bernstein coefficients. */
+/* Computes the Bernstein coefficients of tuples of `size` doubles from the tuples at the cell's nodes. Tuples at nodes
+ * that a serendipity cell lacks are computed first. */
 static void find_coefficients(const bound_job *job, int size, const double *tuples)
 {
     const double *matrices[3];
@@ -461,7 +481,7 @@ static void find_coefficients(const bound_job *job, int size, const double *tupl
     apply(job, size, matrices, false, job->nodes, job->coefficients);
 }
 
-/* Computes the bounds of the differences from interpolation. */
+/* Computes position_bound and value_bound. */
 static void bound_differences(bound_job *job)
 {
     bound_sums sums = {{0}, {0}};
@@ -476,8 +496,8 @@ static void bound_differences(bound_job *job)
     job->value_bound = largest[3];
 }
 
-/* Finds a sphere around the cell, whose positions are means of their coefficients. The radius is NaN if a coefficient
- * is not finite. */
+/* Finds a sphere around the box of the Bernstein coefficients of positions. It contains the cell, because positions are
+ * weighted means of these. The radius is NaN if a coefficient is not finite. */
 static void find_sphere(const bound_job *job, session_cell_bound *out)
 {
     double low[SIZE], high[SIZE], half[3], zero = 0;
@@ -501,7 +521,8 @@ bool session_is_any_between(const session_isovalues *isovalues, double low, doub
     return false;
 }
 
-/* Computes the gradient by the derivatives along the axes: for a cell with two axes, the one in its surface. */
+/* Computes the gradient of the field at a node of the level's lattice from the derivatives along the axes. For a cell
+ * with two axes it is the gradient along the cell's surface. */
 static void find_gradient(const bound_job *job, int node, double out[3])
 {
     const double *a = job->slopes[0] + SIZE * node, *b = job->slopes[1] + SIZE * node;
@@ -533,7 +554,8 @@ static void find_gradients(bound_job *job)
     for (int n = 0; n < of->levels[job->level].count; n++) find_gradient(job, n, job->gradients[n]);
 }
 
-/* Returns a lower bound of the lengths of means of the gradients at a piece's corners; 0 if there is none. */
+/* Returns a lower bound of the length of any weighted mean of the gradients at a piece's corners; 0 if the bound is not
+ * positive or not finite. */
 static double least_gradient(const bound_job *job, const int *corners, int count)
 {
     double mean[3] = {0}, least = INFINITY;

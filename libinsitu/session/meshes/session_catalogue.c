@@ -163,7 +163,7 @@ static void hash_parts(const session_parts *parts, uint64_t *hash)
     }
 }
 
-/* An error that only some blocks have is part of the hash of names, because other ranks must be informed of it. */
+/* The hash of names includes errors that only some blocks have, because other ranks must be informed of these. */
 uint64_t session_names_hash(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
@@ -268,7 +268,7 @@ static session_catalogue_mesh *find_mesh(const session_catalogue *catalogue, con
     return bsearch(&key, catalogue->meshes, (size_t)catalogue->mesh_count, sizeof key, compare_mesh_names);
 }
 
-/* Stores the names of the meshes in the text, if names is not NULL. Returns their number. */
+/* Stores pointers to the names of the meshes in the text, unless names is NULL. Returns their number. */
 static size_t list_names(const char *text, size_t size, const char **names)
 {
     size_t count = 0;
@@ -341,7 +341,7 @@ static session_catalogue_field *record_field(session_catalogue_mesh *mesh, bool 
     return field;
 }
 
-/* Completes a mesh's entry in a rank's table: records the fields that the rank lacks. */
+/* Called after the last field of a mesh in a rank's table has been read. Records the fields that the rank lacks. */
 static void record_missing_fields(session_catalogue_mesh *mesh, bool has_cells, bool has_ids, int rank)
 {
     if (!mesh || !has_cells) return;
@@ -567,8 +567,9 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
 /* ---- homes ----------------------------------------------------------------------------------------------------- */
 
 /* Computes hashes of the stamps at which the cells and the coordinates of this rank's parts of a mesh last changed; 0
- * if this rank has no part. The hashes of all ranks are added up. They are mixed, because a stamp that changes in one
- * bit otherwise raises the hash of one rank by what it lowers that of another, so that the sum remains the same. */
+ * if this rank has no part. The hashes of all ranks are added up. They are mixed, so that changes on two ranks do not
+ * cancel in the sum: without mixing, a changed bit could add to the hash of one rank what it subtracts from that of
+ * another. */
 static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2])
 {
     bool has_any = false;
@@ -586,7 +587,7 @@ static void hash_stamps(const session_parts *parts, int rank, uint64_t hashes[2]
     for (int k = 0; k < 2; k++) hashes[k] = has_any ? session_mix_bits(hashes[k]) : 0;
 }
 
-/* Sums up, over the ranks, hashes of the stamps at which each mesh last changed. */
+/* Computes cells_hash and positions_hash of each mesh, which are sums over all ranks of hashes of the stamps. */
 static insitu_status update_parts(session_catalogue *catalogue, const session_meshes *meshes, const session_team *team,
                                   base_error *error)
 {

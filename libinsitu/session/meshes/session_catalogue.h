@@ -22,7 +22,7 @@ typedef struct session_catalogue_field {
 
 /* A vertex that hangs on a face: its value is the weighted sum of the values at the face's corners. */
 typedef struct session_hanging_vertex {
-    int64_t group;      /* group of equal vertices that contains it (session_hanging.h) */
+    int64_t group;      /* index of its group of equal vertices (session_vertex_groups) */
     int64_t corners[4]; /* indices of groups, or of the values received from other ranks */
     double weights[4];  /* weight of the value at each corner; they sum to 1 */
     bool is_received;   /* set if the corners are values received from other ranks, not groups of this rank */
@@ -131,8 +131,8 @@ typedef struct session_catalogue {
     session_mesh_group **mesh_groups;
 } session_catalogue;
 
-/* Updates the catalogue. is_shared states that all ranks have equal names (compared by session_names_hash()) and that
- * no mesh or field has an error. Meshes with an error are excluded from the step. Collective. */
+/* Updates the catalogue. is_shared: all ranks have equal names (compared by session_names_hash()), and no mesh or field
+ * has an error. Meshes with an error are excluded from the step. Collective. */
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);
@@ -145,7 +145,8 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
  * session_update_homes() then finds out which meshes have changed. Local. */
 void session_forget_homes(session_catalogue *catalogue);
 
-/* Returns the name of the mesh group to which the mesh belongs if the layer's meshes are mesh_group_name. */
+/* Returns the name of the mesh group over which values on this mesh are averaged: the group of the mesh alone if it has
+ * vertex ids, and otherwise mesh_group_name, the name stored in the layer's field. */
 static inline uint64_t session_mesh_group_name(const session_catalogue_mesh *mesh, uint64_t mesh_group_name)
 {
     return mesh->single_group_name ? mesh->single_group_name : mesh_group_name;
@@ -154,7 +155,7 @@ static inline uint64_t session_mesh_group_name(const session_catalogue_mesh *mes
 /* Returns the mesh group with this name, or NULL if there is none. */
 session_mesh_group *session_find_mesh_group(const session_catalogue *catalogue, uint64_t name);
 void session_drop_mesh_groups(session_catalogue *catalogue);
-/* Frees the data of the hanging vertices and, if with_borders, the data of the faces. */
+/* Frees the data of the hanging vertices and, if with_borders is set, the borders. */
 void session_hanging_free(session_hanging *hanging, bool with_borders);
 
 /* This rank's parts of the meshes of a mesh group, sorted by mesh. */

@@ -53,7 +53,7 @@ typedef enum face_fault {
 typedef struct face_fault_details {
     int64_t count;         /* number of the cell's faces */
     int64_t face;          /* number of the faulty face, as stored in the connectivity */
-    int64_t first, end;    /* begin and end of the face in the list of faces' vertices */
+    int64_t first, end;    /* start and end of the face in the list of faces' vertices */
     int64_t vertex, other; /* the faulty vertex, or the two ends of an edge */
     int sharing;           /* number of faces that have the edge */
     double position[3];    /* coordinates of the faulty vertex */
@@ -204,7 +204,7 @@ typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORD
 
 typedef struct fault_details {
     int type;
-    int64_t first, end; /* begin and end offset of the cell */
+    int64_t first, end; /* start and end offset of the cell */
     int64_t vertex;     /* number of the faulty vertex, as stored in the connectivity */
     double position[3];
     face_fault fault_of_faces;
@@ -278,7 +278,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, edge_buffer
     return grid_is_ghost(g, cell) ? CELL_GOOD : check_coordinates(g, vertices, count, details);
 }
 
-/* Returns the type as stored in the caller's array, which may contain integers of 64 bits. */
+/* Returns the type as stored in the caller's array, which may contain 64-bit integers. */
 static long long original_type(const session_mesh *mesh, int64_t cell)
 {
     const grid *g = &mesh->cells;

@@ -1,7 +1,7 @@
 /* The code that processes meshes reads coordinates as float32 or float64, indices as int32 or int64, and flags as
  * bytes, int32 or int64, all aligned: its loops are compiled once for each combination of these types. Arrays of other
- * types are converted here, so that no other code meets them. Unsigned indices are read as signed ones, without a copy,
- * as long as they are below half of their range. */
+ * types are converted here, so that no other code has to read them. Unsigned indices are read as signed ones, without a
+ * copy, as long as they are below half of their range. */
 #include "session_conform.h"
 
 #include <string.h>
@@ -169,8 +169,9 @@ static bool copy_map(const insitu_mesh *original, session_conformed *out)
     return true;
 }
 
-/* Makes the description refer to a copy of the array with this number, if its type cannot be read in place. If is_kept,
- * the previous description's copy is reused; otherwise a new one is allocated. Returns false if memory runs out. */
+/* If the type of the array with this number cannot be read in place, makes the description refer to a copy of it. If
+ * is_kept, the previous description's copy is reused; otherwise a new one is allocated. Returns false if memory runs
+ * out. */
 static bool refer_to_copy(session_conformed *last, bool is_kept, int number, insitu_mesh *given, session_conformed *out)
 {
     const conform_array of = find_array(given, number);

@@ -34,7 +34,8 @@ void session_place_nodes(int p, bool is_lobatto, double out[NODES_MOST_ORDER + 1
  * middle of a face, 3 at that of a hex. */
 int session_missing_directions(int type, const int at[3], int directions[3][3]);
 
-/* The polynomials of all cells of a mesh whose cells are split. */
+/* The derivatives of the polynomials of all cells of a mesh whose cells of higher order are split into linear
+ * pieces. */
 typedef struct session_polynomials {
     session_rows rows;
     const int64_t *first_pieces; /* same as session_topology.first_pieces */

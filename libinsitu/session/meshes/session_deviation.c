@@ -40,16 +40,16 @@ void session_read_request_values(const session_rows *rows, const session_deviati
         read_distances(rows, request->plane, cell, count, out);
 }
 
-/* The work on the cells of a mesh. */
+/* The data with which a mesh's cells are measured. */
 typedef struct deviation_work {
-    session_rows rows; /* of the caller's cells */
+    session_rows rows; /* rows of the caller's cells */
     const session_deviation_request *request;
     int field_size;                        /* number of components of the field, or 1 */
-    session_bound bounds[ROWS_MOST_KINDS]; /* nothing for kinds of cells that are not measured */
+    session_bound bounds[ROWS_MOST_KINDS]; /* empty for kinds of cells that are not measured */
 } deviation_work;
 
-/* Returns whether the cells have bounds. Linear ones are not measured, but are marked, since their neighbours may be of
- * higher order. */
+/* Returns whether session_make_bound() supports this kind of cell. Linear cells are included: they are not measured,
+ * but they are marked, since their neighbours may be of higher order. */
 static bool has_bound(const session_nodes *of)
 {
     return of->order <= BOUND_MOST_ORDER && of->type != GRID_PYRAMID;
@@ -118,15 +118,16 @@ static session_cell_bound bound_cell(const deviation_work *w, const session_boun
     return session_bound_cell(of, tuples, has_isovalues ? &w->request->isovalues : NULL, level, tuples + 4 * count);
 }
 
-/* Returns the largest error that counts: half the distance between two nodes. With linear pieces between nodes, half a
- * circle from node to node is off by that. Where surfaces bend more, nodes do not resolve them. */
+/* Returns the largest surface error that is reported for a cell: half the distance between two nodes, plus the error of
+ * positions. Half the distance is the error of a linear piece across half a circle from node to node. If a surface
+ * bends more, the nodes do not resolve it. */
 static double limit_error(const session_cell_bound *bound)
 {
     return 0.5 * bound->node_distance + bound->position_error;
 }
 
-/* Finds the bound of the isosurfaces in a cell, by the lattices as fine as needed: it need not be below `enough` if it
- * is below the limit. */
+/* Returns a bound of the isosurfaces' error in a cell. Finer lattices are used as long as the bound exceeds `enough` or
+ * limit_error(). first: the bounds from the coarsest lattice. */
 static double find_surface_error(const deviation_work *w, const session_bound *of, int64_t cell, double enough,
                                  const session_cell_bound *first, double *buffer)
 {
@@ -137,7 +138,8 @@ static double find_surface_error(const deviation_work *w, const session_bound *o
     return least;
 }
 
-/* Adds the range of a cell's values, and their error if some view shows the cell. */
+/* Extends the range in *out by a cell's values and, if some view shows the cell, raises value_error to the bound of
+ * their error. */
 static void measure_values(const deviation_work *w, int count, const session_cell_bound *bound, const double *values,
                            session_deviation *out)
 {
@@ -150,8 +152,8 @@ static void measure_values(const deviation_work *w, int count, const session_cel
         out->value_error = fmax(out->value_error, bound->value_error);
 }
 
-/* A cell that does not increase the largest error needs no better bound, so that the result does not depend on the
- * order of cells. */
+/* Measures a cell, and updates *out. A cell whose error is below the largest error so far does not affect the result,
+ * so its bound is not refined. The result therefore does not depend on the order of cells. */
 static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, session_deviation *out)
 {
     const session_bound *of = &w->bounds[session_kind_of(&w->rows, cell)];

@@ -1,4 +1,5 @@
-/* The largest distance, in pixels, between what is drawn of a mesh's cells of higher order and their polynomials. */
+/* Measures the largest distance, in pixels, between the polynomials of a mesh's cells of higher order and the linear
+ * pieces that are drawn. */
 #ifndef SESSION_DEVIATION_H
 #define SESSION_DEVIATION_H
 
@@ -9,24 +10,25 @@
 /* The sizes of pixels in the views that show a mesh. */
 typedef struct session_pixels {
     const void *of;
-    /* Returns a lower bound of the size, in scene units, of a pixel on a sphere; INFINITY if no view shows the
-     * sphere. It is called by several threads at once. */
+    /* Returns a lower bound of the size of a pixel at any point of a sphere, in units of coordinates; INFINITY if no
+     * view shows the sphere. It is called by several threads at once. */
     double (*size)(const void *of, const double centre[3], double radius);
 } session_pixels;
 
-/* What of a mesh is measured. */
+/* A request to measure a mesh: its isosurfaces, the values of a field, or the positions of its cells. */
 typedef struct session_deviation_request {
-    /* a field whose isosurfaces are measured; NULL: the positions of the cells that the plane may cross or, if there is
-     * none, of all cells */
+    /* values of the field that is measured, or whose isosurfaces are. NULL: positions are measured, of the cells that
+     * `plane` may cross or, if `plane` is NULL, of all cells. */
     const session_node_values *values;
     int component;               /* component of the field */
-    session_isovalues isovalues; /* values of the field; or 0, the distance from the plane */
+    session_isovalues isovalues; /* isovalues of the field; if `plane` is given, the distance 0 from it */
     const session_plane *plane;
     session_pixels pixels;
-    bool is_of_values;    /* set if the error of the field's values is wanted, in place of that of isosurfaces */
-    bool is_lobatto;      /* as in session_make_interpolation() */
-    bool marks_only;      /* set if only marks are wanted */
-    unsigned char *marks; /* one byte per cell, which is set if the cell may be crossed; NULL: not wanted */
+    bool is_of_values; /* set if the error of the field's values is measured, instead of that of its isosurfaces */
+    bool is_lobatto;   /* as in session_make_interpolation() */
+    bool marks_only;   /* set if cells are only marked, not measured */
+    /* one byte per cell, which is set if an isosurface or the plane may cross the cell; NULL: cells are not marked */
+    unsigned char *marks;
 } session_deviation_request;
 
 /* Returns the caller's description of a mesh, which may be read as finer lattices. */
@@ -36,16 +38,17 @@ static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
 }
 
 /* Computes the request's component of the field, or else the distance from its plane, at the `count` nodes of a cell.
- * rows: those of the caller's cells. tuple: buffer for all components of the field. */
+ * rows: rows of the caller's cells. tuple: buffer for all components of the field. */
 void session_read_request_values(const session_rows *rows, const session_deviation_request *request, int64_t cell,
                                  int count, double *tuple, double *out);
 
 typedef struct session_deviation {
     double error; /* largest bound in pixels if cells have one piece between two nodes */
-    /* number of cells that an isosurface may cross, and of those that count with less than their bound, because the
-     * distance of their nodes does not resolve the isosurface */
+    /* number of cells that an isosurface may cross, and of those among them whose bound was replaced by a smaller
+     * limit, because their nodes are too far apart to resolve the isosurface */
     int64_t cell_count, unbounded_count;
-    /* if is_of_values: largest error of values if cells have one piece between two nodes, and their range at nodes */
+    /* if is_of_values: largest bound of the error of values, if cells have one piece between two nodes, and the range
+     * of the values at nodes */
     double value_error, low, high;
 } session_deviation;
 

@@ -34,7 +34,7 @@ static int compare_ids(const void *a, const void *b)
 }
 
 /* Returns the r-th of P quantiles of this rank's ids, where r is its rank and P the number of ranks. It is estimated
- * from a sample of the ids; any evenly chosen sample suffices, because all ranks receive the result. */
+ * from an evenly spaced sample of the ids. Any sample suffices, because all ranks receive the result. */
 static int64_t sample_quantile(const session_mesh *mesh, const session_team *team)
 {
     const grid_array ids = session_grid_array(&mesh->given.vertex_ids);

@@ -1,12 +1,13 @@
-/* Homes of items that several ranks share, namely vertices and faces on the borders between the ranks' parts of a mesh.
- * The home of an item is a rank near it, which all ranks that have the item can determine without communication. So
- * neither a rank's messages nor the number of ranks to which it sends grow with the number of ranks.
+/* Determines the home ranks of items that several ranks share, namely vertices and faces on the borders between the
+ * ranks' parts of a mesh. The home of an item is a rank near it, which all ranks that have the item can determine
+ * without communication. So neither a rank's messages nor the number of ranks to which it sends grow with the number of
+ * ranks.
  *
  * If items are identified by coordinates, which have the same bits on all ranks, the home is one of the ranks in whose
- * box all of the item's vertices lie, selected by its hash. If they are identified by global ids, the coordinates may
- * differ in their last bits, and ranks divide the ids among them instead. The share of the r-th of P ranks begins at
- * the r-th of P quantiles of its own ids. So its share is near its own ids if ranks number their vertices
- * consecutively, and shares are evenly distributed if ids are random. */
+ * box all of the item's vertices lie, selected by the item's hash. If items are identified by global ids, their
+ * coordinates may differ in the last bits, so the ids are divided among the ranks instead. Let P be the number of
+ * ranks. The ids of rank r start at the r-th of P quantiles of the ids of its own vertices. So they are near its own
+ * ids if ranks number their vertices consecutively, and evenly distributed if ids are random. */
 #ifndef SESSION_HOMES_H
 #define SESSION_HOMES_H
 

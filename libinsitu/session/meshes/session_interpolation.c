@@ -6,13 +6,13 @@
  *     tet        tet
  *     triangle   triangle
  *
- * A sum has other bits in another order of its terms. So nodes on a face are computed again, from the face's nodes
- * alone, with axes that follow from the positions of the face's corners: the first is the corner that is first in the
- * order of coordinates, and the first axis leads to the next of the corners beside it. Nodes on an edge are then
- * computed from the edge's nodes alone, from the end that is first, and corners are copied. All cells at a face or an
- * edge do the same, on any rank.
+ * The bits of a sum depend on the order of its terms. So nodes on a face are computed a second time, from the face's
+ * nodes alone, in an order that follows from the positions of the face's corners. The origin is the corner that is
+ * first in the order of coordinates, and the first axis leads to the corner next to it that comes earlier in that
+ * order. Nodes on an edge are then computed from the edge's nodes alone, from the end that is first, and corners are
+ * copied. All cells at a face or an edge do the same, on any rank.
  *
- * Each sum is that of differences from its first value, so that a constant is reproduced to the bit. */
+ * Each sum is that of differences from its first value, so that a constant is reproduced exactly. */
 #include "session_interpolation.h"
 
 #include <string.h>
@@ -50,7 +50,8 @@ static double find_product(int n, double t)
     return value;
 }
 
-/* Computes the weights of a triangle or, with many layers, a tet. */
+/* Computes the weights of a triangle or, if is_tet is set, of a tet. p: order of the cell; parts: the fine lattice has
+ * the order parts * p. */
 static void weigh_simplex(int p, int parts, bool is_tet, double *out)
 {
     const int fine = parts * p;
@@ -177,7 +178,7 @@ static double value_beside(const cell_job *job, const int at[3], const int step[
     return job->lattice[find_index(&job->of->complete, node) * job->size + component];
 }
 
-/* Returns the sum of values on both sides of a node. */
+/* Returns the sum of the values at the two nodes that are `step` away from a node. */
 static double sum_pair(const cell_job *job, const int at[3], const int step[3], int component)
 {
     const int back[3] = {-step[0], -step[1], -step[2]};
@@ -253,13 +254,14 @@ static void fill_inside(const cell_job *job)
     }
 }
 
-/* A corner and two steps from it along a face of a lattice of order 1; no second step on edges. */
+/* The axes of a face or edge: positions of its origin and of the ends of both axes, in a lattice of order 1. An edge
+ * has only the first axis. */
 typedef struct face_axes {
     int count; /* number of the face's corners */
     const signed char *origin, *along, *across;
 } face_axes;
 
-/* Returns the index of a node of a face. */
+/* Returns the index in the cell's lattice of the face's node i, j. */
 static int find_face_node(const session_nodes *of, const face_axes *axes, int i, int j)
 {
     int at[3];
@@ -269,7 +271,8 @@ static int find_face_node(const session_nodes *of, const face_axes *axes, int i,
     return find_index(of, at);
 }
 
-/* Copies tuples between a lattice and an array of the face's nodes. */
+/* Copies tuples from a lattice to an array of the face's nodes if is_read is set, and in the opposite direction
+ * otherwise. */
 static void copy_face(const session_nodes *of, const face_axes *axes, int size, bool is_read, double *lattice,
                       double *face)
 {

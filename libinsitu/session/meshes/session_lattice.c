@@ -102,8 +102,8 @@ static insitu_status check_strides(const char *what, const int64_t strides[3], c
     return INSITU_OK;
 }
 
-/* Computes packed strides for these counts, with the first index fastest. The last stride cannot overflow if counts
- * have been checked. */
+/* Computes packed strides for these counts; the first index varies fastest. The last stride cannot overflow if the
+ * counts have been checked. */
 static void compute_packed_strides(const int64_t counts[3], int64_t out[3])
 {
     out[0] = 1;

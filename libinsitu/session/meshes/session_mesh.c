@@ -45,7 +45,7 @@ grid_array session_grid_array(const insitu_array *array)
 
 grid_array session_coordinates(const insitu_mesh *mesh, int axis)
 {
-    static const double zero = 0; /* if it is read as float, the first half of its bytes is a 0 of type float */
+    static const double zero = 0; /* its first four bytes are also a 0 of type float */
     const insitu_array *given = &mesh->coordinates[axis];
     if (given->data) return session_grid_array(given);
     return (grid_array){.data = (const char *)&zero, .is_wide = session_type_size(mesh->coordinates[0].type) == 8};

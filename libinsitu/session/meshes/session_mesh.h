@@ -82,12 +82,12 @@ typedef struct session_scalar {
     int interval_count;
     mmbvh_interval *intervals;
     session_plane plane; /* the plane from which distances are computed */
-    float *distances;    /* distance of each vertex, a copy reported to the user; NULL: not computed yet */
-    /* cell values recentred to vertices, a copy reported to the user; NULL: not computed yet */
+    float *distances;    /* distance of each vertex; NULL: not computed yet. insitu_report lists it as a copy */
+    /* cell values recentred to vertices; NULL: not computed yet. insitu_report lists them as a copy */
     double *vertex_values;
     grid_field original_values; /* the caller's values of the cells, if recentred values are used */
-    /* index of each vertex in `gradients`, or -1; NULL: not computed yet. A copy reported to the user, for smooth
-     * normals of the last step that drew some */
+    /* index of each vertex in `gradients`, or -1; NULL: not computed yet. The gradients are those of the last step that
+     * drew smooth normals. insitu_report lists them as a copy */
     int32_t *gradient_indices;
     float (*gradients)[3];    /* gradient at each vertex that has an index */
     int64_t gradient_count;   /* number of gradients */
@@ -123,7 +123,7 @@ typedef struct session_threshold {
 } session_threshold;
 
 /* The faces that belong to only one of the cells selected by a threshold, over all ranks, and a mesh of tets and
- * pyramids that is built on these faces. It is a copy reported to the user (session_outer_mesh.h). */
+ * pyramids that is built on these faces (session_outer_mesh.h). insitu_report lists it as a copy. */
 typedef struct session_outer {
     session_threshold threshold;
     /* session_scalar.version of the values to which the threshold was applied, if there is a threshold */
@@ -145,7 +145,7 @@ typedef struct session_outer {
 } session_outer;
 
 /* Arrays owned by the session that are read in place of the caller's (session_topology.h). They are computed once per
- * topology, and are reported to the user as copies. */
+ * topology. insitu_report lists them as copies. */
 typedef struct session_topology {
     /* set if the arrays match the current cells, even if nothing had to be computed */
     bool is_made;
@@ -170,17 +170,19 @@ typedef struct session_topology {
     unsigned char *ghosts;       /* one byte per piece, nonzero if its cell is a ghost; NULL: there are no ghosts */
 } session_topology;
 
-/* Separate vertices for each corner of each cell, which are read in place of the vertices that cells share
- * (session_discontinuous.h). They are a copy reported to the user. Corners are numbered as in the caller's
- * connectivity, without the unused ends of rows. */
+/* Vertices of a discontinuous mesh (session_discontinuous.h): each corner of each cell has a vertex of its own, which
+ * is read in place of the vertices that cells share. insitu_report lists them as a copy. Corners are numbered as in the
+ * caller's connectivity, without the unused ends of rows. */
 typedef struct session_discontinuous {
-    bool is_active; /* set if vertices are separate; if not set, all other members are empty */
+    bool is_active; /* set if the mesh is discontinuous; otherwise all other members are empty */
     bool is_made;   /* set if the coordinates are up to date */
-    /* set if cells are split into pieces: then `shared` is the caller's connectivity, whose entries are the corners */
+    /* set if cells are split into pieces. `shared_connectivity` is then the caller's connectivity, whose entries are
+     * the corners. */
     bool are_corners_entries;
     int64_t corner_count;
-    grid_array shared_connectivity; /* the connectivity whose corners get separate vertices */
-    grid_array corners;             /* for each entry of `shared`, its corner; the permutation is its own inverse */
+    grid_array shared_connectivity; /* connectivity that refers to the vertices that cells share */
+    /* for each entry of shared_connectivity, its corner; the permutation is its own inverse */
+    grid_array corners;
     grid_array coordinates[3];
     int64_t bytes;
 } session_discontinuous;
@@ -207,8 +209,8 @@ typedef struct session_piece_set {
 
 enum { SESSION_FINER_COUNTS = 64 };
 
-/* Nodes of a finer lattice in cells of higher order, at which their polynomials are evaluated (session_finer.h). They
- * are a copy reported to the user. */
+/* Nodes of a finer lattice in cells of higher order, at which their polynomials are evaluated (session_finer.h).
+ * insitu_report lists them as a copy. */
 typedef struct session_finer {
     bool is_counted; /* set if `counts` are those of the current cells */
     int64_t counts[SESSION_FINER_COUNTS];
@@ -230,13 +232,13 @@ typedef struct session_finer {
 typedef struct session_lattice {
     insitu_lattice given; /* given.lattice of the mesh points to it, or is NULL if the mesh is not structured */
     grid_lattice cells;
-    double *axis_coordinates[3]; /* coordinates along the axes, if they are uniform or rectilinear; a copy reported to
-                                    the user */
-    int64_t bytes;               /* size of the coordinates along all axes in bytes */
+    /* coordinates along the axes of a uniform or rectilinear lattice. insitu_report lists them as a copy */
+    double *axis_coordinates[3];
+    int64_t bytes; /* size of the coordinates along all axes in bytes */
 } session_lattice;
 
 /* Coordinates that are read in place of the caller's, because the scene draws the mesh with moved vertices
- * (session_warp.h). They are a copy reported to the user. */
+ * (session_warp.h). insitu_report lists them as a copy. */
 typedef struct session_warp {
     bool is_applied;             /* set if the moved coordinates are read */
     bool is_stale;               /* set if the caller's coordinates may have changed since they were moved */
@@ -250,9 +252,10 @@ typedef struct session_warp {
     base_error problem; /* the reason why the vertices could not be moved; the check of the mesh returns it */
 } session_warp;
 
-/* Coordinates of a mirror image (session_mirror.h). Those that are computed are reported to the user as a copy. */
+/* Coordinates of a mirror image (session_mirror.h). insitu_report lists those that are computed as a copy. */
 typedef struct session_mirrored {
-    double planes[3];            /* coordinate of the mirror plane of each axis along which the image is mirrored */
+    /* for each axis along which the image is mirrored, the coordinate of its mirror plane */
+    double planes[3];
     char *coordinate_memory;     /* memory of the mirrored coordinates (session_own_coordinates.h) */
     insitu_array coordinates[3]; /* the mirrored coordinates; no data along an axis if they are those of the source */
     double *axes[3];             /* coordinates along a lattice's axes, owned; NULL: coordinates are given by vertex */
@@ -264,7 +267,7 @@ typedef struct session_mirrored {
 
 enum { SESSION_CONFORMED = 9 };
 
-/* Copies of arrays whose type cannot be read in place (session_conform.h). They are reported to the user. */
+/* Copies of arrays whose type cannot be read in place (session_conform.h). insitu_report lists them. */
 typedef struct session_conformed {
     char *copies[SESSION_CONFORMED]; /* NULL: the array is read in place */
     /* cell types converted from the caller's own numbers; NULL: the caller uses the library's numbers */
@@ -313,7 +316,7 @@ typedef struct session_mesh {
     session_lattice lattice;
     session_warp warp;
     /* One byte per cell, read in place of `ghosts`: set for ghosts and for cells that finer blocks cover
-     * (outer/session_covers.h). A copy reported to the user; NULL: `ghosts` is read */
+     * (outer/session_covers.h). NULL: `ghosts` is read. insitu_report lists it as a copy. */
     unsigned char *covered;
     session_misfit misfit;
     grid cells;                  /* the cells in the form that all code of the session reads */
@@ -582,8 +585,8 @@ const base_error *session_pending_error(const session_meshes *meshes);
 void session_store_pending(session_meshes *meshes, const base_error *error, const char *mesh, const char *field);
 void session_drop_pending(session_meshes *meshes);
 
-/* Stores an error in a field's values, which lasts for the rest of the step, and copies it to *first unless that
- * already holds an error. */
+/* Stores an error of a field's values, which lasts for the rest of the step. Copies it to *first unless *first already
+ * holds an error. */
 void session_store_problem(session_field *field, const base_error *problem, base_error *first);
 
 /* Removes a mesh from the list for the rest of the step, so that this rank acts as if it had no part of it. */

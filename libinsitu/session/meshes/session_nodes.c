@@ -253,7 +253,8 @@ static int number_lexicographic_node(int type, int p, int i, int j, int k)
     }
 }
 
-/* Returns the permutation of VTK's nodes other than corners, or NULL if it is the identity. */
+/* Returns the permutation from VTK's order to the given one, for nodes other than corners; NULL if it is the
+ * identity. */
 static const signed char *quadratic_permutation(int type, insitu_vertex_order order)
 {
     static const signed char gmsh_tet[] = {4, 5, 6, 7, 9, 8};

@@ -1,6 +1,6 @@
-/* A linear piece contains an isovalue if it is in the range of the values at the piece's corners, so that these decide,
- * and no bound is needed: pieces without the isovalue are seen by no ray. Neighbours of a piece that is made may be
- * missing, since the surface crosses none of their common faces.
+/* A linear piece contains a part of an isosurface only if the isovalue is in the range of the values at the piece's
+ * corners. These ranges therefore decide exactly, without bounds: rays find nothing in pieces that are not made.
+ * Neighbours of a piece that is made may be missing, since the isosurface crosses none of their common faces.
  *
  * The distance from a plane is a polynomial of the same order as the positions, and its values at the nodes of the
  * finer lattice are computed from those at the cell's nodes. */
@@ -13,7 +13,7 @@
 #include "session_pattern.h"
 #include "session_region.h"
 
-/* What is needed for one kind of cell. */
+/* The data with which pieces of one kind of cell are chosen. */
 typedef struct piece_kind {
     session_interpolation nodes;
     session_pattern pieces;
@@ -22,7 +22,7 @@ typedef struct piece_kind {
 } piece_kind;
 
 typedef struct piece_work {
-    session_rows rows; /* of the caller's cells */
+    session_rows rows; /* rows of the caller's cells */
     piece_kind kinds[ROWS_MOST_KINDS];
     const session_deviation_request *request;
     session_piece_set *set;

@@ -1,17 +1,18 @@
-/* Which pieces of refined cells are made: those that an isosurface or a slice may cross, and one at each of the cell's
- * own nodes. So the number of pieces grows with the square of the number along an edge, not with its cube. */
+/* Sets of the pieces of refined cells that are made: those that an isosurface or a slice may cross, and one at each of
+ * the cell's own nodes. The number of pieces therefore grows with the square of the number along an edge, not with its
+ * cube. */
 #ifndef SESSION_PIECE_SET_H
 #define SESSION_PIECE_SET_H
 
 #include "session_deviation.h"
 
-/* Makes the sets of the marked cells, with so many pieces between two nodes, of those at the cells' own nodes: ranges
- * of all fields contain the values there. Other cells have all of their pieces. Local; the caller must drop *out in any
- * case. */
+/* Makes the sets of the marked cells, which have `parts` pieces between two nodes. The sets contain one piece at each
+ * of a cell's own nodes, because ranges of all fields contain the values there. Other cells have all of their pieces.
+ * Local. The caller must drop *out even after an error. */
 insitu_status session_begin_piece_set(const session_mesh *mesh, const unsigned char *marks, int parts,
                                       session_piece_set *out, base_error *error);
 
-/* Adds the pieces of the marked cells that an isosurface of the request, or its plane, may cross, also if values are
+/* Adds the pieces of the marked cells that an isosurface of the request, or its plane, may cross, even after values are
  * rounded to float32. Parallel. Local. */
 insitu_status session_add_crossed_pieces(const session_mesh *mesh, const session_deviation_request *request, int parts,
                                          int threads, session_piece_set *set, base_error *error);

@@ -13,13 +13,13 @@ typedef struct session_extent {
     int64_t cell_count;        /* number of drawn cells on all ranks */
     int64_t solid_count;       /* cells that have a volume */
     double cell_size;          /* mean cube root of the volumes of solid cells; 0 if there are none */
-    int rank_count;            /* number of ranks that have drawn cells */
+    int rank_count;            /* number of ranks with at least one drawn cell */
 } session_extent;
 
 /* Returns the axis along which the data is flat, or the last one if there are several. Returns -1 if the data is not
- * flat, because it has cells with a volume, or because its extent along each axis exceeds 1e-6 of the largest extent.
- * That is about sixteen roundings of float32, and 1/30 pixel of the widest picture. Local; the result is the same on
- * every rank. */
+ * flat: it has cells with a volume, or its extent along each axis exceeds 1e-6 of the largest extent. That fraction is
+ * about sixteen roundings of float32, and 1/30 pixel of the widest picture. Local; the result is the same on every
+ * rank. */
 int session_flat_axis(const session_extent *extent);
 
 typedef struct session_space {

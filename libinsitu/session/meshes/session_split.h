@@ -22,8 +22,8 @@ int64_t session_entry_index(const insitu_mesh *given, int64_t entry);
  * tested only if any_inverted is set, and flat if all its pieces are. Local. */
 session_counts session_count_parents(const session_mesh *mesh, bool any_inverted);
 
-/* Returns how many of the caller's cells have a piece in the list. If memory runs out, returns the number of all drawn
- * cells. Local. */
+/* Returns the number of the caller's cells of which the list contains at least one piece. If memory runs out, returns
+ * the number of all drawn cells. Local. */
 int64_t session_count_parents_of(const session_mesh *mesh, const uint32_t *pieces, int64_t count);
 
 #endif

@@ -264,8 +264,8 @@ MMBVH_INLINE bool tally_one_cell(const session_mesh *mesh, int64_t cell, mesh_ta
     return true;
 }
 
-/* Returns the longest run of cells, beginning with this one, that have its type and contiguous vertices. They can be
- * processed by vectorized code. */
+/* Returns the longest run of cells that starts with this one, in which all cells have one type and their vertices are
+ * contiguous. Vectorized code can process such a run. */
 MMBVH_INLINE lane_cells find_uniform_run(const session_mesh *mesh, int64_t cell, int64_t end, const fetch_shape shape)
 {
     const grid *g = &mesh->cells;
@@ -334,8 +334,8 @@ static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least
 }
 
 /* Adds the cells of a run a second time, each with its own bounding box. This is needed only if the smallest volume is
- * so small, compared to the bounding box of the whole run, that the cell may be flat. Computing all boxes would take a
- * thirtieth of the time for a mesh of tets. */
+ * so small, compared to the bounding box of the whole run, that the cell may be flat. Computing all boxes in the first
+ * pass would take a thirtieth of its time for a mesh of tets. */
 static mesh_tally tally_run_again(const grid *g, int64_t begin, int64_t end)
 {
     mesh_tally again = tally_empty();

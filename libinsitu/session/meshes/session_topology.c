@@ -228,7 +228,7 @@ static insitu_status count_faces(const session_mesh *mesh, const session_face_si
 }
 
 /* Converts counts into offsets, then stores each face at the offsets of its cells. This advances each offset to the
- * begin of the next cell; the last loop shifts the offsets back. */
+ * start of the next cell; the last loop shifts the offsets back. */
 static void store_faces(const session_mesh *mesh, const session_face_sides *sides, const session_topology *t)
 {
     const int64_t count = mesh->given.cell_count;

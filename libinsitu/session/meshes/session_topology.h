@@ -1,5 +1,5 @@
-/* Provides the cells in the form that all other code reads: in the caller's arrays or, if cells are described by their
- * faces, in arrays owned by the session. */
+/* Provides the cells in the form that all other code reads. They are read from the caller's arrays or, if cells are
+ * described by their faces, from arrays owned by the session. */
 #ifndef SESSION_TOPOLOGY_H
 #define SESSION_TOPOLOGY_H
 
@@ -12,7 +12,7 @@ static inline const void *session_face_list(const insitu_mesh *mesh, int64_t fac
     return *(const void *const *)(const void *)((const char *)mesh->face_lists.data + face * stride);
 }
 
-/* The place at which the vertices of one of the caller's faces are stored. */
+/* The position at which the vertices of one of the caller's faces are stored. */
 typedef struct session_face_row {
     grid_array list;
     int64_t first, size; /* index of the row's first entry in the list, and number of the face's vertices */
@@ -37,11 +37,11 @@ void session_read_topology(session_mesh *mesh);
 /* Returns the type that the caller gave the cell, regardless of the type as which it is read. */
 int session_given_type(const session_mesh *mesh, int64_t cell);
 
-/* Computes the data that the description leaves to the library, once per topology: the cells' faces from owner and
- * neighbour, one array of the faces' vertices from several, the cells' vertices in VTK's order, and tets, hexes, wedges
- * and pyramids from polyhedra with such faces. Then it sets the arrays that the grid reads to this data. Errors in
- * owner, neighbour and lists are reported; session_check.c finds all others. After an error nothing is stored.
- * Local. */
+/* Computes what the caller's description of the mesh omits, once per topology: the faces of cells from owner and
+ * neighbour; one array of the vertices of all faces, if they are given in several; the vertices of cells in VTK's
+ * order; and tets, hexes, wedges and pyramids in place of polyhedra that have the faces of one. Then the grid reads
+ * these arrays. Errors in owner, neighbour and lists are reported; session_check.c finds all others. After an error
+ * nothing is stored. Local. */
 insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error);
 
 #endif

@@ -1,7 +1,7 @@
-/* Moved coordinates have the type of the caller's. A lattice with coordinates along its axes is read with coordinates
- * by vertex instead, in double. A coordinate is computed as x + scale * u in double and rounded once, so that equal
- * vertices of blocks and ranks with equal displacements stay equal. New coordinates are compared with the old ones, so
- * that the mesh does not count as moved if the field was set again with the same values. */
+/* Moved coordinates have the type of the caller's. If a lattice has coordinates along its axes, the moved coordinates
+ * are stored by vertex instead, in double. A coordinate is computed as x + scale * u in double and rounded once, so
+ * that equal vertices of blocks and ranks with equal displacements stay equal. New coordinates are compared with the
+ * old ones, so that the mesh does not count as moved if the field was set again with the same values. */
 #include "session_warp.h"
 
 #include <string.h>
@@ -48,7 +48,7 @@ static void mark_moved(session_meshes *meshes, session_mesh *mesh)
 void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
 {
     const bool was_on = mesh->warp.is_applied;
-    /* the check of the mesh has stored this problem as the mesh's error, so that it must be repeated */
+    /* the check of the mesh has stored this problem as the mesh's error, which a new check removes */
     if (mesh->warp.problem.status) {
         mesh->is_check_stale = true;
         meshes->are_cells_changed = true;

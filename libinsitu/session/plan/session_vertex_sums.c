@@ -243,8 +243,8 @@ static bool filter_create(const session_key_table *keys, key_filter *out)
 }
 
 /* Finds the key of each vertex that has one: one of this rank's own keys, which several vertices along a crack may
- * share, or a requested key. If only some pieces of cells of higher order are made, most vertices belong to no piece and
- * are not searched. */
+ * share, or a requested key. If only some pieces of cells of higher order are made, most vertices belong to no piece
+ * and are not searched. */
 static void find_entries(const session_vertex_sums *sums, session_sum_part *part, const key_filter *filter, int threads)
 {
     const bool is_marked = part->mesh->finer.pieces.first_words != NULL;
