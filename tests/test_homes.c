@@ -53,7 +53,7 @@ static int count_homes(const block_rank *own, block_rank *neighbours, int neighb
         if (own->near[n] == own->homes.rank) low = own->boxes[n].lower;
     for (int v = 0; v < 9 * 9 * 9; v++) {
         const double point[1][3] = {{low[0] + v % 9 / 8.0, low[1] + v / 9 % 9 / 8.0, low[2] + v / 81 / 8.0}};
-        if (!session_homes_share(&own->homes, point[0])) continue;
+        if (!session_is_in_other_box(&own->homes, point[0])) continue;
         const int home = session_find_home(&own->homes, point, 1, hash_of(point[0]), 0);
         (*shared)++;
         homes += !is_home[home];

@@ -111,7 +111,7 @@ static insitu_status derive_for_events(insitu_session *s, const session_moment *
     if (!status) session_fill_fields(&s->meshes, &s->catalogue, false, error);
     if (!error->status) session_copy_requested(&s->meshes, s->team.threads, error);
     if (!status) status = session_agree(s->team.comm, error);
-    return status ? status : session_derive(&basis, needed, error);
+    return status ? status : session_compute_derived(&basis, needed, error);
 }
 
 /* Computes the statistics that are due, and determines the images whose conditions hold. If one of them fails, the
@@ -134,7 +134,8 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
 
 static insitu_status name_derived(insitu_session *s, base_error *error)
 {
-    return session_name_derived(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team, error);
+    return session_add_derived_fields(&s->scene_file.scene, s->scene_file.path, &s->catalogue, &s->meshes, &s->team,
+                                      error);
 }
 
 /* Updates the catalogue of all ranks' meshes and fields if names are new, adds the derived fields to it, and finds the
@@ -276,13 +277,13 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status) update_events(s, &basis, &of_events);
     if (!status) status = make_plan(s, &basis, refused, &plan, error);
     const session_derive_basis derived = derive_basis(s);
-    if (!status) status = session_derive(&derived, session_derived_of_plan(basis.scene, &plan), error);
+    if (!status) status = session_compute_derived(&derived, session_derived_of_plan(basis.scene, &plan), error);
     if (!status && (plan.recentring_count || plan.surface_count || session_is_smooth(&plan, &s->catalogue)))
         status = session_update_homes(&s->catalogue, &s->meshes, extent->half_diagonal, team, error);
     if (!status)
         status = session_recentre(plan.recentrings, plan.recentring_count, plan.stale, &s->meshes, team, error);
-    if (!status) status = session_smooth(&plan, &s->catalogue, &s->meshes, team, extent, error);
-    if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
+    if (!status) status = session_find_smooth_gradients(&plan, &s->catalogue, &s->meshes, team, extent, error);
+    if (!status) session_find_changed_values(&s->meshes, team->threads, &s->report);
     if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);
     if (!status && plan.surface_count) status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, error);
     s->report.public_report.prepare_ms = milliseconds_since(start);

@@ -255,9 +255,9 @@ void closed_faces_orient_outward(closed_faces *c, const double (*positions)[3], 
         c->piece_volume[c->piece[t->face]] += t->volume;
     }
     for (int piece = 0; piece < c->piece_count; piece++) {
-        const bool is_turned = c->piece_count > 1 && is_cavity(c, positions, piece);
+        const bool is_reversed = c->piece_count > 1 && is_cavity(c, positions, piece);
         /* from here on, piece_volume is 1, or -1 if the orientation of the piece's faces must be reversed */
-        c->piece_volume[piece] = (c->piece_volume[piece] < 0) != is_turned ? -1 : 1;
+        c->piece_volume[piece] = (c->piece_volume[piece] < 0) != is_reversed ? -1 : 1;
     }
     for (int face = 0; face < c->face_count; face++) c->orientation[face] *= (int)c->piece_volume[c->piece[face]];
     for (int i = 0; i < c->triangle_count; i++)

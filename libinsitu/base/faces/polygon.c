@@ -224,7 +224,7 @@ static int find_ear_again(polygon_work *w, int first)
 }
 
 /* Returns a corner that is collinear with its two neighbours. */
-static int find_straight(const polygon_work *w, int first)
+static int find_collinear_corner(const polygon_work *w, int first)
 {
     int i = first;
     do {
@@ -241,7 +241,7 @@ static void cut_ears(polygon_work *w)
     for (; left > 3; left--) {
         int ear = find_ear(w, first);
         if (ear < 0) ear = find_ear_again(w, first);
-        if (ear < 0) ear = find_straight(w, first);
+        if (ear < 0) ear = find_collinear_corner(w, first);
         if (ear < 0) break;
         const int a = w->previous[ear], c = w->next[ear];
         add_triangle(w, a, ear, c);

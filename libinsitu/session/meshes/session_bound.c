@@ -388,7 +388,7 @@ static void apply(const bound_job *job, int size, const double *const matrices[3
 
 /* Returns the largest value of q (top of the file, with m = 1) inside a triangle whose B_ij are a, b and c; 0 if the
  * maximum is not inside. */
-static double largest_in_triangle(double a, double b, double c)
+static double largest_q_in_triangle(double a, double b, double c)
 {
     const double x = a * (b + c - a), y = b * (c + a - b), z = c * (a + b - c);
     return a > 0 && b > 0 && c > 0 && x >= 0 && y >= 0 && z >= 0 ? 0.5 * a * b * c / (x + y + z) : 0;
@@ -396,7 +396,7 @@ static double largest_in_triangle(double a, double b, double c)
 
 /* Returns the largest value of q inside a tet; 0 if the maximum is not inside. b: B_ij for the pairs of corners 01, 02,
  * 03, 12, 13 and 23. */
-static double largest_in_tet(const double b[6])
+static double largest_q_in_tet(const double b[6])
 {
     double matrix[16] = {0, b[0], b[1], b[2], b[0], 0, b[3], b[4], b[1], b[3], 0, b[5], b[2], b[4], b[5], 0};
     double inverse[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, sum = 0;
@@ -410,7 +410,7 @@ static double largest_in_tet(const double b[6])
     return is_inside && sum > 0 ? 0.25 / sum : 0;
 }
 
-static double largest_in_shape(const double b[6])
+static double largest_q_in_shape(const double b[6])
 {
     static const int faces[4][3] = {{0, 1, 3}, {0, 2, 4}, {1, 2, 5}, {3, 4, 5}};
     double most = 0, least = INFINITY, out = 0;
@@ -419,8 +419,8 @@ static double largest_in_shape(const double b[6])
         least = fmin(least, b[i]);
     }
     out = most / 8;
-    for (int f = 0; f < 4; f++) out = fmax(out, largest_in_triangle(b[faces[f][0]], b[faces[f][1]], b[faces[f][2]]));
-    return least > 0 ? fmax(out, largest_in_tet(b)) : out;
+    for (int f = 0; f < 4; f++) out = fmax(out, largest_q_in_triangle(b[faces[f][0]], b[faces[f][1]], b[faces[f][2]]));
+    return least > 0 ? fmax(out, largest_q_in_tet(b)) : out;
 }
 
 /* Returns the bound of u in the pieces of a factor, for m = 1. b: B_ij for each direction of edges, in the order of
@@ -431,11 +431,12 @@ static double bound_factor(int dimensions, const double b[MOST_DIRECTIONS])
         {0, 1, 3, 2, 4, 5}, {1, 2, 6, 0, 4, 3}, {3, 1, 6, 5, 2, 4}, {4, 3, 6, 0, 1, 2}, {2, 4, 6, 5, 3, 1}};
     double out = 0;
     if (dimensions == 1) return fmax(0, b[0] / 8);
-    if (dimensions == 2) return fmax(fmax(fmax(0, b[0]), fmax(b[1], b[2])) / 8, largest_in_triangle(b[0], b[1], b[2]));
+    if (dimensions == 2)
+        return fmax(fmax(fmax(0, b[0]), fmax(b[1], b[2])) / 8, largest_q_in_triangle(b[0], b[1], b[2]));
     for (int shape = 0; shape < TET_SHAPES; shape++) {
         double of[6];
         for (int i = 0; i < 6; i++) of[i] = b[(int)tets[shape][i]];
-        out = fmax(out, largest_in_shape(of));
+        out = fmax(out, largest_q_in_shape(of));
     }
     return out;
 }

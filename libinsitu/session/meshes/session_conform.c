@@ -150,7 +150,7 @@ static unsigned char byte_of_type(int type)
     return (unsigned char)(type == (unsigned char)type ? type : GRID_NO_TYPE);
 }
 
-bool session_has_types(const session_mesh *mesh, int count, const int *map)
+bool session_has_cell_type_map(const session_mesh *mesh, int count, const int *map)
 {
     const session_conformed *conformed = &mesh->conformed;
     if (!conformed->types || !map) return !conformed->types == !map;

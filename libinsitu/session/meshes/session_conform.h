@@ -17,6 +17,6 @@ void session_fill_conformed(session_mesh *mesh, int threads);
 
 /* Returns whether the map from numbers to cell types equals the one that was copied. NULL means that there is no
  * map. */
-bool session_has_types(const session_mesh *mesh, int count, const int *map);
+bool session_has_cell_type_map(const session_mesh *mesh, int count, const int *map);
 
 #endif

@@ -140,7 +140,7 @@ insitu_status session_homes_find(session_homes *homes, const session_mesh *const
     return INSITU_OK;
 }
 
-bool session_homes_share(const session_homes *homes, const double point[3])
+bool session_is_in_other_box(const session_homes *homes, const double point[3])
 {
     for (int i = 0; i < homes->near_count; i++)
         if (homes->near_ranks[i] != homes->rank && session_is_in_box(&homes->boxes[i], point)) return true;

@@ -54,7 +54,7 @@ insitu_status session_homes_find(session_homes *homes, const struct session_mesh
 bool session_is_in_box(const session_box *box, const double point[3]);
 
 /* Returns whether the point lies in the box of another rank. */
-bool session_homes_share(const session_homes *homes, const double point[3]);
+bool session_is_in_other_box(const session_homes *homes, const double point[3]);
 
 /* Returns the home of an item. points are the positions of its vertices (at least one), which lie in this rank's box,
  * and id is the least id of its vertices. Without ids, the home is determined by the hash. */

@@ -29,7 +29,7 @@ static int find_index(const session_nodes *of, const int at[3])
 
 /* ---- weights --------------------------------------------------------------------------------------------------- */
 
-static void weigh_line(int p, int parts, bool is_lobatto, double *out)
+static void fill_line_weights(int p, int parts, bool is_lobatto, double *out)
 {
     double x[NODES_MOST_ORDER + 1];
     session_place_nodes(p, is_lobatto, x);
@@ -52,7 +52,7 @@ static double find_product(int n, double t)
 
 /* Computes the weights of a triangle or, if is_tet is set, of a tet. p: order of the cell; parts: the fine lattice has
  * the order parts * p. */
-static void weigh_simplex(int p, int parts, bool is_tet, double *out)
+static void fill_simplex_weights(int p, int parts, bool is_tet, double *out)
 {
     const int fine = parts * p;
     for (int k = 0; k <= (is_tet ? fine : 0); k++)
@@ -79,9 +79,9 @@ static bool make_weights(const session_nodes *of, int parts, bool is_lobatto, se
     if (!is_box) out->triangle = base_alloc(count_weights(GRID_TRIANGLE, p, parts) * sizeof *out->triangle);
     if (is_tet) out->tet = base_alloc(count_weights(GRID_TET, p, parts) * sizeof *out->tet);
     if (!out->line || (!is_box && !out->triangle) || (is_tet && !out->tet)) return false;
-    weigh_line(p, parts, is_lobatto && is_box, out->line);
-    if (!is_box) weigh_simplex(p, parts, false, out->triangle);
-    if (is_tet) weigh_simplex(p, parts, true, out->tet);
+    fill_line_weights(p, parts, is_lobatto && is_box, out->line);
+    if (!is_box) fill_simplex_weights(p, parts, false, out->triangle);
+    if (is_tet) fill_simplex_weights(p, parts, true, out->tet);
     return true;
 }
 
@@ -172,7 +172,7 @@ static void apply(const double *matrix, int rows, int columns, int outer, int in
                 apply_long_row(matrix + r * columns, columns, inner, in, out);
 }
 
-static double value_beside(const cell_job *job, const int at[3], const int step[3], int component)
+static double neighbour_value(const cell_job *job, const int at[3], const int step[3], int component)
 {
     const int node[3] = {at[0] + step[0], at[1] + step[1], at[2] + step[2]};
     return job->lattice[find_index(&job->of->complete, node) * job->size + component];
@@ -182,7 +182,7 @@ static double value_beside(const cell_job *job, const int at[3], const int step[
 static double sum_pair(const cell_job *job, const int at[3], const int step[3], int component)
 {
     const int back[3] = {-step[0], -step[1], -step[2]};
-    return value_beside(job, at, step, component) + value_beside(job, at, back, component);
+    return neighbour_value(job, at, step, component) + neighbour_value(job, at, back, component);
 }
 
 /* Returns the value at the middle of a face of a serendipity cell. The sums do not depend on the order of axes. */
@@ -199,8 +199,8 @@ static double middle_of_hex(const cell_job *job, const int at[3], int component)
     for (int n = 0; n < 27; n++) {
         const int step[3] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
         const int zeros = (step[0] == 0) + (step[1] == 0) + (step[2] == 0);
-        if (zeros == 1) edges += value_beside(job, at, step, component);
-        if (zeros == 0) corners += value_beside(job, at, step, component);
+        if (zeros == 1) edges += neighbour_value(job, at, step, component);
+        if (zeros == 0) corners += neighbour_value(job, at, step, component);
     }
     return 0.25 * (edges - corners);
 }

@@ -28,7 +28,7 @@ static bool are_all_zero(const int64_t values[3])
     return !values[0] && !values[1] && !values[2];
 }
 
-bool session_is_plane(const insitu_lattice *l)
+bool session_is_quad_lattice(const insitu_lattice *l)
 {
     return !l->cells[0] || !l->cells[1] || !l->cells[2];
 }
@@ -286,7 +286,7 @@ static grid_numbering make_numbering(const int64_t strides[3], const int64_t cou
     return out;
 }
 
-void session_take_lattice(session_mesh *mesh)
+void session_copy_lattice(session_mesh *mesh)
 {
     session_lattice *own = &mesh->lattice;
     const bool is_given = mesh->given.lattice && !are_all_zero(mesh->given.lattice->cells);
@@ -327,7 +327,7 @@ void session_read_lattice(session_mesh *mesh, grid *g)
     const insitu_lattice *l = mesh->given.lattice;
     if (!l || are_all_zero(l->cells)) return;
     g->lattice = &mesh->lattice.cells;
-    g->cell_type = session_is_plane(l) ? GRID_QUAD : GRID_HEX;
+    g->cell_type = session_is_quad_lattice(l) ? GRID_QUAD : GRID_HEX;
     for (int axis = 0; axis < 3 && session_has_axes(&mesh->given); axis++)
         g->coordinates[axis] = (grid_array){.is_wide = true, .axis = &mesh->lattice.cells.axes[axis]};
 }

@@ -8,7 +8,7 @@
 insitu_status session_check_lattice(const insitu_mesh *mesh, base_error *error);
 
 /* Returns whether the cells are quads, which is the case if the lattice has no cells along one axis. */
-bool session_is_plane(const insitu_lattice *lattice);
+bool session_is_quad_lattice(const insitu_lattice *lattice);
 
 /* Returns whether the coordinates are given along a lattice's axes instead of by vertex. */
 bool session_has_axes(const insitu_mesh *mesh);
@@ -19,7 +19,7 @@ unsigned session_lattice_changes(const insitu_lattice *a, const insitu_lattice *
 
 /* Copies the lattice of the description, if it has one, into the mesh, and makes given.lattice point to the copy.
  * Local. */
-void session_take_lattice(session_mesh *mesh);
+void session_copy_lattice(session_mesh *mesh);
 
 /* Completes the grid of a mesh with a lattice: sets the cell type and the indices and, unless coordinates are given by
  * vertex, the coordinates. */

@@ -68,9 +68,9 @@ static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
     return status;
 }
 
-bool session_may_be_plane(const insitu_mesh *mesh)
+bool session_may_lack_z(const insitu_mesh *mesh)
 {
-    if (mesh->lattice) return session_is_plane(mesh->lattice);
+    if (mesh->lattice) return session_is_quad_lattice(mesh->lattice);
     const int type = (int)mesh->cell_type;
     return mesh->cell_types.data || mesh->cell_count == 0 || grid_is_shell_type(type) ||
            grid_is_shell_type(session_corner_type(type));
@@ -103,7 +103,7 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
     const session_array_rule rules[] = {
         {"x coordinates", vertices, numbers | (has_axes ? optional : 0), 1},
         {"y coordinates", vertices, numbers | (has_axes ? optional : 0), 1},
-        {"z coordinates", vertices, numbers | (has_axes || session_may_be_plane(mesh) ? optional : 0), 1},
+        {"z coordinates", vertices, numbers | (has_axes || session_may_lack_z(mesh) ? optional : 0), 1},
         {"vertex ids", vertices, integers | optional, 1},
         {"cell types", cells, any | optional, 1},
         {"connectivity indices", mesh->connectivity_count, any, 1},
@@ -338,7 +338,7 @@ static unsigned find_description_changes(const session_mesh *mesh, const insitu_
 {
     const insitu_mesh *a = &mesh->original;
     bool has_same_cells =
-        session_has_types(mesh, b->cell_type_map_count, b->cell_types.data ? b->cell_type_map : NULL) &&
+        session_has_cell_type_map(mesh, b->cell_type_map_count, b->cell_types.data ? b->cell_type_map : NULL) &&
         session_is_same_array(&a->cell_types, &b->cell_types) &&
         session_is_same_array(&a->connectivity, &b->connectivity) && session_is_same_array(&a->offsets, &b->offsets) &&
         session_is_same_array(&a->ghosts, &b->ghosts) && session_is_same_array(&a->face_offsets, &b->face_offsets) &&
@@ -396,7 +396,7 @@ void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu
         session_mark_moved(meshes, mesh);
         mesh->warp.is_stale = true;
     }
-    session_take_lattice(mesh);
+    session_copy_lattice(mesh);
     mesh->original.lattice = mesh->given.lattice;
     if (mesh->warp.is_applied) session_read_warp(mesh);
     session_read_topology(mesh);

@@ -15,7 +15,7 @@ insitu_status session_set_mesh(session_meshes *meshes, const char *name, int64_t
 void session_store_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_mesh *given, base_error *error);
 
 /* Returns whether cells without z coordinates may be visible, namely as shells in the plane z = 0. */
-bool session_may_be_plane(const insitu_mesh *mesh);
+bool session_may_lack_z(const insitu_mesh *mesh);
 
 /* Stores the error of a check. The message begins with the mesh's name and, if there is a field, the field's name.
  * Returns the error's status. */

@@ -168,7 +168,7 @@ static insitu_status copy_face_lists(session_mesh *mesh, base_error *error)
 /* number that marks a cell of another rank, or the missing cell of a face in a separate list */
 static const int64_t outside = INT64_MIN;
 
-session_face_sides session_sides(const insitu_mesh *given)
+session_face_sides session_find_face_sides(const insitu_mesh *given)
 {
     return (session_face_sides){given, session_index_array(given, &given->owner),
                                 session_index_array(given, &given->neighbour),
@@ -252,7 +252,7 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
 {
     const insitu_mesh *given = &mesh->given;
     session_topology *t = &mesh->topology;
-    const session_face_sides sides = session_sides(given);
+    const session_face_sides sides = session_find_face_sides(given);
     const int64_t faces = session_face_count(given), most = faces + given->neighbour_count;
     t->has_own_cells = true;
     t->cell_type = GRID_POLYHEDRON;

@@ -27,7 +27,7 @@ typedef struct session_face_sides {
     grid_array owner, neighbour, boundary_owner;
 } session_face_sides;
 
-session_face_sides session_sides(const insitu_mesh *given);
+session_face_sides session_find_face_sides(const insitu_mesh *given);
 /* Stores the two cells of a face. A missing cell is negative; it is cells[1], unless both are missing. */
 void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2]);
 

@@ -73,8 +73,8 @@ static void enter_bin_row(session_bin_walk *walk)
     walk->end = b->starts[row + walk->last_bin[0] + 1];
 }
 
-session_bin_walk session_walk_bins(const session_bins *bins, const double lower[3], const double upper[3],
-                                   double margin)
+session_bin_walk session_begin_bin_walk(const session_bins *bins, const double lower[3], const double upper[3],
+                                        double margin)
 {
     session_bin_walk walk = {.bins = bins};
     for (int axis = 0; axis < 3; axis++) {

@@ -18,7 +18,7 @@ void session_bins_free(session_bins *bins);
 
 /* Iterator over the points near a box. It visits all points inside the box, and some outside.
  *
- *     session_bin_walk walk = session_walk_bins(&bins, lower, upper, margin);
+ *     session_bin_walk walk = session_begin_bin_walk(&bins, lower, upper, margin);
  *     while (session_next_binned(&walk, &point)) ... */
 typedef struct session_bin_walk {
     const session_bins *bins;
@@ -28,8 +28,8 @@ typedef struct session_bin_walk {
     int64_t next, end;
 } session_bin_walk;
 
-session_bin_walk session_walk_bins(const session_bins *bins, const double lower[3], const double upper[3],
-                                   double margin);
+session_bin_walk session_begin_bin_walk(const session_bins *bins, const double lower[3], const double upper[3],
+                                        double margin);
 bool session_next_binned(session_bin_walk *walk, int64_t *point);
 
 #endif

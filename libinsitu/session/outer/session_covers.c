@@ -321,7 +321,7 @@ static finer_walk walk_finer(const cover_search *s, const session_mesh *mesh)
     finer_walk w = {.search = s, .box = make_level_box(mesh, s->team->rank)};
     double lower[3], upper[3];
     find_box_bounds(&w.box, lower, upper);
-    w.bins = session_walk_bins(&s->finer_bins.bins, lower, upper, s->finer_bins.largest_half_width);
+    w.bins = session_begin_bin_walk(&s->finer_bins.bins, lower, upper, s->finer_bins.largest_half_width);
     return w;
 }
 
@@ -449,7 +449,7 @@ static const session_level_box *find_finest(const session_meshes *meshes, const 
                                             const double at[3])
 {
     const session_level_box *finest = NULL;
-    session_bin_walk walk = session_walk_bins(&bins->bins, at, at, bins->largest_half_width);
+    session_bin_walk walk = session_begin_bin_walk(&bins->bins, at, at, bins->largest_half_width);
     int64_t near;
     while (session_next_binned(&walk, &near)) {
         const session_level_box *box = &meshes->level_boxes[bins->boxes[near]];
@@ -487,7 +487,8 @@ insitu_status session_drop_faces_between_levels(const session_meshes *meshes, co
         session_fail_for_memory(error, meshes->level_box_count * 32, "faces between levels");
     for (int i = 0; i < count && has_levels && !error->status; i++) {
         const session_mesh *mesh = session_source(parts[i].mesh); /* an image's cells and faces have the same numbers */
-        if (is_level_block(mesh) && !session_is_plane(mesh->given.lattice) && !parts[i].outer->threshold.is_given)
+        if (is_level_block(mesh) && !session_is_quad_lattice(mesh->given.lattice) &&
+            !parts[i].outer->threshold.is_given)
             drop_inner_faces(meshes, &bins, mesh, parts[i].outer);
     }
     bins_free(&bins);

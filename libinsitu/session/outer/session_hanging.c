@@ -232,7 +232,7 @@ static bool do_boxes_intersect(const session_box *a, const session_box *b, doubl
     return true;
 }
 
-static bool is_own(const hanging_search *s, int m, const session_face_outline *f, const candidate *c)
+static bool is_corner_of(const hanging_search *s, int m, const session_face_outline *f, const candidate *c)
 {
     for (int i = 0; i < f->count; i++)
         if (s->basis->group_of_vertex[s->basis->first_vertices[m] + f->vertices[i]] == c->group) return true;
@@ -250,12 +250,12 @@ static bool is_in_box(const session_box *box, const double position[3], double s
  * face are considered; otherwise all candidates that are not corners of this face. */
 static bool has_candidate(const hanging_search *s, int m, const session_face_outline *f, double slack, bool needs_hit)
 {
-    session_bin_walk walk = session_walk_bins(&s->bins, f->box.lower, f->box.upper, slack);
+    session_bin_walk walk = session_begin_bin_walk(&s->bins, f->box.lower, f->box.upper, slack);
     int64_t near;
     while (session_next_binned(&walk, &near)) {
         const candidate *c = &s->candidates[near];
         if (!is_in_box(&f->box, c->position, slack)) continue;
-        if ((needs_hit ? c->hit_list >= 0 : !is_own(s, m, f, c)) && session_may_contain(f, c->position, slack))
+        if ((needs_hit ? c->hit_list >= 0 : !is_corner_of(s, m, f, c)) && session_may_contain(f, c->position, slack))
             return true;
     }
     return false;
@@ -443,7 +443,7 @@ static bool test_faces(hanging_search *s, try_function *try_one)
     bool is_done = true;
     for (int64_t number = 0; number < s->face_count && s->candidate_count && is_done; number++) {
         const session_coarse_face *f = &s->faces[number].face;
-        session_bin_walk walk = session_walk_bins(&s->bins, f->box.lower, f->box.upper, find_face_slack(s, f));
+        session_bin_walk walk = session_begin_bin_walk(&s->bins, f->box.lower, f->box.upper, find_face_slack(s, f));
         int64_t near;
         while (is_done && session_next_binned(&walk, &near)) is_done = try_one(s, number, &s->candidates[near]);
     }

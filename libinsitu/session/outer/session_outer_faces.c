@@ -429,7 +429,7 @@ static bool number_parts(face_search *s)
         s->cell_count += p->grid->cell_count;
         s->vertex_count += count_part_vertices(p);
         if (!of->outer->threshold.is_given) continue;
-        p->is_hidden = session_hidden_cells(of->mesh, &of->outer->threshold, s->threads);
+        p->is_hidden = session_find_hidden_cells(of->mesh, &of->outer->threshold, s->threads);
         if (!p->is_hidden) return false;
     }
     return true;
@@ -469,7 +469,7 @@ static int find_face_home(const face_search *s, const session_homes *homes, int6
     for (int64_t i = 0; i < loop.size; i++) {
         const int64_t vertex = session_face_vertex(&loop, i);
         grid_vertex(p->grid, vertex, point[0]);
-        if (!session_homes_share(homes, point[0])) return -1;
+        if (!session_is_in_other_box(homes, point[0])) return -1;
         if (p->hashes[vertex] < p->hashes[first]) first = vertex;
     }
     grid_vertex(p->grid, first, point[0]);

@@ -146,7 +146,7 @@ static insitu_status list_faces(patch_faces *p, base_error *error)
 static insitu_status check_owner(patch_faces *p, int patch, int64_t i, int64_t f, unsigned char *is_taken,
                                  base_error *error)
 {
-    const session_face_sides sides = session_sides(&p->mesh->given);
+    const session_face_sides sides = session_find_face_sides(&p->mesh->given);
     patch_face face;
     int64_t cells[2];
     if (find_face(p, patch, i, &face, error)) return error->status;

@@ -27,7 +27,7 @@ static void copy_isovalues(const scene_isosurface *layer, scene_lines *out)
  * background. */
 static const float nearly_opaque = 0.99999994F;
 
-scene_surface session_shells_of(const scene_isosurface *layer, int height)
+scene_surface session_make_shell_layer(const scene_isosurface *layer, int height)
 {
     scene_surface out = {.meshes_field = layer->field,
                          .is_of_shells = true,

@@ -12,7 +12,7 @@ bool session_has_shells(const session_catalogue *catalogue);
 
 /* Returns a surface layer that draws the isosurface as contour lines on shells. It refers to data of the layer. height
  * is that of the image in pixels. */
-scene_surface session_shells_of(const scene_isosurface *layer, int height);
+scene_surface session_make_shell_layer(const scene_isosurface *layer, int height);
 
 /* Returns whether the surface layer is drawn on the mesh. */
 bool session_surface_is_on(const scene_surface *layer, const session_mesh *mesh);

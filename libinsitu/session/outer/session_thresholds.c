@@ -85,7 +85,7 @@ bool session_is_outer_stale(const session_mesh *mesh, const session_outer *outer
     return !outer->are_faces_known || (scalar && scalar->version != outer->version);
 }
 
-void session_set_outer_fresh(const session_mesh *mesh, session_outer *outer)
+void session_mark_outer_fresh(const session_mesh *mesh, session_outer *outer)
 {
     const session_scalar *scalar = find_scalar(mesh, &outer->threshold);
     outer->version = scalar ? scalar->version : 0;
@@ -103,7 +103,7 @@ static void hide_whole_cells(const session_mesh *mesh, unsigned char *is_hidden)
     }
 }
 
-unsigned char *session_hidden_cells(const session_mesh *mesh, const session_threshold *threshold, int threads)
+unsigned char *session_find_hidden_cells(const session_mesh *mesh, const session_threshold *threshold, int threads)
 {
     const int64_t count = mesh->cells.cell_count;
     const session_scalar *scalar = find_scalar(mesh, threshold);

@@ -21,10 +21,10 @@ void session_drop_thresholds(session_mesh *mesh);
  * field. */
 bool session_is_outer_stale(const session_mesh *mesh, const session_outer *outer);
 /* Records that the outer faces were computed for the current values of the threshold's field. */
-void session_set_outer_fresh(const session_mesh *mesh, session_outer *outer);
+void session_mark_outer_fresh(const session_mesh *mesh, session_outer *outer);
 
 /* Returns one byte per cell, which is nonzero if the cell is beyond the threshold; NaN counts as beyond. The array is
  * allocated by base_alloc(); NULL if memory runs out. */
-unsigned char *session_hidden_cells(const session_mesh *mesh, const session_threshold *threshold, int threads);
+unsigned char *session_find_hidden_cells(const session_mesh *mesh, const session_threshold *threshold, int threads);
 
 #endif

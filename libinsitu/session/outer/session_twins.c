@@ -137,7 +137,7 @@ static void find_least_corners(twin_search *s)
 {
     for (int64_t i = 0; i < s->corner_count && s->vertex_count; i++) {
         const face_corner *c = &s->corners[i];
-        session_bin_walk walk = session_walk_bins(&s->bins, c->position, c->position, c->slack);
+        session_bin_walk walk = session_begin_bin_walk(&s->bins, c->position, c->position, c->slack);
         int64_t near;
         while (session_next_binned(&walk, &near)) {
             border_vertex *v = &s->vertices[near];

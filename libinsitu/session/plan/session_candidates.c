@@ -103,7 +103,7 @@ static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer, int 
     if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
     if (!scalar) return true;
     if (mesh->has_shells_alone) {
-        const scene_surface shells = session_shells_of(layer, height);
+        const scene_surface shells = session_make_shell_layer(layer, height);
         return mark_outer(mesh, &shells);
     }
     if (!add_isovalue_intervals(scalar, layer)) return false;
@@ -122,8 +122,8 @@ static bool mark_image(session_mesh *mesh, const scene_image *image, const sessi
     return is_marked;
 }
 
-bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count,
-                        const session_extent *extent)
+bool session_mark_needed_data(session_meshes *meshes, const scene_image *const *images, int count,
+                              const session_extent *extent)
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];

@@ -9,8 +9,8 @@
 
 /* Marks on this rank's meshes and scalars the data that the images need, and clears the marks of an earlier step.
  * Returns false if memory ran out. Local. */
-bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count,
-                        const session_extent *extent);
+bool session_mark_needed_data(session_meshes *meshes, const scene_image *const *images, int count,
+                              const session_extent *extent);
 
 /* Returns whether values alone determine which cells may be visible. If so, *key becomes a hash of the scalars and
  * their intervals, which select the candidates by their values. Otherwise any cell may be visible. */

@@ -518,7 +518,7 @@ static insitu_status derive_field(derive_work *w, base_error *error)
     return status ? status : session_agree(b->team->comm, error);
 }
 
-insitu_status session_derive(const session_derive_basis *basis, uint64_t needed, base_error *error)
+insitu_status session_compute_derived(const session_derive_basis *basis, uint64_t needed, base_error *error)
 {
     insitu_status status = INSITU_OK;
     for (int i = 0; i < basis->scene->derived_count && !status; i++) {

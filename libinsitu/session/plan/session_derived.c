@@ -190,7 +190,7 @@ static bool add_to_mesh(const char *scene_path, const scene *scene, int number, 
     return field && (!error.status || store_fault(field, &error));
 }
 
-static bool name_in_catalogue(const scene *scene, const char *scene_path, session_catalogue *catalogue)
+static bool add_derived_to_catalogue(const scene *scene, const char *scene_path, session_catalogue *catalogue)
 {
     session_catalogue_drop_derived(catalogue);
     for (int m = 0; m < catalogue->mesh_count; m++)
@@ -222,7 +222,7 @@ static bool are_fields_named(const session_catalogue_mesh *all, const session_me
     return found == expected;
 }
 
-static bool name_on_mesh(const session_catalogue_mesh *all, session_mesh *mesh)
+static bool add_derived_to_mesh(const session_catalogue_mesh *all, session_mesh *mesh)
 {
     if (are_fields_named(all, mesh)) return true;
     session_drop_derived(mesh);
@@ -238,15 +238,15 @@ static bool name_on_mesh(const session_catalogue_mesh *all, session_mesh *mesh)
     return true;
 }
 
-insitu_status session_name_derived(const scene *scene, const char *scene_path, session_catalogue *catalogue,
-                                   session_meshes *meshes, const session_team *team, base_error *error)
+insitu_status session_add_derived_fields(const scene *scene, const char *scene_path, session_catalogue *catalogue,
+                                         session_meshes *meshes, const session_team *team, base_error *error)
 {
     if (catalogue->are_derived) return INSITU_OK;
-    bool is_done = name_in_catalogue(scene, scene_path, catalogue);
+    bool is_done = add_derived_to_catalogue(scene, scene_path, catalogue);
     for (int m = 0; m < catalogue->mesh_count && is_done; m++) {
         const session_parts parts = session_find_parts(meshes, catalogue->meshes[m].name);
         for (int i = 0; i < parts.count && is_done; i++)
-            if (parts.items[i]->is_given) is_done = name_on_mesh(&catalogue->meshes[m], parts.items[i]);
+            if (parts.items[i]->is_given) is_done = add_derived_to_mesh(&catalogue->meshes[m], parts.items[i]);
     }
     catalogue->are_meshes_grouped = catalogue->are_meshes_grouped && scene->derived_count == 0;
     if (!is_done) session_fail_for_memory(error, scene->derived_count * 100LL, "the names of derived fields");

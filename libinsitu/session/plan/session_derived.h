@@ -11,8 +11,8 @@
  * this rank's meshes, unless they have been added before. A derived field's error is stored as its fault in the
  * catalogue. Must be called whenever the catalogue or the scene may be new. Collective; all ranks return the same
  * status. */
-insitu_status session_name_derived(const scene *scene, const char *scene_path, session_catalogue *catalogue,
-                                   session_meshes *meshes, const session_team *team, base_error *error);
+insitu_status session_add_derived_fields(const scene *scene, const char *scene_path, session_catalogue *catalogue,
+                                         session_meshes *meshes, const session_team *team, base_error *error);
 
 /* Return sets of derived fields, one bit each, including the fields on which they depend. session_derived_of_plan()
  * returns those that the images of the plan need; session_derived_of_events() those that the statistics of a step and,

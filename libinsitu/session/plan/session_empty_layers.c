@@ -216,7 +216,7 @@ static bool is_transparent(const scene_volume *volume, const field_range *range)
 
 /* The true minimum may exceed the trees' minimum by the rounding to float32. Returns the trees' range with the minimum
  * raised by that much. */
-static field_range least_of_trees(const field_range *range)
+static field_range raise_tree_minimum(const field_range *range)
 {
     const double low = range->low < INFINITY ? (double)nextafterf((float)range->low, INFINITY) : INFINITY;
     return (field_range){range->low < low ? nextafter(low, -INFINITY) : low, range->negated_high};
@@ -241,7 +241,7 @@ static bool find_new_warnings(const session_report *report, layer_batch *batch)
     for (int i = 0; i < batch->count; i++) {
         planned_layer *layer = &batch->layers[i];
         layer->is_empty = layer->range.low > -layer->range.negated_high;
-        layer->range = least_of_trees(&layer->range);
+        layer->range = raise_tree_minimum(&layer->range);
         for (int v = 0; v < count_values(layer); v++) {
             const session_warning warning = make_warning(layer, v);
             if (is_layer_empty(layer, v, &layer->range) && !session_is_warned(report, &warning))

@@ -503,7 +503,7 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     if (plan.images) select_images(basis, report, &plan);
     warn_of_no_cells(basis, plan.image_count > 0, report);
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
-                          session_mark_needs(meshes, plan.images, plan.image_count, extent);
+                          session_mark_needed_data(meshes, plan.images, plan.image_count, extent);
     if (is_whole) session_mark_sources(basis->scene, session_derived_of_plan(basis->scene, &plan), meshes);
     if (!is_whole) session_fail_for_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
     insitu_status status =

@@ -257,8 +257,9 @@ static insitu_status find_item_gradients(const smooth_item *item, const session_
     return status;
 }
 
-insitu_status session_smooth(const session_plan *plan, const session_catalogue *catalogue, const session_meshes *meshes,
-                             const session_team *team, const session_extent *extent, base_error *error)
+insitu_status session_find_smooth_gradients(const session_plan *plan, const session_catalogue *catalogue,
+                                            const session_meshes *meshes, const session_team *team,
+                                            const session_extent *extent, base_error *error)
 {
     smooth_items items = {0};
     if (!session_is_smooth(plan, catalogue)) return INSITU_OK;

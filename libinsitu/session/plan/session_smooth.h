@@ -10,8 +10,9 @@
  * Vertices are matched by the same keys as in recentring. extent: the global bounds. The homes of the catalogue's
  * meshes must be up to date. An error that occurs on this rank at the very end is stored only in *error, and is shared
  * in the next phase. Collective; apart from that, all ranks return the same status. */
-insitu_status session_smooth(const session_plan *plan, const session_catalogue *catalogue, const session_meshes *meshes,
-                             const session_team *team, const session_extent *extent, base_error *error);
+insitu_status session_find_smooth_gradients(const session_plan *plan, const session_catalogue *catalogue,
+                                            const session_meshes *meshes, const session_team *team,
+                                            const session_extent *extent, base_error *error);
 
 /* Returns whether an isosurface of the plan has smooth normals. */
 bool session_is_smooth(const session_plan *plan, const session_catalogue *catalogue);

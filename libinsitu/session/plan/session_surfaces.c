@@ -114,7 +114,7 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_requ
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = session_find_outer_faces(of, count, &request->mesh->homes, team, error);
     if (!status && !error->status) session_drop_faces_between_levels(meshes, of, count, error);
-    for (int i = 0; i < count && !status && !error->status; i++) session_set_outer_fresh(of[i].mesh, of[i].outer);
+    for (int i = 0; i < count && !status && !error->status; i++) session_mark_outer_fresh(of[i].mesh, of[i].outer);
     base_free(of);
     return status ? status : session_agree(team->comm, error);
 }

@@ -42,7 +42,7 @@ static render_scale make_scale(const scene_colour_map *map, double low, double h
     return RENDER_LINEAR;
 }
 
-bool session_is_too_narrow(double low, double high)
+bool session_is_range_too_narrow(double low, double high)
 {
     return low < high && high - low < fmax(least_of_data * larger_magnitude(low, high), FLT_MIN);
 }

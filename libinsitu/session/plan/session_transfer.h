@@ -32,6 +32,6 @@ int session_visible_intervals(const scene_volume *volume, mmbvh_interval out[REN
 
 /* Returns whether the values of a range are so close to each other that their rounding is visible in float32, even
  * after the range's low end was subtracted in double. */
-bool session_is_too_narrow(double low, double high);
+bool session_is_range_too_narrow(double low, double high);
 
 #endif

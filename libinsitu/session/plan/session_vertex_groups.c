@@ -103,7 +103,7 @@ static void find_homes(const groups_basis *basis, const int64_t *one_vertex, ses
         double position[1][3];
         find_group_position(basis, out, one_vertex, group, position[0]);
         home[group] = -1;
-        if (!session_homes_share(basis->homes, position[0])) continue;
+        if (!session_is_in_other_box(basis->homes, position[0])) continue;
         home[group] = session_find_home(basis->homes, (const double(*)[3])position, 1, session_key_hash(key),
                                         (int64_t)key->words[0]);
         out->shared_counts[home[group]]++;

@@ -133,7 +133,7 @@ static bool compare_checksum(const session_mesh *mesh, session_scalar *scalar, i
     scalar->checksum = checksum;
     scalar->are_ranges_stale = true;
     scalar->version++;
-    session_forget_extents(scalar);
+    session_clear_extents(scalar);
     return false;
 }
 
@@ -191,7 +191,7 @@ static void compare_parts(const session_parts *parts, int threads, session_repor
                          parts->items[0]->name, (long long)unchanged);
 }
 
-void session_compare_checksums(const session_meshes *meshes, int threads, session_report *report)
+void session_find_changed_values(const session_meshes *meshes, int threads, session_report *report)
 {
     for (int i = 0; i < meshes->count;) {
         const session_parts parts = session_parts_at(meshes, i);

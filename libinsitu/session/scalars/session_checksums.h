@@ -10,6 +10,6 @@
  * and requires reading the values once, at the speed of memory. For other scalars a few values are sampled: if these
  * have changed although the caller declared them unchanged, the scalar is treated as if it was set anew, and a warning
  * is added. Parallel. Local. */
-void session_compare_checksums(const session_meshes *meshes, int threads, session_report *report);
+void session_find_changed_values(const session_meshes *meshes, int threads, session_report *report);
 
 #endif

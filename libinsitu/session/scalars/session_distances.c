@@ -115,7 +115,7 @@ static bool update_distance(const session_mesh *mesh, session_scalar *scalar, in
     compute_distances(mesh, &scalar->plane, threads, scalar->distances);
     scalar->are_values_stale = false;
     scalar->are_ranges_stale = true;
-    session_forget_extents(scalar);
+    session_clear_extents(scalar);
     return true;
 }
 

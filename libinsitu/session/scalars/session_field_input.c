@@ -344,7 +344,7 @@ insitu_status session_set_part_field(session_meshes *meshes, session_mesh *mesh,
     base_error what = {0};
     session_field *field = &mesh->fields[index];
     if (field->is_derived) {
-        /* the caller uses the name of a derived field; session_name_derived() reports this error later */
+        /* the caller uses the name of a derived field; session_add_derived_fields() reports this error later */
         session_drop_copy(field);
         *field = (session_field){.given = {.name = field->given.name}};
     }

@@ -123,7 +123,7 @@ static inline __attribute__((always_inline)) void add_numbers(const target *to, 
 void session_mean_gradients(const int64_t *sum, int field_count, const session_gradient_bounds *bounds, double length,
                             double out[][3])
 {
-    const int count = session_sum_numbers(field_count);
+    const int count = session_count_sum_numbers(field_count);
     double units[2], numbers[MOST_NUMBERS];
     find_rounding_units(bounds, units);
     for (int i = 0; i < count; i++) numbers[i] = (double)sum[i] * LOW_UNIT + (double)sum[count + i];
@@ -158,7 +158,7 @@ static inline __attribute__((always_inline)) void add_edge_gradient(target *to, 
                                                                     const double rise[3][SESSION_GRADIENTS],
                                                                     int field_count)
 {
-    const int pairs = session_sum_numbers(field_count) / 2;
+    const int pairs = session_count_sum_numbers(field_count) / 2;
     double normal[3][3], squares = 0;
     union {
         double numbers[MOST_NUMBERS];

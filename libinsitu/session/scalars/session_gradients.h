@@ -27,14 +27,14 @@ typedef struct session_gradient_basis {
 /* Returns how many numbers a sum consists of. A sum over the cells around a vertex consists of integer words, so that
  * adding two sums word by word is exact and does not depend on the order. These are first the high words of the three
  * components for each scalar, of the weights, and of padding, and then their low words. */
-static inline int session_sum_numbers(int field_count)
+static inline int session_count_sum_numbers(int field_count)
 {
     return field_count == 1 ? 4 : field_count == 2 ? 8 : 10;
 }
 
 static inline int session_sum_words(int field_count)
 {
-    return 2 * session_sum_numbers(field_count);
+    return 2 * session_count_sum_numbers(field_count);
 }
 
 /* Bounds of the numbers that cells add to sums. For several grids or ranks, the maximum of each member must be

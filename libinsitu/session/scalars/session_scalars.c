@@ -235,7 +235,7 @@ void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int
     *high = known->high;
 }
 
-void session_forget_extents(session_scalar *scalar)
+void session_clear_extents(session_scalar *scalar)
 {
     for (int kind = 0; kind < SESSION_EXTENTS; kind++) scalar->extremes[kind].is_known = false;
 }

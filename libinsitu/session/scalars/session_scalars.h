@@ -68,6 +68,6 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
 void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, session_extent_kind kind,
                            double *low, double *high);
 /* Marks the stored minima and maxima as unknown, because the values have changed. */
-void session_forget_extents(session_scalar *scalar);
+void session_clear_extents(session_scalar *scalar);
 
 #endif

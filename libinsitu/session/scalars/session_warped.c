@@ -26,7 +26,7 @@ typedef struct warp_step {
  * z coordinates are given. */
 static bool is_of_shells(const insitu_mesh *mesh)
 {
-    return session_may_be_plane(mesh) && (!mesh->coordinates[2].data || !mesh->cell_types.data);
+    return session_may_lack_z(mesh) && (!mesh->coordinates[2].data || !mesh->cell_types.data);
 }
 
 static insitu_status check_field(const warp_step *step, const scene_warp *warp, const session_mesh *mesh, int index,

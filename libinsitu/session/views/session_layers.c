@@ -146,7 +146,7 @@ static void warn_of_width(const session_layer_basis *basis, const scene_field *f
 {
     const session_warning warning = {WARNING_NARROW, basis->image->name, field->name, 0};
     session_warn(
-        basis->report, &warning, session_is_too_narrow(low, high),
+        basis->report, &warning, session_is_range_too_narrow(low, high),
         "image \"%s\": the values of the field \"%s\" between %.17g and %.17g, the range of its colours, are too "
         "near to one another to be told apart; the colours may show rounding, or one value",
         basis->image->name, field->name, low, high);
@@ -420,7 +420,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
         status = fill_surface(basis, &image->isosurfaces[i], i, &layers, error);
     for (int i = image->isosurface_count; i < layers.first_outer && !status; i++) {
         const scene_isosurface *isosurface = &image->isosurfaces[i - image->isosurface_count];
-        const scene_surface shells = session_shells_of(isosurface, image->height);
+        const scene_surface shells = session_make_shell_layer(isosurface, image->height);
         status = fill_outer(basis, &shells, i, &layers, error);
         /* `shells` is a local variable, which does not exist any more when the layer is drawn */
         layers.surfaces[i].colours = isosurface->colours;
