@@ -34,8 +34,8 @@ insitu_status session_check_array(const insitu_array *array, const session_array
 insitu_status session_check_pointers(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
                                      base_error *error);
 
-/* Checks the stride between the components of a tuple in `data`. is_any_stride: a stride of any size is allowed. `name`
- * is what messages call the components. */
+/* Checks the stride between the components of a tuple in `data`. is_any_stride: a stride of any size is allowed. name:
+ * the word for components in messages. */
 insitu_status session_check_components(const insitu_array *data, int count, int64_t stride, bool is_any_stride,
                                        const char *name, base_error *error);
 

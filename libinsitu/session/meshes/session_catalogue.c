@@ -72,7 +72,8 @@ static bool is_first_with_field(const session_parts *parts, int part, const sess
     return true;
 }
 
-/* Finds an error of a field on any part: its description is invalid, or differs between blocks. */
+/* Finds an error of a field on any part: its description is invalid, or differs from that on the first part that has
+ * the field. */
 static void find_field_problem(const session_parts *parts, const session_field *first, base_error *problem)
 {
     const insitu_field *as = &first->given;

@@ -1,9 +1,9 @@
-/* Validation of a mesh, before any other code reads it: the grid's accessors rely on valid arrays.
+/* Validates a mesh before any other code reads it, because the grid's accessors check nothing.
  *
  * The cells are checked in one parallel pass, in blocks. Each thread records its lowest invalid cell, and the lowest of
- * all is reported, so that the result does not depend on the number of threads. What is wrong with this cell is
- * determined afterwards. Coordinates are checked if a drawn cell uses them: vertices that belong to no cell, or only to
- * ghosts, may have any coordinates. Indices are checked for ghosts too. */
+ * all is reported, so that the result does not depend on the number of threads. The error message is composed
+ * afterwards, from a second check of this cell. Coordinates are checked if a drawn cell uses them: vertices that belong
+ * to no cell, or only to ghosts, may have any coordinates. Indices are checked for ghosts too. */
 #include "session_check.h"
 
 #include <omp.h>

@@ -314,8 +314,8 @@ static lane_cells find_row_run(const session_mesh *mesh, int64_t cell, int64_t e
     return alike;
 }
 
-/* Adds the first cells of the run to the sums with vectorized code, and returns their number. *alone is set to the
- * number of following cells that must be added one by one. */
+/* Adds the first cells of the run to the sums with vectorized code, and returns their number. *alone becomes the number
+ * of cells after them that must be added one by one. */
 static int64_t tally_lanes(const lane_cells *alike, mesh_tally *t, double *least, int64_t *alone)
 {
     *alone = alike->count;

@@ -8,7 +8,7 @@
 /* The displacements of the vertices of a mesh. */
 typedef struct session_displacement {
     int field;                /* index of the field in the mesh */
-    uint64_t key;             /* hash that differs if the displacements may differ */
+    uint64_t key;             /* hash of everything that determines the displacements */
     int component_count;      /* number of components: 2 or 3 */
     grid_array components[3]; /* array of the displacements along each axis, one per tuple */
     grid_array index;         /* index of each vertex's tuple; if it has no data, vertex i has tuple i */

@@ -1,5 +1,5 @@
-/* Finds the outer faces of a mesh, which only one cell has. All cells except ghosts are searched, on all ranks, or only
- * those selected by a threshold. */
+/* Finds the outer faces of a mesh. An outer face belongs to only one cell. All cells except ghosts are searched, on all
+ * ranks, or only those selected by a threshold. */
 #ifndef SESSION_OUTER_FACES_H
 #define SESSION_OUTER_FACES_H
 

@@ -13,7 +13,7 @@ session_outer *session_find_outer(const session_mesh *mesh, const scene_threshol
 /* Marks the outer faces as shown by an image of this step. Returns false if memory runs out. Local. */
 bool session_mark_outer(session_mesh *mesh, const scene_threshold *threshold);
 
-/* Frees the outer faces of thresholds that no image of this step shows. The values on which they depend will probably
+/* Frees the outer faces of thresholds that no image of this step shows: the values on which they depend will probably
  * have changed before they are used again. */
 void session_drop_thresholds(session_mesh *mesh);
 

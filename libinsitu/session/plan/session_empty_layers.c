@@ -1,5 +1,5 @@
-/* Finds layers that show nothing. Trees know the ranges of their cells' values, rounded outward to float32. If a layer
- * shows no value within these ranges, it may be empty; then the exact range of all cells is computed, once, and
+/* Finds layers that show nothing. Trees contain the ranges of their cells' values, rounded outward to float32. A layer
+ * that shows no value within these ranges may be empty. Only then the exact range of all cells is computed, once, and
  * decides. */
 #include "session_empty_layers.h"
 
@@ -284,7 +284,7 @@ static void warn_of_threshold(session_report *report, const planned_layer *layer
                  -layer->range.negated_high);
 }
 
-/* Warns of an empty layer. If the field has no value at all, nothing is said here, because another warning explains
+/* Warns of an empty layer. If the field has no value at all, no warning is added here, because another warning explains
  * it. */
 static void warn_of_layer(session_report *report, const planned_layer *layer)
 {

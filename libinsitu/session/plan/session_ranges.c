@@ -71,7 +71,7 @@ static int pass_shift(int pass)
     return pass + 1 < PASSES ? 64 - DIGIT_BITS * (pass + 1) : 0;
 }
 
-/* Returns the mask of the bits that are known before a pass. */
+/* Returns the mask of the bits that earlier passes have determined. */
 static uint64_t known_bits_mask(int pass)
 {
     return pass ? ~UINT64_C(0) << pass_shift(pass - 1) : 0;

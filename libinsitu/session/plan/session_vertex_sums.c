@@ -1,5 +1,5 @@
-/* A rank has the vertices for which it needs sums, but may not have all cells around them: it requests, from the ranks
- * whose boxes contain such a vertex, their share of its sum.
+/* A rank has all vertices for which it needs sums, but may lack some of the cells around them. It therefore requests,
+ * from the ranks whose boxes contain such a vertex, their shares of its sum.
  *
  *     shared: keys inside another rank's box  --(keys)-->  that rank adds them to its own
  *     local:  every vertex with one of these keys; the cells around them; their sums (session_gradients.h)
@@ -151,9 +151,9 @@ static bool extend_keys(session_vertex_sums *sums, int64_t more)
     return true;
 }
 
-/* Finds the number of each key that other ranks have requested, and adds the key if it is new. If every vertex already
- * has a key, none are added. *numbers: these numbers, in the order of the messages; -1: this rank has no such
- * vertex. */
+/* Finds the number of each key that other ranks have requested, and adds the key if it is new. If has_all_vertices is
+ * set, no keys are added, because every vertex has one already. *numbers: these numbers, in the order of the messages;
+ * -1: this rank has no vertex with the key. */
 static bool read_requests(const session_mail *in, session_vertex_sums *sums, int64_t **numbers)
 {
     const int64_t count = in->total / KEY_WORDS;

@@ -56,7 +56,7 @@ static insitu_status check_field(const warp_step *step, const scene_warp *warp, 
                   has_two ? "2 or 3" : "3");
 }
 
-/* Returns a hash that differs if the displacements may differ. */
+/* Returns a hash of everything that determines the displacements. */
 static uint64_t hash_displacement(const scene_warp *warp, const session_field *field)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
