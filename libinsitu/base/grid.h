@@ -133,7 +133,7 @@ typedef struct grid {
 typedef struct grid_field {
     grid_array values; /* tuples of components; the stride is that between tuples */
     int64_t component_stride;
-    /* the components, each in an array of its own, for a magnitude; NULL if they are in `values` */
+    /* for a magnitude whose components are in separate arrays, these arrays; NULL: all components are in `values` */
     const grid_array *component_arrays;
     int component_count;
     int component; /* number of the component, from 0, or -1 for the magnitude */
@@ -315,8 +315,8 @@ typedef struct grid_walk {
     /* for a lattice: differences between the numbers of the cell's vertices and that of its first one; else NULL */
     const int64_t *corner_offsets;
     int64_t base;                /* for a lattice: the number of the cell's first vertex */
-    int64_t next, end;           /* next and last entry of connectivity, or of `corner` */
-    int64_t face_next, face_end; /* next and last entry of face_connectivity */
+    int64_t next, end;           /* next entry to visit and the end, in connectivity or in corner_offsets */
+    int64_t face_next, face_end; /* next entry to visit and the end, in face_connectivity */
 } grid_walk;
 
 static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)

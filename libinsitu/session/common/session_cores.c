@@ -58,7 +58,7 @@ int session_cores_of_rank(MPI_Comm node)
     const bool is_known = find_allowed_cores(own);
     if (MPI_Allreduce(own, all, MOST_CORES, MPI_INT32_T, MPI_SUM, node) == MPI_SUCCESS && is_known)
         return session_share_of_cores(own, all, MOST_CORES);
-    /* If a rank may not run on all cores of the node, it has been bound to cores of its own, and those are returned. */
+    /* a rank that may not run on all cores of the node has been bound to cores of its own */
     const int cores = omp_get_num_procs(), share = cores / ranks;
     if (cores < sysconf(_SC_NPROCESSORS_ONLN)) return cores;
     return share > 1 ? share : 1;

@@ -32,8 +32,8 @@ typedef struct session_bound_factor {
     double *values[BOUND_MOST_LEVELS], *slopes[BOUND_MOST_LEVELS][3];
 } session_bound_factor;
 
-/* A finer lattice. On its pieces it is determined where isosurfaces cross the cell, and how long the gradients are
- * there. */
+/* A finer lattice, whose pieces are tested for crossings with isosurfaces, and at whose nodes gradients are
+ * computed. */
 typedef struct session_bound_level {
     int order, count; /* order, and number of nodes */
     session_pattern pieces;

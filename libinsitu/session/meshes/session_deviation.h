@@ -9,7 +9,7 @@
 
 /* The sizes of pixels in the views that show a mesh. */
 typedef struct session_pixels {
-    const void *of;
+    const void *of; /* first argument of size() */
     /* Returns a lower bound of the size of a pixel at any point of a sphere, in units of coordinates; INFINITY if no
      * view shows the sphere. It is called by several threads at once. */
     double (*size)(const void *of, const double centre[3], double radius);

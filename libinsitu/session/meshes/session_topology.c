@@ -367,8 +367,8 @@ static void swap_vertices(int64_t *vertices, int i, int j)
     vertices[j] = v;
 }
 
-/* Mirrors a left-handed cell, based on the current positions of its vertices, since faces may have either direction.
- * Images are the same in both cases. */
+/* Reorders the vertices of a left-handed cell so that it becomes right-handed. The handedness is computed from the
+ * current positions, since faces may be listed in either direction. Pictures do not depend on it. */
 static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
 {
     double points[GRID_MAX_CELL_VERTICES][3];
