@@ -11,14 +11,14 @@
 #include "mmbvh.h"
 #include "test_meshes.h"
 
-enum { SIDE = 7, LARGE_SIDE = 15 /* cells for several blocks of several threads */, WISHES = 5 };
+enum { SIDE = 7, LARGE_SIDE = 15 /* cells for several blocks of several threads */, QUERIES = 5 };
 
 /* One isovalue, several, the ranges that a transfer function shows, and the least and greatest of all values, which one
  * vertex has. */
 static const mmbvh_interval at_one[] = {{0.25f, 0.25f}}, at_three[] = {{-1, -1}, {0.1f, 0.1f}, {0.9f, 0.9f}},
                             in_two[] = {{-0.4f, -0.3f}, {1, INFINITY}}, at_least[] = {{-2, -2}}, at_most[] = {{2, 2}};
 
-static void make_wishes(const grid_field *field, mmbvh_query queries[WISHES])
+static void make_queries(const grid_field *field, mmbvh_query queries[QUERIES])
 {
     queries[0] = (mmbvh_query){field, 1, at_one};
     queries[1] = (mmbvh_query){field, 3, at_three};
@@ -43,7 +43,7 @@ static test_mesh make_mesh(test_mesh_kind kind, int side)
     return mesh;
 }
 
-/* -1: not to be used; else whether the wish can show it. */
+/* -1: not to be used; else whether the query selects it. */
 static int expected_selection(const test_view *view, const mmbvh_query *query, int64_t cell)
 {
     double low = (double)INFINITY, high = -(double)INFINITY;
@@ -64,7 +64,7 @@ static int expected_selection(const test_view *view, const mmbvh_query *query, i
 static int64_t assert_selects(const test_view *view, const mmbvh_query *queries, int count)
 {
     mmbvh_selection selection;
-    int64_t unusable[WISHES], unusable_by_hand[WISHES] = {0}, found = 0;
+    int64_t unusable[QUERIES], unusable_by_hand[QUERIES] = {0}, found = 0;
     base_error error;
     assert_int_equal(
         mmbvh_select(&view->cells, queries, count, &(mmbvh_options){.threads = 2}, &selection, unusable, &error),
@@ -86,17 +86,17 @@ static int64_t assert_selects(const test_view *view, const mmbvh_query *queries,
     return found;
 }
 
-static void assert_selects_all_wishes(const test_mesh *mesh, test_layout layout)
+static void assert_selects_all_queries(const test_mesh *mesh, test_layout layout)
 {
     test_view view;
-    mmbvh_query queries[WISHES];
+    mmbvh_query queries[QUERIES];
     test_view_create(mesh, layout, &view);
-    make_wishes(&view.field, queries);
-    for (int i = 0; i < WISHES; i++) {
+    make_queries(&view.field, queries);
+    for (int i = 0; i < QUERIES; i++) {
         const int64_t count = assert_selects(&view, &queries[i], 1);
         assert_true(count > 0 && count < view.cells.cell_count);
     }
-    assert_selects(&view, queries, WISHES);
+    assert_selects(&view, queries, QUERIES);
     test_view_free(&view);
 }
 
@@ -106,10 +106,10 @@ static void just_the_cells_that_can_show_are_selected(void **state)
     for (int kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh = make_mesh((test_mesh_kind)kind, SIDE);
         for (int bits = 0; bits < 16; bits++)
-            assert_selects_all_wishes(&mesh, (test_layout){false, bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3});
+            assert_selects_all_queries(&mesh, (test_layout){false, bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3});
         test_mesh_free(&mesh);
         mesh = make_mesh((test_mesh_kind)kind, LARGE_SIDE);
-        assert_selects_all_wishes(&mesh, (test_layout){false});
+        assert_selects_all_queries(&mesh, (test_layout){false});
         test_mesh_free(&mesh);
     }
 }

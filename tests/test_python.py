@@ -609,7 +609,7 @@ def finite_elements_are_their_hexes():
     everywhere(comm.rank != 0 or same, "nodes and a vector of unknowns draw the plain picture")
 
 
-def corners_of_hexes_are_torn():
+def hexes_with_values_at_corners_are_discontinuous():
     xyz, hexes, f = lattice()
     own = numpy.arange(len(hexes)) % 3 * 0.1
     at_corners = f[hexes] + own[:, None]
@@ -623,7 +623,7 @@ def corners_of_hexes_are_torn():
     rows[:, :8] = at_corners
     for values, named in [(at_corners.ravel(), {}), (vector, {"index": dofs[:, :8]}), (rows.ravel(), {"corner_row": 10}),
                           (vector, {"index": dofs.ravel()[:-2], "corner_row": 10})]:
-        with insitu.Session(comm, scene_text=SCENE.format(name="torn", folder=folder)) as s:
+        with insitu.Session(comm, scene_text=SCENE.format(name="discontinuous", folder=folder)) as s:
             s.set_mesh("m", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)
             raises(ValueError, "index: has 7 columns, expected 8", s.set_field, "m", "f", vector, index=dofs[:, :7],
                    centring=insitu.CORNER)
@@ -633,8 +633,8 @@ def corners_of_hexes_are_torn():
             s.step(0, 0.0)
             everywhere("vertices of each cell's own" in s.report["copied_why"], s.report["copied_why"])
         comm.Barrier()
-        with open(f"{folder}/torn.png", "rb") as file:
-            everywhere(file.read() == doubled, f"{list(named)}: torn hexes are those of doubled vertices")
+        with open(f"{folder}/discontinuous.png", "rb") as file:
+            everywhere(file.read() == doubled, f"{list(named)}: discontinuous hexes are those of doubled vertices")
 
 
 def callables_are_asked_in_steps_that_need_them():
@@ -779,7 +779,7 @@ pictures_are_arrays()
 finite_volumes_are_their_hexes()
 boundaries_have_values_of_their_own()
 finite_elements_are_their_hexes()
-corners_of_hexes_are_torn()
+hexes_with_values_at_corners_are_discontinuous()
 callables_are_asked_in_steps_that_need_them()
 derived_fields_are_fields()
 borrowed_arrays_live_as_long_as_they_are_read_and_no_longer()

@@ -1,7 +1,7 @@
-/* Fields with a value at each corner of each cell. Torn, they draw the pictures of the mesh whose vertices the caller
- * doubled, to the bit: with fields at vertices and cells beside them, by an index, in rows, in another order of
- * vertices, with ids, as values and coordinates change. Averaged, they draw those of the means at vertices by brute
- * force. Errors are returned on all ranks. */
+/* Fields with a value at each corner of each cell. On discontinuous meshes they draw the pictures of the mesh whose
+ * vertices the caller doubled, to the bit: with fields at vertices and cells beside them, by an index, in rows, in
+ * another order of vertices, with ids, as values and coordinates change. Averaged, they draw those of the means at
+ * vertices by brute force. Errors are returned on all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +17,7 @@ enum { SIDE = 3, PIXELS = 64 * 48, PICTURES = 4, STEPS = 3, ROW = 11 };
     "    outputs: [{path: " name ".exr}]\n"
 
 /* clang-format off */
-static const char torn_scene[] =
+static const char discontinuous_scene[] =
     "images:\n"
     IMAGE("a", "      - isosurface: {field: f, values: [0.1, 0.3], opacity: 0.6, colour_by: {field: g, map: turbo}}\n"
                "      - isosurface: {field: g, values: [0.2], colour_by: {field: f}}\n")
@@ -224,7 +224,7 @@ static void scale_coordinates(session_input *in, values *v, double scale)
 static drawing draw(session_input *in, values *v, const form *of, bool is_doubled)
 {
     drawing out = {.copied = 0};
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(torn_scene));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(discontinuous_scene));
     for (int step = 0; step < STEPS; step++) {
         insitu_mesh mesh = shape_mesh(in, v, of, is_doubled);
         mesh.changed = step ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_ALL;
@@ -264,11 +264,11 @@ static void check(test_mesh_kind kind, const form *of)
     if (of->has_ids && rank_count > 1) return input_free(&in); /* the ids are of one rank */
     if (of->is_lexicographic) sort_hex_vertices(&in.part);
     values v = make_values(of, &in.part);
-    drawing doubled = draw(&in, &v, of, true), torn = draw(&in, &v, of, false);
+    drawing doubled = draw(&in, &v, of, true), discontinuous = draw(&in, &v, of, false);
     /* coordinates and an index a corner, g, and f where it is not read in place */
     const int64_t tuples = 3 * 8 + 4 + 8 + (of->is_by_index || of->is_in_rows ? 8 : 0);
-    everywhere(torn.copied == doubled.copied + tuples * v.corners);
-    compare(&doubled, &torn, STEPS);
+    everywhere(discontinuous.copied == doubled.copied + tuples * v.corners);
+    compare(&doubled, &discontinuous, STEPS);
     free_values(&v);
     input_free(&in);
 }

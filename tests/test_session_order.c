@@ -309,10 +309,10 @@ static void corner_fields_are_the_cells_own(void **state)
             if (has_offsets) mesh.mesh.offsets = (insitu_array){offsets, INSITU_INT64, 0};
             mesh.field = own.field;
             mesh.field.centring = INSITU_CORNER;
-            drawn torn = draw(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
+            drawn discontinuous = draw(MPI_COMM_WORLD, all_scene, &mesh, NULL, NULL);
             drawn doubled = draw(MPI_COMM_WORLD, all_scene, &own, NULL, NULL);
-            everywhere(same_drawn(&torn, &doubled));
-            free_drawn(&torn);
+            everywhere(same_drawn(&discontinuous, &doubled));
+            free_drawn(&discontinuous);
             free_drawn(&doubled);
             free(offsets);
             free(own.coordinates);

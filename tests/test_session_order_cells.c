@@ -12,8 +12,8 @@ enum { SIDE = 240, PIXELS = SIDE * SIDE };
 
 /* A pixel is 1/100 wide; looked at along z from z = 5. Cells have one piece between two nodes. */
 #define PICTURE(layer, more)                                                                                           \
-    "finer_pieces: 1\nimages:\n  - name: a\n    size: [240, 240]\n    background: [0, 0, 0, 0]\n"                     \
-    "    camera: {position: [0, 0, 5], focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2.4}\n"                                        \
+    "finer_pieces: 1\nimages:\n  - name: a\n    size: [240, 240]\n    background: [0, 0, 0, 0]\n"                      \
+    "    camera: {position: [0, 0, 5], focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2.4}\n"      \
     "    layers:\n      - " layer "\n    outputs: [{path: a.exr" more "}]\n"
 #define IMAGE(layer) PICTURE(layer, "")
 #define NUMBERED(layer) PICTURE(layer, ", data: true")
@@ -376,13 +376,13 @@ static void cell_values_count_once(void **state)
         const insitu_field d = cell_field("d", INSITU_CORNER, at_corners, corners);
         caught_picture truth = draw_picture(IMAGE("isosurface: {field: v, values: [0.1]}"), &part, &v);
         caught_picture cells = draw_picture(IMAGE("isosurface: {field: c, values: [0.1]}"), &part, &c);
-        caught_picture torn =
+        caught_picture averaged =
             draw_picture(IMAGE("isosurface: {field: d, values: [0.1], interpolate: vertex}"), &part, &d);
         everywhere(same_depths(&truth, &cells));
-        everywhere(same_depths(&truth, &torn));
+        everywhere(same_depths(&truth, &averaged));
         free_caught(&truth);
         free_caught(&cells);
-        free_caught(&torn);
+        free_caught(&averaged);
         free(means);
         free(at_vertices);
         free(of_cells);

@@ -17,10 +17,10 @@ enum { SIDE = 4, PATCHES = 2 };
 static const char plain_scene[] =
     "images:\n  - name: a\n    size: [40, 30]\n    layers: [{isosurface: {field: c, values: [8]}}]\n"
     "    outputs: [{path: a.exr}]\n";
-static const char torn_scene[] = "images:\n  - name: a\n    size: [40, 30]\n    layers:\n"
-                                 "      - isosurface: {field: c, values: [8]}\n"
-                                 "      - slice: {field: g, planes: [{normal: [1, 0, 0]}]}\n"
-                                 "    outputs: [{path: a.exr}]\n";
+static const char corner_scene[] = "images:\n  - name: a\n    size: [40, 30]\n    layers:\n"
+                                   "      - isosurface: {field: c, values: [8]}\n"
+                                   "      - slice: {field: g, planes: [{normal: [1, 0, 0]}]}\n"
+                                   "    outputs: [{path: a.exr}]\n";
 
 static test_mesh whole;
 static int *owners;
@@ -369,7 +369,7 @@ static void meshes_with_corner_fields_take_them(void **state)
 {
     (void)state;
     make_whole(TEST_HEXES, false);
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(torn_scene));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(corner_scene));
     test_partition(&whole, TEST_CHECKERBOARD, SIDE, rank_count, owners);
     part_create(&input, own_rank, false);
     part_lists(&input);

@@ -126,13 +126,13 @@ static void strides_beyond_memory_are_refused(void **state)
     for (mesh_form form = 0; form < MESH_FORM_COUNT; form++) {
         formed_mesh m;
         formed_create(form, SIDE, own_rank, rank_count, &m);
-        const bool is_torn = formed_has_corners(form);
+        const bool is_discontinuous = formed_has_corners(form);
         insitu_session *session =
-            open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_corner_scene : formed_scene));
+            open_session(MPI_COMM_WORLD, write_scene(is_discontinuous ? formed_corner_scene : formed_scene));
         refuse_all(session, &m, list, list_of_mesh(&m.mesh, list));
         refuse_all(session, &m, list, list_of_fields(&m, list, 0));
         refuse_all(session, &m, list, list_of_patch(&m, list));
-        everywhere(formed_submit(session, &m, is_torn) == INSITU_OK);
+        everywhere(formed_submit(session, &m, is_discontinuous) == INSITU_OK);
         const insitu_status status = insitu_step(session, 2, 0);
         reported_everywhere(session, status, INSITU_OK, "");
         insitu_destroy(&session);

@@ -43,8 +43,8 @@ static bool is_empty_and_right(const insitu_mesh *mesh)
            (mesh->face_count == 0 || mesh->face_offsets.data || mesh->face_lists.data);
 }
 
-static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_torn, unsigned mask, bool with_arrays,
-                            bool is_mine)
+static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_discontinuous, unsigned mask,
+                            bool with_arrays, bool is_mine)
 {
     const insitu_mesh right = m->mesh;
     const insitu_field right_fields[FORMED_FIELDS] = {m->fields[0], m->fields[1], m->fields[2], m->fields[3]};
@@ -56,7 +56,7 @@ static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_tor
     formed_fit_fields(m);
     const bool is_right = !is_mine || is_empty_and_right(&m->mesh);
     discard_pictures();
-    const insitu_status set = formed_submit(session, m, is_torn);
+    const insitu_status set = formed_submit(session, m, is_discontinuous);
     const insitu_status status = insitu_step(session, 1, 0);
     if ((set && !status) || (is_right && status))
         fprintf(stderr, "%s mask %u %s: %s\n", mesh_form_name(m->form), mask, with_arrays ? "arrays" : "none",
@@ -70,11 +70,12 @@ static void draw_with_zeros(insitu_session *session, formed_mesh *m, bool is_tor
     memcpy(m->fields, right_fields, sizeof right_fields);
 }
 
-static void check_form(mesh_form form, bool is_torn)
+static void check_form(mesh_form form, bool is_discontinuous)
 {
     formed_mesh m;
     formed_create(form, SIDE, own_rank, rank_count, &m);
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(is_torn ? formed_corner_scene : formed_scene));
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD, write_scene(is_discontinuous ? formed_corner_scene : formed_scene));
     int64_t *counts[COUNTS];
     counts_of(&m.mesh, counts);
     unsigned given = 0;
@@ -83,13 +84,13 @@ static void check_form(mesh_form form, bool is_torn)
     for (unsigned mask = 1; mask < 1u << COUNTS; mask++) {
         if (mask & ~given) continue;
         for (int way = 0; way < 4; way++)
-            draw_with_zeros(session, &m, is_torn, mask, way & 1, way & 2 || own_rank == rank_count - 1);
+            draw_with_zeros(session, &m, is_discontinuous, mask, way & 1, way & 2 || own_rank == rank_count - 1);
     }
     discard_pictures();
-    everywhere(formed_submit(session, &m, is_torn) == INSITU_OK);
+    everywhere(formed_submit(session, &m, is_discontinuous) == INSITU_OK);
     const insitu_status status = insitu_step(session, 2, 0);
     reported_everywhere(session, status, INSITU_OK, "");
-    everywhere(insitu_last_report(session)->images == (is_torn ? FORMED_CORNER_PICTURES : FORMED_PICTURES));
+    everywhere(insitu_last_report(session)->images == (is_discontinuous ? FORMED_CORNER_PICTURES : FORMED_PICTURES));
     insitu_destroy(&session);
     formed_free(&m);
 }

@@ -67,7 +67,7 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     const scene *now = &s->scene_file.scene;
     const bool are_same_pieces = now->finer_pieces == old.finer_pieces && now->finer_memory == old.finer_memory &&
                                  now->is_surface_error_given == old.is_surface_error_given;
-    /* statistics need all cells to be refined (views/session_wishes.c) */
+    /* statistics need all cells to be refined (views/session_error_requests.c) */
     if (are_same_pieces && now->statistics_count == old.statistics_count) return;
     session_end_finer(&s->meshes);
     s->meshes.are_cells_changed = s->meshes.are_names_changed = true;
@@ -176,9 +176,9 @@ static bool has_higher_order(const session_catalogue *catalogue)
     return is_any;
 }
 
-/* Reads cells of higher order as finer ones, unless the scene says otherwise. Which cells are refined follows from the images that
- * are due, and so does the number of pieces by surface_error. *are_cells_changed is set if cells are split otherwise on
- * any rank. Collective. */
+/* Reads cells of higher order as finer ones, unless the scene says otherwise. Which cells are refined follows from the
+ * images that are due, and so does the number of pieces by surface_error. *are_cells_changed is set if cells are split
+ * otherwise on any rank. Collective. */
 static insitu_status refine_cells(insitu_session *s, const session_moment *moment, bool *are_cells_changed,
                                   base_error *error)
 {

@@ -172,8 +172,8 @@ static void report_topology(session_report *out, copied_reasons *copied, const s
     add_copied(copied, mesh->mirrored.bytes, "coordinates of its mirror images");
     add_copied(copied, mesh->warp.bytes, "coordinates of its vertices where the scene's warp moves them");
     if (mesh->covered) add_copied(copied, mesh->given.cell_count, "flags of cells that finer blocks cover");
-    add_copied(copied, mesh->finer.bytes, "nodes of finer cells, with %d piece%s between two nodes",
-               mesh->finer.parts, mesh->finer.parts > 1 ? "s" : "");
+    add_copied(copied, mesh->finer.bytes, "nodes of finer cells, with %d piece%s between two nodes", mesh->finer.parts,
+               mesh->finer.parts > 1 ? "s" : "");
     add_copied(copied, mesh->discontinuous.bytes, "vertices of each cell's own, for fields with values at corners");
 }
 

@@ -472,8 +472,8 @@ typedef struct insitu_report {
      * and again if it has not held in between. Only the warning that an edit of the scene file is invalid is given at
      * every step. All are the same on every rank. */
     const char *warnings;
-    /* "" or, unless the scene has finer_pieces, a line for each mesh with cells of higher order that an image shows: the
-     * number of pieces between two nodes, and their bound. The same on every rank; valid until the next step */
+    /* "" or, unless the scene has finer_pieces, a line for each mesh with cells of higher order that an image shows:
+     * the number of pieces between two nodes, and their bound. The same on every rank; valid until the next step */
     const char *pieces;
 } insitu_report;
 

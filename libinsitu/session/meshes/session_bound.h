@@ -87,8 +87,8 @@ typedef struct session_cell_bound {
 } session_cell_bound;
 
 /* Computes the bounds of a cell. tuples: x, y, z and the field's value at its nodes, in the order of its row.
- * isovalues: NULL if only the bounds of positions and values are needed. level: the lattice to use, 0 .. level_count - 1; a finer
- * one mostly gives a smaller bound, but takes longer. work: working memory. */
+ * isovalues: NULL if only the bounds of positions and values are needed. level: the lattice to use, 0 .. level_count -
+ * 1; a finer one mostly gives a smaller bound, but takes longer. work: working memory. */
 session_cell_bound session_bound_cell(const session_bound *of, const double *tuples, const session_isovalues *isovalues,
                                       int level, double *work);
 

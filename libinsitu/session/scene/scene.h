@@ -617,9 +617,9 @@ typedef struct scene {
     int threads;            /* number of threads per rank; 0: the node's cores divided by its number of ranks */
     /* number of pieces along an edge between two nodes of a cell of higher order, 1 .. 8; 0: surface_error decides */
     int finer_pieces;
-    double surface_error; /* bound of the error of these pieces in pixels, > 0; used if finer_pieces is 0 */
+    double surface_error;        /* bound of the error of these pieces in pixels, > 0; used if finer_pieces is 0 */
     bool is_surface_error_given; /* set if the scene file has the bound; otherwise it is the default */
-    double finer_memory;  /* memory that finer pieces may take on all ranks together, in MiB, > 0 */
+    double finer_memory;         /* memory that finer pieces may take on all ranks together, in MiB, > 0 */
     scene_tree tree;
     scene_schedule schedule;
     scene_writing writing;

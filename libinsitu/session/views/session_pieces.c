@@ -20,7 +20,7 @@
 #include "session_filled.h"
 #include "session_indexed.h"
 #include "session_piece_set.h"
-#include "session_wishes.h"
+#include "session_error_requests.h"
 
 static const double bytes_per_mib = 1048576;
 
@@ -30,13 +30,13 @@ enum { MOST_VOLUMES = 8 };
 
 /* What is measured of a volume of a mesh: the error of the values, and their range. */
 typedef struct volume_error {
-    double allowed, width; /* those of the wish; the same on every rank */
+    double allowed, width; /* those of the request; the same on every rank */
     double error, minus_low, high;
 } volume_error;
 
 /* The errors of one mesh, and what follows from them. */
 typedef struct piece_error {
-    bool is_counted, needs_all; /* those of the wishes; the same on every rank */
+    bool is_counted, needs_all; /* those of the requests; the same on every rank */
     bool is_shown; /* set if some due image shows the mesh, or a fixed number is that of all cells; the same on every
                       rank */
     session_deviation all;                           /* counts are those of isosurfaces */
@@ -52,16 +52,16 @@ typedef struct mesh_work {
     const session_pieces_basis *basis;
     session_finer_choice *choice;
     bool marks_only; /* set if errors are not needed */
-    session_wishes wishes;
+    session_error_requests requests;
     piece_error *out;
 } mesh_work;
 
-/* A part of a mesh of which a wish is measured, or whose pieces are chosen by it. */
+/* A part of a mesh of which a request is measured, or whose pieces are chosen by it. */
 typedef struct part_work {
     const mesh_work *of;
     const session_mesh *mesh;
-    session_deviation_request wish;
-    session_piece_set *pieces; /* NULL: the wish is measured */
+    session_deviation_request request;
+    session_piece_set *pieces; /* NULL: the request is measured */
     volume_error *volume;      /* of a volume */
 } part_work;
 
@@ -69,60 +69,60 @@ static insitu_status measure_volume(part_work *work, base_error *error)
 {
     session_deviation own = {.low = INFINITY, .high = -INFINITY};
     volume_error *out = work->volume;
-    session_measure_deviation(work->mesh, &work->wish, work->of->basis->team->threads, &own, error);
+    session_measure_deviation(work->mesh, &work->request, work->of->basis->team->threads, &own, error);
     out->error = fmax(out->error, own.value_error);
     out->minus_low = fmax(out->minus_low, -own.low);
     out->high = fmax(out->high, own.high);
     return error->status;
 }
 
-static insitu_status use_wish(part_work *work, base_error *error)
+static insitu_status use_request(part_work *work, base_error *error)
 {
     const mesh_work *w = work->of;
     const int threads = w->basis->team->threads;
-    if (work->wish.is_of_values) return measure_volume(work, error);
-    if (!work->pieces) return session_measure_deviation(work->mesh, &work->wish, threads, &w->out->all, error);
-    return session_add_crossed_pieces(work->mesh, &work->wish, w->choice->parts, threads, work->pieces, error);
+    if (work->request.is_of_values) return measure_volume(work, error);
+    if (!work->pieces) return session_measure_deviation(work->mesh, &work->request, threads, &w->out->all, error);
+    return session_add_crossed_pieces(work->mesh, &work->request, w->choice->parts, threads, work->pieces, error);
 }
 
 static insitu_status use_values(void *of, const session_node_values *values, base_error *error)
 {
     part_work *work = of;
-    work->wish.values = values;
-    return use_wish(work, error);
+    work->request.values = values;
+    return use_request(work, error);
 }
 
-static void use_part(part_work *work, const session_wish *wish, base_error *error)
+static void use_part(part_work *work, const session_error_request *request, base_error *error)
 {
     static const double zero = 0;
     const mesh_work *w = work->of;
-    work->wish.component = wish->component;
-    work->wish.isovalues = (session_isovalues){wish->value_count, wish->values, 0};
-    work->wish.plane = wish->has_plane ? &wish->plane : NULL;
-    work->wish.pixels = (session_pixels){wish, session_wish_pixel_size};
-    work->wish.is_lobatto = w->choice->is_lobatto;
-    work->wish.marks_only = w->marks_only;
-    work->wish.values = NULL;
-    work->wish.is_of_values = wish->is_volume;
+    work->request.component = request->component;
+    work->request.isovalues = (session_isovalues){request->value_count, request->values, 0};
+    work->request.plane = request->has_plane ? &request->plane : NULL;
+    work->request.pixels = (session_pixels){request, session_error_request_pixel_size};
+    work->request.is_lobatto = w->choice->is_lobatto;
+    work->request.marks_only = w->marks_only;
+    work->request.values = NULL;
+    work->request.is_of_values = request->is_volume;
     /* A slice at the border of the data may be moved by as much (session_slice_distance()). */
-    if (wish->has_plane)
-        work->wish.isovalues =
-            (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * wish->views->extent.half_diagonal};
-    const int field = wish->field ? session_find_field(work->mesh, wish->field) : -1;
-    if (!wish->field) use_wish(work, error);
+    if (request->has_plane)
+        work->request.isovalues =
+            (session_isovalues){1, &zero, 2 * SESSION_BORDER_SHARE * request->views->extent.half_diagonal};
+    const int field = request->field ? session_find_field(work->mesh, request->field) : -1;
+    if (!request->field) use_request(work, error);
     if (field >= 0) session_read_nodes(work->mesh, field, use_values, work, error);
 }
 
 static void measure_part(const mesh_work *w, const session_mesh *mesh, session_cell_marks *marks, base_error *error)
 {
     unsigned char *cells = marks ? marks->cells : NULL;
-    part_work work = {.of = w, .mesh = mesh, .wish = {.marks = cells}};
-    for (int n = 0, volume = 0; n < w->wishes.count && !error->status; n++) {
-        const session_wish *wish = &w->wishes.items[n];
+    part_work work = {.of = w, .mesh = mesh, .request = {.marks = cells}};
+    for (int n = 0, volume = 0; n < w->requests.count && !error->status; n++) {
+        const session_error_request *request = &w->requests.items[n];
         work.volume = volume < MOST_VOLUMES ? &w->out->volumes[volume] : NULL;
-        volume += wish->is_volume;
-        if (wish->is_volume && (w->marks_only || volume > MOST_VOLUMES)) continue;
-        if (wish->is_shown && (!w->marks_only || marks)) use_part(&work, wish, error);
+        volume += request->is_volume;
+        if (request->is_volume && (w->marks_only || volume > MOST_VOLUMES)) continue;
+        if (request->is_shown && (!w->marks_only || marks)) use_part(&work, request, error);
     }
     session_count_finer_bytes(mesh, cells, w->out->bytes);
 }
@@ -132,8 +132,8 @@ static void choose_part(const mesh_work *w, const session_mesh *mesh, session_ce
 {
     part_work work = {.of = w, .mesh = mesh, .pieces = &marks->pieces};
     session_begin_piece_set(mesh, marks->cells, w->choice->parts, work.pieces, error);
-    for (int n = 0; n < w->wishes.count && !error->status; n++)
-        if (w->wishes.items[n].is_shown) use_part(&work, &w->wishes.items[n], error);
+    for (int n = 0; n < w->requests.count && !error->status; n++)
+        if (w->requests.items[n].is_shown) use_part(&work, &w->requests.items[n], error);
 }
 
 /* Measures the parts of a mesh, or, if the number of pieces has been chosen, lists the pieces of refined cells. */
@@ -141,7 +141,7 @@ static void use_parts(const mesh_work *w, const char *name, base_error *error)
 {
     const session_parts parts = session_find_parts(w->basis->meshes, name);
     const bool is_chosen = w->choice->parts > 1;
-    if (!is_chosen && !w->wishes.needs_all && !session_begin_marks(w->choice, &parts))
+    if (!is_chosen && !w->requests.needs_all && !session_begin_marks(w->choice, &parts))
         session_fail_for_memory(error, parts.count, "marks of cells of higher order");
     for (int i = 0; i < parts.count && !error->status; i++) {
         const session_mesh *mesh = parts.items[i];
@@ -153,18 +153,18 @@ static void use_parts(const mesh_work *w, const char *name, base_error *error)
     }
 }
 
-static void list_volumes(const session_wishes *wishes, piece_error *out)
+static void list_volumes(const session_error_requests *requests, piece_error *out)
 {
     out->volume_count = 0;
-    for (int n = 0; n < wishes->count; n++) {
-        const session_wish *wish = &wishes->items[n];
-        if (wish->is_volume && out->volume_count < MOST_VOLUMES)
-            out->volumes[out->volume_count] = (volume_error){wish->allowed, wish->width, 0, -INFINITY, -INFINITY};
-        out->volume_count += wish->is_volume;
+    for (int n = 0; n < requests->count; n++) {
+        const session_error_request *request = &requests->items[n];
+        if (request->is_volume && out->volume_count < MOST_VOLUMES)
+            out->volumes[out->volume_count] = (volume_error){request->allowed, request->width, 0, -INFINITY, -INFINITY};
+        out->volume_count += request->is_volume;
     }
 }
 
-static void use_mesh(const session_pieces_basis *basis, const session_wish_views *views, int mesh,
+static void use_mesh(const session_pieces_basis *basis, const session_due_views *views, int mesh,
                      session_finer_choice *choice, piece_error *out, session_report *report, base_error *error)
 {
     const scene *scene = basis->scene;
@@ -174,22 +174,22 @@ static void use_mesh(const session_pieces_basis *basis, const session_wish_views
         w->choice = choice;
         w->marks_only = scene->finer_pieces > 0;
         w->out = out;
-        session_list_wishes(scene, views, &basis->catalogue->meshes[mesh], choice->shell_count > 0, &w->wishes,
-                            scene->is_surface_error_given ? report : NULL);
-        out->is_counted = w->wishes.is_counted;
-        out->needs_all = w->wishes.needs_all;
-        list_volumes(&w->wishes, out);
-        out->is_shown = w->wishes.is_shown || (w->marks_only && w->wishes.needs_all);
-        if (w->wishes.is_complete) use_parts(w, basis->catalogue->meshes[mesh].name, error);
+        session_list_error_requests(scene, views, &basis->catalogue->meshes[mesh], choice->shell_count > 0,
+                                    &w->requests, scene->is_surface_error_given ? report : NULL);
+        out->is_counted = w->requests.is_counted;
+        out->needs_all = w->requests.needs_all;
+        list_volumes(&w->requests, out);
+        out->is_shown = w->requests.is_shown || (w->marks_only && w->requests.needs_all);
+        if (w->requests.is_complete) use_parts(w, basis->catalogue->meshes[mesh].name, error);
     }
-    if (!w || !w->wishes.is_complete) session_fail_for_memory(error, sizeof *w, "bounds of isosurfaces");
-    if (w) session_free_wishes(&w->wishes);
+    if (!w || !w->requests.is_complete) session_fail_for_memory(error, sizeof *w, "bounds of isosurfaces");
+    if (w) session_free_error_requests(&w->requests);
     base_free(w);
 }
 
 /* Calls the fill functions of fields that isosurfaces and volumes show. If one fails, the field is not measured, and
  * the plan returns the error. Local, but fill functions may communicate. */
-static void fill_fields(const session_pieces_basis *basis, const session_wish_views *views)
+static void fill_fields(const session_pieces_basis *basis, const session_due_views *views)
 {
     base_error unheard = {.status = INSITU_OK};
     for (int i = 0; i < views->count; i++) {
@@ -258,7 +258,7 @@ static insitu_status reduce_errors(piece_error *errors, int count, MPI_Comm comm
     return status;
 }
 
-static insitu_status find_errors(const session_pieces_basis *basis, const session_wish_views *views,
+static insitu_status find_errors(const session_pieces_basis *basis, const session_due_views *views,
                                  session_finer_choice *choices, piece_error *errors, session_report *report,
                                  base_error *error)
 {
@@ -270,7 +270,7 @@ static insitu_status find_errors(const session_pieces_basis *basis, const sessio
 }
 
 /* Lists the pieces that are made in meshes not all of whose cells are refined. */
-static insitu_status list_pieces(const session_pieces_basis *basis, const session_wish_views *views,
+static insitu_status list_pieces(const session_pieces_basis *basis, const session_due_views *views,
                                  session_finer_choice *choices, piece_error *errors, base_error *error)
 {
     for (int m = 0; m < basis->catalogue->mesh_count && !error->status; m++)
@@ -475,17 +475,17 @@ insitu_status session_choose_pieces(const session_pieces_basis *basis, session_f
     const size_t count = (size_t)basis->catalogue->mesh_count + 1;
     piece_error *errors = base_calloc(count, sizeof *errors);
     piece_step *steps = base_calloc(count * FINER_MOST_PARTS, sizeof *steps);
-    session_wish_views views = {.count = 0};
+    session_due_views views = {.count = 0};
     if (!errors || !steps)
         session_fail_for_memory(error, (int64_t)(count * (sizeof *errors + FINER_MOST_PARTS * sizeof *steps)),
                                 "numbers of pieces");
     insitu_status status = session_agree(basis->team->comm, error);
     if (!status)
-        status = session_make_wish_views(basis->scene, basis->moment, basis->meshes, basis->team->comm, &views, error);
+        status = session_make_due_views(basis->scene, basis->moment, basis->meshes, basis->team->comm, &views, error);
     if (!status) status = find_errors(basis, &views, choices, errors, report, error);
     if (!status) choose_all(basis, errors, steps, choices, report);
     if (!status) status = list_pieces(basis, &views, choices, errors, error);
-    session_free_wish_views(&views);
+    session_free_due_views(&views);
     base_free(errors);
     base_free(steps);
     return status;

@@ -1,29 +1,29 @@
 /* Lists what the due images show of a mesh with cells of higher order: the isosurfaces, slices and cells whose error is
- * measured (each is a "wish"), and which cells must be refined. */
-#ifndef SESSION_WISHES_H
-#define SESSION_WISHES_H
+ * measured (each is a "request"), and which cells must be refined. */
+#ifndef SESSION_ERROR_REQUESTS_H
+#define SESSION_ERROR_REQUESTS_H
 
 #include "render.h"
 #include "session_finer.h"
 #include "session_plan.h"
 
 /* The cameras of the due images. */
-typedef struct session_wish_views {
+typedef struct session_due_views {
     int count; /* number of images of the scene */
     bool *are_due;
     render_camera *cameras; /* cameras of the images that are due */
     session_extent extent;  /* bounds of the caller's nodes; empty if neither cameras nor slices need them */
-} session_wish_views;
+} session_due_views;
 
 /* Computes the cameras of the images that are due at the moment. If a camera has no direction of view, its image is
  * treated as not due; drawing it returns the error. The caller must free *out even after an error. Collective. */
-insitu_status session_make_wish_views(const scene *scene, const session_moment *moment, const session_meshes *meshes,
-                                      MPI_Comm comm, session_wish_views *out, base_error *error);
-void session_free_wish_views(session_wish_views *views);
+insitu_status session_make_due_views(const scene *scene, const session_moment *moment, const session_meshes *meshes,
+                                     MPI_Comm comm, session_due_views *out, base_error *error);
+void session_free_due_views(session_due_views *views);
 
 /* Something whose error is measured: the isosurfaces of a field, a plane of a slice, or the positions of all cells. */
-typedef struct session_wish {
-    const session_wish_views *views;
+typedef struct session_error_request {
+    const session_due_views *views;
     bool *images; /* set for each image of the scene that shows it */
     bool is_shown;
     const char *field; /* name of the field; NULL: a plane or positions */
@@ -34,30 +34,30 @@ typedef struct session_wish {
     session_plane plane;
     bool is_volume; /* set if it is a volume of the field */
     double allowed; /* error of values in the volume that is allowed, as a fraction of the width of its range */
-    double width; /* 0: that of the values */
-} session_wish;
+    double width;   /* 0: that of the values */
+} session_error_request;
 
-enum { SESSION_MOST_WISHES = 256 };
+enum { SESSION_MOST_ERROR_REQUESTS = 256 };
 
-/* All wishes of a mesh. The first one is the positions of all cells. */
-typedef struct session_wishes {
+/* All requests of a mesh. The first one is the positions of all cells. */
+typedef struct session_error_requests {
     int count;
     bool is_complete; /* set as long as memory has not run out */
     bool is_shown;    /* set if some due image shows the mesh */
     bool is_counted;  /* set if statistics or conditions of images are sums over pieces */
     bool needs_all;   /* set if all cells are refined, not only those that isosurfaces and slices may cross */
-    session_wish items[SESSION_MOST_WISHES];
-} session_wishes;
+    session_error_request items[SESSION_MOST_ERROR_REQUESTS];
+} session_error_requests;
 
 /* Lists what the due images show of a mesh. has_shells: set if some of its cells, on any rank, are triangles or quads.
  * report: receives warnings of isosurfaces whose error has no bound; may be NULL. Local; the result is the same on
  * every rank. The caller must free *out. */
-void session_list_wishes(const scene *scene, const session_wish_views *views, const session_catalogue_mesh *mesh,
-                         bool has_shells, session_wishes *out, session_report *report);
-void session_free_wishes(session_wishes *wishes);
+void session_list_error_requests(const scene *scene, const session_due_views *views, const session_catalogue_mesh *mesh,
+                                 bool has_shells, session_error_requests *out, session_report *report);
+void session_free_error_requests(session_error_requests *requests);
 
-/* Returns a lower bound of the size, in scene units, of a pixel on a sphere, in the images that show the session_wish
- * `of`; INFINITY if none of them shows the sphere. */
-double session_wish_pixel_size(const void *of, const double centre[3], double radius);
+/* Returns a lower bound of the size, in scene units, of a pixel on a sphere, in the images that show the
+ * session_error_request `of`; INFINITY if none of them shows the sphere. */
+double session_error_request_pixel_size(const void *of, const double centre[3], double radius);
 
 #endif

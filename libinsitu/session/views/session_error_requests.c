@@ -6,7 +6,7 @@
  * All cells need them if faces of pieces are drawn or compared with those of neighbours (outer surfaces, contours of
  * shells), if rays pass from cell to cell (volumes), if values at vertices are means or derivatives over neighbours, if
  * pieces are counted (percentiles), or if sums over pieces are written (statistics). */
-#include "session_wishes.h"
+#include "session_error_requests.h"
 
 #include <math.h>
 #include <string.h>
@@ -20,17 +20,17 @@
 
 /* ---- cameras ----------------------------------------------------------------------------------------------------- */
 
-void session_free_wish_views(session_wish_views *views)
+void session_free_due_views(session_due_views *views)
 {
     base_free(views->are_due);
     base_free(views->cameras);
 }
 
-insitu_status session_make_wish_views(const scene *scene, const session_moment *moment, const session_meshes *meshes,
-                                      MPI_Comm comm, session_wish_views *out, base_error *error)
+insitu_status session_make_due_views(const scene *scene, const session_moment *moment, const session_meshes *meshes,
+                                     MPI_Comm comm, session_due_views *out, base_error *error)
 {
     bool needs_extent = false;
-    *out = (session_wish_views){.count = scene->image_count};
+    *out = (session_due_views){.count = scene->image_count};
     out->are_due = base_calloc((size_t)out->count, sizeof *out->are_due);
     out->cameras = base_calloc((size_t)out->count, sizeof *out->cameras);
     if (!out->are_due || !out->cameras)
@@ -70,22 +70,22 @@ static double size_in_view(const render_camera *camera, const double centre[3], 
     return 2 * half * near * near / (camera->height * fmax(vector3_length(to) + radius, near));
 }
 
-double session_wish_pixel_size(const void *of, const double centre[3], double radius)
+double session_error_request_pixel_size(const void *of, const double centre[3], double radius)
 {
-    const session_wish *wish = of;
+    const session_error_request *request = of;
     double least = INFINITY;
-    for (int i = 0; i < wish->views->count; i++)
-        if (wish->images[i]) least = fmin(least, size_in_view(&wish->views->cameras[i], centre, radius));
+    for (int i = 0; i < request->views->count; i++)
+        if (request->images[i]) least = fmin(least, size_in_view(&request->views->cameras[i], centre, radius));
     return least;
 }
 
 /* ---- what images show of a mesh ---------------------------------------------------------------------------------- */
 
-void session_free_wishes(session_wishes *wishes)
+void session_free_error_requests(session_error_requests *requests)
 {
-    for (int i = 0; i < wishes->count; i++) {
-        base_free(wishes->items[i].images);
-        base_free(wishes->items[i].values);
+    for (int i = 0; i < requests->count; i++) {
+        base_free(requests->items[i].images);
+        base_free(requests->items[i].values);
     }
 }
 
@@ -96,7 +96,7 @@ static bool is_same_plane(const session_plane *a, const session_plane *b)
     return is_same;
 }
 
-static bool is_same_wish(const session_wish *a, const session_wish *b)
+static bool is_same_request(const session_error_request *a, const session_error_request *b)
 {
     if (a->is_volume != b->is_volume || a->allowed != b->allowed || a->width != b->width) return false;
     if (a->has_plane || b->has_plane) return a->has_plane && b->has_plane && is_same_plane(&a->plane, &b->plane);
@@ -106,38 +106,39 @@ static bool is_same_wish(const session_wish *a, const session_wish *b)
 
 /* Returns the entry that equals `like`, and adds it if there is none. If there is no space, returns the entry for
  * positions, and all cells are refined. */
-static session_wish *find_wish(session_wishes *wishes, const session_wish_views *views, const session_wish *like)
+static session_error_request *find_request(session_error_requests *requests, const session_due_views *views,
+                                           const session_error_request *like)
 {
-    for (int i = 0; i < wishes->count; i++)
-        if (is_same_wish(&wishes->items[i], like)) return &wishes->items[i];
-    wishes->needs_all = wishes->needs_all || wishes->count == SESSION_MOST_WISHES;
-    if (wishes->count == SESSION_MOST_WISHES) return &wishes->items[0];
-    session_wish *wish = &wishes->items[wishes->count++];
-    *wish = *like;
-    wish->views = views;
-    wish->images = base_calloc((size_t)views->count, sizeof *wish->images);
-    wishes->is_complete = wishes->is_complete && wish->images;
-    return wish;
+    for (int i = 0; i < requests->count; i++)
+        if (is_same_request(&requests->items[i], like)) return &requests->items[i];
+    requests->needs_all = requests->needs_all || requests->count == SESSION_MOST_ERROR_REQUESTS;
+    if (requests->count == SESSION_MOST_ERROR_REQUESTS) return &requests->items[0];
+    session_error_request *request = &requests->items[requests->count++];
+    *request = *like;
+    request->views = views;
+    request->images = base_calloc((size_t)views->count, sizeof *request->images);
+    requests->is_complete = requests->is_complete && request->images;
+    return request;
 }
 
-static session_wish *show_wish(session_wishes *wishes, const session_wish_views *views, const session_wish *like,
-                               int image)
+static session_error_request *show_request(session_error_requests *requests, const session_due_views *views,
+                                           const session_error_request *like, int image)
 {
-    session_wish *wish = find_wish(wishes, views, like);
-    wish->is_shown = wishes->is_shown = true;
-    if (wishes->is_complete) wish->images[image] = true;
-    return wish;
+    session_error_request *request = find_request(requests, views, like);
+    request->is_shown = requests->is_shown = true;
+    if (requests->is_complete) request->images[image] = true;
+    return request;
 }
 
-static void add_value(session_wishes *wishes, session_wish *wish, double value)
+static void add_value(session_error_requests *requests, session_error_request *request, double value)
 {
-    for (int i = 0; i < wish->value_count; i++)
-        if (wish->values[i] == value) return;
-    double *values = base_realloc(wish->values, ((size_t)wish->value_count + 1) * sizeof *values);
-    wishes->is_complete = wishes->is_complete && values;
+    for (int i = 0; i < request->value_count; i++)
+        if (request->values[i] == value) return;
+    double *values = base_realloc(request->values, ((size_t)request->value_count + 1) * sizeof *values);
+    requests->is_complete = requests->is_complete && values;
     if (!values) return;
-    values[wish->value_count++] = value;
-    wish->values = values;
+    values[request->value_count++] = value;
+    request->values = values;
 }
 
 static const session_catalogue_field *find_shown(const session_catalogue_mesh *mesh, const scene_field *field)
@@ -165,22 +166,23 @@ static bool counts_cells(const scene_colour_map *map)
     return !map->range.is_fixed && map->range.source == SCENE_RANGE_PERCENTILES;
 }
 
-static void add_isosurface(session_wishes *wishes, const session_wish_views *views, const session_catalogue_mesh *mesh,
-                           const scene_image *image, int index, int layer, session_report *report)
+static void add_isosurface(session_error_requests *requests, const session_due_views *views,
+                           const session_catalogue_mesh *mesh, const scene_image *image, int index, int layer,
+                           session_report *report)
 {
     const scene_isosurface *shown = &image->isosurfaces[layer];
     const session_catalogue_field *field = find_shown(mesh, &shown->field);
-    session_wish like = {.field = NULL};
+    session_error_request like = {.field = NULL};
     if (!field) return;
     const bool is_bounded = is_polynomial(mesh, field, &shown->field);
     if (is_bounded) like.field = field->name;
     if (is_bounded) like.component = session_resolve_component(&shown->field, field->component_count);
-    session_wish *wish = show_wish(wishes, views, &like, index);
-    for (int i = 0; i < shown->value_count && wish->field && image->variant.view == 0; i++)
-        add_value(wishes, wish, shown->values[i]);
+    session_error_request *request = show_request(requests, views, &like, index);
+    for (int i = 0; i < shown->value_count && request->field && image->variant.view == 0; i++)
+        add_value(requests, request, shown->values[i]);
     /* central differences also sample neighbours of crossed cells */
-    wishes->needs_all = wishes->needs_all || !is_bounded || shown->normals == SCENE_DIFFERENCES ||
-                        (shown->has_colour_by && counts_cells(&shown->colour_map));
+    requests->needs_all = requests->needs_all || !is_bounded || shown->normals == SCENE_DIFFERENCES ||
+                          (shown->has_colour_by && counts_cells(&shown->colour_map));
     if (!report) return;
     session_warn(report, &(session_warning){WARNING_PIECES, image->name, mesh->name, layer}, !is_bounded,
                  "image \"%s\": surface_error does not hold for the isosurface of \"%s\" on mesh \"%s\": only "
@@ -189,34 +191,34 @@ static void add_isosurface(session_wishes *wishes, const session_wish_views *vie
                  image->name, field->name, mesh->name);
 }
 
-static void add_slice(session_wishes *wishes, const session_wish_views *views, const session_catalogue_mesh *mesh,
-                      const scene_image *image, int index, int layer)
+static void add_slice(session_error_requests *requests, const session_due_views *views,
+                      const session_catalogue_mesh *mesh, const scene_image *image, int index, int layer)
 {
     const scene_slice *shown = &image->slices[layer];
     if (!find_shown(mesh, &shown->field)) return;
     for (int i = 0; i < shown->plane_count; i++) {
-        session_wish like = {.has_plane = true};
+        session_error_request like = {.has_plane = true};
         memcpy(like.plane.normal, shown->planes[i].normal, sizeof like.plane.normal);
         session_find_plane_point(&shown->planes[i], &views->extent, like.plane.point);
-        show_wish(wishes, views, &like, index);
+        show_request(requests, views, &like, index);
     }
-    wishes->needs_all = wishes->needs_all || counts_cells(&shown->colour_map);
+    requests->needs_all = requests->needs_all || counts_cells(&shown->colour_map);
 }
 
-static void add_volume(session_wishes *wishes, const session_wish_views *views, const session_catalogue_mesh *mesh,
-                       const scene_image *image, int index, int layer)
+static void add_volume(session_error_requests *requests, const session_due_views *views,
+                       const session_catalogue_mesh *mesh, const scene_image *image, int index, int layer)
 {
     static const double usual_error = 0.01; /* of volumes that are not integrated to an error */
     const scene_volume *shown = &image->volumes[layer];
     const session_catalogue_field *field = find_shown(mesh, &shown->field);
     if (!field || !is_polynomial(mesh, field, &shown->field)) return;
     const scene_range *range = &shown->colour_map.range;
-    const session_wish like = {.field = field->name,
-                               .component = session_resolve_component(&shown->field, field->component_count),
-                               .is_volume = true,
-                               .allowed = image->max_error > 0 ? image->max_error : usual_error,
-                               .width = range->is_fixed ? fabs(range->high - range->low) : 0};
-    show_wish(wishes, views, &like, index);
+    const session_error_request like = {.field = field->name,
+                                        .component = session_resolve_component(&shown->field, field->component_count),
+                                        .is_volume = true,
+                                        .allowed = image->max_error > 0 ? image->max_error : usual_error,
+                                        .width = range->is_fixed ? fabs(range->high - range->low) : 0};
+    show_request(requests, views, &like, index);
 }
 
 /* Returns whether a layer shows the mesh from all of its cells. */
@@ -239,20 +241,21 @@ static bool has_fields_of_neighbours(const session_catalogue_mesh *mesh, const s
     return false;
 }
 
-void session_list_wishes(const scene *scene, const session_wish_views *views, const session_catalogue_mesh *mesh,
-                         bool has_shells, session_wishes *out, session_report *report)
+void session_list_error_requests(const scene *scene, const session_due_views *views, const session_catalogue_mesh *mesh,
+                                 bool has_shells, session_error_requests *out, session_report *report)
 {
-    const session_wish positions = {.field = NULL};
+    const session_error_request positions = {.field = NULL};
     bool are_any_due = false;
-    *out = (session_wishes){.is_complete = true, .is_counted = scene->statistics_count > 0, .needs_all = has_shells};
-    find_wish(out, views, &positions);
+    *out = (session_error_requests){
+        .is_complete = true, .is_counted = scene->statistics_count > 0, .needs_all = has_shells};
+    find_request(out, views, &positions);
     for (int i = 0; i < views->count; i++) {
         const scene_image *image = &scene->images[i];
         out->is_counted = out->is_counted || image->condition.is_given;
         are_any_due = are_any_due || views->are_due[i];
         if (!views->are_due[i]) continue;
         if (has_whole_layers(mesh, image)) {
-            show_wish(out, views, &positions, i);
+            show_request(out, views, &positions, i);
             out->needs_all = true;
         }
         out->needs_all = out->needs_all || has_fields_of_neighbours(mesh, image);
