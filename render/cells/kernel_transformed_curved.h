@@ -190,17 +190,15 @@ SIMD_INLINE vm kernel_sorted_curved_collapsed(const kernel_sorted_curved *h, boo
     return out;
 }
 
-/* Returns the lanes whose hex has edges parallel to the axes. In the sorted order the neighbours of vertex 0 along x, y
- * and z are vertices 4, 3 and 1. */
-SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_curved *h, bool is_narrow)
+/* Returns the lanes whose hex has edges parallel to the axes: in sorted order the reference coordinates are those along
+ * z, y and x, and each coordinate of a vertex is that of vertex 0 or of its neighbour along the axis. */
+SIMD_INLINE vm kernel_sorted_curved_cuboids(const kernel_sorted_curved *h, bool is_narrow, int type)
 {
     static const int neighbours[3] = {4, 3, 1};
-    static const signed char beside[3][8] = {
-        {0, 0, 0, 0, 1, 1, 1, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 1, 1, 0, 0, 1, 1, 0}};
     vm out = vm_all_lanes();
     for (int axis = 0; axis < 3; axis++)
         for (int i = 1; i < 8; i++) {
-            const int like = beside[axis][i] ? neighbours[axis] : 0;
+            const int like = kernel_cell_shape(type)->corners[i][2 - axis] > 0 ? neighbours[axis] : 0;
             if (i != like) out = vm_and(out, kernel_raw_eq(is_narrow, &h->at[i][axis], &h->at[like][axis]));
         }
     return out;
@@ -225,7 +223,7 @@ SIMD_INLINE vm kernel_sorted_curved_fetch(kernel_transformed_curved *out, const 
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
         memcpy(out->vertex[i], &h.vertex[i], sizeof h.vertex[i]);
     }
-    out->cuboids = kernel_is_box(type) ? vm_bits(kernel_sorted_curved_cuboids(&h, is_narrow)) : 0;
+    out->cuboids = kernel_is_box(type) ? vm_bits(kernel_sorted_curved_cuboids(&h, is_narrow, type)) : 0;
     return kernel_sorted_curved_collapsed(&h, is_narrow, type);
 }
 
@@ -385,9 +383,9 @@ SIMD_INLINE bool kernel_lattice_cells_are_sorted(const kernel_lattice_cells *cel
  * product is computed once for the vertices that share it. In the sorted order, bits 0, 1 and 2 of a vertex's reference
  * coordinates stand for z, y and x. */
 SIMD_INLINE void kernel_lattice_cells_transform(const kernel_lattice_cells *cells, const kernel_frame *f,
-                                                const kernel_tile *tile, int half, kernel_transformed_curved *out)
+                                                const kernel_tile *tile, int half, kernel_transformed_curved *out,
+                                                int type)
 {
-    static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6};
     const double *eye = f->job->camera.eye;
     kernel_f64 parts[3][3][2];
     for (int axis = 0; axis < 3; axis++)
@@ -395,21 +393,22 @@ SIMD_INLINE void kernel_lattice_cells_transform(const kernel_lattice_cells *cell
             const kernel_f64 d = cells->ends[end][axis].half[half] - eye[axis];
             for (int a = 0; a < 3; a++) parts[a][axis][end] = f->scaled_axes[a][axis] * d;
         }
-    for (int b = 0; b < 8; b++) {
-        const int z = b & 1, y = b >> 1 & 1, x = b >> 2, to = vertex[b];
+    for (int i = 0; i < 8; i++) {
+        const float *corner = kernel_cell_shape(type)->corners[i];
+        const int z = corner[0] > 0, y = corner[1] > 0, x = corner[2] > 0;
         kernel_f64 at[3];
         for (int a = 0; a < 3; a++) at[a] = parts[a][0][x] + parts[a][1][y] + parts[a][2][z];
         const kernel_f64 depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
-        kernel_f64_store(out->at[0][to], half, at[0] - tile->centre_x * depth);
-        kernel_f64_store(out->at[1][to], half, at[1] - tile->centre_y * depth);
-        kernel_f64_store(out->at[2][to], half, at[2] - tile->depth_shift);
+        kernel_f64_store(out->at[0][i], half, at[0] - tile->centre_x * depth);
+        kernel_f64_store(out->at[1][i], half, at[1] - tile->centre_y * depth);
+        kernel_f64_store(out->at[2][i], half, at[2] - tile->depth_shift);
     }
 }
 
 /* Stores lattice cells in sorted order. The result has the same bits as that of other hexes. */
 SIMD_INLINE void kernel_lattice_cells_store(const kernel_lattice_cells *cells, int32_t (*const vertices)[SIMD_WIDTH],
                                             const kernel_frame *f, const kernel_tile *tile,
-                                            kernel_transformed_curved *out)
+                                            kernel_transformed_curved *out, int type)
 {
     /* for each vertex in sorted order: its number in the lattice's order, and its rank */
     static const signed char given[8] = {0, 4, 7, 3, 1, 5, 6, 2}, rank[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -419,7 +418,7 @@ SIMD_INLINE void kernel_lattice_cells_store(const kernel_lattice_cells *cells, i
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
         for (int axis = 0; axis < 3; axis++) out->world[axis][i] = cells->ends[rank[i] >> (2 - axis) & 1][axis];
     }
-    for (int half = 0; half < 2; half++) kernel_lattice_cells_transform(cells, f, tile, half, out);
+    for (int half = 0; half < 2; half++) kernel_lattice_cells_transform(cells, f, tile, half, out, type);
     out->cuboids = vm_bits(vm_all_lanes());
 }
 
@@ -434,7 +433,7 @@ SIMD_INLINE vm kernel_transform_curved_vertices(kernel_transformed_curved *out, 
         kernel_lattice_cells lattice;
         kernel_lattice_cells_read(p, vertices[0], &lattice);
         if (kernel_lattice_cells_are_sorted(&lattice)) {
-            kernel_lattice_cells_store(&lattice, vertices, f, tile, out);
+            kernel_lattice_cells_store(&lattice, vertices, f, tile, out, type);
             return vm_none();
         }
     }

@@ -176,8 +176,6 @@ SIMD_INLINE void kernel_tet_lanes_view_bounds(const kernel_finder *s, const kern
 static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kernel_finder *s, const kernel_cells *c,
                                                                      kernel_curved_lanes *l)
 {
-    static const signed char ends[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
-                                           {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
     const render_camera *camera = &s->frame->job->camera;
     const double *axes[3] = {camera->right, camera->up, camera->forward};
     kernel_lattice_cells cells;
@@ -196,9 +194,9 @@ static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kerne
         l->fitting_lanes = kernel_positions_fit_lanes(l->fitting_lanes, place);
     }
     for (int i = 0; i < 8; i++) {
-        const signed char *at = ends[i];
-        for (int a = 0; a < 3; a++)
-            l->at[i][a] = (parts[a][0][(int)at[0]] + parts[a][1][(int)at[1]]) + parts[a][2][(int)at[2]];
+        const float *corner = kernel_cell_shape(c->type)->corners[i];
+        const int x = corner[0] > 0, y = corner[1] > 0, z = corner[2] > 0;
+        for (int a = 0; a < 3; a++) l->at[i][a] = (parts[a][0][x] + parts[a][1][y]) + parts[a][2][z];
     }
 }
 

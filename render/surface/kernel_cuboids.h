@@ -159,15 +159,6 @@ SIMD_INLINE vm kernel_cuboid_interval(const kernel_cuboids *cells, const float (
     return vf_le(begin, end);
 }
 
-/* Computes the field's gradient at the reference coordinates r, in these coordinates. */
-SIMD_INLINE void kernel_cuboid_gradient(const vf c[8], const vf r[3], vf out[3])
-{
-    const vf rs = c[4] + c[7] * r[2];
-    out[0] = (c[1] + rs * r[1]) + c[5] * r[2];
-    out[1] = (c[2] + rs * r[0]) + c[6] * r[2];
-    out[2] = c[3] + ((c[5] * r[0] + c[6] * r[1]) + c[7] * (r[0] * r[1]));
-}
-
 /* Computes the coefficients of the field along each ray's interval. */
 SIMD_INLINE void kernel_cuboid_polynomial(const kernel_cuboids *cells, vi lane, kernel_cuboid_ray *ray)
 {
@@ -175,10 +166,9 @@ SIMD_INLINE void kernel_cuboid_polynomial(const kernel_cuboids *cells, vi lane, 
     vf g[3];
     for (int i = 0; i < 8; i++) ray->field[i] = kernel_gather_lane(cells->field[i], lane);
     ray->value_error = kernel_gather_lane(cells->value_error, lane);
-    kernel_cuboid_gradient(c, r, g);
-    const vf rs = r[0] * r[1];
-    ray->k[0] = ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + rs * c[4];
-    ray->k[0] += r[2] * ((r[0] * c[5] + r[1] * c[6]) + rs * c[7]);
+    const kernel_product m = kernel_product_at(false, r);
+    kernel_gradient_of(c, false, &m, r, g);
+    ray->k[0] = kernel_value_of(c, false, &m, r);
     ray->k[1] = kernel_dot(g, d);
     ray->k[2] =
         (d[0] * d[1]) * (c[4] + c[7] * r[2]) + d[2] * (d[0] * (c[5] + c[7] * r[1]) + d[1] * (c[6] + c[7] * r[0]));
@@ -279,7 +269,8 @@ SIMD_INLINE void kernel_cuboid_roots_of(const kernel_cuboids *cells, const float
         out->one = vm_and(out->one, inside);
     }
     out->t = ray.origin[2] + (ray.begin + s * ray.length);
-    kernel_cuboid_gradient(ray.field, out->r, g);
+    const kernel_product m = kernel_product_at(false, out->r);
+    kernel_gradient_of(ray.field, false, &m, out->r, g);
     for (int a = 0; a < 3; a++)
         out->normal[a] = (g[0] * ray.normal[0][a] + g[1] * ray.normal[1][a]) + g[2] * ray.normal[2][a];
 }
