@@ -2,14 +2,13 @@
  * steps with new values and bytes per cell, in turns in one process. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
-#include <unistd.h>
 
 #include <mpi.h>
 
 #include "bench_command.h"
 #include "bench_scene.h"
+#include "bench_session.h"
 #include "bench_stats.h"
-#include "insitu/insitu.h"
 
 enum { BLOCK = 16, CORNERS = 8, PHASES = 2, FULL_TREE = 12 };
 
@@ -104,35 +103,14 @@ static void free_grid(bench_grid *g)
     free(g->connectivity);
 }
 
-static void must(insitu_session *session, insitu_status status)
+static void write_scene(const void *of, FILE *file)
 {
-    if (status == INSITU_OK) return;
-    fprintf(stderr, "bench_blocks: %s\n", insitu_error(session));
-    exit(1);
-}
-
-static insitu_session *open_session(const bench_scene *scene)
-{
-    char path[] = "/tmp/bench_blocks_XXXXXX";
-    insitu_session *session = NULL;
-    const int descriptor = mkstemp(path);
-    FILE *file = descriptor >= 0 ? fdopen(descriptor, "w") : NULL;
-    if (!file) {
-        perror(path);
-        exit(1);
-    }
+    const bench_scene *scene = of;
     fprintf(file, "threads: %d\nimages:\n  - name: picture\n    size: [%d, %d]\n", scene->subject.threads,
             scene->job.camera.width, scene->job.camera.height);
-    fprintf(file, "    camera: {position: [%g, %g, %g], focal: [%g, %g, %g], up: [%g, %g, %g], angle: %g}\n",
-            bench_eye[0], bench_eye[1], bench_eye[2], bench_focal[0], bench_focal[1], bench_focal[2], bench_up[0],
-            bench_up[1], bench_up[2], bench_degrees);
+    bench_write_camera(file);
     fprintf(file, "    layers: [isosurface: {field: f, values: [%g]}]\n    outputs: [{path: picture.png}]\n",
             bench_isovalues[0]);
-    fclose(file);
-    const insitu_status status = insitu_create(MPI_COMM_WORLD, path, &session);
-    unlink(path);
-    must(session, status);
-    return session;
 }
 
 static void set_mesh(insitu_session *session, const bench_grid *g)
@@ -155,8 +133,9 @@ static void set_mesh(insitu_session *session, const bench_grid *g)
         } else {
             mesh.lattice = &lattice;
         }
-        must(session, g->form == AS_BLOCKS ? insitu_set_block(session, "cube", block, &mesh)
-                                           : insitu_set_mesh(session, "cube", &mesh));
+        bench_must(g->scene, session,
+                   g->form == AS_BLOCKS ? insitu_set_block(session, "cube", block, &mesh)
+                                        : insitu_set_mesh(session, "cube", &mesh));
     }
 }
 
@@ -169,18 +148,19 @@ static void set_values(insitu_session *session, const bench_grid *g, int phase)
     field.changed = INSITU_CHANGED_VALUES;
     for (int64_t block = 0; block < g->block_count; block++) {
         field.values = (insitu_array){.data = g->values[phase] + block * g->block_vertices, .type = INSITU_FLOAT32};
-        must(session, g->form == AS_BLOCKS ? insitu_set_block_field(session, "cube", block, &field)
-                                           : insitu_set_field(session, "cube", &field));
+        bench_must(g->scene, session,
+                   g->form == AS_BLOCKS ? insitu_set_block_field(session, "cube", block, &field)
+                                        : insitu_set_field(session, "cube", &field));
     }
 }
 
 static void measure_first_step(const bench_grid *g, int number, bench_series *series)
 {
-    insitu_session *session = open_session(g->scene);
+    insitu_session *session = bench_open_session(g->scene, write_scene, g->scene);
     const double began = bench_begin();
     set_mesh(session, g);
     set_values(session, g, 0);
-    must(session, insitu_step(session, 0, 0));
+    bench_must(g->scene, session, insitu_step(session, 0, 0));
     bench_end(began, number, series);
     insitu_destroy(&session);
 }
@@ -193,7 +173,7 @@ static void measure_new_values(insitu_session *session, const bench_grid *g, int
 {
     set_values(session, g, number % PHASES);
     const double began = bench_begin();
-    must(session, insitu_step(session, 0, 0));
+    bench_must(g->scene, session, insitu_step(session, 0, 0));
     bench_end(began, number, &times->whole);
     bench_add_sample(1e-3 * insitu_last_report(session)->surface_ms, number, &times->trace);
 }
@@ -218,7 +198,7 @@ static void print(const bench_grid *g, const insitu_report *report, bench_times 
 
 static void measure(const bench_command *command, test_mesh_kind kind, int n)
 {
-    bench_scene scene = {.subject = {.program = "bench_blocks"}};
+    bench_scene scene; /* for its camera alone */
     (void)kind;
     bench_scene_create(&scene, "bench_blocks", TEST_HEXES, 1);
     bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
@@ -232,7 +212,7 @@ static void measure(const bench_command *command, test_mesh_kind kind, int n)
         for (bench_form form = 0; form < FORM_COUNT; form++)
             measure_first_step(&grids[form], number, &times[form].first);
     for (bench_form form = 0; form < FORM_COUNT; form++) {
-        sessions[form] = open_session(&scene);
+        sessions[form] = bench_open_session(&scene, write_scene, &scene);
         set_mesh(sessions[form], &grids[form]);
         for (int i = 0; i < FULL_TREE; i++) measure_new_values(sessions[form], &grids[form], 0, &times[form]);
     }

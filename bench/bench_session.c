@@ -84,11 +84,16 @@ const char *bench_picture_name(bench_picture picture)
     return names[picture];
 }
 
-static void must(const bench_session *s, insitu_status status)
+void bench_must(const bench_scene *scene, insitu_session *session, insitu_status status)
 {
     if (status == INSITU_OK) return;
-    fprintf(stderr, "%s: %s\n", s->scene->subject.program, insitu_error(s->session));
+    fprintf(stderr, "%s: %s\n", scene->subject.program, insitu_error(session));
     exit(1);
+}
+
+static void must(const bench_session *s, insitu_status status)
+{
+    bench_must(s->scene, s->session, status);
 }
 
 static float *copy(const float *from, int64_t count)
@@ -250,6 +255,13 @@ static void write_isosurface(bench_picture picture, FILE *file)
     fprintf(file, "}\n");
 }
 
+void bench_write_camera(FILE *file)
+{
+    fprintf(file, "    camera: {position: [%g, %g, %g], focal: [%g, %g, %g], up: [%g, %g, %g], angle: %g}\n",
+            bench_eye[0], bench_eye[1], bench_eye[2], bench_focal[0], bench_focal[1], bench_focal[2], bench_up[0],
+            bench_up[1], bench_up[2], bench_degrees);
+}
+
 /* Writes an image with a layer of this picture. part: number of the image in a montage, whose pictures are a quarter as
  * large; -1: it is alone. */
 static void write_image(const bench_session *s, bench_picture picture, int part, const char *ending, FILE *file)
@@ -259,9 +271,7 @@ static void write_image(const bench_session *s, bench_picture picture, int part,
     const bool is_small = picture == BENCH_Q_CRITERION;
     fprintf(file, "  - name: picture%d\n    size: [%d, %d]\n", part + 1, is_small ? least : camera->width / side,
             is_small ? least : camera->height / side);
-    fprintf(file, "    camera: {position: [%g, %g, %g], focal: [%g, %g, %g], up: [%g, %g, %g], angle: %g}\n",
-            bench_eye[0], bench_eye[1], bench_eye[2], bench_focal[0], bench_focal[1], bench_focal[2], bench_up[0],
-            bench_up[1], bench_up[2], bench_degrees);
+    bench_write_camera(file);
     fprintf(file, "    layers:\n");
     if (picture == BENCH_VOLUME)
         write_volume(s, file);
@@ -272,20 +282,28 @@ static void write_image(const bench_session *s, bench_picture picture, int part,
     fprintf(file, "    outputs: [{path: picture%s%s}]\n", ending, part < 0 ? "" : ", grid: [2, 2]");
 }
 
-static void write_scene(const bench_session *s, const char *ending, FILE *file)
+/* A session's scene, and the ending of its pictures' names. */
+typedef struct scene_file {
+    const bench_session *session;
+    const char *ending;
+} scene_file;
+
+static void write_scene(const void *of, FILE *file)
 {
     static const bench_picture parts[BENCH_VIEWS] = {BENCH_SLICE, BENCH_SURFACE, BENCH_CLIPPED, BENCH_ISOSURFACE};
+    const scene_file *written = of;
+    const bench_session *s = written->session;
     fprintf(file, "threads: %d\n", s->scene->subject.threads);
     if (shows_q(s->picture)) fprintf(file, "fields: {q: {q_criterion: v}}\n");
     if (s->picture == BENCH_WARPED) fprintf(file, "meshes: {cube: {warp: {field: v, scale: %g}}}\n", bench_warp);
     if (s->picture == BENCH_MIRRORED) fprintf(file, "meshes: {cube: {mirror: {x: %g}}}\n", bench_mirror);
     fprintf(file, "images:\n");
-    if (s->picture != BENCH_MONTAGE) write_image(s, s->picture, -1, ending, file);
-    for (int i = 0; i < BENCH_VIEWS && s->picture == BENCH_MONTAGE; i++) write_image(s, parts[i], i, ending, file);
+    if (s->picture != BENCH_MONTAGE) write_image(s, s->picture, -1, written->ending, file);
+    for (int i = 0; i < BENCH_VIEWS && s->picture == BENCH_MONTAGE; i++)
+        write_image(s, parts[i], i, written->ending, file);
 }
 
-/* Opens a session whose picture has this ending; .exr has depth. */
-static insitu_session *open_session(const bench_session *s, const char *ending)
+insitu_session *bench_open_session(const bench_scene *scene, void (*write)(const void *of, FILE *file), const void *of)
 {
     char path[] = "/tmp/bench_session_XXXXXX";
     insitu_session *session = NULL;
@@ -295,12 +313,19 @@ static insitu_session *open_session(const bench_session *s, const char *ending)
         perror(path);
         exit(1);
     }
-    write_scene(s, ending, file);
+    write(of, file);
     fclose(file);
     const insitu_status status = insitu_create(MPI_COMM_WORLD, path, &session);
     unlink(path);
-    must(s, status);
+    bench_must(scene, session, status);
     return session;
+}
+
+/* Opens a session whose picture has this ending; .exr has depth. */
+static insitu_session *open_session(const bench_session *s, const char *ending)
+{
+    const scene_file written = {s, ending};
+    return bench_open_session(s->scene, write_scene, &written);
 }
 
 static bool is_building(const bench_session *s)

@@ -4,6 +4,8 @@
 #ifndef BENCH_SESSION_H
 #define BENCH_SESSION_H
 
+#include <stdio.h>
+
 #include "bench_scene.h"
 #include "insitu/insitu.h"
 
@@ -66,6 +68,15 @@ typedef struct bench_session {
     bench_series whole, parts[BENCH_PARTS];
     int64_t bytes_trees, bytes_peak;
 } bench_session;
+
+/* Opens a session with the scene that write() writes to the file; `of` is passed on. Errors end the process. */
+insitu_session *bench_open_session(const bench_scene *scene, void (*write)(const void *of, FILE *file), const void *of);
+
+/* Ends the process with the session's message if the status is an error. */
+void bench_must(const bench_scene *scene, insitu_session *session, insitu_status status);
+
+/* Writes the line of a scene file with the benchmarks' camera. */
+void bench_write_camera(FILE *file);
 
 /* The scene is borrowed; MPI is initialized. Some steps are taken, so that the session knows what changes and what does
  * not. */
