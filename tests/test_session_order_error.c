@@ -438,42 +438,6 @@ static void defaults_are_within_a_quarter_of_a_pixel(void **state)
     order_mesh_free(&mesh);
 }
 
-#define VOLUME SMALL("volume: {field: f, range: [-1, 1], opacity: [[0, 0], [1, 0.8]]}")
-
-/* Volumes have 2 pieces if the values of 1 are off by more than 1 % of the range. Values are then off by a quarter, and
- * the picture, which is opaque in part, by less than half of that of 1 piece. In straight cells that contain a plane, 1
- * piece suffices. */
-static void volumes_have_the_pieces_that_their_values_need(void **state)
-{
-    (void)state;
-    const order_kind tet = {"tet 2", INSITU_QUADRATIC_TET, INSITU_ORDER_VTK, 2};
-    const order_kind *kinds[] = {&hex_27, &tet};
-    for (int k = 0; k < 2; k++) {
-        order_mesh mesh, whole, plane;
-        order_mesh_create(kinds[k], 2, 0, order_wavy, own_rank, rank_count, &mesh);
-        order_mesh_create(kinds[k], 2, 0, order_wavy, 0, 1, &whole);
-        order_mesh_create(kinds[k], 2, 0, order_plane, own_rank, rank_count, &plane);
-        told of = draw(MPI_COMM_WORLD, "images:\n" VOLUME, &mesh),
-             alone = draw(MPI_COMM_SELF, "images:\n" VOLUME, &whole);
-        told coarse = draw(MPI_COMM_WORLD, FINER("1") VOLUME, &mesh),
-             fine = draw(MPI_COMM_WORLD, FINER("8") VOLUME, &mesh);
-        double differences[2] = {0, 1};
-        if (own_rank == 0) differences[0] = colour_difference(&of.pictures.pictures[0], &fine.pictures.pictures[0]);
-        if (own_rank == 0) differences[1] = colour_difference(&coarse.pictures.pictures[0], &fine.pictures.pictures[0]);
-        if (own_rank == 0) printf("%s; %.4f, and %.4f with 1\n", of.pieces, differences[0], differences[1]);
-        everywhere(of.count == 2 && strstr(of.pieces, "; values in volumes within ") != NULL);
-        everywhere(strcmp(of.pieces, alone.pieces) == 0 && differences[0] < differences[1] / 2);
-        everywhere(tell("images:\n" VOLUME, &plane).count == 1);
-        free_drawn(&of.pictures);
-        free_drawn(&alone.pictures);
-        free_drawn(&coarse.pictures);
-        free_drawn(&fine.pictures);
-        order_mesh_free(&mesh);
-        order_mesh_free(&whole);
-        order_mesh_free(&plane);
-    }
-}
-
 /* Straight hexes of 20 nodes are drawn as those of 27 nodes that have the same polynomials, with one piece between two
  * nodes if no isosurface needs more. The field has no terms that 20 nodes do not determine. */
 static void serendipity_cells_are_completed(void **state)
@@ -630,7 +594,6 @@ int main(int argc, char **argv)
         cmocka_unit_test(other_descriptions_have_the_same_pieces),
         cmocka_unit_test(fields_without_a_bound_are_told),
         cmocka_unit_test(defaults_are_within_a_quarter_of_a_pixel),
-        cmocka_unit_test(volumes_have_the_pieces_that_their_values_need),
         cmocka_unit_test(serendipity_cells_are_completed),
         cmocka_unit_test(linear_meshes_are_not_affected),
         cmocka_unit_test(the_number_is_in_the_database),

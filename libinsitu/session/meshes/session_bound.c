@@ -31,6 +31,7 @@
 #include "session_bound.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "memory.h"
@@ -45,6 +46,9 @@ enum {
     MOST_DIRECTIONS = 7, /* number of directions of the edges of pieces in one simplex */
     TET_SHAPES = 5
 };
+
+/* Number of directions of the edges of pieces in a simplex, by its dimensions. */
+static const int direction_counts[] = {0, 1, 3, MOST_DIRECTIONS};
 
 /* ---- one simplex ----------------------------------------------------------------------------------------------- */
 
@@ -186,10 +190,9 @@ static void list_differences(const node_lists *lists, session_bound_factor *out)
 {
     static const int directions[MOST_DIRECTIONS][4] = {{-1, 1, 0, 0}, {-1, 0, 1, 0}, {0, -1, 1, 0}, {-1, 0, 0, 1},
                                                        {0, -1, 0, 1}, {0, 0, -1, 1}, {-1, -1, 1, 1}};
-    static const int counts[] = {0, 1, 3, MOST_DIRECTIONS};
     const int count = list_nodes(lists->dimensions, lists->order - 2, lists->lower);
     for (int n = 0; n < count; n++)
-        for (int d = 0; d < counts[lists->dimensions]; d++) add_difference(lists, n, d, directions[d], out);
+        for (int d = 0; d < direction_counts[lists->dimensions]; d++) add_difference(lists, n, d, directions[d], out);
 }
 
 static double *make_matrix(int rows, int columns)
@@ -604,6 +607,116 @@ static double find_node_distance(const session_bound *of, const double *tuples)
     return sqrt(sum / shape->edge_count) / of->nodes.of.order;
 }
 
+/* Estimates the cell's volume from the mean edge along each axis of the reference cell. */
+static double find_volume(const session_bound *of, const double *tuples)
+{
+    const session_shape *shape = session_shape_of(of->nodes.of.type);
+    const double share = of->nodes.of.type == GRID_TET ? 1.0 / 6 : of->nodes.of.type == GRID_WEDGE ? 0.5 : 1;
+    double axes[3][3] = {{0}}, cross[3];
+    int counts[3] = {0};
+    for (int e = 0; e < shape->edge_count; e++) {
+        const int from = shape->edges[e][0], to = shape->edges[e][1];
+        int steps[3], axis = 0, sum = 0;
+        for (int a = 0; a < 3; a++) {
+            steps[a] = shape->corners[to][a] - shape->corners[from][a];
+            sum += abs(steps[a]);
+            axis = steps[a] ? a : axis;
+        }
+        if (sum > 1) continue; /* an edge that is not parallel to an axis */
+        counts[axis]++;
+        for (int x = 0; x < 3; x++)
+            axes[axis][x] +=
+                steps[axis] * (tuples[SIZE * of->nodes.corners[to] + x] - tuples[SIZE * of->nodes.corners[from] + x]);
+    }
+    vector3_cross(axes[0], axes[1], cross);
+    return of->axis_count < 3 ? 0 : share * fabs(vector3_dot(cross, axes[2])) / (counts[0] * counts[1] * counts[2]);
+}
+
+/* Finds the mean gradient of the field at the nodes of the level's lattice. In straight cells, whose positions differ
+ * by rounding only, it is 0, because it is not needed. Elsewhere it may be not finite. */
+static void find_mean_gradient(bound_job *job, const session_cell_bound *bound, double out[3])
+{
+    static const double straight = 1e-6;
+    const int count = job->of->levels[job->level].count;
+    for (int x = 0; x < 3; x++) out[x] = 0;
+    if (bound->position_error <= straight * bound->radius) return;
+    find_gradients(job);
+    for (int n = 0; n < count; n++)
+        for (int x = 0; x < 3; x++) out[x] += job->gradients[n][x] / count;
+}
+
+/* Mean of u and of its square over the pieces of a cell, for m = 1. */
+typedef struct difference_means {
+    double mean, square;
+} difference_means;
+
+/* Returns the means of u over a piece of a simplex with these second derivatives along its edges, in the order of
+ * list_differences(). u is half the sum of -second l_i l_j over the edges; the means of products of l_i are known. */
+static difference_means find_means(int dimensions, const double *second)
+{
+    static const int edge_counts[] = {0, 1, 3, 6};
+    static const double singles[] = {0, 1.0 / 6, 1.0 / 12, 1.0 / 20}; /* mean of l_i l_j, by dimensions */
+    /* means of l_i^2 l_j^2, l_i^2 l_j l_k and l_i l_j l_k l_l */
+    static const double products[][3] = {{0}, {1.0 / 30}, {1.0 / 90, 1.0 / 180}, {1.0 / 210, 1.0 / 420, 1.0 / 840}};
+    difference_means out = {0, 0};
+    for (int d = 0; d < edge_counts[dimensions]; d++) {
+        out.mean -= 0.5 * singles[dimensions] * second[d];
+        for (int e = 0; e < edge_counts[dimensions]; e++) {
+            const bool is_opposite = dimensions == 3 && d + e == 5;
+            out.square += 0.25 * second[d] * second[e] * products[dimensions][d == e ? 0 : is_opposite ? 2 : 1];
+        }
+    }
+    return out;
+}
+
+/* Returns the means over a cell for one factor. coefficients: of a scalar. inner: number of coefficients from one of
+ * the factor to the next. */
+static difference_means find_factor_means(const bound_job *job, const session_bound_factor *factor, int inner,
+                                          const double *coefficients)
+{
+    const int p = job->of->nodes.of.order, all = job->of->nodes.complete.count;
+    const int directions = direction_counts[factor->dimensions];
+    difference_means out = {0, 0};
+    int count = 0;
+    for (int outer = 0; outer < all; outer += inner * factor->node_count)
+        for (int s = 0; s < inner; s++)
+            for (int d = 0; d < factor->difference_count; d += directions, count++) {
+                double second[MOST_DIRECTIONS];
+                for (int n = 0; n < directions; n++) {
+                    const session_second_difference *of = &factor->differences[d + n];
+                    second[n] = 0;
+                    for (int t = 0; t < of->count; t++)
+                        second[n] += p * (p - 1) * of->weights[t] * coefficients[outer + of->nodes[t] * inner + s];
+                }
+                const difference_means own = find_means(factor->dimensions, second);
+                out.mean += own.mean;
+                out.square += own.square;
+            }
+    return (difference_means){out.mean / fmax(1, count), out.square / fmax(1, count)};
+}
+
+/* Returns the root mean square of u in the pieces of the cell, for m = 1, as if its second derivatives were those of
+ * the coefficients. At a point of space, the field differs by u of the values minus the gradient times u of the
+ * positions, to first order. The tets of octahedra are taken to have the shape of the others, and the differences of
+ * the factors to be independent. coefficients: working memory of a number for each node. */
+static double mean_difference(const bound_job *job, const double gradient[3], double *coefficients)
+{
+    double mean = 0, variance = 0;
+    int inner = 1;
+    for (int i = 0; i < job->of->nodes.complete.count; i++) {
+        const double *tuple = job->coefficients + SIZE * i;
+        coefficients[i] = tuple[3] - vector3_dot(gradient, tuple);
+    }
+    for (int f = 0; f < count_factors(job->of->nodes.of.type); f++) {
+        const session_bound_factor *factor = factor_of(job->of, f);
+        const difference_means own = find_factor_means(job, factor, inner, coefficients);
+        mean += own.mean;
+        variance += own.square - own.mean * own.mean;
+        inner *= factor->node_count;
+    }
+    return sqrt(fmax(0, mean * mean + variance));
+}
+
 bool session_may_cross(const session_bound *of, const double *values, const session_isovalues *isovalues, double *work)
 {
     bound_job job = {.of = of};
@@ -632,7 +745,13 @@ session_cell_bound session_bound_cell(const session_bound *of, const double *tup
     if (!out.is_crossed) return out;
     bound_differences(&job);
     out.position_error = job.position_bound / (p * p);
-    out.value_error = job.value_bound / (p * p);
-    if (isovalues) bound_isosurface(&job, &out);
+    if (isovalues) {
+        bound_isosurface(&job, &out);
+        return out;
+    }
+    double gradient[3];
+    find_mean_gradient(&job, &out, gradient);
+    out.value_error = mean_difference(&job, gradient, job.work) / (p * p);
+    out.volume = find_volume(of, tuples);
     return out;
 }

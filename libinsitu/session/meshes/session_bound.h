@@ -83,7 +83,10 @@ typedef struct session_cell_bound {
     double position_error; /* upper bound of the distance between positions */
     /* upper bound of the distance between isosurfaces; INFINITY if the gradient may vanish near one */
     double surface_error;
-    double value_error; /* upper bound of the difference between values of the field, in their unit */
+    /* Only without isovalues, and estimates: the root mean square of the difference between values of the field at the
+     * same point of space, in their unit, which may be not finite if the cell is flat; and the cell's volume, which is
+     * 0 for shells. */
+    double value_error, volume;
 } session_cell_bound;
 
 /* Computes the bounds of a cell. tuples: x, y, z and the field's value at its nodes, in the order of its row.

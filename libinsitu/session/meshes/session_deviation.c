@@ -138,18 +138,21 @@ static double find_surface_error(const deviation_work *w, const session_bound *o
     return least;
 }
 
-/* Extends the range in *out by a cell's values and, if some view shows the cell, raises value_error to the bound of
- * their error. */
-static void measure_values(const deviation_work *w, int count, const session_cell_bound *bound, const double *values,
+/* Extends the range in *out by a cell's values, and passes the cell to the request's function. */
+static void measure_values(const deviation_work *w, const session_bound *of, int64_t cell, double *buffer,
                            session_deviation *out)
 {
-    const session_pixels *pixels = &w->request->pixels;
+    const session_deviation_request *request = w->request;
+    const int count = of->nodes.of.count;
+    const double *values = buffer + w->field_size;
     for (int n = 0; n < count; n++) {
         out->low = fmin(out->low, values[n]);
         out->high = fmax(out->high, values[n]);
     }
-    if (pixels->size(pixels->of, bound->centre, bound->radius) < INFINITY)
-        out->value_error = fmax(out->value_error, bound->value_error);
+    if (!request->use_cell) return;
+    const session_cell_bound bound = bound_cell(w, of, cell, 0, buffer);
+    const session_value_cell read = {count, (const double(*)[4])(values + count), &bound};
+    if (bound.is_crossed) request->use_cell(request->of_values, &read);
 }
 
 /* Measures a cell, and updates *out. A cell whose error is below the largest error so far does not affect the result,
@@ -159,12 +162,9 @@ static void measure_cell(const deviation_work *w, int64_t cell, double *buffer, 
     const session_bound *of = &w->bounds[session_kind_of(&w->rows, cell)];
     const session_pixels *pixels = &w->request->pixels;
     if (!of->level_count || grid_is_ghost(&w->rows.cells, cell) || !may_cross(w, of, cell, buffer)) return;
-    if (w->request->marks_only || of->nodes.of.order < 2) return;
+    if (w->request->is_of_values) measure_values(w, of, cell, buffer, out);
+    if (w->request->is_of_values || w->request->marks_only || of->nodes.of.order < 2) return;
     const session_cell_bound bound = bound_cell(w, of, cell, 0, buffer);
-    if (w->request->is_of_values) {
-        if (bound.is_crossed) measure_values(w, of->nodes.of.count, &bound, buffer + w->field_size, out);
-        return;
-    }
     const double size = bound.is_crossed ? pixels->size(pixels->of, bound.centre, bound.radius) : INFINITY;
     if (size == INFINITY) return;
     double error = bound.position_error;
@@ -182,10 +182,10 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
     const int64_t cells = w->rows.cells.cell_count;
     const size_t buffer_size = find_buffer_size(w);
     bool is_lacking = false;
-    double error = out->error, value_error = out->value_error, low = out->low, high = out->high;
+    double error = out->error, low = out->low, high = out->high;
     int64_t count = 0, unbounded = 0;
 #pragma omp parallel num_threads(session_region_threads(threads, cells)) reduction(|| : is_lacking)                    \
-    reduction(max : error, value_error, high) reduction(min : low) reduction(+ : count, unbounded)
+    reduction(max : error, high) reduction(min : low) reduction(+ : count, unbounded)
     {
         region_enter();
         double *buffer = base_alloc(buffer_size * sizeof *buffer);
@@ -195,7 +195,6 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
         for (int64_t cell = 0; cell < cells; cell++)
             if (buffer) measure_cell(w, cell, buffer, &own);
         error = own.error;
-        value_error = own.value_error;
         low = own.low;
         high = own.high;
         count = own.cell_count;
@@ -204,7 +203,6 @@ static bool measure_cells(const deviation_work *w, int threads, session_deviatio
         region_leave();
     }
     out->error = error;
-    out->value_error = value_error;
     out->low = low;
     out->high = high;
     out->cell_count += count;

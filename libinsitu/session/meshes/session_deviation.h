@@ -15,6 +15,13 @@ typedef struct session_pixels {
     double (*size)(const void *of, const double centre[3], double radius);
 } session_pixels;
 
+/* A cell whose values are measured. */
+typedef struct session_value_cell {
+    int count;                 /* number of nodes */
+    const double (*tuples)[4]; /* x, y, z and the value at each node, in the order of the cell's row */
+    const session_cell_bound *bound;
+} session_value_cell;
+
 /* A request to measure a mesh: its isosurfaces, the values of a field, or the positions of its cells. */
 typedef struct session_deviation_request {
     /* values of the field that is measured, or whose isosurfaces are. NULL: positions are measured, of the cells that
@@ -24,9 +31,13 @@ typedef struct session_deviation_request {
     session_isovalues isovalues; /* isovalues of the field; if `plane` is given, the distance 0 from it */
     const session_plane *plane;
     session_pixels pixels;
-    bool is_of_values; /* set if the error of the field's values is measured, instead of that of its isosurfaces */
-    bool is_lobatto;   /* as in session_make_interpolation() */
-    bool marks_only;   /* set if cells are only marked, not measured */
+    bool is_of_values; /* set if the range of the field's values is measured, instead of the error of its isosurfaces */
+    /* if is_of_values: receives each cell, and `of_values`; several threads call it at once. NULL: only the range of
+     * the values is needed. */
+    void (*use_cell)(void *of, const session_value_cell *cell);
+    void *of_values;
+    bool is_lobatto; /* as in session_make_interpolation() */
+    bool marks_only; /* set if cells are only marked, not measured */
     /* one byte per cell, which is set if an isosurface or the plane may cross the cell; NULL: cells are not marked */
     unsigned char *marks;
 } session_deviation_request;
@@ -47,9 +58,7 @@ typedef struct session_deviation {
     /* number of cells that an isosurface may cross, and of those among them whose bound was replaced by a smaller
      * limit, because their nodes are too far apart to resolve the isosurface */
     int64_t cell_count, unbounded_count;
-    /* if is_of_values: largest bound of the error of values, if cells have one piece between two nodes, and the range
-     * of the values at nodes */
-    double value_error, low, high;
+    double low, high; /* if is_of_values: the range of the values at nodes */
 } session_deviation;
 
 /* Measures the caller's cells of a mesh with cells of higher order, ghosts excepted, adds the result to *out, and sets

@@ -497,8 +497,9 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
     X(CYAML_FIELD_FLOAT_PTR("surface_error", OPTIONAL, scene_file, surface_error),                                     \
       .help = "Cells of higher order are drawn as linear pieces, whose number is chosen, from 1 to 8 for each "        \
               "mesh and step: isosurfaces, and positions in other layers, are at most so many pixels away from "       \
-              "those of the cells' polynomials. The report tells the numbers and the bounds. Meshes all of whose "     \
-              "cells are refined have at most 2 pieces, unless the scene gives this key. See [Cells of higher "        \
+              "those of the cells' polynomials. The report tells the numbers and the bounds. Volumes have as "         \
+              "many as their `max_error` needs. Meshes all of whose cells are refined for other reasons have at most " \
+              "2 pieces, unless the scene gives this key. See [Cells of higher "                                       \
               "order](high_order.md#an-error-in-pixels).",                                                             \
       .default_text = "`0.25`", .low = 0, .is_low_excluded = true, .high = 1000)                                       \
     X(CYAML_FIELD_FLOAT_PTR("finer_memory", OPTIONAL, scene_file, finer_memory),                                       \

@@ -30,7 +30,7 @@ insitu_status session_make_due_views(const scene *scene, const session_moment *m
                                      MPI_Comm comm, session_due_views *out, base_error *error)
 {
     bool needs_extent = false;
-    *out = (session_due_views){.count = scene->image_count};
+    *out = (session_due_views){.scene = scene, .count = scene->image_count};
     out->are_due = base_calloc((size_t)out->count, sizeof *out->are_due);
     out->cameras = base_calloc((size_t)out->count, sizeof *out->cameras);
     if (!out->are_due || !out->cameras)
@@ -39,7 +39,9 @@ insitu_status session_make_due_views(const scene *scene, const session_moment *m
     for (int i = 0; i < out->count; i++) {
         const scene_image *image = &scene->images[i];
         out->are_due[i] = session_is_due(image, moment);
-        needs_extent = needs_extent || (out->are_due[i] && (image->camera.is_automatic || image->slice_count > 0));
+        needs_extent =
+            needs_extent ||
+            (out->are_due[i] && (image->camera.is_automatic || image->slice_count > 0 || image->volume_count > 0));
     }
     if (needs_extent && session_find_nodal_extent(meshes, comm, &out->extent, error)) return error->status;
     for (int i = 0; i < out->count; i++) {
@@ -96,9 +98,23 @@ static bool is_same_plane(const session_plane *a, const session_plane *b)
     return is_same;
 }
 
+/* Returns whether two volumes have the same transfer function. Images of a series have copies of one volume. */
+static bool is_same_volume(const scene_volume *a, const scene_volume *b)
+{
+    if (!a || !b) return a == b;
+    const scene_colour_map *x = &a->colour_map, *y = &b->colour_map;
+    bool is_same = a->opacity_count == b->opacity_count && a->unit_distance == b->unit_distance &&
+                   x->count == y->count && x->is_banded == y->is_banded && x->scale == y->scale &&
+                   x->threshold == y->threshold && x->range.is_fixed == y->range.is_fixed &&
+                   x->range.low == y->range.low && x->range.high == y->range.high && x->range.source == y->range.source;
+    for (int i = 0; i < a->opacity_count && is_same; i++)
+        is_same = a->opacity[i].position == b->opacity[i].position && a->opacity[i].opacity == b->opacity[i].opacity;
+    return is_same && memcmp(x->colours, y->colours, (size_t)x->count * 3 * sizeof *x->colours) == 0;
+}
+
 static bool is_same_request(const session_error_request *a, const session_error_request *b)
 {
-    if (a->is_volume != b->is_volume || a->allowed != b->allowed || a->width != b->width) return false;
+    if (!is_same_volume(a->volume, b->volume) || a->allowed != b->allowed) return false;
     if (a->has_plane || b->has_plane) return a->has_plane && b->has_plane && is_same_plane(&a->plane, &b->plane);
     if (!a->field || !b->field) return !a->field && !b->field;
     return strcmp(a->field, b->field) == 0 && a->component == b->component;
@@ -212,12 +228,10 @@ static void add_volume(session_error_requests *requests, const session_due_views
     const scene_volume *shown = &image->volumes[layer];
     const session_catalogue_field *field = find_shown(mesh, &shown->field);
     if (!field || !is_polynomial(mesh, field, &shown->field)) return;
-    const scene_range *range = &shown->colour_map.range;
     const session_error_request like = {.field = field->name,
                                         .component = session_resolve_component(&shown->field, field->component_count),
-                                        .is_volume = true,
-                                        .allowed = image->max_error > 0 ? image->max_error : usual_error,
-                                        .width = range->is_fixed ? fabs(range->high - range->low) : 0};
+                                        .volume = shown,
+                                        .allowed = image->max_error > 0 ? image->max_error : usual_error};
     show_request(requests, views, &like, index);
 }
 

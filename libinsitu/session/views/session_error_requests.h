@@ -9,10 +9,11 @@
 
 /* The cameras of the due images. */
 typedef struct session_due_views {
+    const scene *scene;
     int count; /* number of images of the scene */
     bool *are_due;
     render_camera *cameras; /* cameras of the images that are due */
-    session_extent extent;  /* bounds of the caller's nodes; empty if neither cameras nor slices need them */
+    session_extent extent;  /* bounds of the caller's nodes; empty if no camera, slice or volume needs them */
 } session_due_views;
 
 /* Computes the cameras of the images that are due at the moment. If a camera has no direction of view, its image is
@@ -32,9 +33,8 @@ typedef struct session_error_request {
     double *values; /* isovalues of the field */
     bool has_plane;
     session_plane plane;
-    bool is_volume; /* set if it is a volume of the field */
-    double allowed; /* error of values in the volume that is allowed, as a fraction of the width of its range */
-    double width;   /* 0: that of the values */
+    const scene_volume *volume; /* a volume of the field; NULL: it is no volume */
+    double allowed;             /* error of the volume's pixels that is allowed in each colour channel */
 } session_error_request;
 
 enum { SESSION_MOST_ERROR_REQUESTS = 256 };

@@ -20,19 +20,11 @@
 #include "session_filled.h"
 #include "session_indexed.h"
 #include "session_piece_set.h"
-#include "session_error_requests.h"
+#include "session_volume_errors.h"
 
 static const double bytes_per_mib = 1048576;
 
 /* ---- errors ------------------------------------------------------------------------------------------------------ */
-
-enum { MOST_VOLUMES = 8 };
-
-/* What is measured of a volume of a mesh: the error of the values, and their range. */
-typedef struct volume_error {
-    double allowed, width; /* those of the request; the same on every rank */
-    double error, minus_low, high;
-} volume_error;
 
 /* The errors of one mesh, and what follows from them. */
 typedef struct piece_error {
@@ -41,10 +33,11 @@ typedef struct piece_error {
                       rank */
     session_deviation all;                           /* counts are those of isosurfaces */
     session_finer_bytes bytes[FINER_MOST_PARTS + 1]; /* that finer lattices take on all ranks */
-    volume_error volumes[MOST_VOLUMES];
-    int volume_count; /* number of volumes, some of which may have no place in the list; the same on every rank */
-    int components;   /* number of components of the fields that images of the scene show */
-    int wanted;       /* number of pieces without a limit of memory */
+    double light_error;  /* largest estimate of the error of a pixel in a volume, if cells have one piece */
+    double light_excess; /* the largest quotient of such an error and of what is allowed */
+    int volume_count;    /* number of volumes */
+    int components;      /* number of components of the fields that images of the scene show */
+    int wanted;          /* number of pieces without a limit of memory */
 } piece_error;
 
 /* The work on one mesh. */
@@ -62,25 +55,12 @@ typedef struct part_work {
     const session_mesh *mesh;
     session_deviation_request request;
     session_piece_set *pieces; /* NULL: the request is measured */
-    volume_error *volume;      /* of a volume */
 } part_work;
-
-static insitu_status measure_volume(part_work *work, base_error *error)
-{
-    session_deviation own = {.low = INFINITY, .high = -INFINITY};
-    volume_error *out = work->volume;
-    session_measure_deviation(work->mesh, &work->request, work->of->basis->team->threads, &own, error);
-    out->error = fmax(out->error, own.value_error);
-    out->minus_low = fmax(out->minus_low, -own.low);
-    out->high = fmax(out->high, own.high);
-    return error->status;
-}
 
 static insitu_status use_request(part_work *work, base_error *error)
 {
     const mesh_work *w = work->of;
     const int threads = w->basis->team->threads;
-    if (work->request.is_of_values) return measure_volume(work, error);
     if (!work->pieces) return session_measure_deviation(work->mesh, &work->request, threads, &w->out->all, error);
     return session_add_crossed_pieces(work->mesh, &work->request, w->choice->parts, threads, work->pieces, error);
 }
@@ -103,7 +83,6 @@ static void use_part(part_work *work, const session_error_request *request, base
     work->request.is_lobatto = w->choice->is_lobatto;
     work->request.marks_only = w->marks_only;
     work->request.values = NULL;
-    work->request.is_of_values = request->is_volume;
     /* A slice at the border of the data may be moved by as much (session_slice_distance()). */
     if (request->has_plane)
         work->request.isovalues =
@@ -117,12 +96,9 @@ static void measure_part(const mesh_work *w, const session_mesh *mesh, session_c
 {
     unsigned char *cells = marks ? marks->cells : NULL;
     part_work work = {.of = w, .mesh = mesh, .request = {.marks = cells}};
-    for (int n = 0, volume = 0; n < w->requests.count && !error->status; n++) {
+    for (int n = 0; n < w->requests.count && !error->status; n++) {
         const session_error_request *request = &w->requests.items[n];
-        work.volume = volume < MOST_VOLUMES ? &w->out->volumes[volume] : NULL;
-        volume += request->is_volume;
-        if (request->is_volume && (w->marks_only || volume > MOST_VOLUMES)) continue;
-        if (request->is_shown && (!w->marks_only || marks)) use_part(&work, request, error);
+        if (request->is_shown && !request->volume && (!w->marks_only || marks)) use_part(&work, request, error);
     }
     session_count_finer_bytes(mesh, cells, w->out->bytes);
 }
@@ -153,17 +129,6 @@ static void use_parts(const mesh_work *w, const char *name, base_error *error)
     }
 }
 
-static void list_volumes(const session_error_requests *requests, piece_error *out)
-{
-    out->volume_count = 0;
-    for (int n = 0; n < requests->count; n++) {
-        const session_error_request *request = &requests->items[n];
-        if (request->is_volume && out->volume_count < MOST_VOLUMES)
-            out->volumes[out->volume_count] = (volume_error){request->allowed, request->width, 0, -INFINITY, -INFINITY};
-        out->volume_count += request->is_volume;
-    }
-}
-
 static void use_mesh(const session_pieces_basis *basis, const session_due_views *views, int mesh,
                      session_finer_choice *choice, piece_error *out, session_report *report, base_error *error)
 {
@@ -178,7 +143,6 @@ static void use_mesh(const session_pieces_basis *basis, const session_due_views 
                                     &w->requests, scene->is_surface_error_given ? report : NULL);
         out->is_counted = w->requests.is_counted;
         out->needs_all = w->requests.needs_all;
-        list_volumes(&w->requests, out);
         out->is_shown = w->requests.is_shown || (w->marks_only && w->requests.needs_all);
         if (w->requests.is_complete) use_parts(w, basis->catalogue->meshes[mesh].name, error);
     }
@@ -209,52 +173,75 @@ typedef struct piece_sums {
     session_finer_bytes bytes[FINER_MOST_PARTS + 1];
 } piece_sums;
 
-static void pack_largest(const piece_error *of, double *out)
-{
-    *out++ = of->all.error;
-    for (int i = 0; i < MOST_VOLUMES; i++, out += 3)
-        memcpy(out, (const double[]){of->volumes[i].error, of->volumes[i].minus_low, of->volumes[i].high},
-               3 * sizeof *out);
-}
-
-static void unpack_largest(const double *in, piece_error *out)
-{
-    out->all.error = *in++;
-    for (int i = 0; i < MOST_VOLUMES; i++, in += 3) {
-        out->volumes[i].error = in[0];
-        out->volumes[i].minus_low = in[1];
-        out->volumes[i].high = in[2];
-    }
-}
-
 static insitu_status reduce_errors(piece_error *errors, int count, MPI_Comm comm, base_error *error)
 {
     enum { WORDS = sizeof(piece_sums) / sizeof(int64_t) };
-    enum { MOST_WORDS = 1 + 3 * MOST_VOLUMES };
-    double *most = base_calloc((size_t)count * MOST_WORDS + 1, sizeof *most);
+    double *most = base_calloc((size_t)count + 1, sizeof *most);
     piece_sums *sums = base_calloc((size_t)count + 1, sizeof *sums);
     if (!most || !sums) session_fail_for_memory(error, count * (int64_t)sizeof *sums, "bounds of isosurfaces");
     insitu_status status = session_agree(comm, error);
     for (int m = 0; m < count && !status; m++) {
-        pack_largest(&errors[m], most + m * MOST_WORDS);
+        most[m] = errors[m].all.error;
         sums[m] =
             (piece_sums){.cell_count = errors[m].all.cell_count, .unbounded_count = errors[m].all.unbounded_count};
         memcpy(sums[m].bytes, errors[m].bytes, sizeof sums[m].bytes);
     }
     if (!status)
-        status = session_check_mpi(
-            error, MPI_Allreduce(MPI_IN_PLACE, most, MOST_WORDS * count, MPI_DOUBLE, MPI_MAX, comm), "MPI_Allreduce");
+        status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, most, count, MPI_DOUBLE, MPI_MAX, comm),
+                                   "MPI_Allreduce");
     if (!status)
         status = session_check_mpi(error, MPI_Allreduce(MPI_IN_PLACE, sums, WORDS * count, MPI_INT64_T, MPI_SUM, comm),
                                    "MPI_Allreduce");
     for (int m = 0; m < count && !status; m++) {
-        unpack_largest(most + m * MOST_WORDS, &errors[m]);
+        errors[m].all.error = most[m];
         errors[m].all.cell_count = sums[m].cell_count;
         errors[m].all.unbounded_count = sums[m].unbounded_count;
         memcpy(errors[m].bytes, sums[m].bytes, sizeof sums[m].bytes);
     }
     base_free(most);
     base_free(sums);
+    return status;
+}
+
+/* Estimates the errors of the volumes on one mesh. Collective. */
+static insitu_status estimate_volumes(const session_pieces_basis *basis, const session_due_views *views, int mesh,
+                                      const session_finer_choice *choice, const session_value_ranges *ranges,
+                                      piece_error *out, base_error *error)
+{
+    const session_catalogue_mesh *named = &basis->catalogue->meshes[mesh];
+    const session_parts parts = session_find_parts(basis->meshes, named->name);
+    session_error_requests *requests = base_alloc(sizeof *requests);
+    if (requests) session_list_error_requests(basis->scene, views, named, choice->shell_count > 0, requests, NULL);
+    if (!requests || !requests->is_complete) session_fail_for_memory(error, sizeof *requests, "errors of volumes");
+    session_agree(basis->team->comm, error);
+    for (int n = 0; !error->status && n < requests->count; n++) {
+        const session_error_request *request = &requests->items[n];
+        double own = 0;
+        if (!request->volume) continue;
+        session_estimate_volume_error(request, ranges, &parts, choice->is_lobatto, basis->team, &own, error);
+        out->volume_count++;
+        out->light_error = fmax(out->light_error, own);
+        out->light_excess = fmax(out->light_excess, own / request->allowed);
+    }
+    if (requests) session_free_error_requests(requests);
+    base_free(requests);
+    return error->status;
+}
+
+/* Estimates the errors of all volumes on meshes with cells of higher order. Collective. */
+static insitu_status estimate_all_volumes(const session_pieces_basis *basis, const session_due_views *views,
+                                          const session_finer_choice *choices, piece_error *errors, base_error *error)
+{
+    session_value_ranges ranges;
+    bool is_any = false;
+    for (int i = 0; i < views->count; i++)
+        is_any = is_any || (views->are_due[i] && basis->scene->images[i].volume_count > 0);
+    if (!is_any || basis->scene->finer_pieces) return INSITU_OK;
+    insitu_status status = session_find_volume_ranges(basis->scene, views, basis->meshes, basis->team, &ranges, error);
+    for (int m = 0; m < basis->catalogue->mesh_count && !status; m++)
+        if (choices[m].order > 1 && !choices[m].pyramid_count)
+            status = estimate_volumes(basis, views, m, &choices[m], &ranges, &errors[m], error);
+    session_free_volume_ranges(&ranges);
     return status;
 }
 
@@ -266,7 +253,8 @@ static insitu_status find_errors(const session_pieces_basis *basis, const sessio
     for (int m = 0; m < basis->catalogue->mesh_count && !error->status; m++)
         if (choices[m].order > 0 && !choices[m].pyramid_count)
             use_mesh(basis, views, m, &choices[m], &errors[m], report, error);
-    return reduce_errors(errors, basis->catalogue->mesh_count, basis->team->comm, error);
+    if (reduce_errors(errors, basis->catalogue->mesh_count, basis->team->comm, error)) return error->status;
+    return estimate_all_volumes(basis, views, choices, errors, error);
 }
 
 /* Lists the pieces that are made in meshes not all of whose cells are refined. */
@@ -281,35 +269,23 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
 
 /* ---- numbers of pieces ------------------------------------------------------------------------------------------- */
 
-/* Returns the largest error of values in volumes if cells have one piece between two nodes: as a fraction of the width
- * of the range, or as a multiple of what is allowed. */
-static double find_volume_error(const piece_error *of, bool is_multiple)
-{
-    double most = of->volume_count > MOST_VOLUMES ? INFINITY : 0;
-    for (int i = 0; i < of->volume_count && i < MOST_VOLUMES; i++) {
-        const volume_error *v = &of->volumes[i];
-        const double width = v->width > 0 ? v->width : v->high + v->minus_low;
-        if (v->error > 0) most = fmax(most, v->error / (is_multiple ? width * v->allowed : width));
-    }
-    return most;
-}
-
 /* Returns whether the number of pieces must not depend on cameras, because statistics would. */
 static bool is_constant(const scene *scene, const piece_error *of)
 {
     return of->is_counted && !scene->is_surface_error_given;
 }
 
-/* Returns the smallest number of pieces with which the error is allowed. In meshes all of whose cells are refined,
- * memory and time grow with its cube, so that it must be asked for if it is more than 2; for volumes by its number,
- * since few of their cells have the largest error. */
+/* Returns the smallest number of pieces with which the errors of surfaces and of volumes are allowed. In meshes all of
+ * whose cells are refined, memory and time grow with its cube, so that more than 2 pieces for the error of surfaces must
+ * be asked for. */
 static int find_pieces(const scene *scene, const session_finer_choice *choice, const piece_error *of)
 {
     enum { MOST_UNASKED = 2 };
     const bool is_limited = of->needs_all && !scene->is_surface_error_given;
     if (is_constant(scene, of)) return 1;
     const int supported = session_most_parts(choice), most = is_limited ? MOST_UNASKED : FINER_MOST_PARTS;
-    int parts = supported > 1 && find_volume_error(of, true) > 1 ? MOST_UNASKED : 1;
+    int parts = 1;
+    while (parts < FINER_MOST_PARTS && parts < supported && of->light_excess > parts * parts) parts++;
     while (parts < most && parts < supported && of->all.error > scene->surface_error * parts * parts) parts++;
     return parts;
 }
@@ -438,8 +414,8 @@ static void report_pieces(const char *mesh, const session_finer_choice *choice, 
         snprintf(cells, sizeof cells, "; isosurfaces may cross %lld cells, of which %lld have no bound",
                  (long long)of->all.cell_count, (long long)of->all.unbounded_count);
     if (of->volume_count)
-        snprintf(volumes, sizeof volumes, "; values in volumes within %.2g of their range",
-                 find_volume_error(of, false) / (choice->parts * choice->parts));
+        snprintf(volumes, sizeof volumes, "; pixels of volumes within %.2g by estimate",
+                 of->light_error / (choice->parts * choice->parts));
     session_text_add(&report->pieces, "mesh \"%s\": %d piece%s between two nodes: %s%s%s", mesh, choice->parts,
                      choice->parts > 1 ? "s" : "", bound, cells, volumes);
 }
