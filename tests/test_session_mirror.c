@@ -152,11 +152,19 @@ static drawn draw_blocks(const char *scene, const insitu_mesh *mesh, const mirro
     return out;
 }
 
+static void expect_mirrored_with(const char *keys, const insitu_mesh *mesh, const insitu_field *f, const mirror *by,
+                                 const char *what)
+{
+    char text[MOST_TEXT];
+    snprintf(text, sizeof text, "%s%s", keys, all_layers);
+    drawn a = draw_mesh(open_text(MPI_COMM_WORLD, by->text, text), mesh, f, NULL);
+    drawn b = draw_blocks(text, mesh, by, f, 1);
+    expect_same(&a, &b, what);
+}
+
 static void expect_mirrored(const insitu_mesh *mesh, const insitu_field *f, const mirror *by, const char *what)
 {
-    drawn a = draw_mesh(open_text(MPI_COMM_WORLD, by->text, all_layers), mesh, f, NULL);
-    drawn b = draw_blocks(all_layers, mesh, by, f, 1);
-    expect_same(&a, &b, what);
+    expect_mirrored_with("", mesh, f, by, what);
 }
 
 static void forms_draw_their_images(void **state)
@@ -191,6 +199,7 @@ static void cells_of_higher_order_draw_their_images(void **state)
         order_mesh m;
         order_mesh_create(&order_kinds[k], 2, 0.1, test_wave, own_rank, rank_count, &m);
         expect_mirrored(&m.mesh, &m.field, &mirrors[0], order_kinds[k].name);
+        expect_mirrored_with("finer_pieces: 2\n", &m.mesh, &m.field, &mirrors[0], order_kinds[k].name);
         order_mesh_free(&m);
     }
 }

@@ -118,14 +118,22 @@ static void forms_draw_their_moved_meshes(void **state)
         }
 }
 
-static void expect_moved(const insitu_mesh *mesh, const insitu_field *f, int components, const char *what)
+static void expect_moved_with(const char *keys, const insitu_mesh *mesh, const insitu_field *f, int components,
+                              const char *what)
 {
     warped w;
+    char text[256];
+    snprintf(text, sizeof text, "%s%s", keys, WARP);
     make_warped(mesh, components, &w);
-    drawn a = draw_mesh(open_text(MPI_COMM_WORLD, WARP, all_layers), mesh, f, &w.field);
-    drawn b = draw_mesh(open_text(MPI_COMM_WORLD, "", all_layers), &w.moved, f, NULL);
+    drawn a = draw_mesh(open_text(MPI_COMM_WORLD, text, all_layers), mesh, f, &w.field);
+    drawn b = draw_mesh(open_text(MPI_COMM_WORLD, keys, all_layers), &w.moved, f, NULL);
     expect_same(&a, &b, what);
     free_warped(&w);
+}
+
+static void expect_moved(const insitu_mesh *mesh, const insitu_field *f, int components, const char *what)
+{
+    expect_moved_with("", mesh, f, components, what);
 }
 
 static void cells_of_higher_order_draw_their_moved_nodes(void **state)
@@ -135,8 +143,50 @@ static void cells_of_higher_order_draw_their_moved_nodes(void **state)
         order_mesh m;
         order_mesh_create(&order_kinds[k], 2, 0.1, test_wave, own_rank, rank_count, &m);
         expect_moved(&m.mesh, &m.field, 3, order_kinds[k].name);
+        expect_moved_with("finer_pieces: 2\n", &m.mesh, &m.field, 3, order_kinds[k].name);
         order_mesh_free(&m);
     }
+}
+
+/* Finer pieces are made of the moved nodes, and again if the displacements change, the scene's warp goes and comes, or
+ * nodes move. The plain session is handed the moved nodes anew in each step. */
+static void finer_pieces_follow_the_warp(void **state)
+{
+    (void)state;
+    static const double factors[] = {0.3, 0.3, 0.6, 0, 0.3, 0.3};
+    static const order_kind hex = {"hex 27", INSITU_TRIQUADRATIC_HEX, INSITU_ORDER_VTK, 2};
+    char text[MOST_TEXT];
+    order_mesh m;
+    warped w;
+    order_mesh_create(&hex, 2, 0.1, test_wave, own_rank, rank_count, &m);
+    make_field(&m.mesh, 3, &w);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(all_layers));
+    insitu_session *plain = open_text(MPI_COMM_WORLD, "finer_pieces: 2\n", all_layers);
+    for (int i = 0; i < 6; i++) {
+        snprintf(text, sizeof text, "finer_pieces: 2\nmeshes: {m: {warp: {field: u, scale: %g}}}\n%s", factors[i],
+                 all_layers);
+        write_scene(text);
+        if (i == 5)
+            for (int64_t n = 0; n < 3 * m.vertex_count; n++) m.coordinates[n] *= 1.25;
+        m.mesh.changed = i == 5 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
+        w.field.changed = i ? INSITU_CHANGED_NOTHING : INSITU_CHANGED_ALL;
+        everywhere(insitu_set_mesh(session, "m", &m.mesh) == INSITU_OK);
+        everywhere(insitu_set_field(session, "m", &m.field) == INSITU_OK);
+        everywhere(insitu_set_field(session, "m", &w.field) == INSITU_OK);
+        move_mesh(&m.mesh, factors[i], &w);
+        w.moved.changed = INSITU_CHANGED_ALL;
+        drawn a = step_drawn(session, i);
+        everywhere(strstr(insitu_last_report(session)->copied_why, "with 2 pieces") != NULL || m.cell_count == 0);
+        m.field.changed = INSITU_CHANGED_ALL;
+        everywhere(insitu_set_mesh(plain, "m", &w.moved) == INSITU_OK);
+        everywhere(insitu_set_field(plain, "m", &m.field) == INSITU_OK);
+        drawn b = step_drawn(plain, i);
+        expect_same(&a, &b, "a step");
+    }
+    insitu_destroy(&plain);
+    insitu_destroy(&session);
+    free_warped(&w);
+    order_mesh_free(&m);
 }
 
 /* Lagrange hexes without connectivity, each with nodes of its own. */
@@ -613,6 +663,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(forms_draw_their_moved_meshes),
         cmocka_unit_test(cells_of_higher_order_draw_their_moved_nodes),
+        cmocka_unit_test(finer_pieces_follow_the_warp),
         cmocka_unit_test(nodes_of_each_cells_own_are_moved),
         cmocka_unit_test(planes_move_by_two_or_three_components),
         cmocka_unit_test(lattices_draw_their_moved_vertices),

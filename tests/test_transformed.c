@@ -64,11 +64,11 @@ insitu_session *open_text(MPI_Comm comm, const char *before, const char *scene)
 }
 
 const char all_layers[] =
-    "threads: 1\nfiner_pieces: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1]}}]")
+    "threads: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1]}}]")
         LAYERS("b", "[{volume: {field: f}}]") LAYERS("c", "[{slice: {field: f, planes: [{normal: [1, 2, 3]}]}}]")
             LAYERS("d", "[{surface: {colour_by: {field: f}, edges: {}, threshold: {field: f, from: -0.8}}}]");
 const char surface_layers[] =
-    "threads: 1\nfiner_pieces: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1], normals: vertex}}]")
+    "threads: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1], normals: vertex}}]")
         LAYERS("d", "[{surface: {colour_by: {field: f}, edges: {}}}]\n    shadows: true");
 
 drawn draw_mesh(insitu_session *session, const insitu_mesh *mesh, const insitu_field *f, const insitu_field *u)

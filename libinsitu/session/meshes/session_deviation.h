@@ -42,12 +42,6 @@ typedef struct session_deviation_request {
     unsigned char *marks;
 } session_deviation_request;
 
-/* Returns the caller's description of a mesh, which may be read as finer lattices. */
-static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
-{
-    return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
-}
-
 /* Computes the request's component of the field, or else the distance from its plane, at the `count` nodes of a cell.
  * rows: rows of the caller's cells. tuple: buffer for all components of the field. */
 void session_read_request_values(const session_rows *rows, const session_deviation_request *request, int64_t cell,

@@ -201,7 +201,7 @@ static void drop_node_data(session_meshes *meshes, session_mesh *mesh)
     for (int i = 0; i < mesh->field_count; i++) session_drop_copy(&mesh->fields[i]);
 }
 
-static void end_finer_mesh(session_meshes *meshes, session_mesh *mesh)
+void session_end_finer_mesh(session_meshes *meshes, session_mesh *mesh)
 {
     if (!mesh->finer.parts) return;
     mesh->given = mesh->finer.nodal;
@@ -212,7 +212,7 @@ static void end_finer_mesh(session_meshes *meshes, session_mesh *mesh)
 void session_end_finer(session_meshes *meshes)
 {
     for (int i = 0; i < meshes->count; i++) {
-        end_finer_mesh(meshes, meshes->items[i]);
+        session_end_finer_mesh(meshes, meshes->items[i]);
         meshes->items[i]->given.vertex_ids = meshes->items[i]->original.vertex_ids;
     }
 }
@@ -247,7 +247,7 @@ static bool make_finer_mesh(session_meshes *meshes, session_mesh *mesh, const se
     memcpy(made.counts, old->counts, sizeof made.counts);
     if (old->parts == made.parts && (!made.parts || (old->is_lobatto == made.is_lobatto && has_marks(old, marks))))
         return false;
-    end_finer_mesh(meshes, mesh);
+    session_end_finer_mesh(meshes, mesh);
     if (!made.parts || !session_has_higher_order(&mesh->given)) return true;
     made.nodal = mesh->given;
     if (!make_cells(&made, marks ? marks->cells : NULL, threads)) {

@@ -74,7 +74,10 @@ insitu_status session_make_finer(session_meshes *meshes, const session_catalogue
                                  session_finer_choice *choices, const session_team *team, bool *are_changed,
                                  base_error *error);
 
-/* Reads the caller's cells in place of finer lattices, and the vertex ids again. Local. */
+/* Reads the caller's cells in place of finer lattices, on one mesh. Local. */
+void session_end_finer_mesh(session_meshes *meshes, session_mesh *mesh);
+
+/* The same on all meshes, which also read their vertex ids again. Local. */
 void session_end_finer(session_meshes *meshes);
 
 /* The values at the nodes of the caller's cells. */

@@ -454,6 +454,12 @@ typedef struct session_parts {
     session_mesh **items;
 } session_parts;
 
+/* Returns the description of a mesh by the caller's nodes, which may be read as finer lattices. */
+static inline const insitu_mesh *session_nodal_mesh(const session_mesh *mesh)
+{
+    return mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
+}
+
 session_parts session_find_parts(const session_meshes *meshes, const char *name);
 /* Returns the parts that have the same name as the one at index `first`, which must be the first of them. */
 session_parts session_parts_at(const session_meshes *meshes, int first);

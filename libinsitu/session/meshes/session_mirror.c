@@ -25,7 +25,7 @@ static bool is_mirrored(const session_mesh *image, int axis)
 static int find_own_axes(const session_mesh *image)
 {
     enum { IN_PLANE = 3, ALL = 7 };
-    const insitu_mesh *given = &image->source->given;
+    const insitu_mesh *given = session_nodal_mesh(image->source);
     bool are_packed = true;
     for (int axis = 0; axis < 3; axis++) {
         const insitu_array *array = &given->coordinates[axis];
@@ -38,10 +38,10 @@ static int find_own_axes(const session_mesh *image)
 /* Copies coordinates along an axis without changing their type, and mirrors them if the axis is mirrored. */
 static void mirror_numbers(const session_mesh *image, int axis, int threads)
 {
-    const grid_array from = session_coordinates(&image->source->given, axis);
+    const grid_array from = session_coordinates(session_nodal_mesh(image->source), axis);
     const double plane = image->mirrored.planes[axis];
     const insitu_array *to = &image->mirrored.coordinates[axis];
-    const int64_t count = image->source->given.vertex_count;
+    const int64_t count = session_nodal_mesh(image->source)->vertex_count;
     const bool is_copied = !is_mirrored(image, axis);
 #pragma omp parallel num_threads(session_region_threads(threads, count))
     {
@@ -58,7 +58,7 @@ static void mirror_numbers(const session_mesh *image, int axis, int threads)
 /* Mirrors the coordinates of the source's vertices. Returns false if memory runs out. */
 static bool mirror_vertices(session_mesh *image, int threads)
 {
-    const insitu_mesh *given = &image->source->given;
+    const insitu_mesh *given = session_nodal_mesh(image->source);
     session_mirrored *m = &image->mirrored;
     const int axes = find_own_axes(image);
     insitu_type types[3];
@@ -111,7 +111,7 @@ static void describe_lattice(session_mesh *image, insitu_mesh *out)
 static insitu_mesh describe_image(session_mesh *image, unsigned changed)
 {
     const session_mesh *source = image->source;
-    insitu_mesh out = source->given;
+    insitu_mesh out = *session_nodal_mesh(source);
     out.changed = changed;
     for (int axis = 0; axis < 3; axis++)
         if (image->mirrored.coordinates[axis].data) out.coordinates[axis] = image->mirrored.coordinates[axis];
@@ -137,7 +137,7 @@ static unsigned find_changes(const session_mesh *image, const double planes[3])
 static bool mirror_coordinates(session_mesh *image, const double planes[3], unsigned changed, int threads)
 {
     const session_mesh *source = image->source;
-    const bool has_axes = session_has_axes(&source->given);
+    const bool has_axes = session_has_axes(session_nodal_mesh(source));
     session_mirrored *m = &image->mirrored;
     if (changed & INSITU_CHANGED_TOPOLOGY || has_axes != (m->axes[0] != NULL)) session_drop_mirrored(m);
     m->bytes = 0;
@@ -158,7 +158,8 @@ session_mesh *session_mirror_mesh(session_meshes *meshes, session_mesh *source, 
     base_error problem = {.status = INSITU_OK};
     if (source->is_check_stale) session_fill_conformed(source, threads);
     if (!mirror_coordinates(image, planes, changed, threads))
-        session_fail_for_memory(&problem, source->given.vertex_count * 24, "coordinates of a mirrored mesh");
+        session_fail_for_memory(&problem, session_nodal_mesh(source)->vertex_count * 24,
+                                "coordinates of a mirrored mesh");
     if (!problem.status) {
         const insitu_mesh description = describe_image(image, changed);
         session_store_mesh(meshes, image, &description, &problem);

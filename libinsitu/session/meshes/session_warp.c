@@ -8,6 +8,7 @@
 
 #include "session_agree.h"
 #include "session_conform.h"
+#include "session_finer.h"
 #include "session_lattice.h"
 #include "session_own_coordinates.h"
 #include "session_region.h"
@@ -16,9 +17,10 @@
 void session_read_warp(session_mesh *mesh)
 {
     session_warp *warp = &mesh->warp;
+    insitu_mesh *nodal = mesh->finer.parts ? &mesh->finer.nodal : &mesh->given;
     for (int axis = 0; axis < 3; axis++) {
-        warp->unmoved[axis] = mesh->given.coordinates[axis];
-        if (warp->coordinates[axis].data) mesh->given.coordinates[axis] = warp->coordinates[axis];
+        warp->unmoved[axis] = nodal->coordinates[axis];
+        if (warp->coordinates[axis].data) nodal->coordinates[axis] = warp->coordinates[axis];
     }
     if (!mesh->given.lattice) return;
     warp->lattice = *mesh->given.lattice;
@@ -53,6 +55,7 @@ void session_unwarp_mesh(session_meshes *meshes, session_mesh *mesh)
         mesh->is_check_stale = true;
         meshes->are_cells_changed = true;
     }
+    if (was_on) session_end_finer_mesh(meshes, mesh);
     restore_coordinates(mesh);
     session_drop_warp(mesh);
     if (was_on) {
@@ -167,6 +170,7 @@ insitu_status session_warp_mesh(session_meshes *meshes, session_mesh *mesh, cons
     const bool was_on = warp->is_applied;
     bool differ = !was_on;
     if (warp->is_applied && !warp->is_stale && warp->key == by->key) return INSITU_OK;
+    session_end_finer_mesh(meshes, mesh); /* finer lattices are made of the moved nodes */
     if (warp->is_stale) session_fill_conformed(mesh, threads);
     restore_coordinates(mesh);
     if (compute_coordinates(mesh, by, threads, &differ, error)) {

@@ -76,7 +76,7 @@ static session_displacement read_displacement(const scene_warp *warp, const sess
     session_displacement out = {.field = index,
                                 .key = hash_displacement(warp, field),
                                 .component_count = field->given.component_count,
-                                .index = session_index_array(&mesh->given, &field->given.index),
+                                .index = session_index_array(session_nodal_mesh(mesh), &field->given.index),
                                 .count = field->given.count,
                                 .scale = warp->scale};
     for (int c = 0; c < out.component_count; c++) out.components[c] = grid_field_component(&values, c);

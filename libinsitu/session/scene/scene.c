@@ -175,9 +175,7 @@ static insitu_status convert_images(const scene_document *d, const scene_file *i
 
 static insitu_status convert_pieces(const scene_document *d, const scene_file *in, scene *out)
 {
-    /* vertices are warped and mirrored before finer lattices are made */
-    const int otherwise = in->surface_error || in->meshes_count == 0 ? 0 : 1;
-    out->finer_pieces = in->finer_pieces ? *in->finer_pieces : otherwise;
+    out->finer_pieces = in->finer_pieces ? *in->finer_pieces : 0;
     out->surface_error = in->surface_error ? *in->surface_error : SCENE_SURFACE_ERROR;
     out->is_surface_error_given = in->surface_error != NULL;
     out->finer_memory = in->finer_memory ? *in->finer_memory : SCENE_FINER_MEMORY;

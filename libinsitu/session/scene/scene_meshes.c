@@ -87,16 +87,6 @@ insitu_status scene_convert_meshes_drawn(const scene_document *d, const scene_fi
 {
     insitu_status status = INSITU_OK;
     if (in->meshes_count == 0) return INSITU_OK;
-    /* Displacements and mirrored coordinates are computed at nodes only, not at the points of finer lattices between
-     * them. */
-    if (in->finer_pieces && *in->finer_pieces > 1)
-        return scene_fail_at_key(d, "finer_pieces", "",
-                                 "is %d and meshes are warped or mirrored, expected 1 with these", *in->finer_pieces);
-    if (in->surface_error)
-        return scene_fail_at_key(d, "surface_error", "",
-                                 "is %g and meshes are warped or mirrored, expected none with "
-                                 "these",
-                                 *in->surface_error);
     out->warps = base_calloc((size_t)in->meshes_count, sizeof *out->warps);
     out->mirrors = base_calloc((size_t)in->meshes_count, sizeof *out->mirrors);
     if (!out->warps || !out->mirrors) return scene_fail_for_memory(d);

@@ -493,7 +493,7 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
               "come closer to the polynomial's: with twice as many pieces, their error is divided by 4. Memory "       \
               "and time grow with the number of pieces. See [Cells of higher order](high_order.md#finer-pieces). "     \
               "Linear cells are not affected.",                                                                        \
-      .default_text = "by `surface_error`; `1` if `meshes` is given", .low = 1, .high = 8)                             \
+      .default_text = "by `surface_error`", .low = 1, .high = 8)                                                       \
     X(CYAML_FIELD_FLOAT_PTR("surface_error", OPTIONAL, scene_file, surface_error),                                     \
       .help = "Cells of higher order are drawn as linear pieces, whose number is chosen, from 1 to 8 for each "        \
               "mesh and step: isosurfaces, and positions in other layers, are at most so many pixels away from "       \
