@@ -7,6 +7,7 @@
 #include "polygon.h"
 #include "session_agree.h"
 #include "session_cell_faces.h"
+#include "session_face_normals.h"
 #include "session_rims.h"
 #include "session_scalars.h"
 #include "vector3.h"
@@ -136,6 +137,16 @@ typedef struct outer_work {
     bool has_rims;
     session_rims rims;
     const uint32_t *parents; /* for each piece of a split cell, the caller's cell (session_topology.parents) */
+    const session_mesh *whole;
+    float (*normals)[3];         /* for each vertex of the outer mesh; NULL: there are none */
+    session_face_normals curved; /* used if there are normals and rims */
+    /* The caller's cell and its face on which the current face lies; face: -1 if it lies on none. */
+    int64_t parent;
+    int face;
+    /* the parent and the face for which vertex_map holds vertices, and the first of these vertices */
+    int64_t mapped_parent, first_mapped;
+    int mapped_face;
+    double normal_scale; /* factor by which their normals are multiplied; 0: not known yet */
     /* for each face of the current cell, the index of its rim's loop; 0: the loop is not stored yet */
     int64_t rim_loops[RIMS_MOST_FACES];
 } outer_work;
@@ -155,9 +166,50 @@ static int64_t add_copied_vertex(outer_work *w, int64_t origin, const double pos
     return *out;
 }
 
+/* Makes the current face use other vertices than the faces before, unless both lie on the same curved face. */
+static void separate_vertices(outer_work *w)
+{
+    if (w->face >= 0 && w->face == w->mapped_face && w->parent == w->mapped_parent) return;
+    for (int64_t v = w->first_mapped; v < w->vertex_count; v++) w->vertex_map[w->out->vertex_origins[v]] = -1;
+    w->first_mapped = w->vertex_count;
+    w->mapped_parent = w->parent;
+    w->mapped_face = w->face;
+    w->normal_scale = 0;
+}
+
+/* Computes the normal at a corner: of the curved face, or else of the bilinear patch or triangle, which has the length
+ * of twice its area there. */
+static void find_corner_normal(outer_work *w, const corner_loop *loop, int corner, double out[3])
+{
+    const int count = loop->count, next = (corner + 1) % count, last = (corner + count - 1) % count;
+    double a[3], b[3];
+    if (w->face >= 0 && session_find_face_normal(&w->curved, w->whole, w->parent, w->face, loop->vertices[corner], out))
+        return;
+    subtract(loop->positions[next], loop->positions[corner], a);
+    subtract(loop->positions[last], loop->positions[corner], b);
+    vector3_cross(a, b, out);
+}
+
+/* Stores the normals at the corners of a cell that was added last, and at its apex, where they are not used. All
+ * normals of a face are multiplied by the same factor: a face of order 2 has normals that are polynomials, which pieces
+ * could not interpolate if each had the length 1. */
+static void add_normals(outer_work *w, const corner_loop *loop, int64_t apex)
+{
+    const int64_t *vertices = w->out->connectivity + w->entry_count - loop->count - 1;
+    for (int i = 0; i < loop->count; i++) {
+        double normal[3];
+        find_corner_normal(w, loop, i, normal);
+        const double length = vector3_length(normal);
+        if (w->normal_scale == 0 && length > 0) w->normal_scale = 1 / length;
+        for (int x = 0; x < 3; x++) w->normals[vertices[i]][x] = (float)(w->normal_scale * normal[x]);
+    }
+    memcpy(w->normals[apex], w->normals[vertices[0]], sizeof w->normals[apex]);
+}
+
 /* Adds a tet on a triangle, or a pyramid on a quad. Its apex must have been added before. */
 static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex, int64_t origin)
 {
+    if (w->normals) separate_vertices(w);
     w->out->offsets[w->cell_count] = w->entry_count;
     w->out->types[w->cell_count] = loop->count == 3 ? GRID_TET : GRID_PYRAMID;
     w->pyramid_count += loop->count == 4;
@@ -165,6 +217,7 @@ static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex,
     for (int i = 0; i < loop->count; i++)
         w->out->connectivity[w->entry_count++] = add_copied_vertex(w, loop->vertices[i], loop->positions[i]);
     w->out->connectivity[w->entry_count++] = apex;
+    if (w->normals) add_normals(w, loop, apex);
 }
 
 /* Adds a tet on a triangle, or a pyramid on a quad, together with its apex. Does nothing if the face's area is 0. */
@@ -269,16 +322,21 @@ static int64_t add_rim(outer_work *w, int64_t cell, int face)
     return loop;
 }
 
+/* Finds the caller's face on which a piece's face lies. */
+static void find_parent_face(outer_work *w, int64_t piece, const face_polygon *p)
+{
+    w->parent = w->parents[piece];
+    if (w->parent != w->rims.cell) memset(w->rim_loops, 0, sizeof w->rim_loops);
+    w->face = session_find_rim(&w->rims, w->parent, p->vertices, p->count);
+}
+
 /* Sets the loop of the cells from number `first` on, which are built on a piece's face, to the rim of the caller's
  * face. */
-static void set_rim(outer_work *w, int64_t piece, const face_polygon *p, int64_t first)
+static void set_rim(outer_work *w, int64_t first)
 {
-    const int64_t cell = w->parents[piece];
-    if (cell != w->rims.cell) memset(w->rim_loops, 0, sizeof w->rim_loops);
-    const int face = session_find_rim(&w->rims, cell, p->vertices, p->count);
-    if (face < 0) return;
-    if (!w->rim_loops[face]) w->rim_loops[face] = add_rim(w, cell, face);
-    for (int64_t i = first; i < w->cell_count; i++) w->out->loops[i] = w->rim_loops[face];
+    if (w->face < 0) return;
+    if (!w->rim_loops[w->face]) w->rim_loops[w->face] = add_rim(w, w->parent, w->face);
+    for (int64_t i = first; i < w->cell_count; i++) w->out->loops[i] = w->rim_loops[w->face];
 }
 
 static void add_polygon(outer_work *w, face_polygon *p, const double inside[3], int64_t origin)
@@ -326,6 +384,7 @@ static void add_face(outer_work *w, const session_face *face)
     double inside[3];
     find_inside(w->cells, face->cell, inside);
     read_polygon(w->cells, &of, p);
+    if (w->has_rims) find_parent_face(w, face->cell, p);
     if (p->count > 4 || is_concave(&of, (const double(*)[3])p->positions, p->count)) {
         add_polygon(w, p, inside, face->cell);
     } else {
@@ -333,7 +392,7 @@ static void add_face(outer_work *w, const session_face *face)
         for (int i = 0; i < p->count; i++) add_corner(&loop, p->vertices[i], p->positions[i]);
         add_cell(w, &loop, inside, face->cell);
     }
-    if (w->has_rims) set_rim(w, face->cell, p, first);
+    if (w->has_rims) set_rim(w, first);
 }
 
 /* Upper bounds of the sizes that the faces require. */
@@ -395,19 +454,29 @@ static void work_free(outer_work *w)
     base_free(w->polygon.positions);
     base_free(w->polygon.triangles);
     base_free(w->polygon.work_memory);
+    base_free(w->normals);
     session_rims_free(&w->rims);
+    session_face_normals_free(&w->curved);
 }
 
-static bool work_create(const session_mesh *whole, session_outer *out, outer_work *w)
+static bool work_create(const session_mesh *whole, bool has_normals, session_outer *out, outer_work *w)
 {
     const grid *g = &whole->cells;
     outer_counts most = find_count_bounds(g, out);
-    *w = (outer_work){.cells = g, .out = out, .has_rims = whole->topology.is_split, .parents = whole->topology.parents};
+    *w = (outer_work){.cells = g,
+                      .out = out,
+                      .has_rims = whole->topology.is_split,
+                      .parents = whole->topology.parents,
+                      .whole = whole,
+                      .face = -1,
+                      .mapped_face = -1};
     if (w->has_rims && !session_rims_create(whole, &w->rims)) return false;
+    if (w->has_rims && has_normals && !session_face_normals_create(whole, &w->curved)) return false;
     if (w->has_rims) add_rim_bounds(w, out, &most);
     const int64_t cells = most.cell_count, entries = most.entry_count, loops = most.loop_entry_count;
     if (most.largest_corner_count > INT32_MAX / 64) return false;
     out->bytes = entries * (int64_t)(5 * sizeof(int64_t) + sizeof(float)) + cells * 17;
+    if (has_normals) out->bytes += entries * (int64_t)(sizeof *w->normals + sizeof(int32_t));
     if (loops) out->bytes += (cells + loops) * (int64_t)sizeof *out->loops;
     out->bytes += out->face_count * (int64_t)sizeof *out->faces;
     out->mesh = base_calloc(1, sizeof *out->mesh);
@@ -421,6 +490,8 @@ static bool work_create(const session_mesh *whole, session_outer *out, outer_wor
     out->cell_origins = base_alloc((size_t)cells * sizeof *out->cell_origins);
     w->heights = base_alloc((size_t)entries * sizeof *w->heights);
     w->vertex_map = base_alloc((size_t)g->vertex_count * sizeof *w->vertex_map);
+    if (has_normals) w->normals = base_calloc((size_t)entries, sizeof *w->normals);
+    if (has_normals && !w->normals) return false;
     return out->mesh && out->coordinates && out->connectivity && out->vertex_origins && out->offsets && out->types &&
            (out->loops || !loops) && out->cell_origins && w->heights && w->vertex_map &&
            allocate_polygon(&w->polygon, most.largest_corner_count);
@@ -447,6 +518,20 @@ static grid describe_grid(const outer_work *w)
     return g;
 }
 
+/* Moves the normals to the scalar as its gradients. Returns false if memory runs out, or if there are more vertices
+ * than indices of gradients can number. */
+static bool finish_normals(outer_work *w, session_scalar *scalar)
+{
+    if (!w->normals) return true;
+    if (w->vertex_count > INT32_MAX) return false;
+    scalar->gradient_indices = base_alloc((size_t)w->vertex_count * sizeof *scalar->gradient_indices + 1);
+    for (int64_t v = 0; v < w->vertex_count && scalar->gradient_indices; v++) scalar->gradient_indices[v] = (int32_t)v;
+    scalar->gradients = w->normals;
+    scalar->gradient_count = w->vertex_count;
+    w->normals = NULL;
+    return scalar->gradient_indices != NULL;
+}
+
 /* Completes the mesh. Its scalar takes ownership of the array of values. Returns false if memory runs out. */
 static bool finish_mesh(const session_mesh *whole, outer_work *w)
 {
@@ -463,14 +548,16 @@ static bool finish_mesh(const session_mesh *whole, outer_work *w)
     scalar->are_values_stale = scalar->may_have_changed = false;
     scalar->distances = w->heights;
     w->heights = NULL;
-    return true;
+    return finish_normals(w, scalar);
 }
 
-insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *outer, base_error *error)
+insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *outer, bool has_normals,
+                                      base_error *error)
 {
     outer_work work;
-    if (outer->mesh) return INSITU_OK;
-    bool is_made = work_create(whole, outer, &work);
+    if (outer->mesh && (outer->mesh->scalars[0].gradients != NULL) == has_normals) return INSITU_OK;
+    session_drop_outer(outer, false);
+    bool is_made = work_create(whole, has_normals, outer, &work);
     if (is_made) {
         for (int64_t v = 0; v < whole->cells.vertex_count; v++) work.vertex_map[v] = -1;
         for (int64_t i = 0; i < outer->face_count; i++) add_face(&work, &outer->faces[i]);

@@ -12,8 +12,12 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Builds outer->mesh and its scalar from the faces, unless they exist. They can then be drawn. Local. */
-insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *outer, base_error *error);
+/* Builds outer->mesh and its scalar from the faces, unless they exist. They can then be drawn. If has_normals is set,
+ * the scalar has gradients at its vertices that are normals of the faces: of the curved faces of cells of higher order,
+ * and of the bilinear or flat faces of others. Faces with different normals at a common vertex then have vertices of
+ * their own. Local. */
+insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *outer, bool has_normals,
+                                      base_error *error);
 
 /* Returns a field's values on the mesh of outer faces, gathered from its values on the whole mesh. They are allocated
  * by base_alloc(); NULL if memory runs out. */

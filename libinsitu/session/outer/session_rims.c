@@ -12,20 +12,36 @@ static const session_face_table *faces_of(int type)
     return type == GRID_TRIANGLE ? &triangle : type == GRID_QUAD ? &quad : session_faces_of_type(type);
 }
 
-/* Returns whether a node of the lattice lies in the plane of the face. */
-static bool is_on_face(const session_nodes *of, const signed char face[4], const int node[3])
+/* Computes the normal of the face's plane in the lattice. */
+static void find_plane(const session_nodes *of, const signed char face[4], int out[3])
 {
     const session_shape *shape = session_shape_of(of->type);
-    int a[3], b[3], c[3];
+    int a[3], b[3];
     for (int axis = 0; axis < 3; axis++) {
         const int begin = shape->corners[(int)face[0]][axis];
         a[axis] = shape->corners[(int)face[1]][axis] - begin;
         b[axis] = shape->corners[(int)face[2]][axis] - begin;
-        c[axis] = node[axis] - begin * of->order;
     }
-    return (a[1] * b[2] - a[2] * b[1]) * c[0] + (a[2] * b[0] - a[0] * b[2]) * c[1] +
-               (a[0] * b[1] - a[1] * b[0]) * c[2] ==
-           0;
+    for (int axis = 0; axis < 3; axis++)
+        out[axis] = a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3];
+}
+
+/* Returns whether a node of the lattice lies in the plane of the face. */
+static bool is_on_face(const session_nodes *of, const signed char face[4], const int node[3])
+{
+    const session_shape *shape = session_shape_of(of->type);
+    int plane[3], height = 0;
+    find_plane(of, face, plane);
+    for (int axis = 0; axis < 3; axis++)
+        height += plane[axis] * (node[axis] - shape->corners[(int)face[0]][axis] * of->order);
+    return height == 0;
+}
+
+void session_rim_plane(const session_nodes *of, int face, double out[3])
+{
+    int plane[3];
+    find_plane(of, faces_of(of->type)->vertices[face], plane);
+    for (int axis = 0; axis < 3; axis++) out[axis] = plane[axis];
 }
 
 static void list_rim(const session_nodes *of, insitu_vertex_order order, const signed char face[4], int *count,

@@ -33,6 +33,10 @@ int64_t session_count_rim_nodes(const session_rims *rims, int64_t cell);
 /* Returns the number of the face of the caller's cell on which all of the vertices lie, or -1 if there is none. */
 int session_find_rim(session_rims *rims, int64_t cell, const int64_t *vertices, int64_t count);
 
+/* Computes the normal, of any length, of a face's plane in the reference cell. It is (0, 0, z) for triangles and
+ * quads. */
+void session_rim_plane(const session_nodes *of, int face, double out[3]);
+
 /* Returns the rims of the cell's kind. */
 static inline const session_rim_kind *session_rims_of(const session_rims *rims, int64_t cell)
 {

@@ -65,6 +65,13 @@ bool session_has_smooth_normals(const scene_isosurface *layer, const session_cat
     return layer->normals == SCENE_VERTEX || (layer->normals == SCENE_GRADIENT && has_polynomials);
 }
 
+bool session_has_curved_faces(const session_catalogue *catalogue)
+{
+    for (int m = 0; m < catalogue->mesh_count; m++)
+        if (catalogue->meshes[m].has_higher_order) return true;
+    return false;
+}
+
 /* Adds a mesh on which a layer with smooth normals is drawn. */
 static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, const scene_isosurface *layer)
 {

@@ -7,6 +7,7 @@
 #include "session_covers.h"
 #include "session_outer_faces.h"
 #include "session_outer_mesh.h"
+#include "session_smooth.h"
 #include "session_thresholds.h"
 
 /* A mesh whose outer faces a layer shows, and the layer's threshold. This rank may have no part of the mesh. */
@@ -120,9 +121,10 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_requ
 }
 
 /* Prepares a mesh of outer faces for drawing, so that each of its cells shows one face. */
-static insitu_status prepare_outer_mesh(const session_mesh *mesh, session_outer *outer, base_error *error)
+static insitu_status prepare_outer_mesh(const session_mesh *mesh, session_outer *outer, bool has_normals,
+                                        base_error *error)
 {
-    const insitu_status status = session_make_outer_mesh(mesh, outer, error);
+    const insitu_status status = session_make_outer_mesh(mesh, outer, has_normals, error);
     if (status) return status;
     outer->mesh->is_needed = true;
     outer->mesh->scalars[0].is_used = outer->mesh->scalars[0].needs_ranges = true;
@@ -130,13 +132,13 @@ static insitu_status prepare_outer_mesh(const session_mesh *mesh, session_outer 
     return INSITU_OK;
 }
 
-static void make_meshes(const session_meshes *meshes, base_error *error)
+static void make_meshes(const session_meshes *meshes, bool have_normals, base_error *error)
 {
     for (int i = 0; i < meshes->count; i++) {
         const session_mesh *mesh = meshes->items[i];
         for (int k = 0; k < mesh->outer_count && !error->status; k++)
             if (mesh->outers[k]->is_needed && mesh->outers[k]->are_faces_known)
-                prepare_outer_mesh(mesh, mesh->outers[k], error);
+                prepare_outer_mesh(mesh, mesh->outers[k], have_normals, error);
     }
 }
 
@@ -156,6 +158,6 @@ insitu_status session_update_surfaces(const session_plan *plan, const session_ca
         if (stale[i]) status = find_faces(meshes, &requests[i], team, error);
     base_free(stale);
     base_free(requests);
-    if (!status) make_meshes(meshes, error);
+    if (!status) make_meshes(meshes, session_has_curved_faces(catalogue), error);
     return status;
 }

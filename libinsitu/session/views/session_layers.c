@@ -46,7 +46,7 @@ static bool allocate_layers(const session_layer_basis *basis, const scene_image 
     out->fields = base_calloc(fields, sizeof *out->fields);
     out->field_count = (int64_t)fields;
     out->gathered_values = base_calloc(fields, sizeof *out->gathered_values);
-    out->gradients = base_calloc((size_t)out->part_count * (size_t)image->isosurface_count, sizeof *out->gradients);
+    out->gradients = base_calloc((size_t)out->part_count * (size_t)out->surface_count, sizeof *out->gradients);
     out->distances = base_calloc(surfaces, sizeof *out->distances);
     out->contours = base_calloc(surfaces, sizeof *out->contours);
     out->ranges = base_calloc(fields, sizeof *out->ranges);
@@ -263,6 +263,22 @@ static render_field set_face_field(const session_meshes *meshes, session_layers 
     return (render_field){layers->fields + first, layers->ranges + first};
 }
 
+/* Stores the normals at the vertices of the outer faces, for the layer with this index. */
+static const render_vertex_gradients *set_face_normals(const session_meshes *meshes, session_layers *layers,
+                                                       int surface, const scene_surface *layer)
+{
+    render_vertex_gradients *const out = layers->gradients + (ptrdiff_t)surface * layers->part_count;
+    int at = 0;
+    for (session_part_walk walk = {.meshes = meshes}; session_next_part(&walk);) {
+        if (!is_part(walk.part)) continue;
+        const session_scalar *scalar = &walk.part->scalars[0];
+        if (is_shown(&walk, layer))
+            out[at] = (render_vertex_gradients){scalar->gradient_indices, (const float(*)[3])scalar->gradients};
+        at++;
+    }
+    return out;
+}
+
 static bool gather_values(const session_mesh *whole, const session_outer *outer, const session_scalar *scalar,
                           double **values, grid_field *out)
 {
@@ -304,6 +320,7 @@ static const scene_material *material_of_faces(const session_layer_basis *basis,
 static insitu_status fill_outer(const session_layer_basis *basis, const scene_surface *layer, int surface,
                                 session_layers *layers, base_error *error)
 {
+    const bool is_curved = session_has_curved_faces(basis->catalogue);
     const scene_material *m = material_of_faces(basis, layer);
     render_surface_layer *out = &layers->surfaces[surface];
     *out = (render_surface_layer){.field = set_face_field(basis->meshes, layers, 2 * surface, layer),
@@ -312,11 +329,12 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
                                   .colours = layer->colour,
                                   .opacity = layer->opacity,
                                   .material = {m->ambient, m->diffuse, m->specular, m->shininess},
-                                  .normal = RENDER_GRADIENT,
+                                  .normal = is_curved ? RENDER_VERTEX : RENDER_GRADIENT,
                                   .edge_width = layer->edge_width,
                                   .is_of_faces = true,
                                   .clips = layer->clips};
     memcpy(out->edge_colour, layer->edge_colour, sizeof out->edge_colour);
+    if (is_curved) out->gradients = set_face_normals(basis->meshes, layers, surface, layer);
     if (layer->has_colour_by) {
         out->colour_map = &layers->transfers[surface].transfer;
         if (!set_gathered_field(basis->meshes, layers, 2 * surface + 1, layer, &layer->colour_by, &out->colour_field))

@@ -1,0 +1,26 @@
+/* Normals of the faces of cells of higher order, by which outer surfaces are lit as curved faces instead of the flat or
+ * bilinear faces of pieces. */
+#ifndef SESSION_FACE_NORMALS_H
+#define SESSION_FACE_NORMALS_H
+
+#include "session_derivatives.h"
+
+typedef struct session_face_normals {
+    session_polynomials polynomials;
+    int64_t cell;                           /* the caller's cell that was read last; -1: none */
+    const session_derivatives *derivatives; /* those of the cell */
+    double *positions;                      /* x, y and z of the cell's nodes, in the order of its row */
+} session_face_normals;
+
+/* Prepares the normals of the faces of a mesh whose cells are split. Returns false if memory runs out; the caller must
+ * free *out in any case. Local. */
+bool session_face_normals_create(const session_mesh *mesh, session_face_normals *out);
+void session_face_normals_free(session_face_normals *normals);
+
+/* Computes the normal, of any length, of a face of one of the caller's cells at one of its nodes. face: its number
+ * (session_find_rim()). vertex: the node, as a vertex of session_mesh.cells. Normals at all nodes of a face are on the
+ * same side of it. Returns false if the cell's polynomials are not known, as in pyramids, or the normal is 0. */
+bool session_find_face_normal(session_face_normals *normals, const session_mesh *mesh, int64_t cell, int face,
+                              int64_t vertex, double out[3]);
+
+#endif
