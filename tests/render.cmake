@@ -149,7 +149,8 @@ insitu_add_set_tests(folded 120 split)
 # options come after all others.
 set_source_files_properties(chord_trace.c PROPERTIES
   COMPILE_OPTIONS "-Wno-unused-function;$<$<C_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
-add_executable(test_chords test_chords.c chord_aim.c chord_hull.c test_mesh_honeycomb.c)
+add_executable(test_chords test_chords.c chord_aim.c chord_hull.c test_mesh_honeycomb.c test_mesh_refined.c
+  test_mesh_order.c)
 target_link_libraries(test_chords PRIVATE test_render_support insitu_flags)
 function(insitu_chords isa definition)
   add_library(chord_trace_${isa} OBJECT chord_trace.c)

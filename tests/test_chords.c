@@ -1,10 +1,10 @@
 /* A ray's intervals in the cells of a mesh add up to its chord of the mesh's hull, and every end within the hull is the
  * end of exactly two intervals, to the bit: no gap, no double. This is tested on exact and jittered lattices of every
- * cell type, whose hull is the cube [-1, 1]^3, with rays at random, to and along vertices, edges and faces, and along
- * the lattice. Every ray is traced twice: set up alone, its edge functions all projected (as differences for normals
- * have it), and as one of a tile, its edge functions by lines where these are good enough (as frames have it). The tile
- * is as wide as its rays are apart: a thousandth of a cell to several cells. The bounds on the sum and the ends are in
- * chord_hull.h. */
+ * cell type, and on the finer pieces of straight and bent cells of higher order, whose hull is the cube [-1, 1]^3, with
+ * rays at random, to and along vertices, edges and faces, and along the lattice. Every ray is traced twice: set up
+ * alone, its edge functions all projected (as differences for normals have it), and as one of a tile, its edge
+ * functions by lines where these are good enough (as frames have it). The tile is as wide as its rays are apart: a
+ * thousandth of a cell to several cells. The bounds on the sum and the ends are in chord_hull.h. */
 #include "chord_aim.h"
 #include "chord_hull.h"
 #include "cpu.h"
@@ -13,6 +13,7 @@
 #include "render_polyhedra.h"
 #include "render_prepare.h"
 #include "test_mesh_honeycomb.h"
+#include "test_mesh_refined.h"
 #include "test_render_fixture.h"
 
 #include <setjmp.h>
@@ -55,14 +56,26 @@ typedef enum chord_mesh {
     MESH_QUAD_POLYHEDRA, /* the hexes as polyhedra */
     MESH_BESIDE,         /* of the mixed mesh every second cell a polyhedron */
     MESH_HONEYCOMB,      /* hexagonal prisms */
-    MESH_COUNT
+    MESH_REFINED,        /* the first of the pieces of cells of higher order: all of refined_kind */
+    MESH_COUNT = MESH_REFINED + REFINED_MIXED + 1
 } chord_mesh;
 
 static const char *mesh_name(chord_mesh mesh)
 {
-    static const char *const names[MESH_COUNT] = {
-        "tets",     "hexes", "wedges", "pyramids", "polyhedra", "mixed", "hexes as polyhedra", "mixed and polyhedra",
-        "honeycomb"};
+    static const char *const names[MESH_COUNT] = {"tets",
+                                                  "hexes",
+                                                  "wedges",
+                                                  "pyramids",
+                                                  "polyhedra",
+                                                  "mixed",
+                                                  "hexes as polyhedra",
+                                                  "mixed and polyhedra",
+                                                  "honeycomb",
+                                                  "pieces of tets of 10 nodes",
+                                                  "pieces of hexes of 20 nodes",
+                                                  "pieces of hexes of 27 nodes",
+                                                  "pieces of wedges of 18 nodes",
+                                                  "pieces of hexes of 27 and wedges of 18 nodes"};
     return names[mesh];
 }
 
@@ -72,6 +85,10 @@ static void make_mesh(chord_mesh kind, double jitter, test_mesh *out)
                                                      TEST_POLYHEDRA, TEST_MIXED, TEST_HEXES,  TEST_MIXED};
     if (kind == MESH_HONEYCOMB) {
         test_mesh_honeycomb(SIDE, jitter / 2, test_linear, out);
+        return;
+    }
+    if (kind >= MESH_REFINED) {
+        test_mesh_refined((refined_kind)(kind - MESH_REFINED), SIDE / 2, jitter / 2, test_linear, out);
         return;
     }
     test_mesh_lattice(bases[kind], SIDE, jitter, test_linear, out);
