@@ -137,6 +137,11 @@ foreach(name order order_cells order_normals order_faults order_finer order_erro
   insitu_add_mpi_test(session_${name} test_session_${name} 2 WHOLE 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()
 
+insitu_session_program(test_session_order_partition)
+target_sources(test_session_order_partition PRIVATE test_mesh_order.c)
+insitu_add_mpi_test(session_order_partition test_session_order_partition 3 WHOLE 1 2 3 7 64 TIMEOUT 120
+  ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 if(INSITU_VTK) # reads a real grid
   insitu_session_program(test_session_order_pictures)
   target_sources(test_session_order_pictures PRIVATE test_mesh_order.c)

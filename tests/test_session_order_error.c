@@ -314,29 +314,6 @@ static void pieces_are_drawn_as_a_fixed_number(void **state)
 }
 
 /* Numbers and pictures are the same, with automatic cameras too. */
-static void pieces_are_the_same_on_any_ranks(void **state)
-{
-    (void)state;
-    bool are_all_same = true;
-    for (int k = 0; k < order_kind_count; k++) {
-        order_mesh part, whole;
-        if (!is_measured(&order_kinds[k]) || (!test_is_whole() && is_of_other_layout(&order_kinds[k]))) continue;
-        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, own_rank, rank_count, &part);
-        order_mesh_create(&order_kinds[k], 2, 0.07, order_wavy, 0, 1, &whole);
-        told all = draw(MPI_COMM_WORLD, WITHIN("1.5") ALL, &part);
-        told alone = draw(MPI_COMM_SELF, WITHIN("1.5") ALL, &whole);
-        const bool is_same = (own_rank != 0 || same_drawn(&all.pictures, &alone.pictures)) &&
-                             strcmp(all.pieces, alone.pieces) == 0 && all.pieces[0];
-        if (!is_same) fprintf(stderr, "%s: %s; alone: %s\n", order_kinds[k].name, all.pieces, alone.pieces);
-        are_all_same = are_all_same && is_same;
-        free_drawn(&all.pictures);
-        free_drawn(&alone.pictures);
-        order_mesh_free(&part);
-        order_mesh_free(&whole);
-    }
-    everywhere(are_all_same);
-}
-
 /* The field is at most -0.06 at nodes, but up to 0.05 more between them. */
 static double ridge(const double p[3])
 {
@@ -589,7 +566,6 @@ int main(int argc, char **argv)
         cmocka_unit_test(bent_cells_are_within_the_stated_error),
         cmocka_unit_test(pieces_follow_the_error_and_the_camera),
         cmocka_unit_test(pieces_are_drawn_as_a_fixed_number),
-        cmocka_unit_test(pieces_are_the_same_on_any_ranks),
         cmocka_unit_test(surfaces_between_nodes_are_found),
         cmocka_unit_test(other_descriptions_have_the_same_pieces),
         cmocka_unit_test(fields_without_a_bound_are_told),
