@@ -10,16 +10,19 @@
 
 enum { SIDE = 240, PIXELS = SIDE * SIDE };
 
-/* A pixel is 1/100 wide; looked at along z from z = 5. Cells have one piece between two nodes. */
-#define PICTURE(layer, more)                                                                                           \
-    "finer_pieces: 1\nimages:\n  - name: a\n    size: [240, 240]\n    background: [0, 0, 0, 0]\n"                      \
+/* A pixel is 1/100 wide; looked at along z from z = 5. Cells have one piece between two nodes, or more. */
+#define PICTURE(pieces, layer, more)                                                                                   \
+    "finer_pieces: " pieces "\nimages:\n  - name: a\n    size: [240, 240]\n    background: [0, 0, 0, 0]\n"             \
     "    camera: {position: [0, 0, 5], focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2.4}\n"      \
     "    layers:\n      - " layer "\n    outputs: [{path: a.exr" more "}]\n"
-#define IMAGE(layer) PICTURE(layer, "")
-#define NUMBERED(layer) PICTURE(layer, ", data: true")
-#define LINED(width)                                                                                                   \
-    IMAGE("surface: {colour: [1, 1, 1], edges: {width: " width                                                         \
-          ", colour: [0, 0, 0]}, material: {ambient: 1, diffuse: 0, specular: 0}}")
+#define IMAGE(layer) PICTURE("1", layer, "")
+#define NUMBERED(layer) PICTURE("1", layer, ", data: true")
+#define FINER_LINED(pieces, width)                                                                                     \
+    PICTURE(pieces,                                                                                                    \
+            "surface: {colour: [1, 1, 1], edges: {width: " width                                                       \
+            ", colour: [0, 0, 0]}, material: {ambient: 1, diffuse: 0, specular: 0}}",                                  \
+            "")
+#define LINED(width) FINER_LINED("1", width)
 
 /* more: a second field, or NULL. The caller owns the session. */
 static insitu_session *draw(const char *scene, const order_mesh *mesh, const insitu_field *more)
@@ -66,23 +69,39 @@ static double segment_distance(const double at[2], const double a[2], const doub
     return pow(d[0] - s * e[0], 2) + pow(d[1] - s * e[1], 2);
 }
 
-/* The edges of eight cubes on their face z = 1, by nodes; and the diagonals of tets and wedges there. */
+/* The edges of eight cubes on their face z = 1, by nodes or finer pieces; and the diagonals of tets and wedges there.
+ */
 typedef struct edge_list {
     int count;
     double ends[512][2][2];
 } edge_list;
 
-static void add_edge(edge_list *list, const double from[2], const double to[2], int order, double bend)
+/* How cells are bent, and how many pieces are between two nodes. */
+typedef struct edge_form {
+    int order, parts;
+    double bend;
+} edge_form;
+
+/* Computes a point of an edge: that of the polynomial through its nodes, which are equispaced until they are bent. */
+static void edge_point(const edge_form *form, const double from[2], const double to[2], double at, double out[2])
 {
-    for (int i = 0; i < order; i++) {
-        for (int end = 0; end < 2; end++) {
-            const double s = (double)(i + end) / order;
-            const double point[3] = {from[0] + s * (to[0] - from[0]), from[1] + s * (to[1] - from[1]), 1};
-            for (int axis = 0; axis < 2; axis++)
-                list->ends[list->count][end][axis] = order_mesh_moved(bend, point, axis);
-        }
-        list->count++;
+    out[0] = out[1] = 0;
+    for (int node = 0; node <= form->order; node++) {
+        const double s = (double)node / form->order;
+        const double point[3] = {from[0] + s * (to[0] - from[0]), from[1] + s * (to[1] - from[1]), 1};
+        double weight = 1;
+        for (int other = 0; other <= form->order; other++)
+            if (other != node) weight *= (form->order * at - other) / (node - other);
+        for (int axis = 0; axis < 2; axis++) out[axis] += weight * order_mesh_moved(form->bend, point, axis);
     }
+}
+
+static void add_edge(edge_list *list, const double from[2], const double to[2], const edge_form *form)
+{
+    const int count = form->order * form->parts;
+    for (int i = 0; i < count; i++, list->count++)
+        for (int end = 0; end < 2; end++)
+            edge_point(form, from, to, (double)(i + end) / count, list->ends[list->count][end]);
 }
 
 static bool has_diagonals(const order_kind *kind)
@@ -90,15 +109,16 @@ static bool has_diagonals(const order_kind *kind)
     return strstr(kind->name, "tet") || strstr(kind->name, "wedge");
 }
 
-static void list_edges(const order_kind *kind, double bend, edge_list *out)
+static void list_edges(const order_kind *kind, double bend, int parts, edge_list *out)
 {
+    const edge_form form = {kind->order, parts, bend};
     out->count = 0;
     for (int i = -1; i <= 1; i++)
         for (int j = -1; j < 1; j++) {
-            add_edge(out, (const double[]){i, j}, (const double[]){i, j + 1}, kind->order, bend);
-            add_edge(out, (const double[]){j, i}, (const double[]){j + 1, i}, kind->order, bend);
+            add_edge(out, (const double[]){i, j}, (const double[]){i, j + 1}, &form);
+            add_edge(out, (const double[]){j, i}, (const double[]){j + 1, i}, &form);
             if (i < 1 && has_diagonals(kind))
-                add_edge(out, (const double[]){i, j}, (const double[]){i + 1, j + 1}, kind->order, bend);
+                add_edge(out, (const double[]){i, j}, (const double[]){i + 1, j + 1}, &form);
         }
 }
 
@@ -119,30 +139,33 @@ static int count_wrong(const caught_picture *picture, const edge_list *edges, do
     return wrong;
 }
 
-static void check_edges(const order_kind *kind, double bend, const char *scene, double width, double fade)
+static void check_edges(const order_kind *kind, double bend, int parts, const char *scene, double width, double fade)
 {
     order_mesh mesh;
     edge_list edges;
     order_mesh_create(kind, 2, bend, order_wavy, own_rank, rank_count, &mesh);
-    list_edges(kind, bend, &edges);
+    list_edges(kind, bend, parts, &edges);
     caught_picture picture = draw_picture(scene, &mesh, NULL);
     const int wrong = own_rank ? 0 : count_wrong(&picture, &edges, width, fade);
-    if (wrong) fprintf(stderr, "%s, bend %g, width %g: %d pixels are wrong\n", kind->name, bend, width, wrong);
+    if (wrong)
+        fprintf(stderr, "%s, bend %g, %d pieces, width %g: %d pixels are wrong\n", kind->name, bend, parts, width,
+                wrong);
     everywhere(wrong == 0);
     free_caught(&picture);
     order_mesh_free(&mesh);
 }
 
-/* Lines run along the caller's cells alone, through the nodes of their edges; and how far they fade follows from the
- * length of a cell's edge, 100 pixels or, of diagonals, 141. */
+/* Lines run along the caller's cells alone, through the nodes of their edges, or along the finer pieces there; and how
+ * far they fade follows from the length of a cell's edge, 100 pixels or, of diagonals, 141. */
 static void edges_are_those_of_the_callers_cells(void **state)
 {
     (void)state;
     for (int k = 0; k < order_kind_count; k++) {
         const double length = has_diagonals(&order_kinds[k]) ? 100 * sqrt(2) : 100;
-        check_edges(&order_kinds[k], 0, LINED("3"), 3, 1);
-        check_edges(&order_kinds[k], 0.1, LINED("3"), 3, 1);
-        check_edges(&order_kinds[k], 0, LINED("20"), 20, fmin(0.25 * (length / 20 - 2), 1));
+        check_edges(&order_kinds[k], 0, 1, LINED("3"), 3, 1);
+        check_edges(&order_kinds[k], 0.1, 1, LINED("3"), 3, 1);
+        check_edges(&order_kinds[k], 0, 1, LINED("20"), 20, fmin(0.25 * (length / 20 - 2), 1));
+        if (!strstr(order_kinds[k].name, "pyramid")) check_edges(&order_kinds[k], 0.1, 4, FINER_LINED("4", "3"), 3, 1);
     }
 }
 
@@ -171,7 +194,7 @@ static void cells_of_several_orders_share_a_mesh(void **state)
     mesh.mesh.cell_types = (insitu_array){types, INSITU_UINT8, 0};
     mesh.mesh.offsets = (insitu_array){offsets, INSITU_INT64, 0};
     mesh.mesh.connectivity_count = offsets[mesh.cell_count];
-    list_edges(&kind, 0, &edges);
+    list_edges(&kind, 0, 1, &edges);
     caught_picture lined = draw_picture(LINED("3"), &mesh, NULL);
     everywhere(own_rank || count_wrong(&lined, &edges, 3, 1) == 0);
     caught_picture flat = draw_picture(NUMBERED("isosurface: {field: f, values: [0.1]}"), &mesh, NULL);
@@ -219,7 +242,7 @@ static void shells_have_edges_of_their_own(void **state)
             mesh.field = cell_field("f", INSITU_VERTEX, values, mesh.vertex_count);
             const order_kind kind = {"quad", mesh.mesh.cell_type, mesh.mesh.vertex_order, p};
             edge_list edges;
-            list_edges(&kind, 0.1, &edges);
+            list_edges(&kind, 0.1, 1, &edges);
             caught_picture picture = draw_picture(LINED("3"), &mesh, NULL);
             everywhere(own_rank || count_wrong(&picture, &edges, 3, 1) == 0);
             free_caught(&picture);
