@@ -88,6 +88,12 @@ add_executable(test_vtk_images test_vtk_images.cpp)
 target_link_libraries(test_vtk_images PRIVATE test_vtk_run insitu_quick_flags PkgConfig::CMOCKA)
 insitu_add_split_test(vtk_images $<TARGET_FILE:test_vtk_images> ${plain}/bin/insitu-render ${MPIEXEC_EXECUTABLE})
 
+# Every type of cell of higher order.
+add_executable(test_vtk_order test_vtk_order.cpp)
+target_link_libraries(test_vtk_order PRIVATE test_vtk_run insitu_quick_flags PkgConfig::CMOCKA VTK::CommonDataModel VTK::IOLegacy VTK::IOXML)
+add_test(NAME vtk_order COMMAND test_vtk_order ${plain}/bin/insitu-render)
+set_tests_properties(vtk_order PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120)
+
 add_executable(test_vtk_default test_vtk_default.cpp)
 target_include_directories(test_vtk_default SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})
 target_link_libraries(test_vtk_default PRIVATE test_vtk_run
