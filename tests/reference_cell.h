@@ -21,7 +21,7 @@ typedef struct reference_polyhedron {
 
 /* A cell in camera coordinates (right, up, forward from the eye). */
 typedef struct reference_cell {
-    int type; /* GRID_* */
+    int type; /* one of GRID_* */
     int count;
     /* coordinates as the simulation gives them: they decide how faces are split */
     double world[REFERENCE_MAX_VERTICES][3];

@@ -41,7 +41,7 @@ typedef struct light {
 
 /* The integrand at a depth. */
 typedef struct sample {
-    double extinction, emission[3]; /* per z */
+    double extinction, emission[3]; /* per unit of z */
 } sample;
 
 typedef struct active_intervals {
@@ -49,7 +49,7 @@ typedef struct active_intervals {
     int64_t count;
     const cell_interval **active; /* the intervals that contain the depth, `count` of them */
     reference_line line;
-    double length; /* per z */
+    double length; /* length of the ray per unit of z */
 } active_intervals;
 
 static void add_cell(reference_integral *scene, int volume, int part, int64_t index)

@@ -313,8 +313,8 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
     const double crossing_search =
         reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
     for (int axis = 0; axis < 3 && crossing_search > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
-    /* A ray that enters and leaves a polyhedron through one quad's patch, beside its triangles, is outside of its tets:
-     * the field there is defined along the ray, from patch to patch, but not across it. */
+    /* A ray that enters and leaves a polyhedron through one quad's patch without meeting the quad's triangles is
+     * outside of its tets: the field there is defined along the ray, from patch to patch, but not across it. */
     const bool has_gradient = crossing_search != 0;
     if (!has_gradient) t->out->ambiguous = true;
     e->hit.conditioning = has_gradient ? 1 / fabs(crossing_search) : 1;

@@ -250,7 +250,7 @@ static void failing_allocation_is_the_same_picture_or_an_error(void **context)
             if (out.allocations < n) break; /* n is beyond the last allocation */
         }
         assert_true(n > 500);
-        assert_true(refused > 0); /* the first allocation is that of the picture's own code */
+        assert_true(refused > 0); /* at least the first allocation, that of the picture itself, is fatal to it */
     }
 }
 

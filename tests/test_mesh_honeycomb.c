@@ -1,7 +1,7 @@
-/* Hexagonal prisms (test_mesh_honeycomb.h).
+/* Makes hexagonal prisms (test_mesh_honeycomb.h).
  *
- * A layer is a wall of bricks, in every second row shifted by half a brick. The corners of a row's bricks stand in the
- * middle of the edges of those beside it, and are pulled towards them, which makes the bricks hexagons:
+ * A layer is a wall of bricks, whose every second row is shifted by half a brick. A corner of a row's bricks is in the
+ * middle of an edge of the neighbouring row, and is moved towards that row, which makes the bricks hexagons:
  *
  *      |     |     |                \   / \   /
  *      +--+--+--+--+                 \ /   \ /

@@ -307,7 +307,7 @@ static void compare(const test_mesh *mesh, const drawing *d, bool with_reference
         if (overlaps < FEWEST || alone < FEWEST)
             fprintf(stderr, "%s, scene %d: %d pixels overlap, %d alone\n", what, (int)d->scene, (int)overlaps,
                     (int)alone);
-        /* Segments of several volumes are drawn at once in the form for overlaps, which reports none. */
+        /* Segments of several volumes are drawn with separate fragments from the start, which reports no overlaps. */
         const bool is_found = (overlaps >= FEWEST && alone >= FEWEST) || (d->max_error > 0 && d->scene == TWO_VOLUMES);
         good = is_found && (rank_count == 1 || same_images(&whole, &ours, d, what));
         /* The reference is slow, and one comparison is enough, because the picture is the same on any number of ranks.
@@ -380,8 +380,8 @@ static void tangled_lattices_are_the_same_everywhere(void **state)
     }
 }
 
-/* Returns whether the number of passes of the last frame was no more than fragment_limit requires: the number is
- * estimated in steps of 8 rays, and a pass may make half of the fragments that the previous pass predicted. */
+/* Returns whether the last frame took no more turns than fragment_limit requires: the number of pixels of a turn grows
+ * at most eightfold, and a turn may make half of the fragments that the previous turn predicted. */
 static bool are_passes_few(int64_t fragment_limit)
 {
     int64_t most = 0;
@@ -389,7 +389,7 @@ static bool are_passes_few(int64_t fragment_limit)
     return frame.turns > 1 && frame.turns <= 4 + 2 * (int)(most / fragment_limit);
 }
 
-/* Checks that passes only change the time at which a pixel is drawn. */
+/* Checks that turns only change the time at which a pixel is drawn. */
 static void draw_in_passes(const test_mesh *mesh, drawing d, int64_t fragment_limit)
 {
     image at_once, in_turns;
@@ -405,8 +405,8 @@ static void draw_in_passes(const test_mesh *mesh, drawing d, int64_t fragment_li
     assert_everywhere(is_few && is_same);
 }
 
-/* Checks passes. Rays of samples make as many fragments as estimated before the first pass, those of segments far
- * fewer. */
+/* Checks pictures drawn in turns. Rays of samples make as many fragments as estimated before the first turn, those of
+ * segments far fewer. */
 static void passes_make_the_same_bits(void **state)
 {
     (void)state;

@@ -198,9 +198,9 @@ static double tree_cost(const insitu_session *session)
     return mmbvh_cost(&session->meshes.items[0]->tree, &(mmbvh_options){.threads = 1});
 }
 
-/* Checks trees of a single step. One of two sessions is told that nothing has changed: its first tree, by the surface
- * area heuristic, is kept. The other session rebuilds its tree at each step, along a curve from the second step on, and
- * by the heuristic again after a tree that was kept for a step. The pictures must always be the same. */
+/* Checks trees of a single step. The caller states to one of two sessions that nothing has changed: its first tree, by
+ * the surface area heuristic, is kept. The other session rebuilds its tree at each step, along a curve from the second
+ * step on, and by the heuristic again after a tree that was kept for a step. The pictures must always be the same. */
 static void trees_of_one_step_are_built_fast(void **context)
 {
     (void)context;

@@ -28,9 +28,9 @@ void assert_everywhere(bool is_well, const char *what, const char *file, int lin
 void assert_reported(const insitu_session *session, insitu_status status, insitu_status expected,
                      const char *const *words, const char *file, int line);
 
-/* Returns the values' sum, rounded once, divided by their number; NAN if there are none. Values that are moved to
- * another origin lose less than 2^-85 of the largest of 100 values, so that the result has the same bits unless a sum
- * is that close to a tie. */
+/* Returns the values' sum, rounded once, divided by their number; NAN if there are none. The compensated sum is off by
+ * less than 2^-85 of the largest of 100 values, so that the result has the bits of the exact sum unless that is this
+ * close to a tie. */
 double mean_of(const double *values, int count);
 
 /* Changes to a directory named by `name` and the number of ranks, inside the directory for scene files, so that each

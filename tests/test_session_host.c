@@ -197,7 +197,7 @@ static void threads_are_at_most_the_cores(void **context)
 {
     (void)context;
     cores = 3;
-    allow_threads(3 - 1 + 4); /* the session tests that it can start these threads */
+    allow_threads(3 - 1 + 4); /* the session tries to start the missing threads and four spare ones */
     insitu_session *session = open_by(1024);
     step_draws_the_same(session, 0);
     everywhere(

@@ -198,7 +198,7 @@ static double error_at(const levels *l, const int vertex[3])
 typedef struct block {
     insitu_lattice lattice;
     int64_t vertex_count, cell_count;
-    double *values, (*places)[3]; /* places is NULL for a uniform block */
+    double *values, (*places)[3]; /* places is NULL if the block is uniform */
     int16_t *flags;               /* flags of cells; NULL if there are none */
 } block;
 

@@ -1,6 +1,6 @@
 /* Checks shadows and ambient occlusion. Outlines of shadows have a closed form: a disk cut from a slice by a ball casts
  * an ellipse on another slice, and an isosurface that is a plane darkens what is behind it. Ambient occlusion in a
- * corner of two planes is a segment of a disk, and is compared ray by ray with planes in double; likewise in a valley
+ * corner of two planes is a segment of a disk, and is compared ray by ray with planes in double; so is that in a valley
  * of an isosurface. All pictures are the same to the bit with any partition, for all kinds of cells. */
 #include <math.h>
 #include <stdio.h>
