@@ -15,8 +15,7 @@ typedef struct reference_hit {
     double slowness;
     int part;
     int64_t cell;
-    /* |gradient| / |component of the gradient along the ray|: the factor from an error of position to an error of depth
-     */
+    /* |gradient| / |component of the gradient along the ray|: the ratio of an error of depth to an error of position */
     double conditioning;
 } reference_hit;
 

@@ -65,7 +65,7 @@ static void set_scale_case(render_transfer *t, const scale_case *l)
  * the outside colours). */
 static const double value_error = 4e-6, colour_error = 3e-6;
 
-/* Compares a pixel's colour with the reference; returns whether the pixel is compared or skipped. */
+/* Compares a pixel's colour with the reference; returns false if the pixel is skipped. */
 static bool check_pixel(const render_transfer *t, double value, const float drawn[3], const char *what)
 {
     double at[3], low[3], high[3];
@@ -184,7 +184,7 @@ static void scales_and_their_inverses_agree(void **state)
 
 static double growing(const double p[3])
 {
-    return pow(10, 2 * test_linear(p)); /* 1.6e-3 to 1600 */
+    return pow(10, 2 * test_linear(p)); /* values from 1.6e-3 to 1600 */
 }
 
 static void set_volume(render_fixture *f, const scale_case *l, double values[3], render_transfer *t)

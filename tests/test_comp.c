@@ -472,7 +472,7 @@ static void spread(uint32_t block, int64_t count, int ranks, int64_t *have)
     for (int r = 0; r < ranks; r++) have[r] = r % 2 && (block >> 5) % 2 ? 0 : count;
 }
 
-/* Checks that ranks share fragments evenly if they have different parts of the picture and win blocks by their
+/* Checks that ranks share fragments to a tenth if they have different parts of the picture and win blocks by their
  * priorities. */
 static void owners_share_what_they_have(void **context)
 {

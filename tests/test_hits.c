@@ -228,8 +228,7 @@ static void opaque_hits_in_cuboids_match_the_reference(void **state)
         assert_true(t.hits > 3500);
         assert_int_equal(t.different, 0);
         assert_depths(&t, 250);
-        /* across the thin cells random values change so fast that the rounding of a vertex changes them by up to 1e-3
-         */
+        /* across thin cells random values change so fast that the rounding of a vertex changes them by up to 1e-3 */
         if (turn == 0) assert_true(t.residual <= 1e-6);
         assert_few_left_out(&t);
     }

@@ -310,8 +310,7 @@ static void compare(const test_mesh *mesh, const drawing *d, bool with_reference
         /* Segments of several volumes are drawn with separate fragments from the start, which reports no overlaps. */
         const bool is_found = (overlaps >= FEWEST && alone >= FEWEST) || (d->max_error > 0 && d->scene == TWO_VOLUMES);
         good = is_found && (rank_count == 1 || same_images(&whole, &ours, d, what));
-        /* The reference is slow, and one comparison is enough, because the picture is the same on any number of ranks.
-         */
+        /* The reference is slow, and one comparison suffices, since the picture is the same on any number of ranks. */
         if (with_reference && (rank_count == 1 || test_is_whole()))
             good = (d->max_error > 0 ? is_as_integrated : is_as_counted)(mesh, d, &ours, what) && good;
         if (rank_count > 1) free_image(&whole);

@@ -64,8 +64,7 @@ static bool borders(const render_camera *c, const session_extent *e, double low[
     return are_before;
 }
 
-/* Returns whether the eye is as close to the nearest corner as allowed, a hundredth of the half diagonal, where it is
- * placed if the fitted position is closer. */
+/* Returns whether the eye is as close to the nearest corner as allowed: a hundredth of the half diagonal. */
 static bool is_close(const render_camera *c, const session_extent *e)
 {
     double nearest = INFINITY;

@@ -174,8 +174,7 @@ static void ranges_over_a_run_widen_and_outlive_it(void **state)
     }
     insitu_destroy(&session);
     everywhere(own_rank != 0 || access(ranges_file(), R_OK) == 0);
-    /* Another session continues the range; only volumes are compared, since the surface is coloured by another field.
-     */
+    /* Another session continues the range. Only volumes are compared, since another field colours the surface. */
     caught_picture again = draw(&distributed, "", run);
     assert_alike(&again, &fixed, 0);
     /* There is no range for another field yet. */

@@ -335,8 +335,7 @@ static void compare(place_form form, array_order order, bool layers, bool blanki
     everywhere(strcmp(statistics[0], statistics[1]) == 0);
     everywhere(strcmp(left_out[0], left_out[1]) == 0); /* the message with the number of cells that trees leave out */
     everywhere(count > 1 || strstr(left_out[1], "cells show nothing"));
-    /* the first image shows the values as they are passed, so that no bytes are allocated for single cells or vertices
-     */
+    /* the first image shows the values as they are passed, so that no bytes are allocated per cell or vertex */
     everywhere(count > 1 || reports[1].bytes_copied == bytes_of_axes(&b));
     const int64_t own =
         (b.own_end[0] - b.own_first[0]) * (b.own_end[1] - b.own_first[1]) * (b.own_end[2] - b.own_first[2]);

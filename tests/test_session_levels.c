@@ -557,8 +557,8 @@ static void levels_come_and_go(void **state)
     free_blocks(&last, held);
 }
 
-/* Removes a block of the finest level: blocks whose covered cells stay the same are not made again, and keep their
- * trees. */
+/* Checks the removal of a block of the finest level: blocks whose covered cells stay the same are not made again, and
+ * keep their trees. */
 static void blocks_beside_a_change_stay(void **state)
 {
     levels l = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count}, rest;
