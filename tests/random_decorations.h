@@ -106,8 +106,7 @@ class random_decorations
         std::snprintf(what_.scale_bar.text, sizeof what_.scale_bar.text, "%s", text(8));
     }
 
-    /* Covers each corner with a probability of one half, by a rectangle close to its edges, as in a panel of a montage.
-     */
+    /* Covers each corner with a probability of one half, by a rectangle close to its edges, as in a montage. */
     void make_covered(int width, int height)
     {
         for (int corner = 0; corner < 4; corner++) {
