@@ -114,7 +114,7 @@ typedef struct domain {
     insitu_lattice lattice;
     int64_t vertex_count, cell_count;
     double *values;
-    int32_t *flags; /* NULL if there are none */
+    int32_t *flags; /* flags of cells; NULL if there are none */
 } domain;
 
 static void measure_domain(const plan *p, int number, domain *out)

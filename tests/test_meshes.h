@@ -16,15 +16,15 @@ typedef double test_function(const double position[3]);
 
 typedef struct test_mesh {
     int64_t vertex_count, cell_count, connectivity_count;
-    double *coordinates;                         /* vertex_count × 3 */
-    double *values;                              /* vertex_count */
-    int64_t *offsets;                            /* cell_count + 1 */
+    double *coordinates;                         /* vertex_count × 3 elements */
+    double *values;                              /* vertex_count elements */
+    int64_t *offsets;                            /* cell_count + 1 elements */
     int64_t *connectivity;                       /* vertices; for polyhedra their faces */
     int64_t face_count, face_connectivity_count; /* 0 if there are no polyhedra */
-    int64_t *face_offsets;                       /* face_count + 1; NULL if there are no polyhedra */
+    int64_t *face_offsets;                       /* face_count + 1 elements; NULL if there are no polyhedra */
     int64_t *face_connectivity;
-    unsigned char *types;  /* cell_count, numbers of VTK's cell types */
-    unsigned char *ghosts; /* cell_count, initially 0 */
+    unsigned char *types;  /* cell_count elements: numbers of VTK's cell types */
+    unsigned char *ghosts; /* cell_count elements, initially 0 */
 } test_mesh;
 
 typedef enum test_mesh_kind {
@@ -135,9 +135,9 @@ typedef struct test_view {
 void test_view_create(const test_mesh *mesh, test_layout layout, test_view *out);
 void test_view_free(test_view *view);
 
-/* sin 6x cos 6y + sin 6y cos 6z + sin 6z cos 6x */
+/* Returns sin 6x cos 6y + sin 6y cos 6z + sin 6z cos 6x. */
 double test_wave(const double position[3]);
-/* 0.3 x - 0.7 y + 0.5 z + 0.1, exact on every cell */
+/* Returns 0.3 x - 0.7 y + 0.5 z + 0.1, which is exact on every cell. */
 double test_linear(const double position[3]);
 
 /* Returns the larger error. NaN counts as infinite, so that a later error does not hide it. */

@@ -253,8 +253,8 @@ static void cell_values_continue_across_hanging_nodes(void **state)
     check(4, BENT, INSITU_HEX);
 }
 
-/* Checks cells with triangles in shapes with plane faces: triangles are flat, so that hanging vertices of bent shapes are
- * not on them. */
+/* Checks cells with triangles in shapes with plane faces: triangles are flat, so that hanging vertices of bent shapes
+ * are not on them. */
 static void cell_values_continue_across_triangles(void **state)
 {
     (void)state;
