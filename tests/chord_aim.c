@@ -1,6 +1,6 @@
-/* Cameras and rays at a mesh (chord_aim.h). A ray to a point is exact in double; float32 then moves ray and point by
- * their rounding. Where the point is the tile's own middle, both stay the same numbers, and the side of it that the ray
- * is on is a tie. */
+/* Chooses cameras and rays at a mesh (chord_aim.h). A ray to a point is exact in double; float32 then rounds the ray
+ * and the point. If the point is the middle of the tile, both are exact in float32, and deciding on which side of the
+ * point the ray passes is a tie. */
 #include "chord_aim.h"
 
 #include <math.h>
@@ -109,7 +109,8 @@ static void between(const double *a, const double *b, double share, double out[3
     for (int k = 0; k < 3; k++) out[k] = a[k] + share * (b[k] - a[k]);
 }
 
-/* A point on the face: a vertex, a point of an edge (often its middle), or of a triangle of vertices. */
+/* Computes a point on the face: a vertex, a point of an edge (often its middle), or a point of a triangle of
+ * vertices. */
 static void point_on(const face_loop *face, chord_aim aim, uint64_t *counter, double out[3])
 {
     const int64_t i = whole(counter, face->count);
@@ -122,7 +123,7 @@ static void point_on(const face_loop *face, chord_aim aim, uint64_t *counter, do
     between(out, c, uniform(counter, 0, 1), out);
 }
 
-/* A point outside the mesh on the line from a to b, or in the plane of a face. */
+/* Computes a point outside the mesh on the line from b through a, at the given distance from a. */
 static void step_back(const double *a, const double *b, double distance, double eye[3])
 {
     double square = 0;
@@ -130,8 +131,8 @@ static void step_back(const double *a, const double *b, double distance, double 
     for (int k = 0; k < 3; k++) eye[k] = a[k] - distance * (b[k] - a[k]) / sqrt(square);
 }
 
-/* The eye on the line of the face's first edge, or in the plane of its first three vertices; in every second camera the
- * view is along that line as well, so that orthographic rays are. */
+/* Sets a camera whose eye lies on the line of the face's first edge, or in the plane of its first three vertices. Every
+ * second camera also looks along that line, so that orthographic rays run along it too. */
 static void view_along(const face_loop *face, chord_aim aim, render_camera *camera, uint64_t *counter)
 {
     double to[3], eye[3], focal[3];
@@ -162,7 +163,7 @@ static void aim_anywhere(const render_camera *camera, uint64_t *counter, chord_r
         add_ray(rays, rays->centre_x + uniform(counter, -half, half), rays->centre_y + uniform(counter, -half, half));
 }
 
-/* Aims rays from the eye, at most 45 degrees off its view. */
+/* Aims rays from the eye at most 45 degrees off the view direction. */
 static void aim_forward(uint64_t *counter, chord_rays *rays)
 {
     rays->centre_x = uniform(counter, -0.9, 0.9);
@@ -171,7 +172,7 @@ static void aim_forward(uint64_t *counter, chord_rays *rays)
         add_ray(rays, rays->centre_x + uniform(counter, -0.1, 0.1), rays->centre_y + uniform(counter, -0.1, 0.1));
 }
 
-/* Every second ray to the point itself, the others past it by 1e-9 to 1e-3. */
+/* Aims half of the rays at the point itself, and the others past it by 1e-9 to 1e-3. */
 static void aim_at(const render_camera *camera, const double p[3], uint64_t *counter, chord_rays *rays)
 {
     double x, y;
@@ -197,7 +198,8 @@ static void aim_at_cell(const test_mesh *mesh, int64_t cell, chord_aim aim, cons
     }
 }
 
-/* The face is a line in the picture: rays to its vertices, edges and inside meet it along that line. */
+/* Aims rays at vertices, edges and inner points of a face that the camera sees as a line, so that every ray meets the
+ * face along that line. */
 static void aim_along(const test_mesh *mesh, int64_t cell, chord_aim aim, uint64_t *counter, render_camera *camera,
                       chord_rays *rays)
 {
@@ -213,8 +215,8 @@ static void aim_along(const test_mesh *mesh, int64_t cell, chord_aim aim, uint64
     aim_at_cell(mesh, cell, (chord_aim)(CHORD_TO_VERTICES + whole(counter, 3)), camera, counter, rays);
 }
 
-/* Aims along an axis, or a diagonal of a face or of the cube, either way; perspective eyes stand on lattice lines. Rays
- * are eighths of a cube apart and begin on a lattice plane. */
+/* Aims along an axis or a diagonal of a face or of the cube, in either direction; eyes of perspective cameras lie on
+ * lattice lines. Rays are an eighth of a cube apart and begin on a lattice plane. */
 static void aim_by_lattice(int n, uint64_t *counter, render_camera *camera, chord_rays *rays)
 {
     const double side = 2.0 / n;

@@ -1,4 +1,4 @@
-/* Chords of the hull (chord_hull.h). */
+/* Computes chords of the hull (chord_hull.h). */
 #include "chord_hull.h"
 
 #include <math.h>
@@ -22,7 +22,7 @@ static chord_line ray_line(const render_job *job, const chord_rays *rays, int i)
     return l;
 }
 
-/* The depths from the eye between which the ray is in the hull of this half side, from the eye's plane on. */
+/* Returns the depths between which the ray is inside the cube of the given half side, clipped at the eye's plane. */
 static chord_depths hull_chord(const chord_line *l, double half)
 {
     chord_depths c = {0, (double)INFINITY};

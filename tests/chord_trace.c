@@ -1,4 +1,4 @@
-/* The intervals of the cells on rays, by the kernels of one instruction set (chord_trace.h). */
+/* Computes the intervals of cells on rays with the kernels of one instruction set (chord_trace.h). */
 #include <math.h>
 
 #include "chord_trace.h"
@@ -14,7 +14,7 @@
 
 typedef struct chord_state {
     chord_rays *rays;
-    int first; /* lane 0's number */
+    int first; /* number of lane 0's ray */
 } chord_state;
 
 static void chord_note(const chord_state *state, vm mask, vf t_in, vf t_out)
@@ -91,7 +91,8 @@ static void chord_tile_rays(kernel_packet *p, const kernel_lanes *l)
     p->slope_y = vf_load(lanes[3]);
 }
 
-/* Does as kernel_packet_setup() and kernel_packet_complete(), for any rays, not only those of pixels. */
+/* Sets up a packet as kernel_packet_setup() and kernel_packet_complete() do, but for any rays, not only those of
+ * pixels. */
 static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread,
                          const chord_rays *rays, int first)
 {

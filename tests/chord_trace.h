@@ -1,6 +1,6 @@
-/* Rays for the tests of exactness, and the intervals of cells that the kernels find on them. The kernels' own headers
- * are compiled into chord_trace.c, once an instruction set as render_kernels.c is: rays are put into packets, packets
- * go down the tree, and every [t_in, t_out) that volumes and surfaces would get is recorded. */
+/* Rays for the tests of exactness, and the intervals of cells that the kernels find on them. chord_trace.c includes the
+ * kernels' own headers and is compiled once for each instruction set, as render_kernels.c is. It puts rays into
+ * packets, sends packets down the tree, and records every [t_in, t_out) that volumes and surfaces would get. */
 #ifndef CHORD_TRACE_H
 #define CHORD_TRACE_H
 
@@ -12,19 +12,21 @@ typedef struct chord_interval {
     float t_in, t_out;
 } chord_interval;
 
-/* Rays of one tile. Where there are more spans than fit, span_count says so all the same. */
+/* Rays of one tile. span_count counts all spans, including those that do not fit. */
 typedef struct chord_rays {
     int count;
-    bool is_pencil;                              /* edges by their lines (kernel_cell.h), as tiles have them? */
-    double centre_x, centre_y;                   /* the tile's middle in the image plane: slopes, or offsets */
-    double x[CHORD_MAX_RAYS], y[CHORD_MAX_RAYS]; /* the rays */
+    /* whether rays cross edges by the edges' lines (kernel_cell.h), as in tiles */
+    bool is_pencil;
+    double centre_x, centre_y;                   /* the tile's middle in the image plane, as slopes or offsets */
+    double x[CHORD_MAX_RAYS], y[CHORD_MAX_RAYS]; /* the rays' positions in the image plane */
     int interval_count[CHORD_MAX_RAYS];
-    chord_interval ray_intervals[CHORD_MAX_RAYS][CHORD_MAX_INTERVALS]; /* in the order of the tree */
+    /* the intervals of each ray, in the order of the tree */
+    chord_interval ray_intervals[CHORD_MAX_RAYS][CHORD_MAX_INTERVALS];
 } chord_rays;
 
 typedef struct chord_table {
     int width;
-    size_t cells_bytes; /* of a thread's cells */
+    size_t cells_bytes; /* size of a thread's memory for cells */
     void (*trace)(const kernel_frame *frame, kernel_thread *thread, chord_rays *rays);
 } chord_table;
 

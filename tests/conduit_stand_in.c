@@ -9,7 +9,7 @@ struct conduit_node_impl {
     int id;
     char *data;
     int64_t count, stride;
-    void *owned; /* data, where it is the node's */
+    void *owned; /* the data, if the node owns it */
     int child_count;
     conduit_node **children;
 };
@@ -49,7 +49,7 @@ void conduit_node_destroy(conduit_node *node)
     free(node);
 }
 
-/* The child of the path's first name; *rest: what follows. */
+/* Returns the child with the first name of the path; *rest is the rest of the path. */
 static conduit_node *first_child(const conduit_node *node, const char *path, const char **rest)
 {
     const size_t length = strcspn(path, "/");
@@ -168,7 +168,7 @@ void stand_in_put(conduit_node *node, const char *path, int id, const void *data
     at->stride = stride ? stride : stand_in_size(id);
 }
 
-/* Puts a copy of so many bytes. */
+/* Stores a copy of the bytes at the path. */
 static void put_copy(conduit_node *node, const char *path, int id, const void *data, size_t bytes)
 {
     void *copy = malloc(bytes);

@@ -1,9 +1,9 @@
-/* A stand-in of the few functions of Conduit's C API that the adaptors call, by the same names: Debian has no Conduit.
- * A node is a name, children, or an array in memory of the test's. As Conduit throws where a path is missing or a node
- * is of another type, this ends the process. */
+/* Replaces the few functions of Conduit's C API that the adaptors call, under the same names, since Debian has no
+ * package of Conduit. A node is a name, children, or an array in the test's memory. On a missing path or a node of
+ * another type Conduit throws an exception; this replacement ends the process. */
 #ifndef CONDUIT_STAND_IN_H
 #define CONDUIT_STAND_IN_H
-#define CONDUIT_NODE_H /* as Conduit's own header */
+#define CONDUIT_NODE_H /* the include guard of Conduit's own header */
 
 #include <stdint.h>
 
@@ -11,7 +11,7 @@ typedef int64_t conduit_index_t;
 typedef struct conduit_node_impl conduit_node;
 typedef struct conduit_datatype_impl conduit_datatype;
 
-/* Conduit's numbers of types. */
+/* Conduit's numbers of data types. */
 enum {
     STAND_IN_EMPTY = 0,
     STAND_IN_OBJECT = 1,
@@ -32,7 +32,7 @@ enum {
 conduit_node *conduit_node_create(void);
 void conduit_node_destroy(conduit_node *node);
 
-/* Makes what is missing of the path. */
+/* Returns the node at the path and creates missing nodes. */
 conduit_node *conduit_node_fetch(conduit_node *node, const char *path);
 conduit_node *conduit_node_fetch_existing(conduit_node *node, const char *path);
 conduit_node *conduit_node_child(conduit_node *node, conduit_index_t number);
@@ -50,16 +50,17 @@ void conduit_node_set_path_char8_str(conduit_node *node, const char *path, const
 void conduit_node_set_path_int64(conduit_node *node, const char *path, int64_t value);
 void conduit_node_set_path_float64(conduit_node *node, const char *path, double value);
 
-/* Beside Conduit's: the array at the path is that in memory; a stride of 0: packed. */
+/* Makes the array in memory the data of the node at the path; a stride of 0 means packed. Conduit has no such
+ * function. */
 void stand_in_put(conduit_node *node, const char *path, int id, const void *data, int64_t count, int64_t stride);
-/* Exchanges what two nodes hold; their names stay. */
+/* Exchanges the contents of two nodes but not their names. */
 void stand_in_swap(conduit_node *a, conduit_node *b);
-/* Makes an array's stride 0. */
+/* Sets the stride of the array at the path to 0. */
 void stand_in_still(conduit_node *node, const char *path);
-/* Takes away what is at the path. */
+/* Removes the node at the path. */
 void stand_in_remove(conduit_node *node, const char *path);
-/* Copies all arrays into one piece of memory, one after the other from an odd address on, as Conduit's compact nodes.
- */
+/* Copies all arrays into one block of memory, one after the other from an odd address on, as Conduit's compact nodes
+ * are. */
 void stand_in_pack(conduit_node *node);
 int64_t stand_in_size(int id);
 

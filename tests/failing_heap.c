@@ -1,4 +1,4 @@
-#define _GNU_SOURCE 1 /* RTLD_NEXT, dl_iterate_phdr */
+#define _GNU_SOURCE 1 /* for RTLD_NEXT and dl_iterate_phdr */
 #include "failing_heap.h"
 
 #include <dlfcn.h>
@@ -26,7 +26,7 @@ bool heap_can_fail(void)
 
 #else
 
-/* The C library's own. */
+/* The C library's own allocators. */
 void *__libc_malloc(size_t size);
 void *__libc_calloc(size_t count, size_t size);
 void *__libc_realloc(void *block, size_t size);
@@ -38,7 +38,7 @@ static _Thread_local struct {
     int64_t count, fails_at;
 } heap;
 
-/* Code of the libraries that are let be. */
+/* Address ranges of the code of libgomp, libomp and the loader, whose allocations neither count nor fail. */
 enum { MOST_RANGES = 16 };
 static struct {
     uintptr_t begin, end;
@@ -104,7 +104,7 @@ bool heap_can_fail(void)
     return true;
 }
 
-/* ---- in front of the C library's ------------------------------------------------------------------------------ */
+/* ---- replacements of the C library's functions ---------------------------------------------------------------- */
 
 #define CALLER __builtin_return_address(0)
 
@@ -141,7 +141,7 @@ int posix_memalign(void **out, size_t alignment, size_t size)
     return 0;
 }
 
-/* Constructors of libraries that are being loaded may end the process where they get no memory. */
+/* Pauses the heap during dlopen(): constructors of loaded libraries may end the process if an allocation fails. */
 void *dlopen(const char *path, int flags)
 {
     void *(*next)(const char *, int);

@@ -1,5 +1,5 @@
-/* MPI's own allocations neither count nor fail (failing_heap.h): every function that the library calls and that may
- * allocate goes by its profiling name, while the heap is let be. */
+/* Excludes MPI's own allocations from the failing heap (failing_heap.h): wraps every MPI function that the library
+ * calls and that may allocate, and calls it by its profiling name while the heap is paused. */
 #include <mpi.h>
 
 #include "failing_heap.h"

@@ -1,5 +1,5 @@
-/* Compiles the integral a second time, on doubles, with as many nodes as they resolve, so that its error is the
- * method's, not the arithmetic's. Replaces simd.h by vectors of two doubles. */
+/* Compiles the integral a second time, on doubles and with as many Gauss nodes as doubles resolve, so that its error is
+ * the method's, not the arithmetic's. Vectors of two doubles replace simd.h. */
 #define KERNEL_REAL_IS_DOUBLE
 #define BASE_SIMD_H
 #define render_pieces_build pieces_build_of_doubles
@@ -113,7 +113,7 @@ static struct {
 #include "kernel_types.h"
 #include "render_pieces.c"
 
-/* Legendre's polynomial and its derivative. */
+/* Computes the Legendre polynomial of degree KERNEL_NODES and its derivative. */
 static double legendre(double x, double *derivative)
 {
     double last = 1, p = x;
@@ -134,7 +134,7 @@ static double lagrange(int k, double x)
     return product;
 }
 
-/* Gauss's nodes on [0, 1], their weights, and the integrals of the Lagrange polynomials up to each. */
+/* Computes the Gauss nodes on [0, 1], their weights, and the integrals of the Lagrange polynomials up to each node. */
 static void prepare_gauss(void)
 {
     for (int i = 0; i < KERNEL_NODES; i++) {

@@ -1,4 +1,4 @@
-/* The integral as the plain kernels have it. */
+/* Computes the integral with the scalar kernels, on floats. */
 #include <stdlib.h>
 
 #include "integral_double.h"

@@ -1,5 +1,6 @@
-/* picture_difference BEFORE AFTER: are the pixels of two pictures the same, to the bit? How a file is packed, and when it was written,
- * does not count. Says how many pixels differ, and by how much at most, and returns 1 where any does. */
+/* picture_difference BEFORE AFTER: compares the pixels of two pictures bit by bit. The compression of the files and
+ * their times do not count. Prints how many pixels differ and by how much at most, and returns 1 if any pixel
+ * differs. */
 #include <OpenImageIO/imageio.h>
 
 #include <cmath>
@@ -8,7 +9,8 @@
 #include <string>
 #include <vector>
 
-namespace {
+namespace
+{
 
 struct picture {
     OIIO::ImageSpec spec;
@@ -46,7 +48,7 @@ int main(int argc, char **argv)
         different++;
         for (size_t c = i; c < i + channels; c++) {
             const double by = std::fabs(static_cast<double>(before.pixels[c]) - static_cast<double>(after.pixels[c]));
-            if (by > most) most = by; // not where a depth is infinite in one of them
+            if (by > most) most = by; /* not counted if a depth is infinite in one of the pictures */
         }
     }
     if (different) std::printf("%zu pixels, by %.3g at most\n", different, most);

@@ -1,5 +1,5 @@
-/* An image library that writes plain numbers, for tests that compare pictures of many runs: OpenImageIO takes longer to
- * load than such a run takes. The file has the picture's floats, then its depths if it has any. */
+/* An image library that writes plain numbers, for tests that compare pictures of many runs: loading OpenImageIO takes
+ * longer than such a run. The file contains the picture's floats, then its depths if there are any. */
 #include <stdio.h>
 
 #include "insitu/image_output.h"

@@ -1,4 +1,5 @@
-/* A library of the image library's name, planted in the working directory: a session that loads it gets no picture. */
+/* A library with the image library's name that a test puts into the working directory: a session that loads it by
+ * mistake fails to write its picture. */
 #include <stdio.h>
 
 #include "insitu/image_output.h"

@@ -1,5 +1,5 @@
-/* Decorations of a picture at random: all anchors, any number of bars, words from none to long ones, big and small,
- * and corners that other pictures cover. */
+/* Draws random decorations of a picture: all anchors, any number of bars, texts from empty to long, small and large
+ * sizes, and corners that other pictures cover. */
 #ifndef TEST_RANDOM_DECORATIONS_H
 #define TEST_RANDOM_DECORATIONS_H
 
@@ -19,11 +19,11 @@ class random_decorations
   public:
     explicit random_decorations(unsigned seed) : random_(seed) {}
 
-    /* In [low, high]. */
+    /* Returns a random integer in [low, high]. */
     int whole(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
     double real(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
 
-    /* Valid until the next call. */
+    /* Returns random decorations, which are valid until the next call. */
     const insitu_decorations &make(int width, int height)
     {
         texts_.clear();
@@ -106,7 +106,7 @@ class random_decorations
         std::snprintf(what_.scale_bar.text, sizeof what_.scale_bar.text, "%s", text(8));
     }
 
-    /* Each corner may be covered, up to its edges, as in a panel among others. */
+    /* Covers each corner with a probability of one half, by a rectangle close to its edges, as in a montage. */
     void make_covered(int width, int height)
     {
         for (int corner = 0; corner < 4; corner++) {

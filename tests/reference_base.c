@@ -14,7 +14,7 @@ void *reference_reserve(void *block, size_t bytes)
     return p;
 }
 
-/* The scale's function, by its definition. */
+/* Computes the scale's function by its definition. */
 static double scaled(const render_transfer *t, double value)
 {
     const double size = fabs(value) / t->threshold;

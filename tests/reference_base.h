@@ -6,12 +6,12 @@
 
 #include "render.h"
 
-/* Does as realloc(); running out of memory ends the process. */
+/* Reallocates the block as realloc() does, but ends the process if memory runs out. */
 void *reference_reserve(void *block, size_t bytes);
 
-/* Colour and opacity of a value, as render.h says. */
+/* Return opacity and colour of a value as render.h defines them. */
 double reference_opacity(const render_transfer *t, double value);
-/* A value's place in the colour table, not clamped. */
+/* Returns the value's position in the colour table, not clamped. */
 double reference_place(const render_transfer *t, double value);
 void reference_colour(const render_transfer *t, double value, double colour[3]);
 

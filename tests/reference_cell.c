@@ -1,13 +1,14 @@
 /* A cell in double.
  *
- * Crossings: the line is sheared upright, x - base - slope z, after which it is the z axis, and a triangle is crossed
- * when the origin of the plane is inside its shadow by the even-odd rule: of the triangle's edges, count those that the
- * positive u axis crosses. An edge is judged the same from both of its triangles (its end below the axis comes first),
- * and a closed surface has every edge in two triangles, so the number of crossings is even whatever the rounding.
+ * Crossings: the line is sheared upright by x - base - slope z, after which it is the z axis. A triangle is crossed if
+ * the origin of the xy plane is inside the triangle's projection by the even-odd rule, which counts the triangle's
+ * edges that the positive u axis crosses. An edge gets the same result from both of its triangles (its end below the
+ * axis comes first), and in a closed surface every edge belongs to two triangles, so the number of crossings is even
+ * whatever the rounding.
  *
- * Inside: one Newton solver for the isoparametric map of every kind, given its shape functions. A pyramid's map is
- * singular at its apex, but homogeneous about it: the point is moved along its line from the apex to the height of the
- * base's centre, solved there, and the weight of the base scaled back. */
+ * Interior: one Newton solver inverts the isoparametric map of every cell type, given its shape functions. A pyramid's
+ * map is singular at its apex but homogeneous about it: the point is moved along its line from the apex to the height
+ * of the base's centre, the map is inverted there, and the weight of the base is scaled back. */
 #include "reference_cell.h"
 
 #include "grid.h"
@@ -60,7 +61,7 @@ static bool comes_before(const double *a, const double *b)
     return false;
 }
 
-/* The face's triangles: one, or two about the diagonal from the smallest vertex. */
+/* Splits the face into its triangles: one, or two along the diagonal from the vertex that is smallest. */
 static int split_face(const reference_cell *cell, const int *face, int triangles[2][3])
 {
     if (face[3] < 0) {
@@ -88,7 +89,7 @@ static long double cross(const double *a, const double *b)
     return (long double)a[0] * (long double)b[1] - (long double)a[1] * (long double)b[0];
 }
 
-/* Tells whether the positive u axis crosses the edge. */
+/* Returns whether the positive u axis crosses the edge. */
 static bool axis_crosses(const double *a, const double *b)
 {
     if ((a[1] >= 0) == (b[1] >= 0)) return false;
@@ -100,7 +101,7 @@ static double edge_length(const double *a, const double *b)
     return hypot(a[0] - b[0], a[1] - b[1]);
 }
 
-/* Barycentric coordinates of the line in a triangle; thirds where the triangle is seen edge-on. */
+/* Computes the barycentric coordinates of the line in a triangle; they are 1/3 each if the triangle is seen edge-on. */
 static void triangle_weights(const reference_cell *cell, const reference_line *line, const int *triangle,
                              double weights[3])
 {
@@ -134,7 +135,7 @@ static double clamp_unit(double u)
     return u < 0 ? 0 : u > 1 ? 1 : u;
 }
 
-/* Given w, the u of a + u b + w c + u w d = 0 from the better conditioned of its two equations. */
+/* Given w, computes the u of a + u b + w c + u w d = 0 from the better conditioned of its two equations. */
 static double solve_u(const double *a, const double *b, const double *c, const double *d, double w)
 {
     const double x = b[0] + w * d[0], y = b[1] + w * d[1];
@@ -143,7 +144,7 @@ static double solve_u(const double *a, const double *b, const double *c, const d
     return below != 0 ? -(a[axis] + w * c[axis]) / below : 0.5;
 }
 
-/* Returns how far a + u b + w c + u w d is from 0, relative to the quad's size. */
+/* Returns how far a + u b + w c + u w d is from 0, relative to the size of the quad. */
 static double bilinear_residual(const double *a, const double *b, const double *c, const double *d, double u, double w)
 {
     double residual = 0, size = 0;
@@ -158,9 +159,9 @@ typedef struct patch_point {
     double u, w, beyond;
 } patch_point;
 
-/* Finds the two (u, w) with a + u b + w c + u w d = 0, and how far beyond the unit square they are: eliminating u
- * leaves a quadratic in w. For a quad with two corners in one place one of the roots is no solution. Returns how many
- * are in the square. */
+/* Finds the two (u, w) with a + u b + w c + u w d = 0, and how far they are outside the unit square: eliminating u
+ * leaves a quadratic in w. For a quad with two corners at the same position, one of the roots is no solution. Returns
+ * how many are inside the square. */
 static int solve_bilinear(const double *a, const double *b, const double *c, const double *d, patch_point points[2])
 {
     const double qa = (double)cross(d, c), qb = (double)(cross(b, c) + cross(d, a)), qc = (double)cross(b, a);
@@ -197,9 +198,10 @@ static int find_patch_points(const reference_cell *cell, const reference_line *l
     return solve_bilinear(a, b, c, d, points);
 }
 
-/* Replaces crossings of a quad's triangles, count of them, by those of its patch. A ray through one triangle meets the
+/* Replaces the `count` crossings of a quad's triangles by those of its patch. A ray through one triangle meets the
  * patch once; a ray through both or none meets it twice or not at all, since the patch is smooth where the triangles
- * have a fold. Returns how many there are; sets is_folded for a ray that meets both triangles but not the patch. */
+ * have a fold. Returns the number of crossings; sets is_folded for a ray that meets both triangles but not the
+ * patch. */
 static int move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
                          reference_crossing crossings[2], int count, bool *is_folded)
 {
@@ -337,7 +339,8 @@ static bool sum_on_line(const reference_cell *cell, const reference_line *line, 
     return reference_polyhedron_interpolate(cell, point, values, value, NULL);
 }
 
-/* The value from which the profile starts at a crossing; inward: towards the other one. */
+/* Returns the value from which the profile starts at a crossing; inward is the sign of the direction to the other
+ * crossing. */
 static double profile_end(const reference_cell *cell, const reference_line *line, const reference_crossing *end,
                           const double *values, double inward)
 {
@@ -346,7 +349,7 @@ static double profile_end(const reference_cell *cell, const reference_line *line
     const double face = reference_face_value(cell, line, end, values, &is_folded);
     if (end->triangle < 0) return face;
     const double triangle = triangle_value(cell, line, cell->poly.triangles[end->triangle], values);
-    /* A little inside: the error is that much of the field's change in the cell. */
+    /* Evaluates the sum slightly inside: the error is 1e-10 of the field's change along z. */
     if (!sum_on_line(cell, line, end->z_triangle + 1e-10 * inward, values, &sum)) sum = triangle;
     return face + (sum - triangle);
 }
@@ -374,7 +377,7 @@ int reference_profile_breaks(const reference_cell *cell, const reference_line *l
     return count;
 }
 
-/* Finds the sum at a sheet, on the side that has one. A piece between two triangles of a quad whose patch the ray does
+/* Computes the sum at a sheet, on a side that has one. A piece between two triangles of a quad whose patch the ray does
  * not meet is in no tet; the field on it is linear between its sheets. */
 static bool sum_at_sheet(const reference_cell *cell, const reference_line *line, double z, double aside,
                          const double *values, double *value)
@@ -391,14 +394,14 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     int next = 1;
     while (next < count - 1 && breaks[next] <= z) next++;
     const double before = breaks[next - 1], behind = breaks[next];
-    /* On triangles the profile is the sum itself. */
+    /* At a triangle the profile is the sum itself. */
     const bool is_first = next == 1 && cell->poly.is_patch[ends[0].face];
     const bool is_last = next == count - 1 && cell->poly.is_patch[ends[1].face];
     if (!is_first && !is_last) {
         const double inner = 1e-9 * length, held = fmin(fmax(z, ends[0].z + inner), ends[1].z - inner);
         if (sum_on_line(cell, line, held, values, value)) return true;
     }
-    /* Sums a little inside the piece: a sheet may lie in the face at the other end. */
+    /* Evaluates the sums slightly inside the piece, since a sheet may lie in the face at the other end. */
     const double aside = 1e-9 * (behind - before);
     bool is_good = true;
     if (next == 1)
@@ -413,7 +416,7 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     return is_good;
 }
 
-/* One vertex's weight and its derivatives by the parameters. */
+/* A vertex's weight and its derivatives with respect to the parameters. */
 typedef struct shape_function {
     double n, d[3];
 } shape_function;
@@ -426,7 +429,7 @@ static void tet_shape(const double *p, shape_function *s)
     s[3] = (shape_function){p[2], {0, 0, 1}};
 }
 
-/* Corner i of the unit square, around. */
+/* Returns the bilinear weight of corner i of the unit square; corners are numbered around the square. */
 static shape_function square_shape(int i, double r, double s)
 {
     const bool right = i == 1 || i == 2, upper = i >= 2;
@@ -434,7 +437,7 @@ static shape_function square_shape(int i, double r, double s)
     return (shape_function){a * b, {right ? b : -b, upper ? a : -a, 0}};
 }
 
-/* A weight over the base times one over the height. */
+/* Multiplies a weight of the base by a weight along the height. */
 static shape_function times_height(shape_function base, double height, double slope)
 {
     return (shape_function){base.n * height, {base.d[0] * height, base.d[1] * height, base.n * slope}};
@@ -474,7 +477,7 @@ static void cell_shape(int type, const double *p, shape_function *s)
     }
 }
 
-/* x of the 3 × 3 system whose columns are a, b, c, by Cramer's rule. */
+/* Solves for x of the 3 × 3 system whose columns are a, b, c, by Cramer's rule. */
 static bool solve3(const double *a, const double *b, const double *c, const double *right, double x[3])
 {
     const double *m[3] = {a, b, c};
@@ -490,8 +493,8 @@ static bool solve3(const double *a, const double *b, const double *c, const doub
     return true;
 }
 
-/* The map's columns dP/dparameter and the rest point - P(parameter). Type and count are the cell's: constants where
- * this is inlined, so that the loops are unrolled. */
+/* Computes the map's columns dP/dparameter and the remainder point - P(parameter). type and count are the cell's; they
+ * are constants where this function is inlined, so that the compiler unrolls the loops. */
 static inline __attribute__((always_inline)) void map_of(const reference_cell *cell, int type, int count,
                                                          const double *parameter, const double *point,
                                                          double columns[3][3], double left[3])
@@ -532,7 +535,7 @@ static inline __attribute__((always_inline)) bool newton_in(const reference_cell
         if (!solve3(columns[0], columns[1], columns[2], left, move)) return false;
         const double length = length3(move), limit = length > 0.5 && type != GRID_TET ? 0.5 / length : 1;
         for (int k = 0; k < 3; k++) parameter[k] += limit * move[k];
-        /* The error goes as the square of the step: the next would be below 1e-16. */
+        /* Newton's error falls as the square of the step: the next one would be below 1e-16. */
         if (length3(left) <= tolerance || length < 1e-9) return isfinite(length);
     }
     return false;
@@ -553,8 +556,9 @@ static double beyond_cell(const double *parameter)
     return fmax(beyond_unit(parameter[0]), fmax(beyond_unit(parameter[1]), beyond_unit(parameter[2])));
 }
 
-/* Newton from the last solution, which is close by if the point is the next one along a ray, then from the cell's
- * centre, and from elsewhere if that fails or leads far out: of several solutions the one nearest to the cell. */
+/* Inverts the map by Newton's method from the last solution, which is close if the point is the next one along a ray,
+ * then from the cell's centre, and from other starts if these fail or lead far outside. Of several solutions it returns
+ * the one nearest to the cell. */
 static bool invert(const reference_cell *cell, const double *point, double parameter[3])
 {
     static _Thread_local double starts[10][3] = {{0.5, 0.5, 0.5},  {0.4, 0.4, 0.5}, {0.1, 0.1, 0.1}, {0.9, 0.05, 0.1},
@@ -572,7 +576,8 @@ static bool invert(const reference_cell *cell, const double *point, double param
     return isfinite(best);
 }
 
-/* Move point along its line from the apex to the base centre's height; scale is how much farther that is. */
+/* Moves the point along its line from the apex to the height of the base's centre; scale is the factor of its distance
+ * from the apex. */
 static bool project_from_apex(const reference_cell *cell, const double *point, double moved[3], double *scale)
 {
     const double *apex = cell->position[4];

@@ -1,9 +1,9 @@
-/* Adaptive integration. The ray is cut wherever a cell begins or ends, and where a polyhedron's profile bends, because
- * only a peak there may show, too narrow for any sample. Between cuts all cells, of all volume layers, emit and absorb
- * together: extinctions add up, and so does emission. An interval is integrated by Boole's rule whole and in halves;
- * where the two differ by more than the tolerance each half is taken in turn. The ray is also cut where the field
- * reaches a point of the opacity, which may last too short for any sampling: such places are sought between samples and
- * the extremes beside them. Kinks of the colours are found by halving. */
+/* Integrates adaptively. The ray is cut at every depth at which a cell begins or ends or a polyhedron's profile bends,
+ * because only there may a peak be too narrow for any sample. Between cuts all cells, of all volume layers, emit and
+ * absorb together: extinctions add up, and so do emissions. Boole's rule integrates an interval as a whole and in
+ * halves; if the two results differ by more than the tolerance, each half is integrated in turn. The ray is also cut
+ * where the field reaches a control point of the opacity, which may last too short for any sampling: these depths are
+ * searched between samples and the extremes next to them. Kinks of the colours are found by halving. */
 #include "reference_integral.h"
 
 #include "reference_base.h"
@@ -27,29 +27,29 @@ struct reference_integral {
     camera_cell *cells;
 };
 
-/* The stretch of the ray in a cell of a layer. */
+/* The interval of the ray inside a cell of a layer. */
 typedef struct cell_interval {
     const camera_cell *cell;
     double z_in, z_out;
     reference_crossing ends[2];
 } cell_interval;
 
-/* The effect of a stretch on light: C and T. */
+/* The effect of an interval on light: its colour C and transmittance T. */
 typedef struct light {
     double colour[3], transmittance;
 } light;
 
-/* The integrand at a place. */
+/* The integrand at a depth. */
 typedef struct sample {
-    double extinction, emission[3]; /* per z */
+    double extinction, emission[3]; /* per unit of z */
 } sample;
 
 typedef struct active_intervals {
     const reference_integral *scene;
     int64_t count;
-    const cell_interval **active; /* the stretches that go on at the place, count */
+    const cell_interval **active; /* the intervals that contain the depth, `count` of them */
     reference_line line;
-    double length; /* per z */
+    double length; /* length of the ray per unit of z */
 } active_intervals;
 
 static void add_cell(reference_integral *scene, int volume, int part, int64_t index)
@@ -138,7 +138,8 @@ static sample sample_at(const active_intervals *c, double z)
     return sum;
 }
 
-/* Boole's rule: both integrals by the quartic through five samples, of which the optical depth up to each is exact. */
+/* Integrates by Boole's rule: both integrals use the quartic through five samples, whose optical depth up to each
+ * sample is exact. */
 static light boole(const sample s[5], double width)
 {
     static const double up_to[5][5] = {{0, 0, 0, 0, 0},
@@ -170,7 +171,7 @@ static double difference(const light *a, const light *b)
     return most;
 }
 
-/* s: at the ends, the quarters and the middle. */
+/* s holds the samples at both ends, the quarters and the middle. */
 static light adapt(const active_intervals *c, double from, double to, const sample s[5], double tolerance, int depth)
 {
     const double middle = 0.5 * (from + to), width = to - from;
@@ -206,7 +207,7 @@ static bool is_near(const reference_cell *cell, const reference_line *line)
     return true;
 }
 
-/* The cells on the ray in front of the eye. */
+/* Collects the intervals of the cells that the ray crosses in front of the eye. */
 static cell_interval *collect(const reference_integral *scene, const reference_line *line, int64_t *count)
 {
     cell_interval *list = NULL;
@@ -257,7 +258,7 @@ static int compare_numbers(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* Finds where the stretch begins, bends and ends; returns how many places. */
+/* Finds the depths at which the interval begins, bends and ends; returns their number. */
 static int stretch_cuts(const cell_interval *s, const reference_line *line, double z[REFERENCE_MAX_BREAKS])
 {
     z[0] = s->z_in;
@@ -271,7 +272,7 @@ static int stretch_cuts(const cell_interval *s, const reference_line *line, doub
     return cuts;
 }
 
-/* Places, as many as there are. */
+/* A growing list of depths. */
 typedef struct places {
     double *z;
     int64_t count, capacity;
@@ -284,8 +285,8 @@ static void add_place(places *list, double z)
     list->z[list->count++] = z;
 }
 
-/* The last place on this side of where the value is x, and the first beyond it, so that neither part's end is of the
- * other's side. */
+/* Adds the last depth before the value reaches x and the first one after it, so that the ends of each part are on the
+ * same side of x. */
 static void add_crossing(const cell_interval *s, const reference_line *line, double low, double high, double x,
                          places *out)
 {
@@ -301,7 +302,7 @@ static void add_crossing(const cell_interval *s, const reference_line *line, dou
     add_place(out, high);
 }
 
-/* The greatest (sign 1) or least (-1) value between the places, by the golden section. */
+/* Returns the greatest (sign 1) or least (sign -1) value between two depths, by golden section. */
 static double extreme(const cell_interval *s, const reference_line *line, double low, double high, double sign)
 {
     const double golden = 0.6180339887498949;
@@ -332,7 +333,8 @@ static void add_crossings(const cell_interval *s, const reference_line *line, do
     }
 }
 
-/* Adds the places at which the stretch, which does not bend between from and to, reaches a point of the opacity. */
+/* Adds the depths at which the interval, which does not bend between from and to, reaches a control point of the
+ * opacity. */
 static void add_points(const cell_interval *s, const reference_line *line, double from, double to, places *out)
 {
     enum { SAMPLES = 48 };
@@ -350,7 +352,7 @@ static void add_points(const cell_interval *s, const reference_line *line, doubl
     for (int i = 0; i <= count; i++) value[i] = value_at(s, line, from + (to - from) * i / count);
     double last = from;
     for (int i = 0; i <= count; i++) {
-        /* An extreme about sample i; about the first and the last one the stretch may hide it. */
+        /* Searches for an extreme near sample i; near the first and the last sample the interval may hide it. */
         const int before = i ? i - 1 : 0, after = i < count ? i + 1 : count;
         const bool is_top = value[i] >= fmax(value[before], value[after]);
         const bool is_bottom = value[i] <= fmin(value[before], value[after]);
@@ -366,7 +368,7 @@ static void add_points(const cell_interval *s, const reference_line *line, doubl
     }
 }
 
-/* The sorted places where something begins, bends, reaches a point of the opacity or ends. */
+/* Returns the sorted depths at which an interval begins, bends, reaches a control point of the opacity or ends. */
 static double *find_cuts(const cell_interval *list, int64_t count, const reference_line *line,
                          const reference_hit *hits, int hit_count, int64_t *cuts)
 {
@@ -392,7 +394,7 @@ static void find_active(active_intervals *c, const cell_interval *list, int64_t 
         if (list[i].z_in <= from && list[i].z_out >= to) c->active[c->count++] = &list[i];
 }
 
-/* Is the ray's place within what the job's clips of volumes leave? */
+/* Returns whether the job's clips of volumes keep the ray's point at depth z. */
 static bool is_kept(const active_intervals *c, double z)
 {
     const render_job *job = c->scene->job;

@@ -3,16 +3,16 @@
 #include <math.h>
 #include <string.h>
 
-/* Shares of the area that count as rounding: for fans, and for corners in a line. */
+/* Fractions of the area that count as rounding: fan_slack for fans, the other for collinear corners. */
 static const double fan_slack = 0x1p-20, line_slack = 1e-14;
 
-/* What is left of the polygon, in the order of cutting. */
+/* The remaining polygon, in the order in which ears are cut. */
 typedef struct loop {
     int count;
     bool is_backward;
     int number[REFERENCE_MAX_CORNERS];
     double place[REFERENCE_MAX_CORNERS][3];
-    double normal[3], area; /* unit; twice the polygon's */
+    double normal[3], area; /* unit normal, and twice the polygon's area */
 } loop;
 
 static double area_along(const double *normal, const double *a, const double *b, const double *c)
@@ -25,7 +25,7 @@ static double area_along(const double *normal, const double *a, const double *b,
     return sum;
 }
 
-/* The rotation, forward or backward, whose list of places is the least. */
+/* Makes the loop from the rotation, forward or backward, whose list of coordinates is lexicographically least. */
 static void make_loop(const double (*corners)[3], int count, loop *out)
 {
     int best[2] = {0, 1};
@@ -84,7 +84,7 @@ static bool is_ear(const loop *l, int tip)
                 return false;
             continue;
         }
-        for (int side = 1; side < n; side += n - 2) { /* the neighbours of the place's other passage */
+        for (int side = 1; side < n; side += n - 2) { /* the neighbours of the other corner at the same position */
             const int end = (i + side) % n;
             if (corner_area(l, a, tip, end) > line_slack && corner_area(l, tip, c, end) > line_slack) return false;
         }

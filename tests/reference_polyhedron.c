@@ -1,10 +1,9 @@
-/* A polyhedron in double, by the letter of its definition: every face is cut as reference_polygon.h says, every
- * triangle makes a tet with the centre, and the field at a point is the sum, over the tets that hold it, of sign times
- * linear field.
- *
- * The signs come from faces turned alike: one face is taken as it is, and any face that shares a directed edge with it
- * in the same direction is turned over, and so on until nothing changes. Then each connected piece is turned to have a
- * positive volume, or a negative one if its first vertex is inside the rest. */
+/* A polyhedron in double, by the letter of its definition: every face is cut into triangles as reference_polygon.h
+ * defines, every triangle makes a tet with the centre, and the field at a point is the sum, over the tets that contain
+ * the point, of sign times linear field. The signs follow from oriented faces: one face is taken as it is, any face
+ * that shares a directed edge with it in the same direction is flipped, and so on until nothing changes. Then each
+ * connected piece is oriented to have a positive volume, or a negative one if its first vertex is inside the other
+ * pieces. */
 #include "reference_polyhedron.h"
 
 #include "reference_polygon.h"
@@ -22,8 +21,9 @@ static double determinant(const double *a, const double *b, const double *c)
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-/* 1 where the faces run along a common edge in opposite directions, -1 where in the same, 0 without one. An edge from a
- * vertex to itself has no direction: collapsed faces share such edges with their neighbours, and they do not count. */
+/* Returns 1 if the faces run along a common edge in opposite directions, -1 if in the same direction, 0 if they have
+ * none in common. An edge from a vertex to itself has no direction and does not count: collapsed faces share such edges
+ * with their neighbours. */
 static int agreement(const reference_polyhedron *p, int one, int other)
 {
     for (int i = 0; i < p->face_size[one]; i++)
@@ -37,7 +37,7 @@ static int agreement(const reference_polyhedron *p, int one, int other)
     return 0;
 }
 
-/* turn: 1 or -1 for each face; piece: the first face of its connected piece. */
+/* Computes for each face turn, 1 or -1, and piece, the first face of its connected piece. */
 static void orient_faces(const reference_polyhedron *p, int *turn, int *piece)
 {
     for (int face = 0; face < p->face_count; face++) turn[face] = 0;
@@ -66,7 +66,7 @@ static void add_triangles(reference_cell *cell)
     for (int face = 0; face < p->face_count; face++) {
         double corners[REFERENCE_MAX_SIDES][3];
         int cut[REFERENCE_MAX_SIDES][3], size = 0, loop[REFERENCE_MAX_SIDES];
-        for (int i = 0; i < p->face_size[face]; i++) { /* a vertex that follows itself counts once */
+        for (int i = 0; i < p->face_size[face]; i++) { /* consecutive copies of a vertex count once */
             const int vertex = p->faces[face][i],
                       before = p->faces[face][(i + p->face_size[face] - 1) % p->face_size[face]];
             if (vertex == before) continue;
@@ -83,7 +83,7 @@ static void add_triangles(reference_cell *cell)
     }
 }
 
-/* Tells whether the point is inside the surface of the pieces other than the one given, by a ray in an arbitrary
+/* Returns whether the point is inside the surface of the pieces other than `mine`, by a ray in an arbitrary
  * direction. */
 static bool is_inside_others(const reference_cell *cell, const int *piece, int mine, const double *point)
 {
@@ -166,7 +166,8 @@ void reference_polyhedron_setup(reference_cell *cell)
     }
 }
 
-/* Barycentric coordinates of a point in tet i: of the triangle's vertices, then the centre; slopes: their gradients. */
+/* Computes barycentric coordinates of a point in tet i, those of the triangle's vertices first, then the centre's;
+ * slopes holds their gradients. */
 static bool tet_coordinates(const reference_cell *cell, int i, const double point[3], double lambda[4],
                             double slopes[4][3])
 {
@@ -195,7 +196,7 @@ static bool tet_coordinates(const reference_cell *cell, int i, const double poin
     return true;
 }
 
-/* The sum at a point; returns how often the tets cover it. */
+/* Computes the sum at a point; returns the signed number of tets that contain it. */
 static int sum_at(const reference_cell *cell, const double point[3], const double *values, double *value,
                   double gradient[3])
 {
@@ -218,7 +219,7 @@ static int sum_at(const reference_cell *cell, const double point[3], const doubl
     return cover;
 }
 
-/* On a sheet, rounding may put a point into none or two of its tets; then a point a little farther serves. */
+/* On a sheet, rounding may put a point into none or two of its tets; then a point slightly farther is used instead. */
 bool reference_polyhedron_interpolate(const reference_cell *cell, const double point[3], const double *values,
                                       double *value, double gradient[3])
 {

@@ -1,15 +1,16 @@
-/* The field of a polyhedron in double: for reference_cell.c. */
+/* The field of a polyhedron in double, used by reference_cell.c. */
 #ifndef REFERENCE_POLYHEDRON_H
 #define REFERENCE_POLYHEDRON_H
 
 #include "grid.h"
 #include "reference_cell.h"
 
-/* The faces of a polyhedral cell of the grid, and its distinct vertices. A cell too large ends the process. */
+/* Reads the faces of a polyhedral cell of the grid and its distinct vertices. Ends the process if the cell is too
+ * large. */
 void reference_polyhedron_read(const grid *g, int64_t index, reference_cell *cell,
                                int64_t vertices[REFERENCE_MAX_VERTICES]);
 
-/* reference_interpolate() of polyhedra. */
+/* Evaluates the interpolant at a point of a polyhedron, as reference_interpolate() does for other cells. */
 bool reference_polyhedron_interpolate(const reference_cell *cell, const double point[3], const double *values,
                                       double *value, double gradient[3]);
 

@@ -1,9 +1,7 @@
-/* The brute-force renderer.
- *
- * Vertices are taken to camera coordinates in double once. Then, for a ray, every cell that is not a ghost and whose
- * sheared box holds the ray gives its intervals [z_in, z_out); each interval gives hits of the surface layers and the
- * samples of the volume layers it owns. All are gathered, sorted by depth and blended. Only margins are kept of cells
- * that the ray misses. */
+/* The brute-force renderer. It transforms vertices to camera coordinates in double once. Then, for each ray, every cell
+ * that is not a ghost and whose sheared box contains the ray gives its intervals [z_in, z_out). Each interval gives
+ * hits of the surface layers and the samples of the volume layers it owns. All of them are gathered, sorted by depth
+ * and blended. Cells that the ray misses contribute only to the margins. */
 #include "reference_render.h"
 
 #include "reference_base.h"
@@ -13,42 +11,42 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Something on the ray: a hit, or a sample whose colour is its own. */
+/* A hit or a sample on the ray; a sample stores its own colour. */
 typedef struct event {
     double depth;
     bool is_sample;
     int order; /* surface id or volume layer */
     double transmittance;
-    double error_bound; /* of a hit: cell size × conditioning, by which rounding moves it */
-    reference_hit hit;  /* of a sample: colour alone */
+    double error_bound; /* of a hit: cell size × conditioning, the scale of the error of depth from rounding */
+    reference_hit hit;  /* of a sample: only the colour is set */
 } event;
 
 struct reference_scene {
     const render_job *job;
-    double **positions;    /* of each part's vertices, × 3, camera coordinates */
-    reference_box **boxes; /* of each part's cells, in the same; unset of ghosts */
+    double **positions;    /* vertices of each part in camera coordinates, × 3 */
+    reference_box **boxes; /* boxes of each part's cells in camera coordinates; unset for ghosts */
 };
 
-/* One ray under way. */
+/* The state of one ray. */
 typedef struct trace {
     const reference_scene *scene;
     reference_line line;
-    double direction[3]; /* world; length 1 along forward */
-    double length;       /* of direction where distances are along the ray, else 1 */
+    double direction[3]; /* in world coordinates; its component along forward is 1 */
+    double length;       /* length of direction if distances are measured along the ray, else 1 */
     double jitter;
     int64_t count, capacity;
     event *events;
     reference_ray *out;
 } trace;
 
-/* A cell on a ray with its part. */
+/* A cell on a ray, and its part. */
 typedef struct camera_cell {
     const render_part *part;
     int part_index;
     int64_t index;
     int64_t vertices[REFERENCE_MAX_VERTICES];
     reference_cell cell;
-    reference_crossing ends[2]; /* of the interval at hand */
+    reference_crossing ends[2]; /* the ends of the current interval */
     double size;
 } camera_cell;
 
@@ -137,7 +135,7 @@ static void shade(const trace *t, const render_material *m, const double base[3]
         normalize(half);
         const double cosine = reference_dot(normal, light->direction), facing = fmax(0, cosine);
         const double shine = cosine > 0 ? pow(fmax(0, reference_dot(normal, half)), (double)m->shininess) : 0;
-        const bool has_normal = reference_dot(normal, normal) > 0; /* else the ray is ambiguous */
+        const bool has_normal = reference_dot(normal, normal) > 0; /* without a normal the ray is ambiguous */
         if (m->specular > 0 && has_normal) lessen(&t->out->light_margin, fabs(cosine));
         for (int c = 0; c < 3; c++) {
             diffuse[c] += (double)light->colour[c] * (double)m->diffuse * facing;
@@ -164,7 +162,7 @@ static double value_along(trace *t, const camera_cell *c, const double *values, 
     return value;
 }
 
-/* The root between the interval's ends, whose sides of iso are given. */
+/* Finds the root between the interval's ends by bisection; side_in is the side of iso at z_in. */
 static double bisect(trace *t, const camera_cell *c, const double *values, double iso, double z_in, double z_out,
                      bool side_in)
 {
@@ -194,7 +192,7 @@ static double relative_along(const crossing_search *a, double z)
     return value_along(a->t, a->c, a->values, z) - a->iso;
 }
 
-/* Finds where side times the field is least in [low, high], by golden section. */
+/* Finds the depth in [low, high] at which side times the field is least, by golden section. */
 static double dip(const crossing_search *a, double low, double high, double side)
 {
     const double golden = 0.6180339887498949;
@@ -220,8 +218,8 @@ static double dip(const crossing_search *a, double low, double high, double side
 
 enum { CROSSING_PIECES = 24 };
 
-/* Points between which the field passes the isovalue at most once: even ones, and the bottom of every dip towards it
- * between two of one side. */
+/* Computes depths between which the field passes the isovalue at most once: evenly spaced ones, and the bottom of every
+ * dip towards the isovalue between two depths on the same side. */
 static int crossing_fence(const crossing_search *a, double z_in, double z_out, double *z, double *v)
 {
     double at[CROSSING_PIECES + 1], f[CROSSING_PIECES + 1];
@@ -235,7 +233,7 @@ static int crossing_fence(const crossing_search *a, double z_in, double z_out, d
         v[n++] = f[i];
         const int before = i > 0 ? i - 1 : 0, behind = i + 2 <= CROSSING_PIECES ? i + 2 : CROSSING_PIECES;
         if (i == CROSSING_PIECES || (f[i] < 0) != (f[i + 1] < 0)) continue;
-        /* A dip is where the slopes about the piece do not agree. */
+        /* A dip is a piece on both sides of which the slopes have opposite signs. */
         const double side = f[i] < 0 ? -1 : 1;
         const bool falls = before == i || side * (f[i] - f[before]) <= 0;
         const bool rises = behind == i + 1 || side * (f[behind] - f[i + 1]) >= 0;
@@ -248,8 +246,8 @@ static int crossing_fence(const crossing_search *a, double z_in, double z_out, d
     return n;
 }
 
-/* Finds where a polyhedron's profile bends; between two such places it is linear. A bend near the isovalue may count on
- * either side of it. */
+/* Finds the depths at which a polyhedron's profile bends; between two of them it is linear. Rounding decides the side
+ * of a bend near the isovalue. */
 static int profile_fence(const crossing_search *a, double z[REFERENCE_MAX_BREAKS], double v[REFERENCE_MAX_BREAKS])
 {
     const int count = reference_profile_breaks(&a->c->cell, &a->t->line, a->c->ends, z);
@@ -304,7 +302,7 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
     e->hit.opacity = (double)layer->opacity;
     e->transmittance = 1 - e->hit.opacity;
     double z = depth;
-    if (c->cell.type == GRID_POLYHEDRON) { /* a quad's patch may stand out of the tets */
+    if (c->cell.type == GRID_POLYHEDRON) { /* a quad's patch may lie outside the tets */
         const double inner = 1e-9 * (c->ends[1].z_triangle - c->ends[0].z_triangle);
         z = fmin(fmax(depth, c->ends[0].z_triangle + inner), c->ends[1].z_triangle - inner);
     }
@@ -315,8 +313,8 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
     const double crossing_search =
         reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
     for (int axis = 0; axis < 3 && crossing_search > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
-    /* A ray that enters and leaves a polyhedron through one quad's patch, beside its triangles, is outside of its tets:
-     * the field there is defined along the ray, from patch to patch, but not across it. */
+    /* A ray that enters and leaves a polyhedron through one quad's patch without meeting the quad's triangles is
+     * outside of its tets: the field there is defined along the ray, from patch to patch, but not across it. */
     const bool has_gradient = crossing_search != 0;
     if (!has_gradient) t->out->ambiguous = true;
     e->hit.conditioning = has_gradient ? 1 / fabs(crossing_search) : 1;
@@ -326,12 +324,12 @@ static reference_hit *add_hit(trace *t, const camera_cell *c, const render_surfa
     return &e->hit;
 }
 
-/* All crossings. Where the interpolant at a face has another side than the face's value, the crossing is at the face.
- */
+/* Adds all crossings. If the interpolant at a face is on another side of the isovalue than the face's value, the
+ * crossing is at the face. */
 static void cross_every(trace *t, const camera_cell *c, const render_surface_layer *layer, int value_index, int surface,
                         const double *values, const reference_crossing ends[2], const double face[2])
 {
-    double z[REFERENCE_MAX_BREAKS], v[REFERENCE_MAX_BREAKS], low, high; /* more than the fence's */
+    double z[REFERENCE_MAX_BREAKS], v[REFERENCE_MAX_BREAKS], low, high; /* more elements than the fence needs */
     crossing_search a = {t, c, values, layer->values[value_index], 0};
     range_of(values, c->cell.count, &low, &high);
     if (a.iso > high || a.iso < low || ends[1].z < 0) return;
@@ -351,8 +349,8 @@ static void cross_every(trace *t, const camera_cell *c, const render_surface_lay
         if (is_polyhedron) keep_off_sheets(t, c, depth);
         if (depth < 0) continue;
         reference_hit *hit = add_hit(t, c, layer, value_index, surface, values, depth);
-        /* The last piece of a profile ends on a quad's patch, which may stand out of the tets, so that the tets'
-         * gradient does not tell the piece's slope. */
+        /* The last piece of a profile ends on a quad's patch, which may lie outside the tets, so that the tets'
+         * gradient does not give the slope of the piece. */
         if (is_polyhedron && is_inner) hit->slowness = a.range * (z[i] - z[i - 1]) / (fabs(v[i] - v[i - 1]) * c->size);
     }
 }
@@ -470,7 +468,7 @@ static void place_cell(const reference_scene *scene, int part, int64_t index, ca
     c->size = longest > 0 ? cbrt(volume) : 1;
 }
 
-/* Tells whether the ray passes the sheared box of the cell, widened by a little. */
+/* Returns whether the ray passes through the sheared box of the cell, widened by a margin. */
 static bool is_near(const trace *t, int part, int64_t index)
 {
     const grid *g = t->scene->job->parts[part].cells;
@@ -520,8 +518,8 @@ static void blend(double rgb[3], double *transmittance, const event *e)
     *transmittance *= e->transmittance;
 }
 
-/* Samples of several volumes at one place share what all absorb in proportion to what each alone would: into the last
- * of them, whose index is returned. */
+/* Merges samples of several volumes at the same depth into the last of them, whose index is returned: the light that
+ * all of them absorb is divided among them in proportion to what each would absorb alone. */
 static int64_t gather_samples(event *events, int64_t count, int64_t i)
 {
     int64_t last = i;
@@ -539,7 +537,7 @@ static int64_t gather_samples(event *events, int64_t count, int64_t i)
     return last;
 }
 
-/* A sample and a hit in nearly one place may be seen in the other order. */
+/* Lowers the margin for a sample and a hit at nearly the same depth, since rounding may swap them. */
 static void margins_between(const event *events, int64_t count, double *margin)
 {
     for (int64_t i = 0; i + 1 < count; i++)

@@ -1,4 +1,4 @@
-/* A cell and the rays of a packet, for the tests of the root finder: the kernels' headers are compiled into them. */
+/* A cell and the rays of a packet for the tests of the root finder, which compile the kernels' headers. */
 #ifndef ROOT_BUNDLE_H
 #define ROOT_BUNDLE_H
 
@@ -11,7 +11,7 @@
 #include "kernel_types.h"
 
 typedef struct bundle {
-    double values[8]; /* as the test numbers vertices */
+    double values[8]; /* in the order in which the test numbers vertices */
     kernel_frame frame;
     kernel_tile tile;
     kernel_thread thread;
@@ -39,7 +39,7 @@ static inline void bundle_open(bundle *b)
     b->packet.t_far = vf_set(INFINITY);
 }
 
-/* A cell whose type, count, world and values are set: tile space is the world. */
+/* Transforms a cell whose type, count, world and values are set: tile space equals world space. */
 static inline void bundle_place(bundle *b)
 {
     kernel_cell_order(&b->cell);
@@ -51,14 +51,14 @@ static inline void bundle_place(bundle *b)
     }
 }
 
-/* All of the packet's directions. */
+/* Returns a beam that contains all directions of the packet. */
 static inline kernel_beam bundle_beam(const kernel_packet *p)
 {
     const vf most = vf_max(vf_abs(p->slope_x), vf_abs(p->slope_y));
     return (kernel_beam){.spread = vf_reduce_max(most)};
 }
 
-/* The packet's intervals in the cell, with its bounds; returns how many they are. */
+/* Computes the packet's intervals in the cell and the cell's bounds; returns the number of intervals. */
 static inline int bundle_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CELL_INTERVALS], kernel_curved *curved)
 {
     const kernel_beam beam = bundle_beam(&b->packet);
@@ -66,7 +66,7 @@ static inline int bundle_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CE
     return kernel_curved_intervals(&b->packet, &b->cell, b->packet.active, list);
 }
 
-/* First hits on all rays, and how many hits there are. */
+/* Finds the first hits on all rays, and the number of hits of each. */
 static inline vm bundle_hits(bundle *b, const kernel_curved *curved, const kernel_interval *i, vf *t, vf *hits)
 {
     const kernel_rays rays = kernel_packet_rays(&b->packet);

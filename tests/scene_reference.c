@@ -1,5 +1,5 @@
-/* Prints docs/scene.md from the schema that reads scene files. With a file's name: says where that file differs, and
- * fails if it does. `ninja scene_docs` writes the page anew. */
+/* Prints docs/scene.md from the schema that reads scene files. If a file's name is given, reports the first difference
+ * from that file and fails if there is one. `ninja scene_docs` writes the page anew. */
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -184,7 +184,7 @@ enum { MOST_MAPPINGS = 128 };
 static const scene_mapping *shown[MOST_MAPPINGS];
 static int shown_count;
 
-/* Mappings with their paths in the file, each once, in the order a reader meets them. */
+/* Prints each mapping with its path in the file once, in the order in which a reader meets it. */
 static void print_mapping(FILE *to, const scene_mapping *mapping, const char *path)
 {
     for (int i = 0; i < shown_count; i++) {

@@ -1,12 +1,10 @@
-/* sched_yield() for the ranks of tests, which are more than the cores: a rank sleeps while others keep the cores busy.
- *
- * A rank that waits for a message calls sched_yield() in a loop. Linux's EEVDF scheduler (since 6.6) lets such a rank
- * run again only after the slices of all busy processes, milliseconds after its message arrived: beside two busy
- * processes a test of many steps on 3 ranks took 115 to 155 s, and takes 16 to 22 s if its ranks sleep. On idle cores
- * a call that yields returns at once, and sleeping would cost a third of the time. So each thread measures its calls
- * that yield: after one that was slow, it sleeps in the calls that follow, and then measures again.
- *
- * MPICH on UCX never yields, but calls ucp_worker_progress() in its loop: a call that moves no message yields here. */
+/* Replaces sched_yield() for the ranks of tests, of which there are more than cores: a rank sleeps while others keep
+ * the cores busy. A rank that waits for a message calls sched_yield() in a loop. Linux's EEVDF scheduler (since 6.6)
+ * lets such a rank run again only after the slices of all busy processes, milliseconds after its message arrived: next
+ * to two busy processes, a test of many steps on 3 ranks took 115 to 155 s, and takes 16 to 22 s if its ranks sleep. On
+ * idle cores sched_yield() returns at once, and sleeping would cost a third of the time. So each thread measures its
+ * calls of sched_yield(): after a slow one, it sleeps in the following calls, and then measures again. MPICH on UCX
+ * never yields, but calls ucp_worker_progress() in its loop: here, a call of it that moves no message yields. */
 #define _GNU_SOURCE 1
 #include <dlfcn.h>
 #include <sched.h>

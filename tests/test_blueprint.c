@@ -1,6 +1,6 @@
-/* Nodes of the Mesh Blueprint draw the pictures of the same meshes as the plain header has them, to the bit, in every
- * layout, packed at odd addresses too, and copy nothing that the header can say. Wrong nodes are reported with their
- * path, with one status on all ranks. */
+/* Checks that nodes of the Mesh Blueprint draw the same pictures, to the bit, as the same meshes passed by the public
+ * header, in every layout, also packed at odd addresses, and that nothing is copied that the header can describe. Wrong
+ * nodes are reported with their path, with the same status on all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@ static const char scene[] =
     "      - surface: {colour_by: {field: radial}, opacity: 0.4}\n"
     "      - volume: {field: vel, component: magnitude, range: [0, 20], opacity: [[0, 0.3], [1, 0]]}\n"
     "    outputs: [{path: a.png}]\n";
-/* Without vel, which some layouts do not have. */
+/* A scene without the field vel, which some layouts do not have. */
 static const char scene_of_two[] = "images:\n"
                                    "  - name: a\n"
                                    "    size: [48, 36]\n"
@@ -52,7 +52,7 @@ static void set_ok(doorway *d, const char *name, const conduit_node *node)
     everywhere(status == INSITU_OK);
 }
 
-/* The picture of the plain header's mesh, and what that copied. */
+/* Draws the mesh passed by the public header; *copied is the number of bytes copied for it. */
 static caught_picture draw_plain(const char *path, const layout_case *layout, int64_t *copied)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, path);
@@ -103,7 +103,8 @@ static void each_layout_is_the_plain_header_s(void **state)
     }
 }
 
-/* Types that are read in place: neither the adaptor nor the session copies more than of the plain header's arrays. */
+/* Checks types that are read in place: adaptor and session together copy no more than for the public header's
+ * arrays. */
 static void what_the_header_says_is_not_copied(void **state)
 {
     (void)state;
@@ -134,7 +135,7 @@ static void what_the_header_says_is_not_copied(void **state)
 
 /* ---- several domains, names and steps --------------------------------------------------------------------------- */
 
-/* Moves what one node has below another, whose it then is. */
+/* Moves the contents of the node child to parent's path; parent then owns them. */
 static void adopt(conduit_node *parent, const char *path, conduit_node *child)
 {
     conduit_node *at = conduit_node_fetch(parent, path);
@@ -142,7 +143,7 @@ static void adopt(conduit_node *parent, const char *path, conduit_node *child)
     conduit_node_destroy(child);
 }
 
-/* The plain header's mesh as a block. */
+/* Submits the mesh by the public header, as a block. */
 static bool submit_block(insitu_session *session, const char *name, int64_t number, const layout_case *layout)
 {
     insitu_mesh mesh = layout->mesh;
@@ -153,7 +154,7 @@ static bool submit_block(insitu_session *session, const char *name, int64_t numb
     return is_set;
 }
 
-/* Draws two domains, which the node then has. */
+/* Draws two domains, which are moved into one node. */
 static caught_picture draw_both(const char *path, layout_case *a, layout_case *b, insitu_blueprint_report *report)
 {
     conduit_node *both = conduit_node_create();
@@ -170,7 +171,8 @@ static caught_picture draw_both(const char *path, layout_case *a, layout_case *b
     return pop_caught_picture();
 }
 
-/* A lattice and a list of cells become blocks of one mesh. With other fields the second is a mesh of its own. */
+/* Checks that a lattice and a list of cells become blocks of one mesh. If their fields differ, the second becomes a
+ * mesh of its own. */
 static void domains_are_blocks_of_one_mesh(void **state)
 {
     (void)state;
@@ -202,7 +204,7 @@ static void domains_are_blocks_of_one_mesh(void **state)
     }
 }
 
-/* A mesh that is one node, then a list of domains, then one node again. */
+/* Checks a mesh that is first one node, then a list of domains, then one node again. */
 static void a_mesh_becomes_blocks_and_a_whole_again(void **state)
 {
     (void)state;
@@ -230,7 +232,7 @@ static void a_mesh_becomes_blocks_and_a_whole_again(void **state)
     layout_free(&a);
 }
 
-/* A rank without domains, and then a mesh that ceases on all ranks. */
+/* Checks a rank without domains, and then a mesh that disappears on all ranks. */
 static void meshes_come_and_go(void **state)
 {
     (void)state;
@@ -266,7 +268,8 @@ static void meshes_come_and_go(void **state)
     layout_free(&b);
 }
 
-/* New coordinates, values and flags in the arrays that there were are seen, and of the same ones no tree is built. */
+/* Checks that new coordinates, values and flags in the same arrays are detected, and that no tree is built if they are
+ * unchanged. */
 static void changes_are_found(void **state)
 {
     (void)state;
@@ -298,7 +301,7 @@ static void changes_are_found(void **state)
         }
 }
 
-/* Without state/cycle steps are counted on from the last one. */
+/* Checks that steps without state/cycle continue counting from the last one. */
 static void cycles_are_counted(void **state)
 {
     (void)state;
@@ -320,7 +323,7 @@ static void cycles_are_counted(void **state)
     layout_free(&l);
 }
 
-/* ---- what is left out ------------------------------------------------------------------------------------------- */
+/* ---- nodes that are left out ------------------------------------------------------------------------------------ */
 
 typedef void corrupt_node(conduit_node *node);
 

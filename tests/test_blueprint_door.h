@@ -10,7 +10,7 @@ typedef struct doorway {
     insitu_blueprint *adaptor;
 } doorway;
 
-/* path: of the scene. Collective. */
+/* Opens a session of the scene at path, and its adaptor. Collective. */
 doorway open_door(const char *path);
 void close_door(doorway *d);
 

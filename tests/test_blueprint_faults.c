@@ -1,5 +1,5 @@
-/* Nodes that a code gets wrong: each is refused with the path of what is wrong, on the last rank alone, and the step
- * returns that with one status on all ranks and draws nothing; once the node is mended, the next step draws. */
+/* Checks faulty nodes: each is refused with the path of its error, on the last rank alone, and the step returns the
+ * error with the same status on all ranks and draws nothing. After the node is corrected, the next step draws. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,18 +15,18 @@ static const char scene[] = "images:\n"
                             "    layers: [{surface: {colour_by: {field: radial}}}]\n"
                             "    outputs: [{path: a.png}]\n";
 
-/* What is put in the place of a part of a node. */
+/* The replacement of a part of a node. */
 typedef enum fault_kind {
     REMOVED,
-    A_WORD,     /* the word of the case */
+    A_WORD,     /* the text of the case */
     A_NUMBER,   /* an int64, the number of the case */
-    A_REAL,     /* a float64, likewise */
+    A_REAL,     /* a float64, the number of the case */
     SHORT,      /* an array without its last element */
     FLOATS,     /* float64 instead of integers */
     AN_OBJECT,  /* a node of children */
     NO_ADDRESS, /* an array without memory */
     NO_STRIDE,  /* an array of stride 0 */
-    ENTRY       /* the array's entry at the case's place is the number */
+    ENTRY       /* the array with the entry at the case's index set to the number */
 } fault_kind;
 
 typedef struct node_fault {
@@ -35,7 +35,8 @@ typedef struct node_fault {
     const char *word;
     int64_t number, place;
     insitu_status status;
-    const char *reported; /* of the message, beside the path; it may have that of another entry itself, before ": " */
+    /* the part of the message after the path; it may itself begin with the path of another entry, before ": " */
+    const char *reported;
 } node_fault;
 
 #define MESH INSITU_ERROR_MESH
@@ -127,9 +128,9 @@ static const node_fault faults[] = {
 };
 enum { FAULTS = sizeof faults / sizeof faults[0] };
 
-static const int64_t *replaced; /* an array to be freed */
+static const int64_t *replaced; /* an array to be freed, or NULL */
 
-/* Puts a copy with one other entry, or of another type. */
+/* Replaces the array by a copy with one different entry, or of another type. */
 static void replace(conduit_node *node, const node_fault *f, int id)
 {
     conduit_node *at = conduit_node_fetch_existing(node, f->path);
@@ -194,7 +195,7 @@ static bool check_message(const char *message, const node_fault *f, const char *
     return is_well;
 }
 
-/* The adaptor keeps no trace of the wrong node. */
+/* Checks that the adaptor draws the corrected node as if the wrong one had never been passed. */
 static void draw_mended(insitu_session *session, insitu_blueprint *adaptor, const conduit_node *node)
 {
     discard_pictures();
@@ -239,7 +240,7 @@ static void wrong_nodes_are_reported_on_all_ranks(void **state)
     everywhere(FAULTS >= 60);
 }
 
-/* What the arrays hold is checked by the session, which names the mesh and the cell. */
+/* Checks wrong contents of arrays, which the session detects: its message names the mesh and the cell. */
 static void wrong_indices_are_reported_on_all_ranks(void **state)
 {
     (void)state;

@@ -15,7 +15,7 @@ static void *own(layout_case *l, int64_t count, size_t size)
     return made;
 }
 
-/* The same whole numbers in another type. */
+/* Returns a copy of the integers in another type. */
 static void *recode(layout_case *l, const int64_t *from, int64_t count, int id)
 {
     char *made = own(l, count, (size_t)stand_in_size(id));
@@ -67,7 +67,7 @@ static void put_head(layout_case *l, const char *name, const char *association)
     conduit_node_set_path_char8_str(l->node, path, "mesh");
 }
 
-/* Adds the three fields, of vel a component each in an allocation of its own. positions: vertices x 3. */
+/* Adds the three fields; in the node each component of vel is in an allocation of its own. positions: vertices × 3. */
 static void add_fields(layout_case *l, const double *positions, int64_t vertices, int64_t cells)
 {
     static const char *const parts[3] = {"fields/vel/values/u", "fields/vel/values/v", "fields/vel/values/w"};
@@ -98,7 +98,7 @@ static void put_topology(layout_case *l, const char *type, const char *of_coords
     conduit_node_set_path_char8_str(l->node, "topologies/mesh/coordset", "coords");
 }
 
-/* Interleaved coordinates in both; without z: two dimensions. */
+/* Stores interleaved coordinates in the node and the header's mesh; two-dimensional if there is no z. */
 static void put_coordinates(layout_case *l, const double *positions, int64_t vertices, bool has_z)
 {
     static const char *const paths[3] = {"coordsets/coords/values/x", "coordsets/coords/values/y",
@@ -136,7 +136,7 @@ static void take_cells(layout_case *l, const int64_t counts[3])
     }
 }
 
-/* first: of the block's first vertex in the whole, which the node tells by elements/origin. */
+/* first is the index of the block's first vertex in the whole mesh, which the node states as elements/origin. */
 static void make_uniform_of(layout_case *l, int dimensions, int64_t first)
 {
     static const char *const paths[4][3] = {
@@ -248,7 +248,7 @@ static void make_structured_shell(layout_case *l)
     make_structured_of(l, 2, true);
 }
 
-/* The values of a field in its padded array, which is NaN elsewhere. */
+/* Stores the values of a field in a padded array, whose other elements are NaN. */
 static void put_padded(layout_case *l, int field, const int64_t counts[3], const int64_t offsets[3],
                        const int64_t strides[3], int64_t length)
 {
@@ -270,7 +270,8 @@ static void put_padded(layout_case *l, int field, const int64_t counts[3], const
     put_integers(l, path, STAND_IN_INT64, strides, 3);
 }
 
-/* The vertices' array is 8 x 7 x 6 with i fastest, the cells' with k fastest; coordinates are beside the block too. */
+/* Makes a block whose array of vertices is 8 x 7 x 6 with i fastest, and whose array of cells has k fastest;
+ * coordinates outside the block are set too. */
 static void make_strided(layout_case *l)
 {
     const int64_t counts[3] = {5, 4, 3}, cells[3] = {4, 3, 2}, offsets[3] = {2, 1, 2}, strides[3] = {1, 8, 56};
@@ -299,7 +300,8 @@ static void make_strided(layout_case *l)
 
 /* ---- unstructured in two dimensions ------------------------------------------------------------------------------ */
 
-/* Quads, of which every second is two triangles where it is said; sizes as the layout has them. */
+/* Lists quads; if both has_triangles and has_quads, every second one is split into two triangles. Stores the sizes as
+ * the layout requires. */
 static int64_t list_plane(layout_case *l, bool has_triangles, bool has_quads, int64_t *connectivity, int64_t *sizes,
                           int64_t *types)
 {
@@ -381,7 +383,7 @@ static void make_polygons_without_offsets(layout_case *l)
 
 /* ---- unstructured in three dimensions ---------------------------------------------------------------------------- */
 
-/* Keeps an array of a test_mesh. */
+/* Copies an array of a test_mesh into memory that the case owns. */
 static void *keep(layout_case *l, const void *from, int64_t count, size_t size)
 {
     void *made = own(l, count, size);
@@ -413,7 +415,7 @@ static void put_faces(layout_case *l, const test_mesh *m, int id)
     put_rows(l, "subelements", id, m->face_offsets, m->face_count);
 }
 
-/* Numbers of a code's own for shapes: VTK's and this. */
+/* Stores the shapes by numbers of the code's own: VTK's plus the shift. */
 static void put_shapes(layout_case *l, const test_mesh *m, int64_t shift, int id)
 {
     static const char *const names[] = {"tet", "hex", "wedge", "pyramid", "polyhedral"};
@@ -431,9 +433,9 @@ static void put_shapes(layout_case *l, const test_mesh *m, int64_t shift, int id
 typedef struct solid_kind {
     test_mesh_kind kind;
     const char *shape;
-    double polyhedra;    /* the share of cells made polyhedra */
-    int64_t shape_shift; /* of mixed ones */
-    int id;              /* of whole numbers */
+    double polyhedra;    /* fraction of cells that become polyhedra */
+    int64_t shape_shift; /* added to the numbers of shapes in mixed meshes */
+    int id;              /* type of the integers */
 } solid_kind;
 
 static void make_solid(layout_case *l, const solid_kind *of)
@@ -480,7 +482,7 @@ SOLID(make_mixed_shorts, TEST_MIXED, "mixed", 0, 7, STAND_IN_INT16)
 
 /* ---- ghosts and fields ------------------------------------------------------------------------------------------- */
 
-/* Flags of a third of the cells. */
+/* Adds an array with the flag `mark` for a third of the cells and `other` for the rest. */
 static void put_ghosts(layout_case *l, const char *name, int id, int64_t mark, int64_t other)
 {
     char path[256];
@@ -503,7 +505,7 @@ static void make_ghosts_of_vtk(layout_case *l)
     put_ghosts(l, "vtkGhostType", STAND_IN_UINT8, 1, 0);
 }
 
-/* Bit 16, of cells at the border of the domain, hides nothing. */
+/* Bit 16, which marks cells at the border of the domain, hides nothing. */
 static void make_ghosts_of_bits(layout_case *l)
 {
     make_uniform(l);
@@ -523,7 +525,7 @@ static void make_ghosts_called_so(layout_case *l)
     conduit_node_set_path_char8_str(l->node, "state/metadata/vtk_fields/halo/attribute_type", "Ghosts");
 }
 
-/* Of vel the components are interleaved, and braid and radial are integers of two and one bytes. */
+/* Makes interleaved components of vel, and integers of two bytes for braid and of one byte for radial. */
 static void make_fields_of_integers(layout_case *l)
 {
     static const char *const parts[3] = {"fields/vel/values/u", "fields/vel/values/v", "fields/vel/values/w"};
@@ -539,7 +541,7 @@ static void make_fields_of_integers(layout_case *l)
                      l->mesh.vertex_count, 3 * (int64_t)sizeof(double));
 }
 
-/* The cells of a window are drawn by another domain. */
+/* Makes a domain some of whose cells, those of a window, are drawn by another domain. */
 static void make_covered(layout_case *l)
 {
     make_rectilinear(l);

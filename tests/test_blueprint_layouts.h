@@ -1,6 +1,6 @@
 /* Small meshes as nodes of the Mesh Blueprint, in the layouts of Conduit's generator of examples, each with the same
- * mesh as the plain header has it: fields braid and vel at vertices and radial at elements. Rank r has the block from x
- * = 20 r on, or its part of a test_mesh. */
+ * mesh in the public header's form. The fields braid and vel are at vertices, radial is at elements. Rank r has the
+ * block that begins at x = 20 r, or its part of a test_mesh. */
 #ifndef TEST_BLUEPRINT_LAYOUTS_H
 #define TEST_BLUEPRINT_LAYOUTS_H
 
@@ -9,7 +9,7 @@
 
 enum { LAYOUT_ARRAYS = 64, LAYOUT_SIDE = 3 };
 
-/* A node and the same in the plain header's terms. */
+/* A node and the same mesh in the public header's form. */
 typedef struct layout_case {
     conduit_node *node;
     insitu_mesh mesh;
@@ -25,7 +25,7 @@ typedef void layout_function(layout_case *out);
 typedef struct layout_kind {
     const char *name;
     layout_function *make;
-    bool is_copied; /* the adaptor copies something, because the node lacks it */
+    bool is_copied; /* the adaptor must copy something, because the header cannot describe the node's arrays */
 } layout_kind;
 
 extern const layout_kind layout_kinds[];
@@ -34,7 +34,7 @@ extern const int layout_kind_count;
 void layout_make(const layout_kind *kind, layout_case *out);
 void layout_free(layout_case *layout);
 
-/* Sets the mesh and its fields as the header has them. */
+/* Passes the mesh and its fields to the session by the public header. */
 insitu_status layout_submit(insitu_session *session, const char *name, const layout_case *layout);
 
 #endif

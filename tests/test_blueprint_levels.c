@@ -1,6 +1,6 @@
-/* Domains of the Mesh Blueprint as blocks of one mesh: uniform domains whose positions are stated with roundings, and
- * levels of refinement with and without ghost layers. The pictures are those of the plain header's blocks, to the bit,
- * no pixel of a sphere shows the background, and nothing is copied. */
+/* Checks domains of the Mesh Blueprint as blocks of one mesh: uniform domains whose positions are rounded, and levels
+ * of refinement with and without ghost layers. The pictures must equal those of the public header's blocks to the bit,
+ * no pixel of a sphere may show the background, and nothing may be copied. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,19 +13,19 @@
 
 enum { MOST_BOXES = 16, SIDE = 8, SIZE = 120 };
 
-/* Looked at along z; the domain is 0.8 wide. */
+/* A view along z; the domain is 0.8 wide. */
 static const char scene[] =
     "images:\n  - name: a\n    size: [120, 120]\n    background: [0, 0, 0, 0]\n    camera: {position: [0.4, 0.4, 5], "
     "focal: [0.4, 0.4, 0], up: [0, 1, 0], projection: orthographic, height: 0.8}\n    layers:\n"
     "      - isosurface: {field: f, values: [0.3]}\n    outputs: [{path: a.exr}]\n";
-/* A wall between two domains would show in it. */
+/* A transparent surface, in which a wall between two domains would show. */
 static const char scene_of_surfaces[] =
     "images:\n  - name: a\n    size: [120, 120]\n    camera: {automatic: {direction: [1, 0.7, 0.9]}}\n    layers:\n"
     "      - surface: {colour_by: {field: f, interpolate: vertex}, opacity: 0.3}\n    outputs: [{path: a.exr}]\n";
 
 /* ---- boxes ------------------------------------------------------------------------------------------------------- */
 
-/* A domain, in cells of the coarsest level, of which the whole has SIDE along each axis. */
+/* A domain, in cells of the coarsest level; the whole mesh has SIDE of these along each axis. */
 typedef struct box {
     int level, lower[3], upper[3];
 } box;
@@ -33,12 +33,12 @@ typedef struct box {
 typedef enum layer_kind { NO_LAYER, BY_ASCENT, BY_VTK } layer_kind;
 
 typedef struct plan {
-    int refinement[3]; /* of each level */
-    double corner;     /* of the whole, along each axis */
-    double width;      /* of a cell of the coarsest level, which is no power of two */
+    int refinement[3]; /* cells per coarsest cell, for each level */
+    double corner;     /* lower coordinate of the whole mesh along each axis */
+    double width;      /* width of a cell of the coarsest level; no power of two, so that positions are rounded */
     bool is_of_cells;
     bool has_first;  /* domains state elements/origin */
-    bool has_layers; /* some have ghost layers, whose values are wrong */
+    bool has_layers; /* some domains have ghost layers, whose values are wrong */
     bool has_levels; /* domains state their level */
     int count;
     box boxes[MOST_BOXES];
@@ -49,7 +49,7 @@ static void add_box(plan *p, int level, int x, int y, int z, int wide, int high,
     p->boxes[p->count++] = (box){level, {x, y, z}, {x + wide, y + high, z + deep}};
 }
 
-/* Boxes whose common faces begin at different vertices of each. */
+/* Adds boxes whose common faces begin at different vertices of each box. */
 static void add_shifted_boxes(plan *p)
 {
     p->count = 0;
@@ -60,7 +60,7 @@ static void add_shifted_boxes(plan *p)
     add_box(p, 0, 4, 5, 0, 4, 3, 8);
 }
 
-/* Eight boxes of the coarsest level, and others in its middle, beside each other and at the border. */
+/* Adds eight boxes of the coarsest level, and refined boxes in their middle, next to each other and at the border. */
 static void add_boxes(plan *p, bool is_moved)
 {
     p->count = 0;
@@ -80,13 +80,13 @@ static double spacing_of(const plan *p, const box *b)
     return p->width / p->refinement[b->level];
 }
 
-/* The position that a code states: the corner and a multiple of the spacing, rounded. */
+/* Returns the position that a simulation states: the corner plus a multiple of the spacing, rounded. */
 static double position_of(const plan *p, const box *b, int axis, int layer)
 {
     return p->corner + spacing_of(p, b) * (b->lower[axis] * p->refinement[b->level] - layer);
 }
 
-/* The origin of the whole lattice as a domain implies it. */
+/* Returns the origin of the whole lattice as a domain implies it. */
 static double origin_of(const plan *p, const box *b, int axis, int layer)
 {
     const double spacing = spacing_of(p, b), at = position_of(p, b, axis, layer);
@@ -98,7 +98,7 @@ static layer_kind layer_of(const plan *p, int number)
     return p->has_layers ? (layer_kind)(number % 3) : NO_LAYER;
 }
 
-/* The smallest origin that domains of the coarsest level imply; those with ghost layers lie further out. */
+/* Returns the smallest origin implied by domains of the coarsest level; domains with ghost layers begin farther out. */
 static double common_origin(const plan *p, int axis)
 {
     double least = INFINITY;
@@ -114,7 +114,7 @@ typedef struct domain {
     insitu_lattice lattice;
     int64_t vertex_count, cell_count;
     double *values;
-    int32_t *flags; /* NULL: none */
+    int32_t *flags; /* flags of cells; NULL if there are none */
 } domain;
 
 static void measure_domain(const plan *p, int number, domain *out)
@@ -136,7 +136,7 @@ static void measure_domain(const plan *p, int number, domain *out)
     }
 }
 
-/* The distance from the middle of the whole; in ghost layers -40. */
+/* Makes a domain whose field is the distance from the middle of the whole mesh, and -40 in ghost layers. */
 static void make_domain(const plan *p, int number, domain *out)
 {
     measure_domain(p, number, out);
@@ -273,7 +273,8 @@ static caught_picture draw_plainly(const char *path, const plan *p, const domain
     return pop_caught_picture();
 }
 
-/* The sphere has a radius of 3 cells of the coarsest level, and the surface in a cell is off it by less than one. */
+/* Returns the number of background pixels inside the sphere. Its radius is 3 cells of the coarsest level, and the
+ * surface inside a cell is less than one cell off. */
 static int count_holes(const caught_picture *picture)
 {
     int holes = 0;
@@ -285,7 +286,7 @@ static int count_holes(const caught_picture *picture)
     return holes;
 }
 
-/* Draws the domains and compares the picture with that of plain blocks. */
+/* Draws the domains and compares the picture with that of blocks passed by the public header. */
 static void draw_and_compare(doorway *d, const char *path, const plan *p, bool is_sphere)
 {
     domain domains[MOST_BOXES];
@@ -338,7 +339,7 @@ static void levels_are_those_of_plain_blocks(void **state)
     }
 }
 
-/* Other boxes in later steps; of the same ones nothing is built. */
+/* Checks boxes that change from step to step; if they do not change, no tree is built. */
 static void levels_move(void **state)
 {
     (void)state;
@@ -347,14 +348,14 @@ static void levels_move(void **state)
     plan p = make_plan(4);
     for (int step = 0; step < 6; step++) {
         add_boxes(&p, step / 2 % 2);
-        if (step == 5) p.count--; /* the finest goes */
+        if (step == 5) p.count--; /* the finest box is removed */
         draw_and_compare(&d, path, &p, true);
     }
     close_door(&d);
 }
 
-/* The whole as one block on the first rank, drawn by the plain header: isosurfaces do not depend on the partition, and
- * a wall between domains would show in a transparent surface. */
+/* Compares the domains with one block of the whole mesh on the first rank, passed by the public header: isosurfaces do
+ * not depend on the partition, and a wall between domains would show in a transparent surface. */
 static void domains_of_one_level_have_no_seam(void **state)
 {
     (void)state;
@@ -396,7 +397,8 @@ static void domains_of_one_level_have_no_seam(void **state)
     }
 }
 
-/* A domain whose cells are no fraction of the coarsest ones' is named, and drawn with the cells that it lies on. */
+/* Checks that a domain whose cells are no fraction of the coarsest cells is reported by name, and is drawn together
+ * with the cells that it overlaps. */
 static void domains_on_no_level_are_named(void **state)
 {
     (void)state;

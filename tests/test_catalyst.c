@@ -1,5 +1,5 @@
-/* What an implementation of Catalyst's API does, on a stand-in of Conduit's functions: where it finds its scene, which
- * channels it draws, what it reports, and that errors are the same on all ranks. */
+/* Checks the implementation of Catalyst's API on a replacement of Conduit's functions: where it looks for its scene,
+ * which channels it draws, what it reports, and that errors are the same on all ranks. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,7 +48,7 @@ static conduit_node *with_scene(void)
     return node;
 }
 
-/* The adaptor's results. */
+/* Returns the adaptor's results in a new node. */
 static conduit_node *results(void)
 {
     conduit_node *node = conduit_node_create();
@@ -74,7 +74,7 @@ static double number_of(conduit_node *node, const char *path)
     return conduit_datatype_id(conduit_node_dtype(at)) == STAND_IN_INT64 ? (double)whole : real;
 }
 
-/* A channel of a mesh, which becomes the node's. */
+/* Moves a mesh into the node as a channel. */
 static void put_channel(conduit_node *node, const char *channel, const char *type, const char *data, layout_case *l)
 {
     char path[256];
@@ -127,7 +127,7 @@ static void scenes_are_found(void **state)
     everywhere(initialize(node) == INSITU_ERROR_MESH);
 }
 
-/* Channels of one mesh, of several, and of domains; a rank may have no data. */
+/* Checks channels of one mesh, of several meshes and of domains; a rank may have no data. */
 static void channels_are_drawn(void **state)
 {
     (void)state;
@@ -136,7 +136,7 @@ static void channels_are_drawn(void **state)
     layout_make(&layout_kinds[10], &b);
     layout_make(&layout_kinds[15], &c);
     everywhere(initialize(with_scene()) == INSITU_OK);
-    everywhere(initialize(with_scene()) == INSITU_ERROR_ARGUMENT); /* a second time */
+    everywhere(initialize(with_scene()) == INSITU_ERROR_ARGUMENT); /* a second call is an error */
     conduit_node *node = at_step(7);
     if (own_rank == 0) put_channel(node, "grid", "mesh", "data", &a);
     put_channel(node, "parts", "multimesh", "data/walls", &b);
@@ -197,7 +197,7 @@ static void parameters_are_results(void **state)
     everywhere(initialize(node) == INSITU_OK);
     node = at_step(0);
     discard_pictures();
-    catalyst_adaptor_execute(node); /* nothing is there to be drawn */
+    catalyst_adaptor_execute(node); /* there is nothing to draw */
     conduit_node *out = results();
     everywhere(number_of(out, "insitu/parameters/inflow") == 2.5 && number_of(out, "insitu/parameters/outflow") == 3);
     conduit_node_destroy(out);

@@ -1,6 +1,6 @@
-/* Volumes of single cells (session_volume.h) against quadrature in double and closed forms: bent hexes, wedges and
- * pyramids at random, in either orientation; polyhedra that are not star-shaped, have a hole or a cavity, whatever the
- * order of their faces. */
+/* Checks volumes of single cells (session_volume.h) against quadrature in double and closed forms: random bent hexes,
+ * wedges and pyramids in either orientation; polyhedra that are not star-shaped or have a hole or a cavity, with faces
+ * in any order. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,13 +15,13 @@
 
 /* ---- quadrature ------------------------------------------------------------------------------------------------ */
 
-enum { POINTS = 4 /* of Gauss and Legendre: exact up to degree 7 along each axis */ };
+enum { POINTS = 4 /* Gauss-Legendre points per axis: exact up to degree 7 along each axis */ };
 static const double nodes[POINTS] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263};
 static const double weights[POINTS] = {0.17392742256872692, 0.32607257743127307, 0.32607257743127307,
                                        0.17392742256872692};
 
-/* A map from the unit cube: trilinear, a prism's with its triangle collapsed from a square, a pyramid's with its base
- * shrinking to the apex. */
+/* Maps a point of the unit cube into the cell: the map is trilinear for hexes; for wedges the triangle is a collapsed
+ * square; for pyramids the base shrinks towards the apex. */
 static void place_of(int type, double (*p)[3], const double at[3], double out[3])
 {
     const double u = at[0], v = at[1], w = at[2];
@@ -36,7 +36,8 @@ static void place_of(int type, double (*p)[3], const double at[3], double out[3]
     }
 }
 
-/* The determinant of the map's slopes, by differences that are exact: along each axis alone the maps are linear. */
+/* Computes the determinant of the map's derivatives, by differences that are exact because the maps are linear along
+ * each axis. */
 static double determinant_at(int type, double (*p)[3], const double at[3])
 {
     double d[3][3];
@@ -65,7 +66,7 @@ static double integral(int type, double (*p)[3])
 
 /* ---- volumes --------------------------------------------------------------------------------------------------- */
 
-/* The one cell's volume; all vertices of the mesh are the cell's, and each is found once. */
+/* Returns the volume of the mesh's only cell. All vertices of the mesh are the cell's, and each must be found once. */
 static double volume_of(const test_mesh *mesh)
 {
     const test_layout wide = {.wide_coordinates = true, .wide_indices = true, .wide_values = true, .with_types = true};
@@ -80,7 +81,7 @@ static double volume_of(const test_mesh *mesh)
     return volume;
 }
 
-/* Sums of some hundred products of numbers of order 1 are off by less than 1e-13. */
+/* Sums of a few hundred products of numbers of order 1 are off by less than 1e-13. */
 static void assert_near(double volume, double expected)
 {
     if (fabs(volume - expected) <= 1e-12) return;
@@ -118,7 +119,8 @@ static double shape_volume(const test_mesh *mesh, test_polyhedron_shape shape)
     double places[16][3], sum = 0;
     memcpy(places, mesh->coordinates, 3 * (size_t)mesh->vertex_count * sizeof(double));
     if (shape == TEST_CAVITY) return integral(GRID_HEX, places) - integral(GRID_HEX, places + 8);
-    const int around = shape == TEST_L_PRISM ? 6 : 8; /* upright prisms, sheared; the base's area by its corners */
+    /* sheared upright prisms; the area of the base follows from its corners */
+    const int around = shape == TEST_L_PRISM ? 6 : 8;
     for (int i = 0; i < around; i++) {
         const double *a = places[i], *b = places[(i + 1) % around];
         sum += (a[0] * b[1] - a[1] * b[0]) / 2;
@@ -141,7 +143,7 @@ static void concave_polyhedra_are_closed_forms(void **state)
         }
 }
 
-/* A square frame: the cell's centre is in its hole, and sees the inner faces from behind. */
+/* Checks a square frame: the cell's centre is in its hole and sees the inner faces from behind. */
 static void rings_are_closed_forms(void **state)
 {
     (void)state;

@@ -1,10 +1,14 @@
-/* A ray's intervals in the cells of a mesh add up to its chord of the mesh's hull, and every end within the hull is the
- * end of exactly two intervals, to the bit: no gap, no double. This is tested on exact and jittered lattices of every
- * cell type, and on the finer pieces of straight and bent cells of higher order, whose hull is the cube [-1, 1]^3, with
- * rays at random, to and along vertices, edges and faces, and along the lattice. Every ray is traced twice: set up
- * alone, its edge functions all projected (as differences for normals have it), and as one of a tile, its edge
- * functions by lines where these are good enough (as frames have it). The tile is as wide as its rays are apart: a
- * thousandth of a cell to several cells. The bounds on the sum and the ends are in chord_hull.h. */
+/* Checks that a ray's intervals in the cells of a mesh add up to its chord of the mesh's hull, and that every end
+ * inside the hull is shared by exactly two intervals, to the bit: no gap, no overlap.
+ *
+ * Meshes are exact and jittered lattices of every cell type, and finer pieces of straight and bent cells of higher
+ * order. Their hull is the cube [-1, 1]^3. Rays are random, aimed at vertices, edges and faces, along edges and faces,
+ * and along the lattice.
+ *
+ * Every ray is traced twice: set up alone, with all its edge functions projected (as differences for normals need), and
+ * as one ray of a tile, with edge functions by the edges' lines if these are accurate enough (as in frames). The tile
+ * is as wide as the distance between its rays: a thousandth of a cell to several cells. chord_hull.h derives the bounds
+ * of the sum and of the ends. */
 #include "chord_aim.h"
 #include "chord_hull.h"
 #include "cpu.h"
@@ -28,8 +32,9 @@ enum { SIDE = 4 };
 
 static const double length_allowed = 1e-6;
 
-/* Two faces that meet at a vertex are each placed to float32, a few times 6e-8. By so much one cell's interval may
- * reach into the next one's, or end before it, where a concave cell has several there. */
+/* The maximum overlap of two intervals of a ray. Two faces that meet at a vertex are each rounded to float32, by a few
+ * times 6e-8. By that much the interval of one cell may reach into the next cell's, or end before it, if a concave cell
+ * has several intervals there. */
 static const double doubled_allowed = 5e-7;
 
 static int64_t rays_wanted = 300000;
@@ -51,12 +56,12 @@ typedef enum chord_mesh {
     MESH_HEXES,
     MESH_WEDGES,
     MESH_PYRAMIDS,
-    MESH_POLYHEDRA, /* concave, of triangles */
+    MESH_POLYHEDRA, /* concave polyhedra with triangular faces */
     MESH_MIXED,
-    MESH_QUAD_POLYHEDRA, /* the hexes as polyhedra */
-    MESH_BESIDE,         /* of the mixed mesh every second cell a polyhedron */
+    MESH_QUAD_POLYHEDRA, /* hexes stored as polyhedra */
+    MESH_BESIDE,         /* the mixed mesh, with every second cell a polyhedron */
     MESH_HONEYCOMB,      /* hexagonal prisms */
-    MESH_REFINED,        /* the first of the pieces of cells of higher order: all of refined_kind */
+    MESH_REFINED,        /* pieces of cells of higher order, of the first refined_kind; the others follow */
     MESH_COUNT = MESH_REFINED + REFINED_MIXED + 1
 } chord_mesh;
 
@@ -96,23 +101,23 @@ static void make_mesh(chord_mesh kind, double jitter, test_mesh *out)
     if (kind == MESH_BESIDE) test_mesh_to_polyhedra(out, 0.5);
 }
 
-/* The jitter, as a share of a cube's side. Cells are sound up to here; at 0.3 quads pass through the faces beside them,
- * and cells really overlap (docs/development/hard-cases.md). */
+/* The jitter, as a fraction of a cube's side. Up to this value cells are valid; at 0.3 quads pass through neighbouring
+ * faces, and cells really overlap (docs/development/hard-cases.md). */
 static const double jitter_wanted = 0.2;
 
 /* ---- a ray ---- */
 
-/* Counts of a test's rays. Lengths are in sides of the hull. */
+/* Counts and worst errors of a test's rays. Lengths are in sides of the hull. */
 typedef struct tally {
     int64_t rays, met, ray_intervals;
-    int64_t slanted, touching; /* of both kinds each ray counts once */
-    int64_t unpaired;          /* with an end alone where there may be none */
+    int64_t slanted, touching; /* a ray counts in at most one of them */
+    int64_t unpaired;          /* rays with an unshared end that is not allowed */
     int64_t off;
-    int64_t doubled, gaps;  /* on which intervals overlap by rounding, or leave gaps */
-    double worst_length;    /* of rays that are neither */
-    double worst_slanted;   /* of slanted rays, in shares of what the shift changes */
-    double worst_bracketed; /* of all: beyond the shrunk and the swollen hull's chords */
-    double worst_doubled;   /* the longest overlap */
+    int64_t doubled, gaps;  /* rays on which intervals overlap by rounding, or have gaps between them */
+    double worst_length;    /* error of length of rays that are neither slanted nor touching */
+    double worst_slanted;   /* error of length of slanted rays, as a fraction of the change by hull_shift */
+    double worst_bracketed; /* of all rays: length outside the chords of the shrunk and the swollen hull */
+    double worst_doubled;   /* the longest overlap of two intervals */
     double worst_gap;
 } tally;
 
@@ -129,7 +134,7 @@ static int compare_floats(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* The ends that are not two intervals', sorted; returns how many. */
+/* Finds the ends that are not shared by two intervals, sorted; returns their number. */
 static int lone_ends(const chord_interval *ray_intervals, int count, float lone[2 * CHORD_MAX_INTERVALS])
 {
     float ends[2 * CHORD_MAX_INTERVALS];
@@ -147,7 +152,7 @@ static int lone_ends(const chord_interval *ray_intervals, int count, float lone[
     return alone;
 }
 
-/* Clips spans at near: parts behind the eye's plane do not count. Returns how many are left. */
+/* Clips intervals at depth near, since parts behind the eye's plane do not count. Returns how many remain. */
 static int clip_intervals(chord_interval *ray_intervals, int count, float near)
 {
     int left = 0;
@@ -162,7 +167,7 @@ static double depth_of(const render_job *job, float t)
     return (double)t / job->space.scale + job->space.depth_origin;
 }
 
-/* Tells whether ends are alone only where they may be. */
+/* Returns whether all unshared ends are at allowed depths. */
 static bool is_paired(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count)
 {
     float lone[2 * CHORD_MAX_INTERVALS];
@@ -175,8 +180,8 @@ static bool is_paired(const render_job *job, const chord_ray *r, const chord_int
     return true;
 }
 
-/* The longest overlap of intervals, which are sorted, and the longest gap; of rays that run within the hull's surface
- * only gaps in the shrunk hull count. */
+/* Records the longest overlap and the longest gap of the sorted intervals; on rays that run within the hull's surface
+ * only gaps inside the shrunk hull count. */
 static void verify_neighbours(const render_job *job, const chord_ray *r, const chord_interval *ray_intervals, int count,
                               tally *t)
 {
@@ -255,7 +260,7 @@ static void trace(const render_job *job, kernel_thread *thread, chord_rays *rays
     render_unprepare(&frame);
 }
 
-/* The first tally is of rays that are set up alone, the second of the same rays as those of one tile. */
+/* The first tally counts rays that are set up alone, the second the same rays as rays of one tile. */
 static void verify_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t count, tally tallies[2])
 {
     static const double value[1] = {0};
@@ -315,9 +320,10 @@ static void add_tally(tally *sum, const tally *t)
     sum->worst_gap = fmax(sum->worst_gap, t->worst_gap);
 }
 
-/* Bounds the share of slanted rays, and of those that run within the hull's surface, by the way in which rays are
- * aimed. Bounds are the counted shares and a tenth or so more, and one camera's rays, even if there are few: a fifth of
- * all edges and faces are the hull's own, and rays to these and their vertices come from anywhere. */
+/* Bounds the fraction of slanted rays, and of rays that run within the hull's surface, for each aim. A bound is the
+ * measured fraction plus about a tenth, plus the rays of one camera, in case rays are few. The fractions are not small,
+ * since a fifth of all edges and faces belong to the hull, and rays to them and their vertices come from any
+ * direction. */
 static void assert_few_at_the_surface(chord_aim aim, const tally *t)
 {
     static const double slanted_most[CHORD_AIM_COUNT] = {
@@ -406,7 +412,7 @@ static void rays_from_inside_add_up_to_their_chords(void **state)
     verify(CHORD_FROM_INSIDE, "from inside");
 }
 
-/* The argument is the number of rays. */
+/* The command's argument is the number of rays. */
 int main(int argc, char **argv)
 {
     if (fixture_set_is_unavailable()) return 77;

@@ -1,6 +1,6 @@
-/* Volumes by segments under max_error, cut by spheres that rays graze: what a sphere leaves of a ray or takes from it
- * may be as short as 1e-4 of its radius, and begin and end anywhere in a cell. The truth is the adaptive integral in
- * double, cut where the line meets the sphere in closed form. */
+/* Checks volumes by segments under max_error that are clipped by spheres which rays graze: the part of a ray that a
+ * sphere keeps or removes may be as short as 1e-4 of the sphere's radius, and may begin and end anywhere in a cell. The
+ * reference is the adaptive integral in double, cut at the closed-form intersections of line and sphere. */
 #include "reference_integral.h"
 #include "test_effort.h"
 #include "test_render_fixture.h"
@@ -14,8 +14,8 @@
 
 enum { SIDE = 13 };
 
-/* A sphere whose surface the pixel's ray passes at a share of the radius, below; and the depths at which it meets it.
- */
+/* Makes a sphere whose surface the pixel's ray passes at a random fraction of the radius below it, and computes the
+ * depths at which the ray meets the sphere. */
 static void graze(const render_camera *camera, int pixel, uint64_t seed, render_clip *clip, double depths[2])
 {
     double base[3], d[3], square = 0, along = 0, across = 0;
@@ -35,7 +35,7 @@ static void graze(const render_camera *camera, int pixel, uint64_t seed, render_
     depths[1] = nearest + half;
 }
 
-/* The error of a random picture of the mesh on the pixel whose ray grazes the sphere. */
+/* Returns the error of a random picture of the mesh, at the pixel whose ray grazes the sphere. */
 static double error_of(test_mesh_kind kind, uint64_t seed, double max_error)
 {
     render_fixture f;
@@ -52,7 +52,7 @@ static double error_of(test_mesh_kind kind, uint64_t seed, double max_error)
     f.transfer.low = -1;
     f.job.integration = RENDER_SEGMENTS;
     f.job.max_error = max_error;
-    f.job.extent = 3.5; /* the cube's diagonal is less */
+    f.job.extent = 3.5; /* the diagonal of the cube is shorter */
     graze(&f.job.camera, pixel, seed, &clip, depths);
     f.job.clips = &clip;
     f.job.clip_count = 1;
@@ -87,9 +87,9 @@ static void grazed_spheres_keep_max_error(void **state)
         }
 }
 
-/* A medium of one density, so dense that the short way within a grazed sphere takes between a tenth and nearly all of
- * the light: its ends, rounded to float32 each on its own, would be as much as a hundredth of that way off. The truth
- * is the exponential of the way in closed form. */
+/* Returns the error in a medium of constant density, so dense that the short path inside a grazed sphere absorbs
+ * between a tenth and nearly all of the light. If the ends of the path were each rounded to float32, its length would
+ * be off by as much as a hundredth. The reference is the exponential of the path's length in closed form. */
 static double error_in_fog(test_mesh_kind kind, uint64_t seed)
 {
     static const float half[1] = {0.5f};
@@ -101,7 +101,7 @@ static double error_in_fog(test_mesh_kind kind, uint64_t seed)
     fixture_create_lattice(&f, kind, 3, 0.2, test_linear);
     fixture_set_camera(&f, (fixture_camera)(seed / 2 % 2), SIDE, SIDE);
     fixture_set_volume(&f, 1);
-    graze(&f.job.camera, pixel, 2 * seed, &clip, depths); /* what is within is kept */
+    graze(&f.job.camera, pixel, 2 * seed, &clip, depths); /* the clip keeps the inside */
     render_camera_ray(&f.job.camera, pixel % SIDE, pixel / SIDE, base, d);
     const double length = (depths[1] - depths[0]) * sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     const double depth = test_uniform_in(4, seed, 0.1, 4);

@@ -1,4 +1,5 @@
-/* Colour maps: the published ends and middles, lightness that rises where it must, and the sRGB curve. */
+/* Checks colour maps: the published colours at the ends and in the middle, monotonic lightness of the maps that promise
+ * it, and the sRGB curve. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -38,8 +39,8 @@ static const float *table_of(const char *name)
     return table;
 }
 
-/* The published tables in codes of 8 bits: FNV-1a of all 768 codes, and entry 128. They come from matplotlib 3.6.3 (the
- * ColorBrewer ones by its interpolation between keys); batlow from Scientific Colour Maps 7.0.1. */
+/* The published tables in 8-bit codes: the FNV-1a hash of all 768 codes, and entry 128. They come from matplotlib 3.6.3
+ * (the ColorBrewer maps from its interpolation between keys); batlow comes from Scientific Colour Maps 7.0.1. */
 static const struct published {
     const char *name;
     uint64_t hash;
@@ -83,8 +84,8 @@ static void colour_map_codes_are_the_published(void **state)
     }
 }
 
-/* Moreland's map has a formula, whose published ends and middle are met to half a code, and its 257 entries' middle,
- * which lies between two of ours, to a code more. */
+/* Moreland's map has a formula. Its published ends and middle are met to half a code, and the middle of its table of
+ * 257 entries, which lies between two entries of ours, to one code more. */
 static void colour_map_meets_published_colours(void **state)
 {
     (void)state;
@@ -130,8 +131,8 @@ static void colour_map_steps_are_small(void **state)
         const float *table = table_of(name);
         for (int i = 0; i < 3 * 255; i++) {
             assert_true(table[i] >= 0 && table[i] <= 1);
-            /* a mistyped key or a hue that turns the wrong way jumps by tens; sRGB is steepest in the dark, where
-             * cool_to_warm's green ends */
+            /* a mistyped key or a hue that runs in the wrong direction jumps by tens of codes; sRGB is steepest in the
+             * dark, where the green of cool_to_warm ends */
             const double step = fabs(code_of(table[i + 3]) - code_of(table[i]));
             if (!(step < 12)) fail_msg("%s jumps by %g codes at %d", name, step, i / 3);
         }

@@ -1,5 +1,6 @@
-/* Colours of values: surfaces where no light falls show the map's own colours, in closed form, by every scale, in
- * bands, and outside of the range; volumes by logarithmic scales are the integral's. */
+/* Checks colours of values. Surfaces without any light show the map's own colours, compared in closed form for every
+ * scale, in bands, and outside of the range. Volumes with logarithmic scales are compared with the reference
+ * integral. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -28,7 +29,7 @@ typedef struct scale_case {
     bool is_banded, has_outside;
 } scale_case;
 
-/* The colours' field goes from -1.4 to 1.6. */
+/* Cases of scales and ranges; the field of the colours ranges from -1.4 to 1.6. */
 static const scale_case scale_cases[] = {
     {"linear", -0.4, 0.7, RENDER_LINEAR, 0, false, false},
     {"outside", -0.4, 0.7, RENDER_LINEAR, 0, false, true},
@@ -59,11 +60,12 @@ static void set_scale_case(render_transfer *t, const scale_case *l)
 }
 
 /* The value at the hit is off by the rounding of the depth and of the cell's coordinates and values in float32: 4e-6
- * for lengths and values near 1, by which fixtures bound depths too. The colours at both ends of that range tell how
- * far it may move a colour; a pixel is left out if a step lies between (of bands, or to the colours outside). */
+ * for lengths and values near 1, which is also the fixture's bound of depths. The colours at both ends of that range of
+ * values bound the error of the colour. A pixel is skipped if a jump of the colour lies between them (of bands, or to
+ * the outside colours). */
 static const double value_error = 4e-6, colour_error = 3e-6;
 
-/* Returns whether the pixel counts. */
+/* Compares a pixel's colour with the reference; returns false if the pixel is skipped. */
 static bool check_pixel(const render_transfer *t, double value, const float drawn[3], const char *what)
 {
     double at[3], low[3], high[3];
@@ -182,7 +184,7 @@ static void scales_and_their_inverses_agree(void **state)
 
 static double growing(const double p[3])
 {
-    return pow(10, 2 * test_linear(p)); /* 1.6e-3 to 1600 */
+    return pow(10, 2 * test_linear(p)); /* values from 1.6e-3 to 1600 */
 }
 
 static void set_volume(render_fixture *f, const scale_case *l, double values[3], render_transfer *t)
@@ -204,8 +206,8 @@ static const scale_case volume_looks[] = {
     {"symlog", -10, 1e3, RENDER_SYMLOG, 0.1, false, false},
 };
 
-/* Samples have the bound of other transfer functions, and one for the rounding of a place, 3e-7 of the scale's value,
- * which moves the colour by less than 1e-5. */
+/* Samples have the bound of other transfer functions, plus one for the rounding of the position in the colour table,
+ * 3e-7 of the scale's value, which changes the colour by less than 1e-5. */
 static void sampled_volumes_match_the_reference(void **state)
 {
     (void)state;
@@ -223,9 +225,9 @@ static void sampled_volumes_match_the_reference(void **state)
     }
 }
 
-/* In segments colours are linear between 256 entries. Over 12 decades an entry is 0.11 of ln, and neighbours differ by
- * 0.03; the chord is off by 0.11 / 8 of that, 4e-4. The extinction is to 1e-4 of itself, and so is light. Otherwise
- * tets are exact, other cells to max_error. */
+/* In segments, colours are linear between 256 entries. Over 12 decades an entry spans 0.11 of ln, and neighbouring
+ * colours differ by 0.03; the chord is off by 0.11 / 8 of that, 4e-4. The extinction has a relative error of 1e-4, and
+ * so has the light. Apart from that, tets are exact and other cells keep max_error. */
 static void integrated_volumes_keep_their_error(void **state)
 {
     (void)state;
@@ -261,10 +263,10 @@ static void integrated_volumes_keep_their_error(void **state)
 
 static double decades, constant;
 
-/* Over the decades, within [-1, 1]^3, to 1. */
+/* A field that spans the decades up to 1 within [-1, 1]^3. */
 static double over_decades(const double p[3])
 {
-    return pow(10, decades * 0.5 * (test_linear(p) / 1.61 - 1)); /* the most of test_linear */
+    return pow(10, decades * 0.5 * (test_linear(p) / 1.61 - 1)); /* 1.61 is the maximum of test_linear */
 }
 
 static double of_one_value(const double p[3])
@@ -281,8 +283,8 @@ typedef struct random_ramp {
     render_transfer transfer;
 } random_ramp;
 
-/* Two to six points that are straight along the scale, from opacities of 0, and to 1, more often than others. Nowhere
- * is a cell longer than 20 unit distances. */
+/* Makes a ramp of two to six control points that is piecewise linear along the scale, more often than not with an
+ * opacity of 0 or 1 at its ends. No cell is longer than 20 unit distances. */
 static void make_ramp(random_ramp *r, uint64_t seed, double unit)
 {
     const bool is_log = test_uniform(0, seed) < 0.5;
@@ -338,9 +340,9 @@ static double ramp_is_off(test_mesh_kind kind, test_function *field, uint64_t se
     return worst;
 }
 
-/* What a ramp is off adds up along a ray, in a cell of one value most of all. Polyhedra have values in single precision
- * (docs/development/error_budget.md, narrow ramps): at the foot of a ramp that begins at 1e-6 of the range they were
- * off by 1.6e-3 where 1e-3 was asked. */
+/* Checks max_error for random ramps. The error of a ramp adds up along a ray, most of all in a cell of a single value.
+ * Polyhedra have values in single precision (docs/development/error_budget.md, narrow ramps): at the foot of a ramp
+ * that begins at 1e-6 of the range they were off by 1.6e-3 under a max_error of 1e-3. */
 static void ramps_along_scales_keep_max_error(void **state)
 {
     (void)state;

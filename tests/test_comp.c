@@ -1,5 +1,5 @@
-/* Compositing without MPI: the rule of merging against a reference in double and closed forms, who owns what for more
- * ranks than a machine has, and the strips of the picture that both rest on. */
+/* Checks compositing without MPI: the merge rule against a reference in double and closed forms, the owners of blocks
+ * for more ranks than a machine has, and the strips of the picture, on which both are based. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -24,7 +24,7 @@ enum { most_fragments = 200 };
 
 static const float black[4] = {0, 0, 0, 0};
 static const float blue[4] = {0.125f, 0.25f, 0.5f, 0.75f};
-static const double half_ulp = 0x1p-24; /* of a float in [0.5, 1) */
+static const double half_ulp = 0x1p-24; /* half a unit in the last place of a float in [0.5, 1) */
 
 static uint64_t state;
 
@@ -64,8 +64,8 @@ static int by_depth(const void *a, const void *b)
     return (of_a > of_b) - (of_a < of_b);
 }
 
-/* Each step of the blend rounds a product and a sum of colour and a product of transmittance, all at most 1: three
- * half units a step, and three for the background. */
+/* Each step of the blend rounds a product and a sum of colour and a product of transmittance, all at most 1: three half
+ * units for each step, and three for the background. */
 static double tolerance(int count)
 {
     return 3.0 * (count + 1) * half_ulp;
@@ -106,7 +106,7 @@ static void merge_matches_double_reference(void **context)
         double expected[4];
         for (int i = 0; i < count; i++) {
             items[i] = random_fragment();
-            items[i].t_in = (float)(i * 37 % 101) + 0.5f * next_unit(); /* all distinct: 101 is prime */
+            items[i].t_in = (float)(i * 37 % 101) + 0.5f * next_unit(); /* all are distinct, since 101 is prime */
             items[i].t_out = items[i].t_in + (items[i].kind < FRAGMENT_SURFACE ? 0.4f : 0);
             if (items[i].kind >= FRAGMENT_SURFACE) nearest = fminf(nearest, items[i].t_in);
         }
@@ -223,7 +223,8 @@ static void joining_neighbours_changes_rounding_alone(void **context)
     }
 }
 
-/* Ties of every kind: equal depths, both zeros, equal fragments but for one field, equal fragments. */
+/* Returns a fragment with ties of every kind: equal depths, both zeros, fragments that differ in one field only, and
+ * equal fragments. */
 static fragment tied_fragment(void)
 {
     fragment f = random_fragment();
@@ -257,13 +258,14 @@ static void permutations_give_the_same_bits(void **context)
     }
 }
 
-/* ---- who owns what ------------------------------------------------------------------------------------------- */
+/* ---- owners of blocks ---------------------------------------------------------------------------------------- */
 
-/* Every pixel has one number in one strip, and strips lie in the picture; blocks are few and hold all strips. */
+/* Checks that every pixel has one number in one strip, that strips lie inside the picture, and that the number of
+ * blocks is bounded and blocks contain all strips. */
 static void check_grid(uint32_t width, uint32_t height, int ranks)
 {
     const comp_grid grid = comp_grid_of(width, height, ranks);
-    const uint32_t every = grid.strips / 5000000 + 1; /* of more strips a part */
+    const uint32_t every = grid.strips / 5000000 + 1; /* of many strips only a sample is checked */
     uint64_t area = 0;
     assert_true(grid.blocks >= 1 && grid.blocks <= comp_max_blocks(ranks));
     assert_true(ranks == 1 ||
@@ -303,7 +305,7 @@ static void strips_share_all_pixels(void **context)
         for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++) check_grid(sizes[i][0], sizes[i][1], ranks[n]);
 }
 
-/* The number of lots for a block that ranks with so many fragments each draw, and who wins. */
+/* Returns the rank that wins a block, given the fragments of each rank in it. */
 static int winner_of(uint32_t block, const int64_t *fragments, int ranks)
 {
     int32_t greatest = 0;
@@ -315,9 +317,9 @@ static int winner_of(uint32_t block, const int64_t *fragments, int ranks)
     return comp_priority_rank(greatest);
 }
 
-/* A rank owns a block with a chance as the fourth power of its fragments. Of n draws with chance p a rank wins pn,
- * within five standard deviations sqrt(n p (1 - p)) in all but one of a million cases, and of 1/16 of what is drawn, by
- * which priorities are rounded. */
+/* Checks that the chance of a rank to win a block is proportional to the fourth power of its fragments. Of n draws with
+ * chance p a rank must win pn, to within five standard deviations sqrt(n p (1 - p)), which all but one of a million
+ * cases meet, plus 1/16 of the chance, to which priorities are rounded. */
 static void owners_are_drawn_by_what_they_have(void **context)
 {
     (void)context;
@@ -336,7 +338,7 @@ static void owners_are_drawn_by_what_they_have(void **context)
     }
 }
 
-/* Shapes in pictures 1 high and centred at 0: the covered part of a row at height y is lower <= |x| < upper. */
+/* Shapes in pictures of height 1 centred at 0: the covered part of a row at height y is lower <= |x| < upper. */
 typedef struct interval {
     double lower, upper;
 } interval;
@@ -380,7 +382,7 @@ static void cover(const comp_grid *grid, uint32_t y, double from, double to)
     }
 }
 
-/* Claims with a fragment in each covered pixel, and no priorities. Returns how many pixels are covered. */
+/* Sets claims with a fragment in each covered pixel, and no priorities. Returns the number of covered pixels. */
 static int64_t claim_shape(const comp_grid *grid, span_function *span_of)
 {
     int64_t covered = 0;
@@ -399,9 +401,9 @@ static int64_t claim_shape(const comp_grid *grid, span_function *span_of)
     return covered;
 }
 
-/* Levels the claims, whose priorities are cast. No fragment is lost, ranks that won nothing own nothing, and nobody has
- * more than the mean of the others and those of the fullest block. Returns what the busiest rank owns over the mean of
- * all ranks. */
+/* Balances the claims, whose priorities are set. Checks that no fragment is lost, that ranks which won nothing own
+ * nothing, and that no rank has more than the mean of the owners plus the fragments of the fullest block. Returns the
+ * fragments of the busiest owner over the mean of all ranks. */
 static double check_levels(uint32_t blocks, int ranks)
 {
     static uint64_t won[MOST_RANKS], owned[MOST_RANKS], loads[MOST_RANKS];
@@ -430,9 +432,10 @@ static double check_levels(uint32_t blocks, int ranks)
     return all ? (double)busiest * ranks / (double)all : 1;
 }
 
-/* Where all ranks have the same, each owns the same, to a tenth: of pictures 1000 to 4096 wide, of which at least an
- * eighth is covered, by up to a thousand ranks. The lot is then any rank's. A block has 16 pixels at least: where a
- * rank has fewer than ten of these on average, nobody has more than one beyond the mean (check_levels()). */
+/* Checks that if all ranks have the same fragments, each owns the mean to a tenth: in pictures 1000 to 4096 wide, of
+ * which at least an eighth is covered, for up to a thousand ranks. Any rank may win a block then. A block has at least
+ * 16 pixels: if there are fewer than ten blocks per rank on average, no rank has more than the mean plus one block
+ * (check_levels()). */
 static void owners_share_what_all_have(void **context)
 {
     (void)context;
@@ -462,14 +465,15 @@ static void owners_share_what_all_have(void **context)
     assert_int_equal(uneven, 0);
 }
 
-/* Ranks' fragments in a block that has so many on those that see it: the first, the third, the fifth and so on see all,
- * the others a part of the picture. */
+/* Distributes a block's `count` fragments: even ranks have fragments in all of the picture, odd ranks only in a part of
+ * it. */
 static void spread(uint32_t block, int64_t count, int ranks, int64_t *have)
 {
     for (int r = 0; r < ranks; r++) have[r] = r % 2 && (block >> 5) % 2 ? 0 : count;
 }
 
-/* The same by lots, where ranks have different parts of the picture. */
+/* Checks that ranks share fragments to a tenth if they have different parts of the picture and win blocks by their
+ * priorities. */
 static void owners_share_what_they_have(void **context)
 {
     (void)context;
@@ -491,7 +495,8 @@ static void owners_share_what_they_have(void **context)
     }
 }
 
-/* Gives all ranks' priorities by lot to places of the route, and sees that they share the blocks to a tenth. */
+/* Sets priorities of all ranks at their positions in the route, and checks that the positions share the blocks to a
+ * tenth. */
 static void check_folded(const comp_route *route)
 {
     const comp_grid grid = comp_grid_of(1920, 1080, route->ranks);
@@ -503,12 +508,13 @@ static void check_folded(const comp_route *route)
     assert_true(check_levels(grid.blocks, route->owners) <= 1.1);
 }
 
-/* The same where fewer places own blocks than there are ranks, whose partners win more lots than others. */
+/* Checks the same balance for routes with fewer owners than ranks: owners that have a partner win more blocks than
+ * others. */
 static void fewer_owners_than_ranks_share_all(void **context)
 {
     (void)context;
     static const int ranks[][2] = {{3, 1},  {5, 1},   {7, 1},   {12, 4},
-                                   {33, 3}, {100, 4}, {191, 1}, {996, 12}}; /* of a node */
+                                   {33, 3}, {100, 4}, {191, 1}, {996, 12}}; /* ranks, and ranks of a node */
     int folded = 0;
     state = 23;
     for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++)
@@ -521,22 +527,25 @@ static void fewer_owners_than_ranks_share_all(void **context)
     assert_true(folded >= 20);
 }
 
-/* Who wins block b of so many. */
+/* Returns the rank that wins block b of `blocks`. */
 static int unfair_winner(int how, uint32_t b, uint32_t blocks, int ranks)
 {
     const uint32_t count = (uint32_t)ranks;
     switch (how) {
-    case 0: return (int)(b < count ? b : 0);                           /* one has all, the others a block each */
-    case 1: return (int)(b < count ? 0 : b % count);                   /* the first blocks are one's */
-    case 2: return (int)((uint64_t)b * b / blocks * count / blocks);   /* runs, of which the first are the longest */
-    case 3: return (int)(next_random() % (1 + next_random() % count)); /* a few often, the others rarely */
-    case 4: return ranks - 1;                                          /* one has all */
+    /* one rank has almost all blocks, the others one each */
+    case 0: return (int)(b < count ? b : 0);
+    case 1:
+        return (int)(b < count ? 0 : b % count); /* the first blocks all belong to one rank */
+    /* consecutive blocks, most for the first ranks */
+    case 2: return (int)((uint64_t)b * b / blocks * count / blocks);
+    case 3: return (int)(next_random() % (1 + next_random() % count)); /* a few ranks often, the others rarely */
+    case 4: return ranks - 1;                                          /* one rank has all blocks */
     default: return (int)(next_random() % count);
     }
 }
 
-/* The fragments of a block: of all the same; few but in one block; any number; none in most; more than can be counted.
- */
+/* Returns the fragments of block b: the same for all; few except in one block; any number; none in most; more than the
+ * counter holds. */
 static uint32_t unfair_fragments(int how, uint32_t b, uint32_t blocks)
 {
     switch (how) {
@@ -545,11 +554,11 @@ static uint32_t unfair_fragments(int how, uint32_t b, uint32_t blocks)
     case 2: return 1 + next_random() % 100000;
     case 3: return next_random() % 10 ? 0 : 1 + next_random() % 512;
     case 4: return UINT32_MAX - next_random() % 2;
-    default: return 0; /* nobody has anything */
+    default: return 0; /* no rank has any fragments */
     }
 }
 
-/* Whoever wins and whatever there is, the bound holds. */
+/* Checks that the bound of check_levels() holds whichever ranks win and however many fragments there are. */
 static void unfair_lots_are_levelled(void **context)
 {
     (void)context;
@@ -568,7 +577,7 @@ static void unfair_lots_are_levelled(void **context)
                 }
 }
 
-/* Claims add up in any order, also where there are more fragments than can be counted. */
+/* Checks that claims add up in any order, also if there are more fragments than the counter holds. */
 static void claims_add_up(void **context)
 {
     (void)context;
@@ -583,7 +592,7 @@ static void claims_add_up(void **context)
 
 /* ---- strips -------------------------------------------------------------------------------------------------- */
 
-/* The fragments that sheets have handed over. */
+/* The fragments unpacked from received sheets. */
 typedef struct received_sheets {
     const comp_grid *grid;
     fragment *items;
@@ -606,8 +615,8 @@ static int by_all_bits(const void *a, const void *b)
     return memcmp(a, b, sizeof(fragment));
 }
 
-/* All fragments of a list come in sheets of their strips, for any number of threads: those of most are as many as the
- * fullest pixel has. */
+/* Checks that all fragments of a list are sent in sheets of their strips, for any number of threads; a strip sends as
+ * many sheets as its fullest pixel has fragments. */
 static void strips_send_all(void **context)
 {
     (void)context;
@@ -618,7 +627,7 @@ static void strips_send_all(void **context)
     state = 11;
     for (int threads = 1; threads <= 4; threads += 3)
         for (int spread = 1; spread <= 1000; spread *= 10) {
-            comp_grid grid = comp_grid_of(101, 67, threads); /* for four in shorter strips */
+            comp_grid grid = comp_grid_of(101, 67, threads); /* a grid for four ranks has shorter strips */
             comp_strips strips;
             received_sheets h = {&grid, back, 0, 0};
             grid.threads = threads;
@@ -657,8 +666,8 @@ static void pixels_beyond_the_image_are_seen(void **context)
     }
 }
 
-/* In any order, samples together absorb all light that does not pass every one of them, each in proportion to its own
- * absorption. */
+/* Checks samples at the same depth: together, in any order, they absorb all light that does not pass every one of them,
+ * and each contributes colour in proportion to its own absorption. */
 static void samples_of_one_place_share_what_they_absorb(void **context)
 {
     (void)context;
@@ -682,7 +691,7 @@ static void samples_of_one_place_share_what_they_absorb(void **context)
     }
 }
 
-/* A medium that is the same throughout. */
+/* A homogeneous medium. */
 typedef struct medium {
     double begin, end, extinction, colour[3];
 } medium;
@@ -695,7 +704,8 @@ static fragment fragment_of(const medium *m)
     return f;
 }
 
-/* All media together, in small steps between whole eighths, where all begin and end; a surface at 4. */
+/* Integrates all media together, in small steps between multiples of 1/8, at which all begin and end; a surface is at
+ * depth 4. */
 static void mix_media(const medium *media, int count, const fragment *surface, double rgba[4])
 {
     double through = 1;
@@ -715,8 +725,8 @@ static void mix_media(const medium *media, int count, const fragment *surface, d
     rgba[3] = 1 - through;
 }
 
-/* Rounding T and C to float errs by 3e-8, and so the depth, at most 2 for a medium, by up to e^2 times that: 3e-7 a
- * medium. */
+/* Checks that overlapping volume fragments are mixed. Rounding T and C to float errs by 3e-8, and so changes the
+ * optical depth, at most 2 for each medium, by up to e^2 times that: 3e-7 for each medium. */
 static void stretches_that_overlap_are_mixed(void **context)
 {
     (void)context;
@@ -743,9 +753,9 @@ static void stretches_that_overlap_are_mixed(void **context)
     }
 }
 
-/* A ray through a fine and a coarse mesh has one long stretch over many short ones in a row. The time must be
- * proportional to their number: a quadratic rule would take minutes. All cuts mix the same two media, so the whole is
- * one medium of their sum; sums of so many err by less than 1e-9, the floats by less than 3e-7. */
+/* Checks a ray through a fine and a coarse mesh, which has one long interval over many short ones in a row. The time
+ * must be proportional to their number: a quadratic algorithm would take minutes. All intervals mix the same two media,
+ * so the result is one medium of their sum; a sum of so many errs by less than 1e-9, the floats by less than 3e-7. */
 static void many_short_stretches_under_a_long_one_take_no_time(void **context)
 {
     (void)context;
@@ -753,7 +763,7 @@ static void many_short_stretches_under_a_long_one_take_no_time(void **context)
     const float clear = 0.99999f;
     fragment *items = calloc(SHORT + 1, sizeof *items);
     for (int i = 0; i < SHORT; i++) {
-        fragment *f = &items[(int64_t)i * 7919 % SHORT]; /* in no order */
+        fragment *f = &items[(int64_t)i * 7919 % SHORT]; /* in a shuffled order */
         *f = (fragment){.t_in = (float)i, .t_out = (float)(i + 1), .transmittance = clear};
         f->colour[0] = 1 - clear;
     }
@@ -771,7 +781,7 @@ static void many_short_stretches_under_a_long_one_take_no_time(void **context)
     free(items);
 }
 
-/* If rounding gives a sample to two neighbours, the one behind counts, in any order of the two. */
+/* Checks that if rounding gives a sample to two neighbouring cells, the one behind counts, in any order of the two. */
 static void samples_of_neighbours_count_once(void **context)
 {
     (void)context;
@@ -808,18 +818,18 @@ static void overlaps_are_where_a_volume_has_not_ended(void **context)
         {2, {{.t_in = 2, .t_out = 3, .transmittance = 0.5f}, {.t_in = 0, .t_out = 1, .transmittance = 0.5f}}, false},
         {2, {{.t_in = 1, .t_out = 3, .transmittance = 0.5f}, {.t_in = 0, .t_out = 1, .transmittance = 0.5f}}, true},
         {2, {{.t_in = 1, .t_out = 1, .transmittance = 0.5f}, {.t_in = 1, .t_out = 1, .transmittance = 1}}, true},
-        /* within a long one, behind a short one */
+        /* inside a long interval, behind a short one */
         {3,
          {{.t_in = 0, .t_out = 9, .transmittance = 0.5f},
           {.t_in = 1, .t_out = 2, .transmittance = 0.5f},
           {.t_in = 4, .t_out = 5, .transmittance = 0.5f}},
          true},
-        /* surfaces: in front of, within, at the last sample of, behind a volume; two in one place */
+        /* surfaces in front of a volume, inside it, at its last sample and behind it; two surfaces at the same depth */
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {1, 1, 1, {0}, 0.5f, S}}, false},
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 1.5f, 1.5f, {0}, 0.5f, S}}, true},
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 2, 2, {0}, 0, S}}, true},
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 3, 3, {0}, 0, S}}, false},
-        /* where a volume begins, within rounding; but that is no excuse for another that began in front */
+        /* a surface where a volume begins, within rounding; a volume that began in front of it still overlaps */
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 1.000003f, 1.000003f, {0}, 0.5f, S}}, false},
         {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 1.00001f, 1.00001f, {0}, 0.5f, S}}, true},
         {2, {{.t_in = 8, .t_out = 9, .transmittance = 0.5f}, {0, 8.00002f, 8.00002f, {0}, 0.5f, S}}, false},
@@ -834,17 +844,18 @@ static void overlaps_are_where_a_volume_has_not_ended(void **context)
           {.t_in = 0.999999f, .t_out = 2, .transmittance = 0.5f}},
          false},
         {2, {{0, 1, 1, {0}, 0.5f, S}, {0, 1, 1, {0}, 0.5f, S + 1}}, false},
-        /* fragments behind an opaque one do not show */
+        /* fragments behind an opaque one are invisible */
         {3,
          {{0, 1, 1, {0}, 0, S},
           {.t_in = 2, .t_out = 4, .transmittance = 0.5f},
           {.t_in = 3, .t_out = 5, .transmittance = 0.5f}},
          false},
-        /* shorter than rounding */
+        /* an overlap shorter than rounding */
         {2,
          {{.t_in = 0, .t_out = 2, .transmittance = 0.5f}, {.t_in = 1, .t_out = 0.99f, .transmittance = 0.5f}},
          false},
-        /* samples of cells whose common face is in two places; of cells in one place; beside those of another volume */
+        /* samples of cells whose common face is rounded to two depths; samples of cells at the same position; samples
+         * next to those of another volume */
         {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V + EARLY}}, false},
         {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V}}, true},
         {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V + LATE}}, true},
@@ -860,10 +871,10 @@ static void overlaps_are_where_a_volume_has_not_ended(void **context)
 
 enum { LARGEST_TILE = 20 };
 
-/* A picture's fragments, some pixels with none, one or many, in any order within a tile. */
+/* The fragments of a picture: pixels have none, one or many, in any order within a tile. */
 typedef struct tiled {
     image picture;
-    fragment *items; /* tile by tile */
+    fragment *items; /* grouped by tile */
     int64_t starts[64];
     pixel_area areas[64];
     int tile_count;
@@ -874,7 +885,7 @@ static int64_t next_count(int most)
     return next_random() % 3 ? (int64_t)(next_random() % (uint32_t)(most + 1)) : 0;
 }
 
-/* Volumes may overlap, and be samples of one place. */
+/* Returns a fragment of a volume that may overlap others, or be a sample at the same depth. */
 static fragment crowded_fragment(uint32_t pixel)
 {
     fragment f = random_fragment();
@@ -912,7 +923,7 @@ static void free_tiled(tiled *t)
     free(t->items);
 }
 
-/* Pixel by pixel, by the rule; returns whether the fragments overlap. */
+/* Merges the fragments of one pixel by the merge rule; returns whether they overlap. */
 static bool merge_one(const tiled *t, uint32_t pixel, float rgba[4], float *depth)
 {
     fragment own[most_fragments];

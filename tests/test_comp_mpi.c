@@ -1,8 +1,7 @@
-/* Compositing across ranks: however a set of fragments is dealt, rank 0's picture is, bit for bit, the serial merge of
- * the union; and a failure on one rank is one on all.
- *
- * Every rank makes the whole set and keeps its share. Verdicts are reduced before they are asserted, so that a failing
- * rank does not leave the others waiting. */
+/* Checks compositing across ranks: however a set of fragments is distributed, rank 0's picture equals, bit for bit, the
+ * serial merge of the union; and a failure on one rank is reported on all ranks. Every rank generates the whole set and
+ * keeps its share. Results are reduced before they are asserted, so that a failing rank does not leave the others
+ * waiting. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -53,7 +52,8 @@ static void assert_everywhere(bool well, const char *what)
     assert_true(all);
 }
 
-/* Depths repeat, so that ties are met; most pixels of a large image have none or a few. */
+/* Makes a fragment whose depth repeats among others, so that ties occur; most pixels of a large image have none or a
+ * few. */
 static fragment make_fragment(uint32_t i, uint32_t seed, uint32_t pixel_count)
 {
     const uint32_t key = hash(seed) + 16 * i;
@@ -64,7 +64,8 @@ static fragment make_fragment(uint32_t i, uint32_t seed, uint32_t pixel_count)
     return f;
 }
 
-/* The same, but by seed all, every second or none is a hit of an opaque surface. */
+/* Makes a fragment as make_fragment() does, but depending on the seed all, every second or none are hits of an opaque
+ * surface. */
 static fragment make_some_fragment(uint32_t i, uint32_t seed, uint32_t pixel_count)
 {
     fragment f = make_fragment(i, seed, pixel_count);
@@ -130,11 +131,11 @@ static bool same_image(const image *a, const image *b)
 
 typedef struct setting {
     fragment_list own;
-    image expected, out; /* on rank 0 only they have arrays */
-    int64_t count;       /* of all ranks */
+    image expected, out; /* they have arrays on rank 0 only */
+    int64_t count;       /* number of fragments of all ranks */
 } setting;
 
-/* Makes the i-th fragment of all. */
+/* Makes fragment i of the whole set. */
 typedef fragment fragment_maker(uint32_t i, uint32_t seed, uint32_t pixel_count);
 
 static setting make_setting_of(fragment_maker *make, int width, int height, uint32_t count, distribution how,
@@ -168,18 +169,18 @@ static void free_setting(setting *s)
     free_image(&s->out);
 }
 
-/* Every schedule in turn, by dense rounds and sparse ones. Nodes are made up: any two, three ... ranks that divide all
- * may stand for one. */
+/* Selects the schedule by the turn, with dense or sparse rounds. Nodes are simulated: any number of ranks that divides
+ * all may form a node. */
 static void set_schedule(uint32_t turn)
 {
     group.schedule = (comp_schedule)(COMP_DIRECT + turn % (COMP_SCHEDULE_COUNT - 1));
     group.nodes = (comp_nodes){1, false};
-    group.max_dense_ranks = turn / 4 % 2; /* 1: all rounds are sparse */
+    group.max_dense_ranks = turn / 4 % 2; /* with 1, all rounds are sparse */
     for (int n = 2; n < rank_count && turn / 8 % 2; n++)
         if (rank_count % n == 0) group.nodes = (comp_nodes){n, turn / 16 % 2};
 }
 
-/* Bytes that are held for the list. */
+/* Returns the bytes allocated for the list. */
 static int64_t held_by(const fragment_list *list)
 {
     return list->items ? list->capacity * (int64_t)sizeof *list->items : 0;
@@ -206,7 +207,8 @@ static void composite_equals_serial_merge(void **context)
     (void)context;
     const int sizes[][2] = {{1, 1}, {1, 7}, {65, 3}, {101, 67}, {257, 131}};
     const uint32_t counts[] = {0, 1, 2, 50, 3000, 60000};
-    const size_t count_end = sizeof counts / sizeof *counts - (rank_count > 8); /* each rank makes them all */
+    /* the largest count is skipped for many ranks, since each generates all fragments */
+    const size_t count_end = sizeof counts / sizeof *counts - (rank_count > 8);
     uint32_t seed = 1;
     for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
         for (size_t c = 0; c < count_end; c++)
@@ -220,7 +222,8 @@ static void composite_equals_serial_merge(void **context)
     }
 }
 
-/* Every pair of every pixel; nothing is opaque here. The fragments are sorted by pixel. */
+/* Marks pixels in which any two fragments overlap, by testing every pair; nothing is opaque here. Sorts the fragments
+ * by pixel. */
 static void find_overlaps(fragment *all, uint32_t count, unsigned char *pixels)
 {
     uint32_t first = 0;
@@ -276,7 +279,8 @@ static void overlaps_are_reported_on_all_ranks(void **context)
                 check_overlaps(sizes[s][0], sizes[s][1], counts[c], how, seed++);
 }
 
-/* More strips than blocks. With few fragments, an owner has strips in which nobody has anything. */
+/* Checks images with more strips than blocks. With few fragments, an owner has strips in which no rank has a
+ * fragment. */
 static void large_image_equals_serial_merge(void **context)
 {
     (void)context;
@@ -285,7 +289,8 @@ static void large_image_equals_serial_merge(void **context)
     check_composite(5003, 3, 700, distribute_blocks, 1003);
 }
 
-/* Fragments of a curved surface, each in the pixels of one row, as in a tile of a picture. */
+/* Returns a fragment of a smooth curved surface; each rank has such fragments in whole rows, as in a tile of a
+ * picture. */
 static fragment smooth_fragment(uint32_t pixel, int width)
 {
     const float x = (float)(pixel % (uint32_t)width) / 500, y = (float)(pixel / (uint32_t)width) / 500;
@@ -295,8 +300,9 @@ static fragment smooth_fragment(uint32_t pixel, int width)
     return f;
 }
 
-/* A hit is 32 bytes and a finished pixel 24 in memory. Of a smooth surface only depth and three colours are written, in
- * one or two bytes and two bits each, at most 9 bytes; messages and blocks have heads as well. */
+/* Checks the size of messages. A hit has 32 bytes in memory and a finished pixel 24. For a smooth surface only the
+ * depth and three colours are sent, each in one or two bytes and two bits, at most 9 bytes together, plus the headers
+ * of messages and blocks. */
 static void smooth_surfaces_travel_in_a_third(void **context)
 {
     (void)context;
@@ -312,7 +318,8 @@ static void smooth_surfaces_travel_in_a_third(void **context)
                       "composite succeeds");
     int64_t own[2] = {statistics.sent_bytes, statistics.sent_messages}, all[2];
     MPI_Allreduce(own, all, 2, MPI_INT64_T, MPI_SUM, comm);
-    const double travelled = (double)WIDTH * HEIGHT * (rank_count - 1) / rank_count; /* to owners, and to rank 0 */
+    /* pixels sent to owners, and those sent to rank 0 */
+    const double travelled = (double)WIDTH * HEIGHT * (rank_count - 1) / rank_count;
     assert_everywhere(rank_count == 1 ? all[0] == 0
                                       : (double)all[0] < 2 * MOST_BYTES * travelled + 64.0 * (double)all[1],
                       "smooth surfaces travel in few bytes");
@@ -320,8 +327,8 @@ static void smooth_surfaces_travel_in_a_third(void **context)
     if (own_rank == 0) free_image(&s.out);
 }
 
-/* Compares the arithmetic of the schedules with the messages sent: without fragments, one for each partner and round,
- * and up the tree one from each owner but rank 0. */
+/* Compares the computed number of messages of each schedule with the messages sent: without fragments, one for each
+ * partner and round, and one up the tree from each owner except rank 0. */
 static void messages_are_as_counted(void **context)
 {
     (void)context;
@@ -342,8 +349,8 @@ static void messages_are_as_counted(void **context)
     set_schedule(0);
 }
 
-/* The n-th allocation of the victim fails, in a copy of the list; returns whether the status is the same on all ranks
- * and the error is told, and whether the picture was drawn. */
+/* Makes the n-th allocation of the victim fail, while it composites a copy of the list. Returns whether the status is
+ * the same on all ranks and the error has a message, and whether the picture was drawn. */
 static bool draws_without_allocation(setting *s, int victim, int64_t n)
 {
     const int64_t held = base_memory_held();
@@ -363,8 +370,9 @@ static bool draws_without_allocation(setting *s, int victim, int64_t n)
     return status == INSITU_OK;
 }
 
-/* Every allocation of every rank fails once; after the last the picture is right again. Usually rank 0 and the last one
- * fail at each, and the ranks between share the numbers; of 16 ranks four share them. */
+/* Checks that every allocation of every rank fails once; after the last one the picture is right again. Up to 8 ranks,
+ * rank 0 and the last rank fail at each allocation and the ranks between share the numbers; with more ranks, four of
+ * them share the numbers. */
 static void failed_allocation_is_an_error_on_all(void **context)
 {
     (void)context;

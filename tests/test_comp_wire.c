@@ -1,5 +1,5 @@
-/* Messages without MPI: sheets of any contents come back bit for bit; routes lead every fragment from
- * every rank to its owner, and every pixel to rank 0, for more ranks than any machine at hand has. */
+/* Checks messages without MPI: sheets of any contents are decoded bit for bit; routes lead every fragment from every
+ * rank to its owner, and every pixel to rank 0, for more ranks than any available machine has. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -26,7 +26,7 @@ static uint32_t next_random(void)
     return (uint32_t)(state >> 32);
 }
 
-/* Ways to fill a word of a record. */
+/* The kinds of values in a word of a record. */
 enum filling { ANY_BITS, SMOOTH, CONSTANT, AS_BEFORE, NOT_A_NUMBER, FILLING_COUNT };
 
 static uint32_t bits_of(float value)
@@ -48,7 +48,7 @@ static uint32_t filled(enum filling how, int i, int k, uint32_t before)
     }
 }
 
-/* Masks of full rows, of rows with gaps, and empty ones; those of a sparse sheet have few pixels. */
+/* Sets masks with full rows, rows with gaps, and empty rows; the masks of a sparse sheet have few pixels. */
 static void fill_masks(comp_sheet *sheet)
 {
     const uint32_t how = next_random() % 4;
@@ -72,7 +72,7 @@ static void fill_sheet(comp_sheet *sheet)
     }
 }
 
-/* Counts the words of pixels that differ, among the first `words` of each; differing masks count as one. */
+/* Counts the words that differ among the first `words` of each pixel; differing masks count as one. */
 static int count_differences(const comp_sheet *a, const comp_sheet *b, int words)
 {
     int count = memcmp(a->masks, b->masks, sizeof a->masks) != 0;
@@ -101,7 +101,8 @@ static void free_pair(sheet_pair *p)
     base_free(p->bytes);
 }
 
-/* Sheets of any contents come back to the bit by each instruction set, whichever wrote them, in the same bytes. */
+/* Checks that sheets of any contents are decoded to the bit by each instruction set, whichever encoded them, and that
+ * the encoded bytes are equal. */
 static void sheets_come_back(void **context)
 {
     (void)context;
@@ -128,8 +129,8 @@ static void sheets_come_back(void **context)
     free_pair(&p);
 }
 
-/* Columns of a plane's depths, exact in float32, have no remains but in their first two rows: with half a byte for each
- * row and word, what is left is small. */
+/* Checks columns of depths of a plane, exact in float32: only the first two rows have residuals, so that besides half a
+ * byte for each row and word little is sent. */
 static void straight_lines_take_half_a_byte_a_row(void **context)
 {
     (void)context;
@@ -141,12 +142,13 @@ static void straight_lines_take_half_a_byte_a_row(void **context)
             p.sheet->words[w][k] =
                 bits_of(1 + (float)(w + 1) * 0x1p-12f * (float)(k / COMP_LANES + 2 * k % COMP_LANES));
     const int64_t length = comp_sheet_write(p.sheet, COMP_WORDS, p.bytes) - p.bytes;
-    /* The head; of each word its first value, half a byte a row, and two rows of at most four bytes a pixel. */
+    /* The header, and for each word its first value, half a byte for each row, and two rows of at most four bytes a
+     * pixel. */
     assert_true(length <= COMP_SHEET_HEAD + COMP_WORDS * (4 + COMP_ROWS / 2 + 2 * 4 * COMP_LANES));
     free_pair(&p);
 }
 
-/* Sheets of opaque hits, some of which tie: the nearest stay, as the rule of merging has it. */
+/* Checks sheets of opaque hits, some at equal depths: the nearest hit remains, by the merge rule. */
 static void nearest_hits_stay(void **context)
 {
     (void)context;
@@ -177,7 +179,8 @@ static void nearest_hits_stay(void **context)
     free_pair(&p);
 }
 
-/* A sheet of fragments that are numbers: what blending makes of others is not the same bits by each compiler's code. */
+/* Fills a sheet with fragments that contain no NaN or infinity: blending these gives bits that depend on the
+ * compiler. */
 static void fill_numbers(comp_sheet *sheet)
 {
     comp_sheet_begin(sheet, 0);
@@ -195,7 +198,8 @@ static void fill_numbers(comp_sheet *sheet)
 
 enum { WIDE = 40, HIGH = 50 };
 
-/* A picture, colours and then depths, whose right strips and lower ones are cut. Every second strip has no depths. */
+/* Stores a picture, colours and then depths, whose rightmost and lowest strips are cut off. Every second strip has no
+ * depths. */
 static void store_by(const comp_sheet_loops *loops, const comp_sheet *pixels, const float background[4], int ranks,
                      float *stored)
 {
@@ -209,7 +213,7 @@ static void store_by(const comp_sheet_loops *loops, const comp_sheet *pixels, co
     }
 }
 
-/* Joining, blending and storing are the same bits by each instruction set. */
+/* Checks that joining, blending and storing give the same bits with each instruction set. */
 static void sheets_are_merged_alike(void **context)
 {
     (void)context;
@@ -219,7 +223,7 @@ static void sheets_are_merged_alike(void **context)
         plain_stored[5 * WIDE * HIGH] __attribute__((aligned(64)));
     const comp_sheet_loops *const plain = comp_sheet_loops_of(CPU_PLAIN);
     for (int trial = 0; trial < 300; trial++) {
-        const int ranks = trial % 3 ? 1 + trial % 16 : 1; /* more have shorter strips */
+        const int ranks = trial % 3 ? 1 + trial % 16 : 1; /* grids of more ranks have shorter strips */
         uint16_t plain_left[COMP_ROWS], left[COMP_ROWS];
         fill_numbers(&first);
         fill_numbers(&other);
@@ -244,7 +248,7 @@ static void sheets_are_merged_alike(void **context)
 
 /* ---- routes -------------------------------------------------------------------------------------------------- */
 
-/* The place of a fragment for the owner after the round. */
+/* Returns the position that has the fragment for the owner after the round. */
 static int carried(const comp_route *route, int round, int place, int owner)
 {
     const int stride = comp_route_stride(route, round);
@@ -257,7 +261,7 @@ static void check_way(const comp_route *route, int from, int owner)
     for (int round = 0; round < route->round_count; round++) {
         const int to = carried(route, round, at, owner), stride = comp_route_stride(route, round);
         assert_in_range(to, 0, route->owners - 1);
-        /* Whoever it comes from is a partner of whom it goes to. */
+        /* The sender is a partner of the receiver. */
         assert_int_equal(comp_route_partner(route, round, stride, to, comp_route_digit(route, round, stride, at)), at);
         at = to;
     }
@@ -300,7 +304,7 @@ static void check_gather(int ranks, comp_nodes nodes, comp_schedule schedule)
     assert_non_null(children);
     for (int place = 1; place < route.owners; place++) {
         const int parent = comp_gather_parent(&route, place);
-        assert_in_range(parent, 0, place - 1); /* so that every way ends at 0 */
+        assert_in_range(parent, 0, place - 1); /* so that every path to the root ends at 0 */
         children[parent]++;
     }
     for (int place = 0; place < route.owners; place++) {
@@ -320,8 +324,8 @@ static void gathering_is_a_tree(void **context)
                 check_gather(counts[i], (comp_nodes){node, false}, s);
 }
 
-/* The chosen route is no dearer than any schedule; few ranks send directly; and with up to 100,000 ranks, each with its
- * share of a picture, none sends more than a few hundred messages. */
+/* Checks that the chosen route costs no more than any schedule, that few ranks send directly, and that with up to
+ * 100,000 ranks, each with its share of a picture, no rank sends more than a few hundred messages. */
 static void the_cheapest_route_is_chosen(void **context)
 {
     (void)context;
@@ -340,7 +344,7 @@ static void the_cheapest_route_is_chosen(void **context)
     }
 }
 
-/* A round of direct send among eight costs what the model says, term by term. */
+/* Checks that a round of direct send among eight ranks costs what the model states, term by term. */
 static void costs_are_those_of_the_model(void **context)
 {
     (void)context;

@@ -1,4 +1,4 @@
-/* The points of VTK's contour lines on a plane lie on pixels that our lines cover. */
+/* Checks that the points of VTK's contour lines on a plane lie on pixels that our lines cover. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -24,14 +24,14 @@ static double distance(const double p[3])
     return normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2] - 0.1;
 }
 
-/* A wave of 42 cells. */
+/* test_wave() stretched by two: its wavelength is 42 cells. */
 static double wave(const double p[3])
 {
     return test_wave((const double[]){p[0] / 2, p[1] / 2, p[2] / 2});
 }
 
-/* Returns the share of the point's pixel that lines cover; -1: it is not in the picture, or so near to the border of
- * the cube that the pixel's middle may not be on the plane. */
+/* Returns how much of the point's pixel lines cover, from 0 to 1; -1 if the point is outside the picture, or so near to
+ * the border of the cube that the pixel's middle may not be on the plane. */
 static double cover_at(const render_camera *c, const image *picture, const double point[3])
 {
     const double size = 2 * c->half_height / c->height;
@@ -48,9 +48,10 @@ static double cover_at(const render_camera *c, const image *picture, const doubl
     return (double)picture->rgba[4 * ((int)row * c->width + (int)column)];
 }
 
-/* A point is no more than half of a pixel's diagonal from its middle: a line of 1.5 pixels covers 1.25 - 0.71 of it or
- * more. VTK cuts a hex's polygon into triangles; on 40 cubes that moves lines of this field by 0.1 of a pixel at most.
- * Where lines turn sharply, at a saddle or about an extremum, neither is straight: 1 of 1000 points may lie beside. */
+/* Checks the coverage at VTK's points. A point is at most half of a pixel's diagonal from the pixel's middle, so a line
+ * 1.5 pixels wide covers at least 1.25 - 0.71 of the pixel. VTK cuts a hex's polygon into triangles; on 40 cubes that
+ * moves lines of this field by at most 0.1 of a pixel. At sharp turns of a line, at a saddle or near an extremum,
+ * neither line is straight: 1 of 1000 points may be off the line. */
 static void check_kind(test_mesh_kind kind, int type, fixture_camera camera)
 {
     test_mesh mesh, values;

@@ -1,19 +1,20 @@
-/* A ray's one crossing by contraction (kernel_contraction.h): hexes, wedges and pyramids from parallelepipeds to cells
- * that are strongly bent, flat, tiny, and far from the origin, each with a ray of its own, against brute force in
- * double. The kernels' headers are compiled here, plain.
+/* Checks a ray's single crossing by contraction (kernel_contraction.h) against brute force in double: hexes, wedges and
+ * pyramids from parallelepipeds to cells that are strongly bent, flat, tiny, or far from the origin, each with a ray of
+ * its own. The kernels' headers are compiled here for the scalar instruction set.
  *
- * The truth: a ray's intervals in the cell are reference_crossings(), and in each the field is looked at at many
- * depths; where its sign changes from one to the next, bisection finds the root. A crossing that is decided must be the
- * only one, at its depth, and where none is decided there must be none.
+ * Reference: a ray's intervals in the cell are reference_crossings(), and in each the field is sampled at many depths;
+ * between two samples of different sign, bisection finds the root. If the kernel decides that there is one crossing, it
+ * must be the only one and at its depth; if it decides that there is none, there must be none.
  *
  * Depth: the last step of Newton's method begins at most KERNEL_CONTRACTION_END from the root, in the cell's
- * coordinates. f's second derivative is no more than some 4 K (its first one is K at the domain's corners, and 0 in the
- * middle), so with K < 0.9 the step leaves 2 K / (1 - K) (1e-4)^2 = 1.8e-7 of r, which is as much of the cell's extent
- * along the ray; t is rounded to half a unit, twice.
+ * coordinates. The second derivative of f is at most about 4 K (the first derivative of the iteration is K at the
+ * domain's corners, and 0 in the middle), so with K < 0.9 the step leaves 2 K / (1 - K) (1e-4)^2 = 1.8e-7 of r, which
+ * is the same fraction of the cell's extent along the ray; t is rounded by half a unit, twice.
  *
- * And quads that are taken to look convex along all rays of a box (kernel_curved_nonconvex_quads()), of the same cells:
- * as each of many rays sees its vertices, in float32, all of its corners turn one way in double; and where the edges of
- * the quad have known signs, the quad's two triangles and its patch say of the ray what the edges alone do. */
+ * The test also checks quads of the same cells that kernel_curved_nonconvex_quads() takes to look convex along all rays
+ * of a box: seen along each of many rays in float32, all corners of such a quad turn in one direction in double; and if
+ * the signs of the quad's edges are known, its two triangles and its patch give the same result for the ray as the
+ * edges alone. */
 #include "kernel_bounds.h"
 #include "kernel_contraction.h"
 #include "kernel_quad.h"
@@ -43,7 +44,7 @@ typedef enum shape { AFFINE, JITTERED, BENT, FLAT, TINY, FAR, SHAPE_COUNT } shap
 
 static const char *const shape_names[SHAPE_COUNT] = {"affine", "jittered", "bent", "flat", "tiny", "far"};
 
-/* Cells in lanes, each with a ray. */
+/* One cell for each lane, each with its own ray. */
 typedef struct batch {
     int type;
     float at[4][8][SIMD_WIDTH];
@@ -58,7 +59,7 @@ static double shape_size(shape s)
     return s == TINY ? 1e-4 : s == FAR ? 0.008 : pow(10, uniform(-2.5, -0.5));
 }
 
-/* A random rotation's columns, with the extents of the cell. */
+/* Makes the columns of a random rotation, scaled by the extents of the cell. */
 static void random_axes(const double extent[3], double axes[3][3])
 {
     double q[4], sum = 0;
@@ -98,8 +99,8 @@ static void place_cell(batch *b, shape s, int lane)
     }
 }
 
-/* A field that is nearly linear, or not at all; relative to an isovalue among the vertices', as in
- * kernel_cell_relative(). */
+/* Sets values that are nearly linear or far from it, relative to an isovalue within their range, as
+ * kernel_cell_relative() does. */
 static void place_values(batch *b, int lane)
 {
     const int count = grid_type_vertices(b->type);
@@ -118,7 +119,7 @@ static void place_values(batch *b, int lane)
     for (int i = 0; i < count; i++) b->at[3][i][lane] = (float)(v[i] / most);
 }
 
-/* A point in the vertices' box, or somewhat beside. */
+/* Chooses a point in the bounding box of the vertices, or slightly outside it. */
 static void point_near(const batch *b, int lane, double point[3])
 {
     for (int a = 0; a < 3; a++) {
@@ -131,7 +132,7 @@ static void point_near(const batch *b, int lane, double point[3])
     }
 }
 
-/* A ray of the beam by such a point. */
+/* Aims a ray of the beam through a point near the cell. */
 static void aim(batch *b, int lane)
 {
     double point[3];
@@ -179,7 +180,7 @@ static void contract(const batch *b, kernel_contracted *out, kernel_bounds *boun
     memcpy(out->r, at.r, sizeof at.r);
 }
 
-/* ---- truth ---- */
+/* ---- reference ---- */
 
 static void reference_of(const batch *b, int lane, reference_cell *cell, reference_line *line, double values[8])
 {
@@ -196,9 +197,9 @@ typedef struct truth {
     const reference_cell *cell;
     const reference_line *line;
     const double *values;
-    bool has_failed; /* the map could not be inverted somewhere, near a pyramid's apex: the ray is not judged */
+    bool has_failed; /* the map could not be inverted at some depth, near a pyramid's apex: the ray is not compared */
     int roots;
-    double t; /* of the last one */
+    double t; /* depth of the last root */
 } truth;
 
 static double truth_at(truth *r, double t)
@@ -221,7 +222,7 @@ static double truth_bisect(truth *r, double low, double high, bool rises)
     return 0.5 * (low + high);
 }
 
-/* All roots in the cell. */
+/* Finds all roots in the cell. */
 static void truth_find(truth *r)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
@@ -244,7 +245,7 @@ static void truth_find(truth *r)
 
 typedef struct count {
     int64_t rays, contracting, one, none, wrong, off, failed;
-    double worst; /* depth, in bounds */
+    double worst; /* largest error of depth, divided by its bound */
 } count;
 
 static double depth_bound(const batch *b, int lane, double t)
@@ -320,10 +321,11 @@ static void decided_crossings_are_right(void **state)
 enum { BOX_RAYS = 12 };
 
 typedef struct quad_counts {
-    int64_t quads, convex, turned, wrong; /* rays too */
+    int64_t quads, convex, turned, wrong; /* counts of quads, once for each ray */
 } quad_counts;
 
-/* Slopes along which three neighbouring vertices of a quad are seen nearly in line; false where none are small. */
+/* Computes the slopes of a direction along which three consecutive vertices of a quad are seen nearly collinear;
+ * returns false if no such slopes are small. */
 static bool graze(const batch *b, int lane, double slope[2])
 {
     const kernel_shape *shape = kernel_cell_shape(b->type);
@@ -343,7 +345,7 @@ static bool graze(const batch *b, int lane, double slope[2])
     return fabs(slope[own]) < 1;
 }
 
-/* Rays of a box, most of them at its ends. */
+/* Aims the rays of a box, most of them at its corners. */
 static void aim_box(batch *b, kernel_rays rays[BOX_RAYS], kernel_ray_box *box)
 {
     double middle[SIMD_WIDTH][2], half[SIMD_WIDTH];
@@ -395,7 +397,8 @@ static vi edge_of(const vf x[8], const vf y[8], int a, int b, vf *least)
     return vi_from_bits(e);
 }
 
-/* The rays, of those that know the signs of a quad's edges, of which these alone say something else than all of it. */
+/* Returns the rays on which the signs of all edges of the quad are certain but give another result than its triangles
+ * and its patch. */
 static vm edges_are_wrong(const vf x[8], const vf y[8], const signed char *loop)
 {
     vf least = vf_set(INFINITY);
@@ -461,7 +464,7 @@ static void quads_that_look_convex_are(void **state)
         }
 }
 
-/* The argument is the number of rays. */
+/* The command's argument is the number of rays. */
 int main(int argc, char **argv)
 {
     if (argc > 1) rays_wanted = atoll(argv[1]);

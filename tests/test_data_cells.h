@@ -1,4 +1,4 @@
-/* The cells of a real grid as they are, also those of higher order, for tests of sessions. */
+/* Reads the cells of a real grid unchanged, including cells of higher order, for tests of sessions. */
 #ifndef TEST_DATA_CELLS_H
 #define TEST_DATA_CELLS_H
 
@@ -9,17 +9,17 @@
 extern "C" {
 #endif
 
-/* Cells of one type. The arrays are from malloc(). */
+/* Cells of one type. The arrays are allocated by malloc(). */
 typedef struct data_cells {
-    int type, nodes; /* VTK's number of the type, and the number of nodes of a cell */
+    int type, nodes; /* VTK's number of the type, and the number of nodes of each cell */
     int64_t vertex_count, cell_count;
     double *coordinates; /* vertices x 3 */
-    double *values;      /* of the vertices */
+    double *values;      /* values at the vertices */
     int64_t *connectivity;
 } data_cells;
 
-/* Reads a .vtu file all of whose cells have one type. Returns false if there is no such file, or if it has no such
- * field of one component at its points. */
+/* Reads a .vtu file whose cells all have one type. Returns false if there is no such file, or if it has no such field
+ * of one component at its points. */
 bool data_cells_read(const char *path, const char *field, data_cells *out);
 
 #ifdef __cplusplus

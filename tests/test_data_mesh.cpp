@@ -50,7 +50,7 @@ int64_t *integers(const insitu_array &a, int64_t count)
     return out;
 }
 
-/* Meshes of tests have linear cells: quadratic ones become those of their corners, which come first. */
+/* Meshes of tests have linear cells: a quadratic cell becomes the linear cell of its corners, which come first. */
 void keep_corners(test_mesh *mesh)
 {
     static const struct {

@@ -1,4 +1,4 @@
-/* Real grids for the tests: a VTU file through the VTK adaptor, as a test_mesh. */
+/* Reads real grids for the tests: a VTU file through the VTK adaptor, as a test_mesh. */
 #ifndef TEST_DATA_MESH_H
 #define TEST_DATA_MESH_H
 
@@ -8,8 +8,9 @@
 extern "C" {
 #endif
 
-/* The file's cells as the adaptor hands them over, and the named field of one component at the vertices. False, with a
- * message on stderr, where there is no such file or field. Free with test_mesh_free(). */
+/* Reads the file's cells as the adaptor passes them, and the named field of one component at the vertices. Returns
+ * false, with a message on stderr, if there is no such file or field. The caller frees the mesh with
+ * test_mesh_free(). */
 bool test_data_mesh(const char *path, const char *field, test_mesh *out);
 
 #ifdef __cplusplus

@@ -1,6 +1,6 @@
-/* The Voronoi cells of INSITU_TEST_DATA, 8,000 polyhedra of up to 21 faces, against the brute-force renderer: surfaces,
- * samples and segments. They are also moved, so that their faces are not plane, and compared with the same field on
- * their own tets. Returns 77 where INSITU_TEST_DATA is not set. */
+/* Compares the Voronoi cells of INSITU_TEST_DATA, 8,000 polyhedra of up to 21 faces, with the brute-force renderer:
+ * surfaces, samples and segments. Their vertices are also moved, so that their faces are not plane, and they are
+ * compared with the same field on the cells' own tets. Returns 77 if INSITU_TEST_DATA is not set. */
 #include "reference_integral.h"
 #include "test_data_mesh.h"
 #include "test_effort.h"
@@ -17,7 +17,8 @@
 
 static test_mesh mesh;
 static int width,
-    height; /* of the picture that is compared with brute force over all cells: usually a third of the rays */
+    /* height of the picture that is compared with brute force over all cells, usually for a third of the rays */
+    height;
 
 static void cells_fixture(render_fixture *f)
 {
@@ -43,7 +44,8 @@ static void surfaces_and_samples_match_the_reference(void **state)
     }
 }
 
-/* Exact on tets, and so on polyhedra: 1e-6 as in test_segments.c, whose rays meet as many cells. */
+/* Checks segments against the integral. They are exact on tets, and so on polyhedra: the bound is 1e-6 as in
+ * test_segments.c, whose rays cross as many cells. */
 static void segments_are_the_integral(void **state)
 {
     (void)state;
@@ -67,7 +69,7 @@ static void segments_are_the_integral(void **state)
     fixture_free(&f);
 }
 
-/* Vertices moved by up to 1 % of a cell along each axis. After all others: the mesh is another then. */
+/* Moves vertices by up to 1 % of a cell along each axis. This test runs last, because it changes the mesh. */
 static void moved_cells_are_their_own_tets(void **state)
 {
     (void)state;

@@ -1,13 +1,13 @@
-/* Tests max_error on the real grids of INSITU_TEST_DATA: each is drawn by segments to errors of 1e-2, 1e-3 and 1e-4,
- * with two transfer functions, and compared with the adaptive integral in double over all cells, in linear light.
- * Usually a grid has one of the functions, the next grid the other one, and grids of known pixels have both.
+/* Checks max_error on the real grids of INSITU_TEST_DATA: each is drawn by segments with max_error 1e-2, 1e-3 and 1e-4,
+ * with two transfer functions, and compared with the adaptive integral in double over all cells, in linear light. The
+ * usual run draws each grid with one of the two functions alternately; grids with known pixels are drawn with both.
  *
- *     test_data_volumes [pixels [name]]
+ * test_data_volumes [pixels [name]]: `pixels` is the number of pixels of a picture that are compared, 0: all. Half of
+ * them are the pixels in which the pictures differ most from each other, where errors are largest; the others are
+ * chosen at random among pixels that are not empty; pixels that were once wrong are added. Returns 77 if
+ * INSITU_TEST_DATA is not set.
  *
- * So many pixels of a picture are compared, 0: all. Half of them are those in which the pictures differ most from one
- * another, where errors are largest; the others are at random among those that show something; pixels that were once
- * wrong are added. Returns 77 where INSITU_TEST_DATA is not set. The ray's cells are found by their projections, so
- * that brute force need not look at half a million others. */
+ * The ray's cells are found by their projections, so that brute force need not test half a million others. */
 #include <mpi.h>
 
 #include "colour_map.h"
@@ -37,7 +37,7 @@ typedef struct data_set {
     double eye[3], focal[3], up[3];
 } data_set;
 
-/* The data's README gives these numbers. */
+/* These numbers are listed in the data's README. */
 static const data_set sets[] = {
     {"bluntfin_hex",
      "Density",
@@ -121,8 +121,8 @@ static const data_set sets[] = {
     {"tiny_QuadraticWedge", "DistanceToCenter", 0.3, 1.74, {4.85923918, 3.57282612, 5.82404897}, {1, 1, 1}, {0, 1, 0}},
 };
 
-/* Pixels that are always compared: of pentahexa, prisms whose base is one vertex, their faces turned this way and that.
- */
+/* Pixels that are always compared. They show pentahexa: prisms whose base is one vertex and whose faces have either
+ * orientation. */
 typedef struct known_pixel {
     const char *file;
     int x, y;
@@ -132,7 +132,7 @@ static const known_pixel known[] = {{"pentahexa", 34, 24}, {"pentahexa", 35, 27}
 
 enum { KNOWN = sizeof known / sizeof known[0] };
 
-/* Opacities of a scene's default, and of shells: steep ramps of thin colour, as users draw them. */
+/* The opacities: the default of a scene, and shells, which are steep ramps of low opacity, as users draw them. */
 typedef struct opacity_shape {
     const char *name, *map;
     int count;
@@ -154,10 +154,11 @@ typedef struct subject {
     render_fixture f;
     double diagonal;
     double opacity_values[8];
-    unsigned char *ghosts; /* the grid's, a byte a cell */
+    unsigned char *ghosts; /* the ghost flags of the grid, one byte for each cell */
     int rectangle_count;
-    int (*rectangles)[4];  /* of cells: the pixels whose rays may meet it, x and y from and to */
-    unsigned char *folded; /* of pixels: a ray may meet a cell of no one value */
+    /* for each cell the rectangle of pixels whose rays may meet it: first and last x, first and last y */
+    int (*rectangles)[4];
+    unsigned char *folded; /* for each pixel, whether its ray may meet a folded cell, which has no unique value */
 } subject;
 
 static void bounds_of(const test_mesh *mesh, double lower[3], double upper[3])
@@ -183,7 +184,8 @@ static void set_transfer(subject *s, const data_set *set, const opacity_shape *s
     t->colours = colour_map_table(shape->map, &t->colour_count);
 }
 
-/* The pixels, one more all round, whose rays may meet the cell: those within its projection's bounds. */
+/* Computes the rectangle of pixels whose rays may meet the cell: the bounds of its projection, widened by a pixel on
+ * each side. */
 static void project(const render_camera *c, const grid *g, int64_t cell, int out[4])
 {
     const double per_slope = 0.5 * c->height / c->half_height;
@@ -212,7 +214,7 @@ static void project(const render_camera *c, const grid *g, int64_t cell, int out
     }
 }
 
-/* A corner and its three neighbours, in right-handed order where the cell is. */
+/* Each corner with its three neighbours, in right-handed order if the cell is right-handed. */
 static const signed char hex_corners[8][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
                                               {4, 7, 5, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 6, 4, 3}};
 static const signed char wedge_corners[6][4] = {{0, 1, 2, 3}, {1, 2, 0, 4}, {2, 0, 1, 5},
@@ -228,8 +230,8 @@ static double corner_volume(double p[][3], const signed char corner[4])
            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
 }
 
-/* Tells whether the cell is turned inside out at some corners only. Its map is then not one to one, and the solver
- * decides which of several values it has at a place: there is no truth to compare with. */
+/* Returns whether the cell is inverted at some but not all corners. Its map is then not one-to-one, and the solver
+ * decides which of several values it has at a point: there is no reference to compare with. */
 static bool is_folded(const grid *g, int64_t cell)
 {
     const int type = grid_cell_type(g, cell);
@@ -304,7 +306,7 @@ static void subject_free(subject *s)
     free(s->folded);
 }
 
-/* All cells, or those alone that are folded, unless the pixel's ray cannot meet them. */
+/* Hides cells that the pixel's ray cannot meet; if of_folded, also hides all cells that are not folded. */
 static void hide_others(subject *s, int pixel, bool of_folded)
 {
     const int x = pixel % WIDTH, y = pixel / WIDTH;
@@ -323,8 +325,8 @@ static void truth_of(subject *s, int pixel, bool of_folded, double rgba[4])
     reference_integral_free(scene);
 }
 
-/* Tells whether the ray meets a folded cell, or a face whose patch is folded there. A fog throughout shows the folded
- * cells. */
+/* Returns whether the ray meets a folded cell, or a face whose patch is folded there. The folded cells are drawn as a
+ * fog of constant density to see whether the ray meets any. */
 static bool has_no_truth(subject *s, int pixel)
 {
     double rgba[4];
@@ -382,7 +384,7 @@ static int compare_pixels(const void *left, const void *right)
     return at_a != at_b ? (at_a > at_b ? -1 : 1) : a - b;
 }
 
-/* Fill pixels; returns how many. */
+/* Fills pixels with the pixels to compare; returns their number. */
 static int choose_pixels(const data_set *set, const picture *pictures, int pixels[PIXELS + KNOWN])
 {
     int shown = 0;
@@ -404,16 +406,17 @@ static int choose_pixels(const data_set *set, const picture *pictures, int pixel
 
 /* ---- the test ------------------------------------------------------------------------------------------------ */
 
-/* Returns how many of the pixels may have no truth. Only the crushed can has folded cells, which at most a seventh of
- * all its pixels meet (63 of 612, and 58 of 459); but the half of a sample in which pictures differ most may all be
- * such. */
+/* Returns how many of the pixels may lack a reference. Only the crushed can has folded cells, which at most a seventh
+ * of all its pixels meet (63 of 612, and 58 of 459); but the half of a sample in which pictures differ most may all be
+ * such pixels. */
 static int most_left_out(const data_set *set, int count)
 {
     if (strcmp(set->file, "can_2") != 0) return 0;
     return pixel_count == 0 ? count / 7 : count * 3 / 4;
 }
 
-/* Before anything has happened to it the can's field is 0 throughout, where the shells are clear. */
+/* Returns whether the picture is empty: before the impact the can's field is 0 everywhere, where the shells are
+ * transparent. */
 static bool shows_nothing(const data_set *set, const opacity_shape *shape)
 {
     return strcmp(set->file, "can_0") == 0 && strcmp(shape->name, "shells") == 0;

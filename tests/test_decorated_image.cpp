@@ -1,4 +1,4 @@
-/* Tests decorations drawn over a picture: their places, what they hide, and the colours of bars. */
+/* Checks decorations drawn over a picture: their positions, what they hide, and the colours of bars. */
 #include <cmath>
 #include <csetjmp>
 #include <cstdarg>
@@ -19,7 +19,7 @@ namespace
 
 const int width = 320, height = 240;
 
-/* Premultiplied grey of this opacity everywhere. */
+/* Returns a picture that is premultiplied grey with this opacity everywhere. */
 std::vector<float> sheet_of(float grey, float alpha)
 {
     std::vector<float> rgba(static_cast<std::size_t>(4 * width * height));
@@ -60,8 +60,8 @@ void the_picture_is_put_over_its_background(void **)
         assert_true(std::fabs(out[i] - (i % 4 == 3 ? 1 : 0.125F + 0.75F * 0.25F)) < 1e-6F);
 }
 
-/* A line before the picture has its own colour; one behind shows, over the background, as far as the picture lets light
- * through. Beside them nothing changes. */
+/* Checks that a line in front of the picture has its own colour, and that a line behind it shows, over the background,
+ * as far as the picture transmits light. Pixels off the lines must not change. */
 void strokes_are_before_or_behind_the_picture(void **)
 {
     const insitu_stroke strokes[] = {{{0, 50.5}, {width, 50.5}, false}, {{0, 100.5}, {width, 100.5}, true}};
@@ -76,7 +76,7 @@ void strokes_are_before_or_behind_the_picture(void **)
     assert_true(at(hidden, 160, 100) == 0.5F);
 }
 
-/* A line's light is its length times its width, whichever way it goes: edges are smooth. */
+/* Checks that a line's total light is its length times its width in any direction, since its edges are antialiased. */
 void slanted_strokes_are_as_bright_as_straight_ones(void **)
 {
     for (int degrees = 0; degrees < 180; degrees += 7) {
@@ -89,12 +89,12 @@ void slanted_strokes_are_as_bright_as_straight_ones(void **)
         double sum = 0;
         const std::vector<float> out = draw(sheet_of(0, 0), d);
         for (std::size_t i = 0; i < out.size(); i += 4) sum += out[i];
-        /* A tent one pixel wide on either side holds 180; the round ends add at most one each. */
+        /* A tent profile one pixel wide on either side sums to 180; the round ends add at most one each. */
         assert_true(sum > 178 && sum < 183);
     }
 }
 
-/* Finds the tallest column of the bar's colours. */
+/* Checks the colours in the tallest column of the bar. */
 void a_bar_has_the_colours_of_its_map(void **)
 {
     const float colours[] = {0.1F, 0.2F, 0.9F, 0.3F, 0.8F, 0.1F, 0.9F, 0.1F, 0.2F};
@@ -113,12 +113,13 @@ void a_bar_has_the_colours_of_its_map(void **)
             int run = 0;
             float before = -1;
             for (int y = 0; y < height; y++) {
-                /* In the table's lower half green rises from 0.2 to 0.8 as blue falls from 0.9 to 0.1. */
+                /* In the table's lower half green rises from 0.2 to 0.8 while blue falls from 0.9 to 0.1. */
                 const float r = at(out, x, y, 0), g = at(out, x, y, 1), b = at(out, x, y, 2);
                 const bool is_low = std::fabs((g - 0.2F) / 0.6F - (0.9F - b) / 0.8F) < 1e-4F && r < 0.31F;
                 const bool is_high = std::fabs((r - 0.3F) / 0.6F - (0.8F - g) / 0.7F) < 1e-4F && b < 0.21F && r > 0.29F;
                 if (!is_low && !is_high) continue;
-                if (before >= 0 && is_high) assert_true(r <= before + 1e-6F); /* the high end is above */
+                /* the high end of the bar is at the top */
+                if (before >= 0 && is_high) assert_true(r <= before + 1e-6F);
                 before = is_high ? r : before;
                 run++;
             }
@@ -148,7 +149,7 @@ void bands_are_of_equal_height(void **)
             for (int y = 0; y < height; y++) count += at(out, x, y, band) == 0.9F && at(out, x, y, (band + 1) % 3) == 0;
             rows[band] = count > rows[band] ? count : rows[band];
         }
-    /* The frame takes a row of the outer bands, and a border may cut a row. */
+    /* The frame covers a row of the outer bands, and a border between bands may divide a row. */
     assert_true(rows[1] > 30 && std::abs(rows[0] - rows[1]) <= 2 && std::abs(rows[2] - rows[1]) <= 2);
 }
 

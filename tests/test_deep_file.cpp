@@ -1,5 +1,5 @@
-/* The deep file that a run writes, flattened by OpenImageIO as oiiotool --flatten does, is the flat file that it writes
- * beside it: transparent isosurfaces and a volume, on any number of ranks, written in the background. */
+/* Checks that the deep file of a run, flattened by OpenImageIO as oiiotool --flatten does, equals the flat file of the
+ * same run: transparent isosurfaces and a volume, on any number of ranks, written in the background. */
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
 #include <insitu/insitu.h>
@@ -22,10 +22,10 @@ extern "C" {
 namespace
 {
 
-std::string folder; /* of this number of ranks */
+std::string folder; /* output folder, separate for each number of ranks */
 int own_rank, rank_count;
 
-/* A slab of hexes a rank, along x. */
+/* A slab of hexes for each rank, along x. */
 enum { NX = 3, NY = 10, NZ = 10 };
 
 struct slab {
@@ -75,7 +75,7 @@ void submit(insitu_session *session, const slab &s)
     assert_int_equal(insitu_set_field(session, "slab", &field), INSITU_OK);
 }
 
-/* Each file has its own name, because OpenImageIO caches what it has read. */
+/* Draws one picture. Each file has its own name, because OpenImageIO caches files that it has read. */
 void draw(const std::string &name, const std::string &layers)
 {
     const std::string scene = folder + "/scene.yaml";
@@ -91,7 +91,8 @@ void draw(const std::string &name, const std::string &layers)
     assert_int_equal(insitu_destroy(&session), INSITU_OK);
 }
 
-/* Roundings of 2^-24 of at most 1: of a sample compositing makes three, A is one, and OpenImageIO makes three. */
+/* Compares the flattened deep file with the flat file. The roundings are 2^-24 of values of at most 1: for each sample
+ * three in compositing, one in A, and three in OpenImageIO. */
 void compare(const std::string &name)
 {
     if (own_rank != 0) return;

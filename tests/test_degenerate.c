@@ -1,7 +1,7 @@
-/* Degenerate polyhedra: faces that repeat a vertex, have no area or are all in one place, and cells without volume. The
- * same cell written in another way is drawn to the same bits, cells without volume change no bit, and all else agrees
- * with the reference. All are listed in docs/development/hard-cases.md; those that are refused are in
- * test_session_faces.c. */
+/* Checks degenerate polyhedra: faces that repeat a vertex, have no area or consist of one point, and cells without
+ * volume. The same cell stored in another form is drawn to the same bits, cells without volume change no bit, and
+ * everything else agrees with the reference. docs/development/hard-cases.md lists all cases; test_session_faces.c
+ * checks those that are refused. */
 #include "reference_integral.h"
 #include "test_effort.h"
 #include "test_mesh_make.h"
@@ -17,7 +17,7 @@
 
 static const double values[2] = {-0.2, 0.3};
 
-/* The scenes: an opaque surface, transparent ones in a sampled volume, a volume by segments. */
+/* The scenes: an opaque surface, transparent surfaces in a sampled volume, and a volume by segments. */
 typedef enum scene_kind { OPAQUE, SURFACES_IN_SAMPLES, SEGMENTS, SCENE_COUNT } scene_kind;
 
 static void open_scene(render_fixture *f, const test_mesh *mesh, scene_kind scene, fixture_camera camera, int width,
@@ -46,9 +46,9 @@ static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera,
     fixture_free(&f);
 }
 
-/* ---- other ways to write a mesh -------------------------------------------------------------------------------- */
+/* ---- other forms of a mesh ------------------------------------------------------------------------------------- */
 
-/* The vertices and values of a mesh, no cells yet; with room for some more. */
+/* Returns a mesh with the vertices and values of another and without cells, with room for additional ones. */
 static test_mesh begin_copy(const test_mesh *from)
 {
     test_mesh mesh;
@@ -105,8 +105,8 @@ static void finish_copy(test_mesh *mesh, test_mesh *copy)
 
 typedef void rewriting(test_mesh *mesh);
 
-/* Repeats vertices in two faces of three, twice or three times, also the first one at the end: a quad then has up to
- * seven entries. Both of a face's cells have it so. */
+/* Repeats vertices in two of three faces, twice or three times, including the first one at the end: a quad then has up
+ * to seven entries. Both cells of a face share the changed face. */
 static void repeat_vertices(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh);
@@ -122,8 +122,8 @@ static void repeat_vertices(test_mesh *mesh)
     finish_copy(mesh, &copy);
 }
 
-/* Adds a face for every vertex, all of it in that place. A cell gets that of the first vertex of its first face, so
- * cells share some. */
+/* Adds for every vertex a face that consists of this vertex only. A cell gets the face of the first vertex of its first
+ * face, so that cells share some of them. */
 static void add_point_faces(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh);
@@ -136,7 +136,7 @@ static void add_point_faces(test_mesh *mesh)
     finish_copy(mesh, &copy);
 }
 
-/* All faces, or every second, the other way round. */
+/* Reverses the orientation of all faces, or of every second one. */
 static void reverse_faces(test_mesh *mesh)
 {
     for (int64_t face = 0; face < mesh->face_count; face++)
@@ -161,9 +161,9 @@ static void reorder_every_second(test_mesh *mesh)
     finish_copy(mesh, &copy);
 }
 
-/* ---- cells of no volume beside others -------------------------------------------------------------------------- */
+/* ---- cells without volume next to others ----------------------------------------------------------------------- */
 
-/* A face of the cell before and behind, closed by two faces that are points. */
+/* Adds a flat cell: a face of a cell twice, as front and back, closed by two faces that are points. */
 static void add_pillow(test_mesh *mesh, int64_t face)
 {
     const int64_t *loop = mesh->face_connectivity + mesh->face_offsets[face];
@@ -175,7 +175,7 @@ static void add_pillow(test_mesh *mesh, int64_t face)
     test_mesh_add_polyhedron(mesh, faces, 4);
 }
 
-/* Two faces of the cell before and behind: bent, of no volume. */
+/* Adds a bent cell without volume: two faces of a cell, each twice, as front and back. */
 static void add_bent_pillow(test_mesh *mesh, int64_t one, int64_t other)
 {
     int64_t faces[4] = {one, other};
@@ -197,7 +197,8 @@ static void add_tet(test_mesh *mesh, const int64_t v[4])
     test_mesh_add_polyhedron(mesh, faces, 4);
 }
 
-/* A tet of new vertices, in the place of one, or along the line from it to another by quarters. */
+/* Adds a tet of new vertices that are all at one vertex's position, or on the line from that vertex to another at
+ * quarters of its length. */
 static void add_new_tet(test_mesh *mesh, int64_t from, int64_t to)
 {
     int64_t v[4];
@@ -238,7 +239,7 @@ static void add_flat_cells(test_mesh *mesh)
 
 /* ---- the same bits --------------------------------------------------------------------------------------------- */
 
-/* Makes polyhedra from tets, hexes of which half or all are polyhedra, or mixed cells. */
+/* Makes a mesh of polyhedra from tets, of hexes of which half or all become polyhedra, or of mixed cells. */
 static void make_mesh(int kind, double jitter, test_mesh *mesh)
 {
     static const test_mesh_kind kinds[4] = {TEST_POLYHEDRA, TEST_HEXES, TEST_HEXES, TEST_MIXED};
@@ -292,15 +293,16 @@ static void polyhedra_of_no_volume_change_no_pixel(void **state)
 
 /* ---- the reference --------------------------------------------------------------------------------------------- */
 
-/* Compares pictures of surfaces and samples, and for segments every ray's integral: float32's values err by some 1e-6,
- * and so does the length in a steep stretch of the function (see sums_through_spokes_match_the_reference). */
+/* Compares pictures of surfaces and samples, and for segments the integral of every ray: values in float32 err by about
+ * 1e-6, and so does the length of a segment in a steep part of the transfer function (see
+ * sums_through_spokes_match_the_reference). */
 static void assert_reference(const test_mesh *mesh, fixture_camera camera, const char *what)
 {
     render_fixture f;
     drawn_frame drawn;
     open_scene(&f, mesh, SURFACES_IN_SAMPLES, camera, 49, 43);
-    /* A hit on the sheets of a face of no area, which lie in one plane, is as near to an edge of a tet, and is left
-     * out. */
+    /* The sheets of a face without area lie in one plane; a hit on them is equally near to an edge of a tet, and is
+     * excluded. */
     fixture_bounds bounds = fixture_usual_bounds;
     bounds.excluded = 3e-3;
     const fixture_outcome o = fixture_compare(&f, &bounds, what);
@@ -326,9 +328,9 @@ static void assert_reference(const test_mesh *mesh, fixture_camera camera, const
     fixture_free(&f);
 }
 
-/* An edge between two vertices, and the one put in its middle. */
+/* An edge between two vertices, and the vertex in its middle. */
 typedef struct split_edge {
-    int64_t low, high, middle, face; /* the face of no area along it */
+    int64_t low, high, middle, face; /* face: the face without area along the edge */
 } split_edge;
 
 typedef struct split_edges {
@@ -356,7 +358,7 @@ static split_edge *find_split(split_edges *edges, test_mesh *mesh, int64_t a, in
     return e;
 }
 
-/* Tells whether the edge's middle is a vertex of the face. It is in both of the face's cells. */
+/* Returns whether the middle of the edge is a vertex of the face. The answer is the same for both cells of the face. */
 static bool face_has_middle(int64_t face, int64_t low)
 {
     return test_uniform((uint64_t)(face * 1000 + low), 4) < 0.5;
@@ -374,8 +376,8 @@ static void hang_face(const test_mesh *mesh, int64_t face, split_edges *edges, t
     test_mesh_add_face(copy, loop, count);
 }
 
-/* If only one of a cell's two faces at an edge has the edge's middle, the cell needs the face without area between
- * them. */
+/* Adds to a cell a face without area for each edge of which only one of the cell's two faces has the middle as a
+ * vertex. */
 static int hang_cell(const test_mesh *mesh, int64_t cell, split_edges *edges, test_mesh *copy, int64_t more[32])
 {
     int count = 0;
@@ -399,7 +401,7 @@ static int hang_cell(const test_mesh *mesh, int64_t cell, split_edges *edges, te
     return count;
 }
 
-/* Returns how many cells have faces of no area, which neighbours share. */
+/* Adds vertices in the middle of edges; returns how many cells have faces without area, which neighbours share. */
 static int hang_middles(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh);
@@ -417,9 +419,9 @@ static int hang_middles(test_mesh *mesh)
     return cells;
 }
 
-/* Vertices amid edges that some faces do not have, with the value of the edge there; in jittered lattices they are off
- * the edges by rounding. With other values the field's definition has a jump at the face without area, and a ray's
- * profile may take either side up to the next sheet: the picture must still be finite numbers. */
+/* Checks vertices in the middle of edges that some faces do not have, with the edge's value there; in jittered lattices
+ * they are off the edges by rounding. With other values, the field as defined jumps at the face without area, and a
+ * ray's profile may take either side up to the next sheet: then the picture must only consist of finite numbers. */
 static void faces_of_no_area_match_the_reference(void **state)
 {
     (void)state;
@@ -441,7 +443,7 @@ static void faces_of_no_area_match_the_reference(void **state)
         }
 }
 
-/* Two tets on one face that passes a vertex twice, where they meet. */
+/* Checks two tets with one common face, which passes a vertex twice, at the point where the tets touch. */
 static void face_through_a_vertex_twice_matches_the_reference(void **state)
 {
     (void)state;
@@ -463,8 +465,9 @@ static void face_through_a_vertex_twice_matches_the_reference(void **state)
     }
 }
 
-/* A flat cell alone, with its own vertices and values, does not show in volumes. Its field may differ before and behind
- * it, and a surface then shows between them, as in the sliver whose limit the flat cell is; but all is finite. */
+/* Checks that a flat cell alone, with its own vertices and values, is invisible in volumes. Its field may differ in
+ * front of and behind it, and a surface is then visible between both, as in the sliver whose limit the flat cell is;
+ * but all numbers are finite. */
 static void flat_polyhedra_are_finite(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* What is made of gradients of an ABC flow, away from the border, beside the closed form and VTK's gradient filter: on
- * hexes and tets, plain and jittered. Q is interpolated as a slice would show it. INSITU_TEST_WHOLE: the finest grids
- * too, and how long it takes. */
+/* Compares quantities derived from gradients of an ABC flow, away from the border, with the closed form and with VTK's
+ * gradient filter: on hexes and tets, regular and jittered. Q is interpolated as in a slice. With INSITU_TEST_WHOLE the
+ * test includes the finest grids, and measures the time. */
 #include <math.h>
 #include <mpi.h>
 #include <stdio.h>
@@ -40,7 +40,7 @@ typedef struct sample_sums {
     int64_t count;
 } sample_sums;
 
-/* The flow is its own curl, times k. */
+/* Adds the errors at a point. The curl of the flow is k times the flow itself. */
 static void add_sample(const double p[3], const double values[6], sample_sums *sums)
 {
     double u[3];
@@ -57,7 +57,7 @@ static void add_sample(const double p[3], const double values[6], sample_sums *s
     sums->count++;
 }
 
-/* Weights of a hex's or tet's corners at eight places inside. */
+/* Computes the weights of a hex's or tet's corners at one of eight inner points. */
 static void find_weights(int corners, int place, double weights[8])
 {
     static const int bits[8] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -72,7 +72,7 @@ static void find_weights(int corners, int place, double weights[8])
     for (int i = 0; i < corners; i++) weights[i] /= sum;
 }
 
-/* nodes: 6 numbers of each vertex. */
+/* nodes has 6 numbers for each vertex. */
 static sample_sums compare(const test_mesh *mesh, const double (*nodes)[6])
 {
     sample_sums sums = {0};
@@ -145,7 +145,7 @@ static float *make_velocity(const test_mesh *mesh)
     return velocity;
 }
 
-/* Errors over the sizes: of Q, and VTK's; of vorticity; and the divergence over the vorticity's size. */
+/* Relative errors: of our Q, of VTK's Q, and of the vorticity; and the divergence over the size of the vorticity. */
 typedef struct grid_errors {
     double ours, vtks, curl, divergence;
 } grid_errors;
@@ -200,7 +200,7 @@ static void q_criterion_is_as_accurate_as_vtks(void **state)
         }
 }
 
-/* What a step with new velocities takes to prepare a slice of Q, at all vertices: the least of some steps. */
+/* Returns the time of a step with new velocities for a slice of Q, at all vertices: the minimum over several steps. */
 static double seconds_for_q_criterion(const test_mesh *mesh, const float *velocity)
 {
     static const char scene[] = "threads: 1\nfields: {q: {q_criterion: u}}\nimages: [{name: a, size: [8, 8], layers: "
@@ -217,7 +217,8 @@ static double seconds_for_q_criterion(const test_mesh *mesh, const float *veloci
     return least;
 }
 
-/* The bars are those that the library has set itself; both run on one thread, one after the other. */
+/* Compares the time with VTK's. The bounds are the library's own targets; both run on one thread, one after the
+ * other. */
 static void q_criterion_takes_less_time_than_vtks(void **state)
 {
     (void)state;

@@ -1,7 +1,8 @@
-/* A mesh whose faces are not plane: the dual of tets. Its isosurfaces are those of the same field on the tets of its
- * cells' triangles and centres, drawn as tets, in every pixel that rounding does not decide; cells that are not
- * star-shaped are left out, as their tets overlap. Faces of four vertices are split for this, as rays meet whole ones
- * on bilinear patches; with whole faces, all cells agree with the reference. */
+/* Checks a mesh whose faces are not plane: the dual of a tet mesh. Its isosurfaces must equal those of the same field
+ * on the tets of its cells' triangles and centres, drawn as tets, in every pixel that rounding does not decide. Cells
+ * that are not star-shaped are left out, because their tets overlap. Faces of four vertices are split for this
+ * comparison, because rays intersect unsplit quads on bilinear patches; with unsplit faces, all cells agree with the
+ * reference. */
 #include "test_mesh_dual.h"
 #include "test_own_tets.h"
 #include "test_render_fixture.h"
@@ -15,7 +16,7 @@
 
 static int cubes = 8, width = 320, height = 240;
 
-/* noise: of the values, beside the wave. */
+/* Makes a dual mesh; noise is added to the values of the wave. */
 static void make_dual(int n, double noise, test_mesh *out)
 {
     test_mesh_dual(n, 0.15, test_wave, out);
@@ -36,7 +37,7 @@ static void duals_are_their_own_tets(void **state)
         assert_true(t.pixels > width * height / 10);
         assert_int_equal(t.missing, 0);
         assert_int_equal(t.added, 0);
-        /* Little is left out: of the 7,471 cells of the long run 258 are not star-shaped. */
+        /* Few pixels and cells are left out: of the 7,471 cells of the long run 258 are not star-shaped. */
         assert_true(1000 * t.in_band < t.pixels && 25 * t.ghosts < mesh.cell_count);
         test_mesh_free(&mesh);
     }

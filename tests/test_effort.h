@@ -1,4 +1,4 @@
-/* A test runs its usual part, which meets each kind of case, or the whole, by ./test --long. CMake's
+/* The effort of a test: the usual part, which covers each kind of case, or the whole, with ./test --long. CMake's
  * insitu_add_split_test() registers both. */
 #ifndef TEST_EFFORT_H
 #define TEST_EFFORT_H
@@ -12,7 +12,7 @@ static inline bool test_is_whole(void)
     return whole && whole[0] == '1';
 }
 
-/* The number of cases to do. */
+/* Returns the number of cases to run. */
 static inline int test_effort(int usual, int whole)
 {
     return test_is_whole() ? whole : usual;

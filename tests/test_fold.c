@@ -1,5 +1,5 @@
-/* The fold of a ray's samples or segments is the same to the bit however they are shared out to ranks, and however many
- * of them each rank folds before it sends them; and it is what "over" makes of them in double. */
+/* Checks that folding a ray's samples or segments gives the same bits however they are distributed over ranks, and
+ * however many of them each rank folds before sending, and that the result is that of the "over" operator in double. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -22,7 +22,8 @@ static double random_number(void)
     return (double)(state_of_chance >> 8) / 16777216.0;
 }
 
-/* A ray of segments that touch, of lengths from a millionth to a tenth of the scene, some left out, some surfaces. */
+/* A ray of adjacent segments, whose lengths are a millionth to a tenth of the scene; some are left out, some are
+ * surfaces. */
 typedef struct ray {
     fragment items[MOST];
     int owners[MOST];
@@ -43,11 +44,12 @@ static void make_ray(ray *r, double density, double gap, double surface)
             f->kind = is_surface ? FRAGMENT_SURFACE : FRAGMENT_VOLUME;
             for (int c = 0; c < 3; c++) f->colour[c] = (1 - clear) * (float)random_number();
         }
-        t = is_surface ? nextafterf(t, 2) : end; /* two surfaces at one depth have an order of their own */
+        /* a second surface at the same depth must still have a defined order */
+        t = is_surface ? nextafterf(t, 2) : end;
     }
 }
 
-/* Runs of some pieces a rank. */
+/* Distributes runs of consecutive fragments over the ranks. */
 static void distribute(ray *r, double change)
 {
     int owner = 0;
@@ -57,7 +59,8 @@ static void distribute(ray *r, double change)
     }
 }
 
-/* Makes what the rank sends: for each connected run between surfaces, the fold of all nodes that it has whole. */
+/* Computes the fragments that the rank sends: for each connected run between surfaces, the fold of each tree node that
+ * the rank has completely. */
 static int64_t send(const ray *r, int rank, fragment *out)
 {
     int64_t count = 0;
@@ -103,8 +106,9 @@ static void blend_in_double(const ray *r, double rgba[4])
     rgba[3] = 1 - through + through * (double)background[3];
 }
 
-/* A fragment adds a product and a sum of colours and a product of transmittances, which affects all behind it: three
- * roundings of 2^-24 of at most 1. Dark stretches may be left out. */
+/* Compares the result with blending in double. A fragment adds a product and a sum of colours and a product of
+ * transmittances, which affects all fragments behind it: three roundings of 2^-24 of values of at most 1. Dark segments
+ * may be left out. */
 static void verify(const ray *r, const float rgba[4])
 {
     double expected[4];

@@ -1,7 +1,8 @@
-/* Cells whose maps are folded: a point then has several solutions or none, and there is no truth to compare with. But
- * the picture has finite numbers only, it depends neither on how the simulation numbers a cell's vertices nor on the
- * rank that has the cell, and the report has the count of inverse maps that found nothing. For cells that are not
- * folded that count is 0. Usually a kind has every second pair of a camera and a scene. */
+/* Checks cells whose maps are folded: a point then has several solutions or none, and there is no reference to compare
+ * with. But the picture must consist of finite numbers, it must depend neither on how the simulation numbers a cell's
+ * vertices nor on the rank that has the cell, and the report must count the inverse maps without a solution. For cells
+ * that are not folded that count is 0. The usual run draws every second pair of a camera and a scene for each kind of
+ * cell. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -17,7 +18,7 @@ enum { SIDE = 4, RANKS = 7, WIDTH = 45, HEIGHT = 39 };
 static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
 static const double values[3] = {-0.3, 0.1, 0.4};
 
-/* Vertices moved by up to a cell and a third: most cells turn inside out somewhere. */
+/* Moves vertices by up to 1.33 cells: most cells are then inverted somewhere. */
 static void tangle(test_mesh_kind kind, test_mesh *out)
 {
     test_mesh_lattice(kind, SIDE, 0.2, test_wave, out);
@@ -86,8 +87,8 @@ static void folded_cells_make_numbers(void **state)
     assert_true(failures > 1000);
 }
 
-/* Draws on seven ranks, each with its own numbering of cells and vertices and order within cells: surfaces agree to the
- * bit, separate samples to the rounding of "over". */
+/* Draws on seven ranks, each with its own numbering of cells and vertices and its own order within cells. Surfaces
+ * agree to the bit, separate samples to the rounding of "over". */
 static void draw_distributed(const test_mesh *mesh, scene_kind scene, drawn_frame *out)
 {
     render_fixture parts[RANKS];
@@ -145,7 +146,8 @@ static void maps_of_sound_cells_converge(void **state)
                 test_mesh_lattice(kinds[k], SIDE, 0.2, test_wave, &mesh);
                 stage(&f, &mesh, camera, scene);
                 fixture_draw(&f, &drawn);
-                /* Along x, rays lie in faces and edges of the rim, where a pyramid's map has no inverse at its apex. */
+                /* Along x, rays lie in faces and edges at the border of the mesh, where a pyramid's map has no inverse
+                 * at its apex. */
                 const int64_t allowed =
                     camera == CAMERA_ALONG_X && kinds[k] == TEST_PYRAMIDS ? drawn.list.count / 50 : 0;
                 if (drawn.statistics.map_failures > allowed)

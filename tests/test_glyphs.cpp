@@ -1,5 +1,5 @@
-/* Words beyond ASCII, read back from a picture and compared with the glyphs that FreeType makes of each code point, set
- * side by side here with the font's kerning. */
+/* Checks text beyond ASCII: compares it in a picture with the glyphs that FreeType renders for each code point, set
+ * next to each other with the font's kerning. */
 #include <ft2build.h>
 #include FT_FREETYPE_H
 
@@ -33,7 +33,7 @@ struct phrase {
     std::vector<char32_t> characters;
 };
 
-/* The code points are written out by hand, so that the test has no decoder of its own. */
+/* The code points are written by hand, so that the test needs no decoder of its own. */
 const phrase phrases[] = {
     {"T [\u00b0C]", {'T', ' ', '[', 0xB0, 'C', ']'}},
     {"0.5 \u00b5m", {'0', '.', '5', ' ', 0xB5, 'm'}},
@@ -49,7 +49,7 @@ const phrase phrases[] = {
     {"Gr\u00f6\u00dfe AV", {'G', 'r', 0xF6, 0xDF, 'e', ' ', 'A', 'V'}},
 };
 
-/* White letters on opaque black. */
+/* Draws white letters on opaque black. */
 std::vector<float> draw(const char *text, std::string &warning)
 {
     const insitu_words words{text, INSITU_TOP_LEFT, 1};
@@ -71,7 +71,7 @@ std::vector<float> draw(const char *text, std::string &warning)
     return red;
 }
 
-/* FreeType by itself, from `left` on this baseline. */
+/* Renders the text by FreeType, from `left` on this baseline. */
 class oracle
 {
   public:
@@ -127,7 +127,7 @@ double difference(const std::vector<float> &a, const std::vector<float> &b)
     return worst;
 }
 
-/* The block may begin anywhere near the corner; there, all pixels are FreeType's but for roundings of a few 2^-24. */
+/* Finds the block of text near the corner; all its pixels must equal FreeType's up to roundings of a few 2^-24. */
 void expect_glyphs(const char *text, const std::vector<char32_t> &characters, std::string &warning)
 {
     oracle truth;
@@ -148,7 +148,7 @@ void words_beyond_ascii_are_freetypes_glyphs(void **)
     }
 }
 
-/* DejaVuSans has no Chinese characters: it draws glyph 0, a box. */
+/* Checks a missing glyph: DejaVuSans has no Chinese characters and draws glyph 0, a box. */
 void a_missing_glyph_is_a_box_and_a_warning(void **)
 {
     std::string warning;

@@ -1,8 +1,7 @@
-/* Hanging nodes: where one cell's face lies on four or sixteen others', both sides find its depth from vertices of
- * their own, and rounding leaves gaps and overlaps between them. None of these may show: no pixel counts as one in
- * which cells overlap, no ray passes between cells, and the picture is the same on any number of ranks.
- *
- * Verdicts are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
+/* Checks hanging nodes: where a cell's face coincides with four or sixteen faces of smaller cells, each side computes
+ * depths from its own vertices, and rounding leaves gaps and overlaps between them. They must not be visible: no pixel
+ * is reported as one in which cells overlap, no ray passes between cells, and the picture is the same on any number of
+ * ranks. Results are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
 #include "memory.h"
 #include "reference_integral.h"
 #include "session_frame.h"
@@ -23,10 +22,10 @@ static int my_rank, rank_count;
 
 typedef struct drawing {
     const char *name;
-    double max_error; /* 0: by samples, or if there is no volume by surfaces alone */
-    float opacity;    /* of surfaces; 0: there are none */
+    double max_error; /* 0: the volume is sampled, or there is none and only surfaces are drawn */
+    float opacity;    /* of surfaces; 0: no surfaces */
     bool has_volume;
-    int value_count; /* of surfaces; 0: there are none */
+    int value_count; /* of surfaces; 0: no surfaces */
 } drawing;
 
 static const drawing volumes[] = {
@@ -84,7 +83,7 @@ static int64_t draw_whole(const test_mesh *mesh, const drawing *d, fixture_camer
     return overlaps;
 }
 
-/* Draws as the session would: all ranks draw, each its share. */
+/* Draws as the session does: every rank draws its share. */
 static int64_t draw_shares(const test_mesh *mesh, test_partition_kind partition, const drawing *d,
                            fixture_camera camera, image *out)
 {
@@ -121,7 +120,7 @@ typedef struct hanging_case {
     test_mesh_kind kind;
     int side;
     test_hanging_shape shape;
-    bool is_polyhedral; /* the cells are given by their faces */
+    bool is_polyhedral; /* the cells are polyhedra, given by their faces */
 } hanging_case;
 
 static const hanging_case cases[] = {
@@ -147,8 +146,8 @@ static void name_case(const hanging_case *c, char *name, size_t size)
 
 /* ---- volumes ------------------------------------------------------------------------------------------------- */
 
-/* Against the integral in double, on which rounding leaves no gap to be seen; of rays in the plane of a face, such as
- * those along x, it cannot tell the side. */
+/* Compares the picture with the integral in double, in which rounding leaves no visible gap. For rays in the plane of a
+ * face, such as those along x, the integral cannot decide the side. */
 static bool is_as_integrated(const test_mesh *mesh, const drawing *d, fixture_camera camera, const image *drawn,
                              const char *what)
 {
@@ -167,7 +166,8 @@ static bool is_as_integrated(const test_mesh *mesh, const drawing *d, fixture_ca
     return worst <= d->max_error;
 }
 
-/* "Over" rounds in other groups, to 1e-6. */
+/* Compares pictures of different partitions. "Over" rounds differently if fragments are grouped differently, by up to
+ * 1e-6. */
 static bool is_one_picture(const test_mesh *mesh, test_partition_kind partition, const drawing *d,
                            fixture_camera camera, const char *what)
 {
@@ -211,8 +211,8 @@ static void hanging_nodes_are_no_overlaps(void **state)
 
 /* ---- surfaces ------------------------------------------------------------------------------------------------ */
 
-/* Finds how far the ray of a pixel must go to the plane on which test_linear() has the value. Returns whether that
- * place is well within the mesh: all shapes hold the ball of radius 0.5. */
+/* Computes the depth at which the ray of a pixel meets the plane on which test_linear() has the value. Returns whether
+ * that point is well inside the mesh: all shapes contain the ball of radius 0.5. */
 static bool intersects_plane(const render_camera *camera, int p, double value, double *depth)
 {
     double base[3], direction[3], end[3], distance = 0;
@@ -228,7 +228,7 @@ static bool intersects_plane(const render_camera *camera, int p, double value, d
     return *depth > 0 && distance < 0.25;
 }
 
-/* The isosurface of a linear field is a plane, for all cells. */
+/* Checks that the isosurface of a linear field is a plane without holes, for all cell types. */
 static bool is_plane_whole(const hanging_case *c, fixture_camera camera)
 {
     static const drawing plane = {"plane", 0, 1, false, 1};
@@ -272,8 +272,9 @@ static void surfaces_continue_across_hanging_nodes(void **state)
 
 /* ---- other faces -------------------------------------------------------------------------------------------- */
 
-/* Where refinement moves hanging nodes off the coarse face, cells do overlap. Any number of ranks finds that, and
- * pictures agree to max_error: whether an overlap that is almost transparent is found depends on the partition. */
+/* Checks refinement that moves hanging nodes off the coarse face, so that cells do overlap. Any number of ranks must
+ * detect that, and pictures agree to max_error: whether an overlap that is almost transparent is detected depends on
+ * the partition. */
 static void nodes_off_the_coarse_face_overlap(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* Hard cases that no other program has; all are listed in docs/development/hard-cases.md. */
+/* Checks hard cases that no other test covers; docs/development/hard-cases.md lists all of them. */
 #include "test_render_fixture.h"
 
 #include <setjmp.h>
@@ -12,7 +12,7 @@
 static const double values[2] = {-0.2, 0.3};
 static const test_mesh_kind kinds[5] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
 
-/* The scenes: an opaque surface, transparent ones in a sampled volume, a volume by segments. */
+/* The scenes: an opaque surface, transparent surfaces in a sampled volume, and a volume by segments. */
 typedef enum scene_kind { OPAQUE, SURFACES_IN_SAMPLES, SEGMENTS, SCENE_COUNT } scene_kind;
 
 static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera, drawn_frame *out)
@@ -28,11 +28,12 @@ static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera,
     fixture_free(&f);
 }
 
-/* Ways to be of no volume: of a cell's vertices only these are left, others stand in for the rest. */
+/* How cells lose their volume: only a point, an edge or a face of a cell's vertices remains, and replaces the
+ * others. */
 typedef enum collapse { TO_A_POINT, TO_AN_EDGE, TO_A_FACE, COLLAPSE_COUNT } collapse;
 
-/* The vertex that replaces the i-th. TO_A_FACE leaves the cell's first face with all its corners, and the cell is that
- * face twice. */
+/* Returns the index of the vertex that replaces vertex i. TO_A_FACE leaves the cell's first face with all its corners,
+ * so that the cell is that face twice. */
 static int stand_in(int type, collapse how, int i)
 {
     static const int tet[4] = {0, 1, 2, 2}, pyramid[5] = {0, 1, 1, 0, 4};
@@ -48,7 +49,7 @@ static void *grow(void *block, int64_t count, size_t size)
     return larger;
 }
 
-/* Adds beside every third cell one without volume, from the same vertices. */
+/* Adds, for every third cell, a cell without volume made of the same vertices. */
 static void add_collapsed(test_mesh *mesh)
 {
     const int64_t cells = mesh->cell_count, most = cells + cells / 3 + 1;

@@ -1,5 +1,6 @@
-/* Rays of ambient occlusion as docs/development/decisions/surface.md has them, written apart from the library's: a
- * spiral of equal steps in area on the disk below, turned and begun by the pixel. */
+/* Ambient occlusion rays as docs/development/decisions/surface.md defines them, implemented independently of the
+ * library: a spiral of equal steps in area on the disk under the hemisphere, whose rotation and start depend on the
+ * pixel. */
 #ifndef TEST_HEMISPHERE_H
 #define TEST_HEMISPHERE_H
 
@@ -8,7 +9,7 @@
 
 #include "render.h"
 
-/* The direction of the k-th of so many samples above the normal n, of a pixel in a picture of that width. */
+/* Computes the direction of sample k of `samples` above the normal n, for a pixel of a picture of the given width. */
 static inline void test_hemisphere(uint32_t pixel, uint32_t width, int samples, int k, const double n[3], double out[3])
 {
     const double pi = acos(-1.0), x = pixel % width, y = pixel / width;

@@ -1,5 +1,5 @@
-/* Tests places and normals of robust roots in whole frames: on warped lattices of hexes, wedges and pyramids, on ugly
- * single cells, and by closed forms. */
+/* Checks positions and normals of robust roots in whole frames: on warped lattices of hexes, wedges and pyramids, on
+ * ill-shaped single cells, and against closed forms. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -12,16 +12,16 @@
 #include <cmocka.h>
 
 static const double three_values[3] = {-0.6, 0.3, 0.95};
-static const double depth_allowed = 1e-5; /* cells */
+static const double depth_allowed = 1e-5; /* in cells */
 static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_TETS};
 
-/* Counts of a test's rays and hits. */
+/* Counts and worst errors of a test's rays and hits. */
 typedef struct tally {
     bool is_opaque; /* set if only each ray's first hit is drawn */
     int64_t rays, hits, excluded, folded, different, beyond, tangent;
-    double residual, depth; /* the worst */
-    double raw;             /* of hits that are not tangent: depths off, in cells */
-    double moved;           /* of all hits: depths off, in shares of depth_moved() */
+    double residual, depth; /* the largest errors */
+    double raw;             /* largest error of depth of hits that are not tangent, in cells */
+    double moved;           /* largest error of depth of all hits, relative to depth_moved() */
 } tally;
 
 static int hits_of(const drawn_frame *drawn, int64_t pixel, const fragment *hits[REFERENCE_MAX_HITS])
@@ -32,25 +32,25 @@ static int hits_of(const drawn_frame *drawn, int64_t pixel, const fragment *hits
     return count;
 }
 
-/* The hit's float32 t is off by half a unit of 1 in scaled units, and so is each vertex's depth; the slope turns that
- * into values. */
+/* Returns the residual allowed at a hit. The hit's float32 t is off by half a unit in the last place of 1 in scaled
+ * units, and so is the depth of each vertex; the slope turns these errors into values. */
 static double residual_allowed(const render_fixture *f, double slope)
 {
     return 1e-6 + (3e-8 + 3e-8) / f->job.space.scale * fabs(slope);
 }
 
 /* Returns how far float32 may move a hit along its ray, in cells. Along the ray, t and the cell's vertices are each off
- * by half a unit of 1 in scaled units, 3e-8. Across it a vertex is off by 3e-8 along both axes, 4.2e-8 together, which
- * the slant of ray and surface turns into depth. The field is off by half a unit of its values and as much in their
- * sum, 6e-8 of their range, which the slope turns into depth. */
+ * by half a unit in the last place of 1 in scaled units, 3e-8. Across the ray a vertex is off by 3e-8 along both axes,
+ * 4.2e-8 together, which the angle between ray and surface turns into depth. The field is off by half a unit of its
+ * values and as much in their sum, 6e-8 of their range, which the slope turns into depth. */
 static double depth_moved(const render_fixture *f, const reference_hit *truth, double slope)
 {
     const double scaled_cell = f->cell_size * f->job.space.scale;
     return (6e-8 + 4.2e-8 * truth->conditioning) / scaled_cell + 6e-8 / (fabs(slope) * f->cell_size);
 }
 
-/* A hit must be within 1e-5 cells of the reference, unless the ray is so nearly tangent to the surface that rounding
- * alone may move the hit farther. That is at slopes of the field below some 0.03 ranges a cell. */
+/* Checks that a hit is within 1e-5 cells of the reference, unless the ray is so nearly tangent to the surface that
+ * rounding alone may move the hit farther. That happens at slopes of the field below about 0.03 ranges per cell. */
 static void verify_depth(const render_fixture *f, const reference_hit *truth, double depth, double slope, tally *t)
 {
     const double off = fabs(depth - truth->depth) / f->cell_size, moved = depth_moved(f, truth, slope);
@@ -70,7 +70,7 @@ static void verify_hit(const render_fixture *f, const reference_scene *scene, in
     t->hits++;
     t->beyond += residual > 1e-6;
     t->residual = fmax(t->residual, residual - residual_allowed(f, slope) + 1e-6);
-    /* An error of the field of 1e-6 ranges is one of depth by the slope. */
+    /* The slope turns an error of the field of 1e-6 ranges into this error of depth. */
     const double grazing = 1e-6 / fabs(slope) / f->cell_size;
     t->depth = fmax(t->depth, fabs(depth - truth->depth) / f->cell_size - grazing);
     verify_depth(f, truth, depth, slope, t);
@@ -122,7 +122,7 @@ static void print_tally(const char *what, const tally *t)
            (int)t->beyond, t->raw, t->moved, (int)t->tangent);
 }
 
-/* Many surfaces have many rims, where rays meet them twice at nearly one place. */
+/* Adds many surfaces: they have many silhouettes, where rays meet a surface twice at nearly the same depth. */
 static void add_many_robust(render_fixture *f)
 {
     static const float black[48];
@@ -137,15 +137,15 @@ static void add_robust(render_fixture *f, float opacity)
     fixture_add_surface(f, three_values, 3, opacity);
 }
 
-/* Rays within the margin of another decision are at most the fixture's share, 0.2 % (test_render_fixture.c). No cell
- * here is folded: lattices are jittered by 0.2, and corners stay on their side of the opposite faces. */
+/* Checks that the rays close to another decision are at most the fixture's fraction, 0.2 % (test_render_fixture.c), and
+ * that no cell is folded: lattices are jittered by 0.2, so that corners stay on their side of the opposite faces. */
 static void assert_few_left_out(const tally *t)
 {
     if (500 * t->excluded > t->rays) fail_msg("%d of %d rays excluded", (int)t->excluded, (int)t->rays);
     assert_int_equal(t->folded, 0);
 }
 
-/* One hit in so many may be tangent. */
+/* Checks the errors of depth; one hit in one_in may be tangent. */
 static void assert_depths(const tally *t, int64_t one_in)
 {
     assert_true(t->depth <= depth_allowed);
@@ -161,10 +161,11 @@ static void robust_hits_are_on_the_surface(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
             render_fixture f;
             tally t = {.rays = 0};
-            if (!test_is_whole() && (k + (int)camera) % 2) continue; /* a kind has one or two cameras */
+            /* the usual run draws one or two cameras for each kind */
+            if (!test_is_whole() && (k + (int)camera) % 2) continue;
             fixture_create_lattice(&f, kinds[k], kinds[k] == TEST_PYRAMIDS ? 3 : 4, 0.2, test_wave);
             fixture_set_camera(&f, camera, 53, 45);
-            add_robust(&f, 0.4f); /* all crossings, not the first alone */
+            add_robust(&f, 0.4f); /* transparent, so that all crossings are drawn, not only the first */
             verify_frame(&f, 1e-6, &t);
             print_tally(test_mesh_kind_name(kinds[k]), &t);
             assert_true(t.hits > 600);
@@ -178,9 +179,9 @@ static void robust_hits_are_on_the_surface(void **state)
 
 /* ---- cuboids ---- */
 
-/* Makes a mesh of cuboids, or of cuboids, wedges, pyramids and tets, whose planes are at uneven distances, some a
- * thousandth of others. random: values are random at each vertex, so that many rays meet a surface twice or three times
- * in a cell. */
+/* Makes a mesh of cuboids, or of cuboids, wedges, pyramids and tets, between planes at uneven distances, some a
+ * thousandth of others. If random, the value of each vertex is random, so that many rays meet a surface twice or three
+ * times in a cell. */
 static void make_cuboids(test_mesh_kind kind, bool random, uint64_t seed, test_mesh *out)
 {
     static const double planes[5] = {-1, -0.3, -0.2995, 0.4, 1};
@@ -213,7 +214,7 @@ static void verify_cuboids(test_mesh_kind kind, bool random, tally *t)
         }
 }
 
-/* Opaque surfaces in cuboids have a way of their own (kernel_cuboids.h). */
+/* Checks opaque surfaces in cuboids, which have their own code (kernel_cuboids.h). */
 static void opaque_hits_in_cuboids_match_the_reference(void **state)
 {
     (void)state;
@@ -227,13 +228,13 @@ static void opaque_hits_in_cuboids_match_the_reference(void **state)
         assert_true(t.hits > 3500);
         assert_int_equal(t.different, 0);
         assert_depths(&t, 250);
-        /* across the thin cells other values change so fast that the rounding of a vertex changes them by up to 1e-3 */
+        /* across thin cells random values change so fast that the rounding of a vertex changes them by up to 1e-3 */
         if (turn == 0) assert_true(t.residual <= 1e-6);
         assert_few_left_out(&t);
     }
 }
 
-/* ---- ugly cells ---- */
+/* ---- ill-shaped cells ---- */
 
 typedef enum ill_shaped {
     ILL_SHAPED_WARPED,
@@ -253,8 +254,8 @@ static void make_ill_shaped(ill_shaped kind, uint64_t seed, test_mesh *out)
         const double amount = kind == ILL_SHAPED_WARPED || kind == ILL_SHAPED_APEX ? 0.2 : 0.1;
         for (uint64_t a = 0; a < 3; a++) p[a] += test_uniform_in(3 * i + a, seed, -amount, amount);
         out->values[i] = test_uniform_in(i, seed + 1000, -1, 1.5);
-        /* A corner pulled in almost to the plane of its neighbours: dents on both sides of its edges. Beyond that plane
-         * the hex's map folds, and a point has several values. */
+        /* Moves a corner inwards almost to the plane of its neighbours, which makes dents on both sides of its edges.
+         * Beyond that plane the hex's map would fold, and a point would have several values. */
         if (kind == ILL_SHAPED_CONCAVE && i == 6)
             for (uint64_t a = 0; a < 3; a++) p[a] = test_uniform_in(a, seed + 2000, 0.24, 0.3);
         if (kind == ILL_SHAPED_WEDGE && i >= 3) {
@@ -279,7 +280,7 @@ static void robust_hits_in_ill_shaped_cells_match_the_reference(void **state)
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                            (const double[]){0, 0, 0});
             fixture_set_camera(&f, seed % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 31, 29);
-            /* Close to the apex: the middle of the picture is its neighbourhood. */
+            /* The camera is close to the apex, whose neighbourhood fills the middle of the picture. */
             if (kind == ILL_SHAPED_APEX)
                 assert_true(render_camera_look_at(&f.job.camera, (const double[]){2.4, 1.6, 3.0},
                                                   mesh.coordinates + 3 * 4, (const double[]){0, 1, 0}, 2, 31, 29));
@@ -299,8 +300,8 @@ static void robust_hits_in_ill_shaped_cells_match_the_reference(void **state)
 
 /* ---- normals ---- */
 
-/* White diffuse surfaces under a red, a green and a blue light from three sides about the eye: a hit's colour is its
- * normal, in the axes of the lights, without the negative components. */
+/* Sets white diffuse surfaces under a red, a green and a blue light from three sides of the eye: a hit's colour is then
+ * its normal in the axes of the lights, without the negative components. */
 static void light_by_axes(render_fixture *f, render_light lights[3])
 {
     static const float white[9] = {1, 1, 1, 1, 1, 1, 1, 1, 1};
@@ -319,7 +320,7 @@ static void light_by_axes(render_fixture *f, render_light lights[3])
     f->surfaces[0].material = (render_material){.ambient = 0, .diffuse = 1, .specular = 0, .shininess = 1};
 }
 
-/* The difference between the fragment's colour and that of the gradient, turned towards the eye. */
+/* Returns the difference between the fragment's colour and the colour of the gradient, oriented towards the eye. */
 static double normal_error(const render_fixture *f, const fragment *hit, const double gradient[3])
 {
     const int width = f->job.camera.width;
@@ -338,10 +339,10 @@ static double normal_error(const render_fixture *f, const fragment *hit, const d
     return off;
 }
 
-/* The gradient is made of differences of float32 values and positions, each off by half a unit, 6e-8, of the cell's
- * range and size; eight of them and the cell's distortion make 2e-6 of range / size, relative to the gradient's length.
- * The place is off by 1e-6 cells, which second derivatives of a range or two turn into as much again. Seen edge-on,
- * either side may face the eye. */
+/* Compares a normal with the field's gradient. The kernels compute the gradient from differences of float32 values and
+ * positions, each off by half a unit, 6e-8, of the cell's range and size; eight of them and the cell's distortion give
+ * 2e-6 of range / size, relative to the gradient's length. The position is off by 1e-6 cells, which second derivatives
+ * of one or two ranges turn into the same error again. If the surface is seen edge-on, either side may face the eye. */
 static void verify_normal(const render_fixture *f, const reference_scene *scene, const reference_hit *truth,
                           const fragment *hit, int64_t *checked)
 {
@@ -401,10 +402,10 @@ static void add_differences(render_fixture *f, const double *values, int count, 
     light_by_axes(f, lights);
 }
 
-/* Isoparametric cells represent a linear field exactly, so all differences, also one-sided ones at the rim, give its
- * gradient. A sample errs by some 5e-7 of the field's range of 3, a difference over half of cells of 2/3, at a slope of
- * 0.9, by some 1e-5 of it. Half a cell from warped faces the polyhedron's field is continued outside the cell's domain,
- * where it is linear as well. */
+/* Checks differences of a linear field. Isoparametric cells represent it exactly, so all differences, including
+ * one-sided ones at the border, give its gradient. A sample errs by about 5e-7 of the field's range of 3; a difference
+ * over half of a cell of 2/3, at a slope of 0.9, errs by about 1e-5 of the slope. Within half a cell of warped faces,
+ * the polyhedron's field is continued outside the cell's domain, where it is linear too. */
 static void differences_of_a_linear_field_are_exact(void **state)
 {
     (void)state;
@@ -434,7 +435,7 @@ static double quadratic(const double p[3])
     return p[0] * p[0] + 0.5 * p[1] * p[1] + 0.7 * p[2] * p[2] + 0.3 * p[0] * p[1];
 }
 
-/* Mean error of normals against the field's own gradient at the hit. */
+/* Returns the mean error of normals against the field's own gradient at the hit. */
 static double quadratic_error(int n, render_normal normal, double difference)
 {
     static const double value[1] = {0.3};
@@ -461,9 +462,10 @@ static double quadratic_error(int n, render_normal normal, double difference)
     return sum;
 }
 
-/* The trilinear interpolant of a quadratic has the same error in every cell of a lattice. So differences over a whole
- * cell are those of the quadratic itself, which are exact up to rounding, well within second order. Over half a cell
- * their error is of the order of the cell's size, as the cell's gradient's is, but smaller. */
+/* Checks the order of differences. The trilinear interpolant of a quadratic field has the same error in every cell of a
+ * lattice. So differences over a whole cell are those of the quadratic field itself, which are exact up to rounding,
+ * far better than second order. Differences over half a cell have an error of the order of the cell's size, like the
+ * cell's own gradient, but smaller. */
 static void differences_of_a_quadratic_field_are_of_second_order(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
-/* Homes of what ranks share (session_homes.h), by arithmetic, as of many ranks without MPI: all that have a thing know
- * the same home, which is one of their neighbours; so a rank sends to few, however many ranks there are. */
+/* Checks homes of vertices that ranks share (session_homes.h) for many ranks, by arithmetic without MPI: all ranks that
+ * have a vertex compute the same home, which is one of their neighbours; so a rank sends to few others, however many
+ * ranks there are. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,7 +12,7 @@
 
 enum { SIDE = 12, RANKS = SIDE * SIDE * SIDE, MOST_NEAR = 27, MOST_SHARES = 64 };
 
-/* Rank (i, j, k) of a block partition has the unit cube there. Its neighbours, itself among them. */
+/* Rank (i, j, k) of a block partition, which has the unit cube there, and its neighbours including itself. */
 typedef struct block_rank {
     session_homes homes;
     int near[MOST_NEAR];
@@ -43,7 +44,8 @@ static uint64_t hash_of(const double point[3])
     return h ^ h >> 29;
 }
 
-/* Every vertex on a block's sides, on a lattice of eighths: whoever of its neighbours has it says the same. */
+/* Checks every vertex on a block's faces, on a lattice of eighths: all neighbours that have the vertex must compute the
+ * same home. Returns the number of distinct homes. */
 static int count_homes(const block_rank *own, block_rank *neighbours, int neighbour_count, int64_t *shared)
 {
     bool is_home[RANKS] = {false};
@@ -88,7 +90,7 @@ static void homes_by_coordinates_are_near_and_the_same_for_all(void **state)
     }
 }
 
-/* Shares begin where they begin; ids before the first belong to it, too. */
+/* Checks homes by id: a share includes its first id, and ids below the first share belong to it too. */
 static void homes_by_id_are_the_shares_owners(void **state)
 {
     (void)state;

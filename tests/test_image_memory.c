@@ -1,6 +1,7 @@
-/* Memory runs out while a picture is written: the result is an error or the same file, and the next picture is as if
- * nothing had happened. The image library fills tables at the first picture, so each try has a process of its own. */
-#define _GNU_SOURCE 1 /* memmem */
+/* Checks that if memory runs out while a picture is written, the result is an error or the same file, and the next
+ * picture is written as if nothing had happened. The image library fills tables at the first picture, so each try has
+ * its own process. */
+#define _GNU_SOURCE 1 /* for memmem() */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -23,7 +24,7 @@
 enum { WIDTH = 40, HEIGHT = 30, MOST_BYTES = 1 << 17, SECONDS = 60 };
 
 static const char *folder = "test_image_memory_files";
-static int stride = 41; /* between the allocations that are tried */
+static int stride = 41; /* distance between the allocations that are tried */
 static float rgba[4 * WIDTH * HEIGHT], depth[WIDTH * HEIGHT];
 
 typedef struct picture_case {
@@ -81,7 +82,7 @@ static insitu_status write_picture(const picture_case *c, base_error *error)
     return session_write_image(&image, c->format, path, error);
 }
 
-/* EXR has the second in which it was written: a text behind its length. */
+/* Clears the time of writing, which EXR stores in seconds: a text that follows its length. */
 static void clear_date(file_bytes *file)
 {
     static const char before[] = "capDate\0string";
@@ -123,7 +124,7 @@ static void remove_picture(const picture_case *c)
     unlink(path);
 }
 
-/* ---- a process of its own ------------------------------------------------------------------------------------- */
+/* ---- one process for each try ---------------------------------------------------------------------------------- */
 
 typedef enum verdict { GOOD, REFUSED, OTHER_PICTURE, OTHER_ERROR, LEFT_FILES, NEXT_FAILED } verdict;
 
@@ -133,7 +134,7 @@ typedef struct outcome {
     char message[256];
 } outcome;
 
-/* Memory is made short by the heap from a number on, or by a limit of the process's addresses. */
+/* Memory is limited by the failing heap from its n-th allocation on, or by the process's address space. */
 typedef struct shortage {
     int64_t n;
     rlim_t spare;
@@ -183,7 +184,7 @@ static verdict verify(const picture_case *c, const file_bytes *expected, const s
     return status ? REFUSED : GOOD;
 }
 
-/* False where the process was ended. */
+/* Writes the picture in a child process. Returns false if the child was terminated. */
 static bool try_in_child(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
 {
     int pipe_ends[2], status = 0;
@@ -219,7 +220,7 @@ static void expect(const picture_case *c, file_bytes *expected)
     remove_picture(c);
 }
 
-/* True where the picture was written. */
+/* Returns whether the picture was written; fails the test for any other outcome than a picture or an error. */
 static bool survives(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
 {
     const bool is_alive = try_in_child(c, expected, s, out);
@@ -239,17 +240,17 @@ static void failing_allocation_is_the_same_picture_or_an_error(void **context)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         outcome out;
         int64_t n = 1;
-        /* OpenEXR's writer of deep rows crashes at one allocation of some thousand: it is only begun where there is
-         * memory to spare. */
+        /* OpenEXR's writer of deep rows crashes at one allocation among a thousand: the image library calls it only if
+         * there is memory to spare. */
         if (cases[i].format == INSITU_DEEP_EXR) continue;
         int refused = 0;
         expect(&cases[i], &expected);
         for (;; n += stride) {
             refused += !survives(&cases[i], &expected, &(shortage){.n = n}, &out);
-            if (out.allocations < n) break; /* there are no more */
+            if (out.allocations < n) break; /* n is beyond the last allocation */
         }
         assert_true(n > 500);
-        assert_true(refused > 0); /* the first: the picture's own */
+        assert_true(refused > 0); /* at least the first allocation, that of the picture itself, is fatal to it */
     }
 }
 
@@ -290,7 +291,7 @@ int main(int argument_count, char **arguments)
     make_samples();
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) remove_picture(&cases[i]);
     mkdir(folder, 0777);
-    /* Loads the image library, which then refuses the picture. */
+    /* Loads the image library by a call with an invalid picture, which it refuses. */
     base_error error = {0};
     const insitu_image nothing = {.rgba = NULL};
     if (session_write_image(&nothing, INSITU_PNG8, "none.png", &error) != INSITU_ERROR_ARGUMENT) {

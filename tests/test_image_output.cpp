@@ -1,5 +1,5 @@
-/* The image adaptor, called as libinsitu calls it: by the loader. Files are read back by OpenImageIO and compared with
- * the pixels, through the sRGB curve in double where the format uses it. */
+/* Tests the image adaptor, loaded as libinsitu loads it: by the dynamic loader. Files are read back by OpenImageIO and
+ * compared with the pixels, through the sRGB curve in double if the format uses it. */
 #include <OpenImageIO/deepdata.h>
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
@@ -24,7 +24,7 @@
 #include <unistd.h>
 #include <vector>
 
-/* Last, for it defines macros as short as fail(). */
+/* Included last, because cmocka defines macros with short names such as fail(). */
 extern "C" {
 #include <cmocka.h>
 
@@ -36,7 +36,7 @@ namespace fs = std::filesystem;
 namespace
 {
 
-fs::path folder; /* of this run, empty at its start */
+fs::path folder; /* folder of this run, empty at its start */
 
 struct picture {
     int width, height;
@@ -59,7 +59,7 @@ float number(std::size_t i)
     return static_cast<float>(hash(static_cast<std::uint32_t>(i)) >> 8) / 16777216.0F;
 }
 
-/* Premultiplied colours of every alpha, or opaque ones; a little outside [0, 1] too, as highlights are. */
+/* Makes premultiplied colours of every alpha, or opaque ones; some are slightly outside [0, 1], as highlights are. */
 picture make_picture(int width, int height, bool opaque)
 {
     const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -119,7 +119,8 @@ void check_png(const picture &p, insitu_image_format format, OIIO::TypeDesc type
     assert_int_equal(spec.nchannels, channels);
     const double largest = std::numeric_limits<code>::max();
     const double half =
-        0.5 + 1e-9 * largest; /* rounding to nearest; the double arithmetic of both sides is far finer */
+        /* rounding to the nearest code; the double arithmetic of both sides is far more accurate */
+        0.5 + 1e-9 * largest;
     for (std::size_t i = 0; i < p.depth.size(); i++) {
         const double alpha = p.rgba[4 * i + 3];
         for (std::size_t c = 0; c < 3; c++) {
@@ -140,7 +141,7 @@ void png8_is_within_half_a_code(void **)
     }
 }
 
-/* Floats at the border between two codes and next to it on both sides, and a ramp over all of 0 to 1. */
+/* Checks floats at the border between two codes and next to it on both sides, and a ramp from 0 to 1. */
 void png8_is_exact_where_codes_change(void **)
 {
     std::vector<float> values;
@@ -203,7 +204,7 @@ void exr_has_channels_of_other_numbers(void **)
         assert_true(pixel[x] == p.rgba[4 * i + 1] && pixel[green] == p.rgba[4 * i + 1]);
         assert_true(pixel[value] == p.depth[i] && pixel[z] == p.depth[i]);
     }
-    write_ok(image, INSITU_PNG8, folder / "png" / "channels.png"); /* which passes them over */
+    write_ok(image, INSITU_PNG8, folder / "png" / "channels.png"); /* PNG ignores the additional channels */
 }
 
 void exr_is_bitwise(void **)
@@ -227,7 +228,7 @@ void exr_is_bitwise(void **)
     }
 }
 
-/* Any number of samples a pixel, none in the first. */
+/* Any number of samples for each pixel, none in the first one. */
 struct deep_picture {
     int width, height;
     std::vector<insitu_deep_sample> samples;
@@ -250,7 +251,7 @@ deep_picture make_deep_picture(int width, int height)
             sample.z_back = n % 2 ? sample.z : sample.z + 0.75F;
             p.samples.push_back(sample);
         }
-        p.samples.push_back({}); /* samples of pixels need not follow each other */
+        p.samples.push_back({}); /* gaps between the samples of different pixels are allowed */
     }
     return p;
 }
@@ -300,7 +301,7 @@ void deep_exr_is_bitwise(void **)
     }
 }
 
-/* Front to back, in double: each sample's colour by what the ones before it let through. */
+/* Composites front to back in double: each sample's colour times the transmittance of the samples in front of it. */
 void check_flat_pixel(const deep_picture &p, std::size_t i, const float *flat)
 {
     double expected[4] = {0, 0, 0, 0};
@@ -309,12 +310,12 @@ void check_flat_pixel(const deep_picture &p, std::size_t i, const float *flat)
         const double through = 1 - expected[3];
         for (std::size_t c = 0; c < 4; c++) expected[c] += through * static_cast<double>(sample.rgba[c]);
     }
-    /* Each sample takes three roundings of numbers up to 1, and one of the transmittance. */
+    /* Each sample is rounded three times, for numbers of at most 1, and its transmittance once. */
     const double bound = 4 * std::ldexp(1.0, -24) * p.counts[i];
     for (std::size_t c = 0; c < 4; c++) assert_true(std::fabs(static_cast<double>(flat[c]) - expected[c]) <= bound);
 }
 
-/* Flattens as oiiotool --flatten does. */
+/* Checks that flattening by the function of oiiotool --flatten gives the same picture. */
 void deep_exr_is_flattened_by_openimageio(void **)
 {
     const deep_picture p = make_deep_picture(64, 33);
@@ -348,7 +349,7 @@ void writing_leaves_the_picture_alone(void **)
     assert_int_equal(spec.width, 5);
 }
 
-/* Root may write anywhere, so nothing here depends on permissions. */
+/* Checks paths that cannot be written. Root may write anywhere, so no case depends on permissions. */
 void unwritable_places_are_reported(void **)
 {
     const fs::path in = folder / "unwritable";
@@ -378,7 +379,7 @@ void unwritable_places_are_reported(void **)
     assert_int_equal(count_files(in), before);
 }
 
-/* A full disk, in small: no file of this process may grow beyond 4 KiB. */
+/* Simulates a full disk: no file of this process may grow beyond 4 KiB. */
 void full_disk_is_reported_and_leaves_the_old_picture(void **)
 {
     const fs::path in = folder / "full";
@@ -403,7 +404,7 @@ void full_disk_is_reported_and_leaves_the_old_picture(void **)
     }
 }
 
-/* Counts a folder's files besides the pictures. */
+/* Counts the files in a folder except the picture. */
 std::size_t count_others(const fs::path &in, const std::string &name)
 {
     std::size_t count = 0;
@@ -411,7 +412,8 @@ std::size_t count_others(const fs::path &in, const std::string &name)
     return count;
 }
 
-/* Its old temporary name had the picture's and some more. */
+/* Checks the longest legal file name: an earlier temporary name was the picture's plus a suffix, and would be too
+ * long. */
 void longest_legal_name_is_written(void **)
 {
     const fs::path in = folder / "long";
@@ -424,7 +426,7 @@ void longest_legal_name_is_written(void **)
     assert_int_equal(count_files(in), 2);
 }
 
-/* Whoever may write to the folder plants links of the name that the temporary file once had. */
+/* Checks an attack: someone with write access to the folder plants links with the former name of the temporary file. */
 void planted_links_keep_their_victims(void **)
 {
     const fs::path in = folder / "planted", victim = folder / "victim";
@@ -439,7 +441,7 @@ void planted_links_keep_their_victims(void **)
     assert_int_equal(count_others(in, "a.png"), 1);
 }
 
-/* Makes files with temporary names: one that a killed run left, one that is being written, a link, a pipe, and ones
+/* Makes files with temporary names (one left by a killed run, one that is being written, a link and a pipe) and files
  * with other names. */
 void files_of_killed_runs_are_removed(void **)
 {
@@ -472,8 +474,8 @@ void pipe_in_the_picture_s_place_is_reported(void **)
     assert_int_equal(count_files(in), 1);
 }
 
-/* A picture in its place in a larger one is over its background, as in a file of its own; around it nothing changes.
- * Where it would not lie in the larger one's columns it is refused. */
+/* Checks a picture at a position inside a larger one: it is blended over its background, as in its own file, and pixels
+ * around it do not change. It is refused if it exceeds the columns of the larger one. */
 void pictures_are_put_into_places(void **)
 {
     const int width = 7, height = 5, larger = 20, rows = 9, left = 4, top = 3;
@@ -511,7 +513,7 @@ void nonsense_is_refused(void **)
     insitu_image_format unknown = INSITU_PNG8;
     const int number_of_none = 7;
     static_assert(sizeof unknown == sizeof number_of_none, "an enum is an int");
-    std::memcpy(&unknown, &number_of_none, sizeof unknown); /* as a caller in C may */
+    std::memcpy(&unknown, &number_of_none, sizeof unknown); /* an invalid number, which C callers may pass */
     assert_int_equal(write(p.view(false), unknown, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
     assert_int_equal(write(p.view(false), INSITU_PNG8, "", error), INSITU_ERROR_ARGUMENT);
     assert_int_equal(write(p.view(false), INSITU_DEEP_EXR, folder / "n.exr", error), INSITU_ERROR_ARGUMENT);

@@ -1,6 +1,6 @@
 /* Compares the integral of a segment with high precision, for random transfer functions, values and lengths. The oracle
- * splits at every point of the function in long double, has the optical depth in closed form (the integral of -ln u is
- * u - u ln u) and the colour by adaptive Simpson. */
+ * splits at every control point of the function in long double, computes the optical depth in closed form (the integral
+ * of -ln u is u - u ln u) and the colour by adaptive Simpson quadrature. */
 #include "integral_double.h"
 #include "test_meshes.h"
 
@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <cmocka.h>
 
-/* Random cases in float a range of opacities. */
+/* Number of random cases in float for each range of opacities. */
 static int floats = 300;
 
 enum { MAX_POINTS = 9, MAX_COLOURS = 40, MAX_CUTS = MAX_POINTS + MAX_COLOURS + 2 };
@@ -23,12 +23,12 @@ typedef struct random_transfer {
     float opacities[MAX_POINTS], colours[3 * MAX_COLOURS];
 } random_transfer;
 
-/* One stretch between points of the function: opacity and colour linear in s of [0, 1]. */
+/* A piece between control points of the function: opacity and colour are linear in s in [0, 1]. */
 typedef struct piece {
     long double a0, a1, c0[3], c1[3], length;
 } piece;
 
-/* Numbers of 1/1024ths are the same in float, so that both builds are given the same function. */
+/* Returns a multiple of 1/1024, which is the same in float, so that both builds use the same function. */
 static double coarse(uint64_t index, uint64_t seed)
 {
     return floor(1024 * test_uniform(index, seed)) / 1024;
@@ -39,7 +39,7 @@ static void make_transfer(random_transfer *r, uint64_t seed, double most)
     render_transfer *t = &r->transfer;
     *t = (render_transfer){.low = 0, .high = 1, .unit_distance = 1};
     t->colour_count = 2 + (int)(test_uniform(0, seed) * (MAX_COLOURS - 2));
-    /* Entries at places that floats have: 2^n + 1 of them. */
+    /* The colour table has 2^n + 1 entries, whose positions are exact in float. */
     t->colour_count = t->colour_count > 33 ? 33 : t->colour_count > 17 ? 17 : t->colour_count > 5 ? 5 : 2;
     for (int i = 0; i < 3 * t->colour_count; i++) r->colours[i] = (float)coarse(10 + (uint64_t)i, seed);
     t->opacity_count = 1 + (int)(test_uniform(1, seed) * (MAX_POINTS - 1));
@@ -78,12 +78,12 @@ static long double colour_at(const render_transfer *t, long double x, int c)
     return low + (place - i) * (high - low);
 }
 
-/* Optical depth from 0 to s. */
+/* Returns the optical depth from 0 to s. */
 static long double depth_to(const piece *p, long double s)
 {
     const long double u0 = 1 - p->a0, u1 = u0 - s * (p->a1 - p->a0), change = u0 - u1;
     if (fabsl(change) < 1e-4L * u0) {
-        /* Three nodes: the remainder is of the sixth power. */
+        /* Gauss quadrature with three nodes: the remainder is of sixth order. */
         const long double r = sqrtl(0.15L), m = 0.5L;
         return -p->length * s *
                (5 * logl(u0 - (m - r) * change) + 8 * logl(u0 - m * change) + 5 * logl(u0 - (m + r) * change)) / 18;
@@ -129,7 +129,7 @@ static int collect_cuts(const render_transfer *t, long double v0, long double v1
     return count;
 }
 
-/* out: rgb, transmittance, and the optical depth; to tolerance relative to the depth. */
+/* Computes rgb, transmittance and optical depth into out; the tolerance is relative to the depth. */
 static void oracle(const render_transfer *t, double length, double v_in, double v_out, long double tolerance,
                    long double out[5])
 {
@@ -138,7 +138,7 @@ static void oracle(const render_transfer *t, double length, double v_in, double 
     const int count = collect_cuts(t, v0, v1, cuts);
     for (int i = 0; i < 5; i++) out[i] = 0;
     for (int i = 0; i + 1 < count; i++) {
-        if (cuts[i] == cuts[i + 1]) continue; /* of a point where the extinction is infinite there is no integral */
+        if (cuts[i] == cuts[i + 1]) continue; /* at a control point with infinite extinction there is no integral */
         const long double x0 = v0 + cuts[i] * (v1 - v0), x1 = v0 + cuts[i + 1] * (v1 - v0), m = 0.5L * (x0 + x1);
         piece p = {.a0 = opacity_near(t, m, x0), .a1 = opacity_near(t, m, x1)};
         p.length = (long double)length * (cuts[i + 1] - cuts[i]);
@@ -154,8 +154,8 @@ static void oracle(const render_transfer *t, double length, double v_in, double 
     out[3] = expl(-out[4]);
 }
 
-/* What the field does to the light by its value, with b behind: (s (c - b))' of the three channels and s' (alpha's), s
- * and |s'|. */
+/* Computes how the light depends on the field's value x, with colour b behind: the derivatives (s (c - b))' of the
+ * three channels and s' (for alpha), then s and |s'|. */
 static void brute_slopes(const render_transfer *t, long double x, long double b, long double out[6])
 {
     const long double step = 1e-6L, a = opacity_near(t, x, x), clear = 1 - a;
@@ -172,7 +172,7 @@ static void brute_slopes(const render_transfer *t, long double x, long double b,
     out[5] = fabsl(slope);
 }
 
-/* As kernel_light_variation, from many values of the range and several b. */
+/* Computes what kernel_light_variation bounds, by brute force from many values of the range and several b. */
 static void brute_swing(const render_transfer *t, double low, double high, double out[4])
 {
     enum { VALUES = 300, BEHIND = 4 };
@@ -204,7 +204,7 @@ static void brute_swing(const render_transfer *t, double low, double high, doubl
 
 typedef void integral(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
 
-/* The largest error, relative to the optical depth where that is below 1, over the decades of depth asked for. */
+/* Returns the largest error, relative to the optical depth if that is below 1, over the requested decades of depth. */
 static double worst_of(integral *of, int count, double most, double tolerance, double *deepest, double *shallowest)
 {
     double worst = 0;
@@ -231,7 +231,7 @@ static double worst_of(integral *of, int count, double most, double tolerance, d
                 assert_true(off == 0);
                 continue;
             }
-            /* A transmittance near 1 cannot be closer than its own rounding. */
+            /* A transmittance near 1 cannot be more accurate than its own rounding. */
             const double excess = c < 3 ? off / scale : off;
             if (excess > worst) worst = excess;
         }
@@ -263,7 +263,7 @@ static void integral_is_near_in_float(void **state)
     }
 }
 
-/* Opacity 1 at points of the function, where the extinction is infinite, and its integral not. */
+/* Checks opacity 1 at control points, where the extinction is infinite but its integral is finite. */
 static void opaque_points_are_integrated(void **state)
 {
     (void)state;
@@ -274,7 +274,7 @@ static void opaque_points_are_integrated(void **state)
         r.transfer.opacity_count = 3;
         r.values[0] = 0.125, r.values[1] = 0.5, r.values[2] = 0.75;
         r.opacities[0] = 0.25f, r.opacities[1] = 1, r.opacities[2] = 0;
-        /* A quarter of them from the pole itself, or to it; and some that hardly leave it. */
+        /* A quarter of the segments begin or end at the pole itself, and some hardly leave it. */
         const double near = 0.5 + (coarse(2, (uint64_t)n + 9) - 0.5) * (n % 16 < 4 ? 1.0 / 4096 : 1);
         const double other = n % 4 ? coarse(1, (uint64_t)n + 9) : 0.5;
         const double v_in = n % 8 ? other : near, v_out = n % 8 ? near : other;
@@ -302,9 +302,9 @@ static void opacity_of_one_lets_nothing_through(void **state)
     assert_true(found[3] < 1e-7);
 }
 
-/* No bound is below what values of the range have, nor above what a range has that is wider by two of 128 bins at
- * either end and by a quarter, but for what interval arithmetic gives away within a bin. What lies beyond all bins
- * counts to the bin at that end. */
+/* Checks that no bound is below the variation over the range's own values, and that none is above the variation over a
+ * range wider by two of 128 bins at either end, times 1.25 plus the overestimate of interval arithmetic within a bin.
+ * Values beyond all bins belong to the bin at that end. */
 static void swings_are_bounds(void **state)
 {
     enum { RANGES = 20 };
@@ -334,7 +334,7 @@ static void swings_are_bounds(void **state)
     assert_true(loosest < 0.25);
 }
 
-/* The argument is the number of cases in float a range of opacities. */
+/* The command's argument is the number of cases in float for each range of opacities. */
 int main(int argc, char **argv)
 {
     if (argc > 1) floats = atoi(argv[1]);

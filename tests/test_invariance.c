@@ -1,13 +1,12 @@
-/* One picture of any partition: the matrix of it.
+/* Checks that every partition of a mesh gives the same picture, for the product of
  *
- *     ranks (mpiexec's) x block, Morton, random, checkerboard, a rank without cells x 0 to 2 layers of ghost cells
+ *     ranks (of mpiexec) x block, Morton, random, checkerboard, a rank without cells x 0 to 2 layers of ghost cells
  *     x hexes, tets, polyhedra, mixed cells x the images below
  *
- * Each part lists its cells' vertices and faces its own way. Rank 0 draws the whole mesh alone and compares. Surfaces
- * are the same to the bit, in depth and colour, and so are volumes that are to be reproducible, faint ones too; other
- * volumes to 1e-6, which is what compositing promises. Of all, how often they are the same to the bit and what they are
- * off by is told.
- */
+ * Each part has its own order of cells' vertices and faces. Rank 0 draws the whole mesh alone and compares. Surfaces
+ * are the same to the bit, in depth and colour, and so are volumes with the reproducible option, also faint ones; other
+ * volumes agree to 1e-6, which compositing guarantees. For all images the test reports how often they are the same to
+ * the bit and the largest difference. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,7 +25,7 @@ typedef struct image_case {
     const char *name;
     promise promise;
     const char *layers, *sampling;
-    const char *more; /* of the image; NULL: nothing */
+    const char *more; /* additional lines of the image; NULL: none */
 } image_case;
 
 #define CLEAR "      - isosurface: {field: f, values: [-0.2, 0.3], opacity: 0.4}\n"
@@ -72,12 +71,12 @@ static const image_case listed[] = {
 };
 enum { LISTED = sizeof listed / sizeof *listed, MOST_FAINT = 20, MOST_CASES = LISTED + MOST_FAINT };
 
-/* Those listed and, from LISTED on, volumes of random faint opacities. */
+/* The listed images, followed from LISTED on by volumes of random faint opacities. */
 static image_case cases[MOST_CASES];
 static int case_count;
 
-/* Opacities from 1e-9 to 1e-3 a cell at five random values: the transmittance of most segments rounds to 1, and what
- * they emit shows all the same. */
+/* Returns a layer with opacities from 1e-9 to 1e-3 per cell at five random values: the transmittance of most segments
+ * rounds to 1, but their emission is visible. */
 static const char *faint_layer(int which)
 {
     static char texts[MOST_FAINT][256];
@@ -132,7 +131,7 @@ static const char *const distribution_names[DEALINGS] = {"block", "Morton", "ran
 static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_TETS, TEST_POLYHEDRA, TEST_MIXED};
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
-/* Calls visit with each vertex of the cell, shared ones more than once. */
+/* Calls visit for each vertex of the cell, more than once for vertices that its faces share. */
 static void for_vertices(const test_mesh *mesh, int64_t cell, void (*visit)(void *state, int64_t vertex), void *state)
 {
     for (int64_t i = mesh->offsets[cell]; i < mesh->offsets[cell + 1]; i++) {
@@ -216,7 +215,7 @@ static void find_vertex(void *state, int64_t vertex)
     set->found = set->found || set->has[vertex];
 }
 
-/* Adds the cells that share a vertex with those that are taken. */
+/* Adds the cells that share a vertex with the selected cells. */
 static void take_layer(const test_mesh *mesh, unsigned char *taken)
 {
     vertex_set set = {.has = calloc((size_t)mesh->vertex_count, 1)};
@@ -231,7 +230,7 @@ static void take_layer(const test_mesh *mesh, unsigned char *taken)
     free(set.has);
 }
 
-/* A part with its field at cells. */
+/* A part of the mesh with a field at vertices and one at cells. */
 typedef struct input {
     session_input vertices;
     double *cell_values;
@@ -305,11 +304,11 @@ static void draw(insitu_session *session, const input *in, int cycle)
     everywhere(status == INSITU_OK);
 }
 
-/* Sums of what all pictures of an image have shown. */
+/* Sums over all pictures of an image. */
 typedef struct tally {
-    int pictures, same, depths; /* depths: of pixels that differ */
+    int pictures, same, depths; /* depths: pixels whose depth differs */
     double worst;
-    int64_t codes[2]; /* 8-bit channels of a PNG that are off by one, by more */
+    int64_t codes[2]; /* 8-bit channels of a PNG that are off by one, and by more */
 } tally;
 
 static tally tallies[MOST_CASES];
@@ -385,7 +384,7 @@ static bool verify_mesh(insitu_session *session, int kind, int side, const test_
     return are_well;
 }
 
-/* The pictures of the whole, on rank 0. */
+/* Draws the pictures of the whole mesh on rank 0. */
 static void draw_whole(const char *scene, const test_mesh *mesh, caught_picture *out)
 {
     static int cycle;

@@ -1,5 +1,5 @@
-/* Where decorations stand: random ones in pictures of 200 x 200 to 8192 x 4320, and the cases that a person would try.
- * Rectangles are checked, no pixels. */
+/* Checks positions of decorations: random ones in pictures of 200 x 200 to 8192 x 4320, and typical cases of users.
+ * Rectangles are checked, not pixels. */
 #include <algorithm>
 #include <cmath>
 #include <csetjmp>
@@ -38,7 +38,7 @@ bool are_apart(const area &a, const area &b)
     return a.x1 <= b.x0 || b.x1 <= a.x0 || a.y1 <= b.y0 || b.y1 <= a.y0;
 }
 
-/* Capitals reach 0.73 of the size above the baseline, in DejaVuSans; digits as high. */
+/* Returns the box of a line of text: in DejaVuSans capitals and digits reach 0.73 of the size above the baseline. */
 area box_of(const placed_line &line, int size)
 {
     return {line.x, line.baseline - 0.73 * size, line.x + measure(line.text, size), line.baseline};
@@ -66,7 +66,7 @@ bool is_decoration(const block &b)
     return b.kind != block_kind::covered;
 }
 
-/* All is placed once or named; labels may be missing. */
+/* Checks that each decoration is either placed once or reported as left out; labels may be missing. */
 void check_all_are_reported(const layout &places, const insitu_decorations &what)
 {
     int wanted = what.bar_count + (what.scale_bar.length > 0) + what.has_axes;
@@ -77,7 +77,7 @@ void check_all_are_reported(const layout &places, const insitu_decorations &what
                      wanted);
 }
 
-/* Nothing is below the pictures that cover parts of this one. */
+/* Checks that no block lies below the pictures that cover parts of this one. */
 void check_covered(const block &b, const insitu_decorations &what)
 {
     for (int i = 0; i < what.covered_count; i++) {
@@ -113,7 +113,7 @@ void random_blocks_neither_overlap_nor_leave_the_picture(void **)
     }
 }
 
-/* ---- what a person would try ------------------------------------------------------------------------------------ */
+/* ---- typical cases of users ------------------------------------------------------------------------------------- */
 
 const float colours[] = {0, 0, 0, 1, 1, 1};
 const insitu_tick ticks[] = {{0, "0"}, {0.2, "0.2"}, {0.4, "0.4"}, {0.6, "0.6"}, {0.8, "0.8"}, {1, "1"}};
@@ -146,7 +146,7 @@ void four_bars_have_room_for_numbers(void **)
     }
 }
 
-/* The bar stays in the right third. */
+/* Checks that a long label is wrapped and the bar stays in the right third. */
 void a_label_of_many_letters_is_wrapped(void **)
 {
     const std::string word(60, 'w');
@@ -174,8 +174,8 @@ void words_at_right_stand_beside_the_bar(void **)
     assert_int_equal(places.blocks.size(), 2);
 }
 
-/* A picture over a corner, whose height is a third, four fifths or all of that of the picture below: the bar stands
- * below or above it, with at least 0.4 of the height, where there is room, and else beside it. */
+/* Checks a picture that covers a corner, with a height of a third, four fifths or all of the picture below: the bar
+ * must be below or above it, with at least 0.4 of the height, if there is space, and next to it otherwise. */
 void bars_keep_clear_of_covered_corners(void **)
 {
     const std::vector<insitu_colour_bar> bars = {bar_named("Temperature [K]")};
@@ -208,7 +208,7 @@ void bars_keep_clear_of_covered_corners(void **)
         }
 }
 
-/* 20 bars with letters of a fifth of the height. */
+/* Checks 20 bars with letters a fifth of the picture high, which do not fit. */
 void what_has_no_room_is_named(void **)
 {
     const std::vector<insitu_colour_bar> bars(20, bar_named("pressure"));

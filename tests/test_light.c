@@ -1,7 +1,7 @@
-/* Rays from hits against brute force in double: each is made the only ray of a picture whose eye is where it begins,
- * and every cell is asked for its roots. For all kinds of cells, by every instruction set; towards lights and into the
- * hemisphere; with what is nearer than half a cell left out, and without. Rays on which rounding may decide are left
- * out, and are few. */
+/* Compares rays from hits with brute force in double: each ray is made the only ray of a picture whose eye is the ray's
+ * origin, and the roots in every cell are computed. The test covers all kinds of cells and every instruction set; rays
+ * towards lights and into the hemisphere; with and without excluding surfaces nearer than half a cell. Rays on which
+ * rounding may decide are excluded, and are few. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -90,7 +90,7 @@ static void grow_box(const double place[3], double low[3], double high[3])
     }
 }
 
-/* The cube root of the cell's box's volume. */
+/* Returns the cube root of the volume of the cell's box. */
 static double size_of(const test_mesh *mesh, int64_t cell)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -106,8 +106,8 @@ static double size_of(const test_mesh *mesh, int64_t cell)
     return cbrt((high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2]));
 }
 
-/* Tells by brute force whether the ray meets something in front: 1, 0, or -1 where rounding may decide. Roots of the
- * hit's own surface lie behind the start by the lift less what hits are off by. */
+/* Computes by brute force whether the ray meets a surface in front: 1, 0, or -1 if rounding may decide. Roots of the
+ * hit's own surface lie behind the origin by the offset of the origin minus the error of the hit. */
 static int is_blocked_by_brute_force(const render_fixture *f, const test_mesh *mesh, const double start[3],
                                      const double d[3], double reach)
 {
@@ -120,7 +120,7 @@ static int is_blocked_by_brute_force(const render_fixture *f, const test_mesh *m
     double focal[3];
     bool is_met = false;
     for (int a = 0; a < 3; a++) focal[a] = start[a] + d[a];
-    clear.opacity = 0.5F; /* all hits, not the first */
+    clear.opacity = 0.5F; /* transparent, so that all hits are found, not only the first */
     job.surfaces = &clear;
     job.paint = RENDER_LIGHT;
     assert_true(render_camera_look_at(&job.camera, start, focal, across, 40, 1, 1));

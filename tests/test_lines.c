@@ -1,6 +1,6 @@
-/* Contour lines on surfaces against closed forms: where the line of a level goes in the picture follows from the
- * surface's and the field's formulas alone, and the share of a pixel that a strip of the line's width covers from
- * counting points of the pixel that are nearer to it than half the width. */
+/* Compares contour lines on surfaces with closed forms. The position of a level's line in the picture follows from the
+ * formulas of the surface and the field alone. The coverage of a pixel by a strip of the line's width is found by
+ * counting points of the pixel that are nearer to the line than half the width. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -33,7 +33,7 @@ static double square_radius(const double p[3])
     return p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - 0.64;
 }
 
-/* Depth of the plane or of the sphere on a ray. */
+/* Returns the depth at which a ray meets the plane (or, below, the sphere). */
 static double plane_depth(const double base[3], const double direction[3])
 {
     const double along = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
@@ -62,16 +62,17 @@ typedef struct lines_case {
     test_function *field;
     fixture_camera camera;
     float width;
-    int cubes;     /* of the lattice along an axis */
-    double jitter; /* of its vertices */
+    int cubes;     /* cubes of the lattice along an axis */
+    double jitter; /* jitter of its vertices */
     int count;
     double values[4];
 } lines_case;
 
-/* A linear field is linear in every cell, and so is the distance from a plane: cells may be of any size. Of the others
- * the cells' interpolants are off: on 40 cubes by an eighth of the second derivative along a tet's longest edge, 0.09,
- * times its square: 4e-4 of the quadratic field, whose slope is 0.6 or more, and 2e-3 of the square of the radius,
- * whose slope is 1.6. A pixel is 0.03 of the scene, so that lines are off by up to 0.02 and 0.04 of a pixel. */
+/* The cases. A linear field is linear in every cell, and so is the distance from a plane: cells may have any size. For
+ * the other fields the cells' interpolants have an error: on 40 cubes an eighth of the second derivative along a tet's
+ * longest edge, 0.09, times the square of its length. That is 4e-4 for the quadratic field, whose slope is at least
+ * 0.6, and 2e-3 for the square of the radius, whose slope is 1.6. A pixel is 0.03 of the scene, so that lines are off
+ * by up to 0.02 and 0.04 of a pixel. */
 static const lines_case cases[] = {
     {"a linear field on a plane", distance, plane_depth, test_linear, CAMERA_OUTSIDE, 1.5F, 4, 0.2, 3, {-0.3, 0, 0.25}},
     {"thin lines", distance, plane_depth, test_linear, CAMERA_OUTSIDE, 0.7F, 4, 0.2, 2, {-0.1, 0.3}},
@@ -99,16 +100,17 @@ static const lines_case cases[] = {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-/* ---- the truth --------------------------------------------------------------------------------------------------- */
+/* ---- the reference ---------------------------------------------------------------------------------------------- */
 
 typedef struct truth {
     const lines_case *of;
     render_camera camera;
-    double cover[PIXELS]; /* -1: the surface or the cube ends nearby, or two lines are near */
+    /* coverage; -1 if the surface or the cube ends nearby, or two lines are close to each other */
+    double cover[PIXELS];
 } truth;
 
-/* The field at a place of the picture, (0, 0) being the middle of the first pixel; NaN beside the surface, and where
- * that is near the border of the cube. */
+/* Returns the field at a position in the picture, whose origin is the middle of the first pixel; NaN outside the
+ * surface and near the border of the cube. */
 static double field_at(const truth *t, double x, double y)
 {
     render_camera camera = t->camera;
@@ -125,7 +127,7 @@ static double field_at(const truth *t, double x, double y)
     return t->of->field(at);
 }
 
-/* The distance of a place from the line of a level: Newton's method along the slope in the picture. */
+/* Returns the distance of a position from the line of a level, by Newton's method along the gradient in the picture. */
 static double line_distance(const truth *t, double level, double x, double y)
 {
     const double h = 1e-3;
@@ -140,7 +142,8 @@ static double line_distance(const truth *t, double level, double x, double y)
     return hypot(px - x, py - y);
 }
 
-/* The share of points in the pixel that the strip holds; no more than half a pixel's diagonal from its middle. */
+/* Returns the fraction of points in the pixel that lie in the strip. No point is farther than half a pixel's diagonal
+ * from the pixel's middle. */
 static double exact_cover(const truth *t, double level, double x, double y)
 {
     const double reach = 0.5 * (double)t->of->width, middle = line_distance(t, level, x, y);
@@ -188,7 +191,7 @@ typedef struct lines_frame {
     render_lines lines;
 } lines_frame;
 
-/* White lines on black. kind: of the cells. */
+/* Creates a frame with white lines on black, on cells of the given kind. */
 static void create_frame(lines_frame *out, const lines_case *of, test_mesh_kind kind, test_layout layout)
 {
     test_mesh lines;
@@ -240,8 +243,9 @@ static lines_error compare(const truth *t, const drawn_frame *drawn)
 static const test_layout layouts[2] = {{.wide_coordinates = true, .wide_values = true, .wide_indices = true},
                                        {.is_interleaved = true}};
 
-/* The root of the mean square of a pixel's error is asked to be 0.02. A ramp of one pixel for every direction of a line
- * is off by up to 0.06 where a diagonal line's own is wider. Sums of coverage are the width times the length. */
+/* Checks the lines of a frame. The root mean square error of a pixel must be below 0.02. The kernels use a ramp one
+ * pixel wide for every direction of a line; it is off by up to 0.06 for diagonal lines, whose exact ramp is wider. The
+ * sum of the coverage must be the width times the length. */
 static void check_frame(const truth *t, const lines_frame *frame, const char *kind, int set)
 {
     drawn_frame drawn;
@@ -258,7 +262,7 @@ static void check_frame(const truth *t, const lines_frame *frame, const char *ki
     drawn_free(&drawn);
 }
 
-/* Of fine lattices, tets and hexes alone. */
+/* Checks a case on all kinds of cells; on fine lattices only tets and hexes. */
 static void check_case(const lines_case *of)
 {
     truth *t = NULL;
@@ -279,7 +283,7 @@ static void lines_cover_what_strips_do(void **state)
     for (int i = 0; i < CASES; i++) check_case(&cases[i]);
 }
 
-/* Whole, and in the parts of three ranks, of every partition: the same bits. */
+/* Checks that the whole mesh and the parts of three ranks, for every partition, give the same bits. */
 static void lines_are_the_same_on_any_partition(void **state)
 {
     (void)state;

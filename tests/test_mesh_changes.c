@@ -1,4 +1,4 @@
-/* Changes meshes: rounds, mirrors, renumbers, turns and moves them. */
+/* Changes meshes: rounds, mirrors, renumbers, rotates and moves them. */
 #include "test_mesh_make.h"
 
 #include <stdlib.h>
@@ -10,7 +10,8 @@ void test_mesh_round(test_mesh *mesh)
     for (int64_t i = 0; i < mesh->vertex_count; i++) mesh->values[i] = (double)(float)mesh->values[i];
 }
 
-/* Symmetries of a kind as reorderings: enough to make all others, the first a mirror. */
+/* Symmetries of a kind of cell as reorderings of its vertices: they generate all symmetries, and the first is a
+ * mirror. */
 typedef struct symmetry {
     int count;
     int order[3][8];
@@ -40,7 +41,7 @@ void test_mesh_mirror(test_mesh *mesh, bool every_second)
             reorder(mesh, cell, symmetries(mesh->types[cell])->order[0]);
 }
 
-/* A random permutation of 0 .. count - 1. */
+/* Returns a random permutation of 0 .. count - 1. */
 static int64_t *permutation(int64_t count, uint64_t seed)
 {
     int64_t *order = test_allocate(count, sizeof *order);
@@ -52,7 +53,7 @@ static int64_t *permutation(int64_t count, uint64_t seed)
     return order;
 }
 
-/* The faces of old in another order, of vertices renumbered; returns where each went. */
+/* Adds the faces of old in another order and with renumbered vertices; returns the new number of each face. */
 static int64_t *shuffle_faces(const test_mesh *old, const int64_t *vertex_to, uint64_t seed, test_mesh *mesh)
 {
     int64_t *face_from = permutation(old->face_count, seed), *face_to = test_allocate(old->face_count, sizeof *face_to);
@@ -111,7 +112,7 @@ static void reverse(int64_t *items, int64_t count)
     for (int64_t i = 0; i < count / 2; i++) swap_indices(&items[i], &items[count - 1 - i]);
 }
 
-/* Another beginning, and by seed the other way. */
+/* Rotates a list to another first entry, and depending on the seed reverses it. */
 static void rotate_loop(int64_t *items, int64_t count, uint64_t seed)
 {
     const int64_t by = (int64_t)(test_hash(1, seed) % (uint64_t)count);

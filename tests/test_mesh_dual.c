@@ -1,4 +1,4 @@
-/* Polyhedra with faces that are not plane (test_mesh_dual.h). */
+/* Makes polyhedra with faces that are not plane (test_mesh_dual.h). */
 #include "test_mesh_dual.h"
 
 #include <stdlib.h>
@@ -6,11 +6,11 @@
 
 #include "test_mesh_make.h"
 
-/* ---- random ones ---- */
+/* ---- random polyhedra ---- */
 
 enum { MOST_POINTS = 22, MOST_TRIANGLES = 2 * MOST_POINTS - 4 };
 
-/* Directions and the triangles of their convex hull, turned outward. */
+/* Directions and the triangles of their convex hull, oriented outwards. */
 typedef struct hull {
     int point_count, triangle_count;
     double points[MOST_POINTS][3];
@@ -43,7 +43,8 @@ static void random_direction(uint64_t index, uint64_t seed, double out[3])
     out[2] = z;
 }
 
-/* Points must not all be in one half, nor too near each other: else the hull has slivers, or lacks the origin. */
+/* Spreads the points: they must not all be in one half space, nor too close to each other, because the hull would not
+ * contain the origin, or would have slivers. */
 static void spread_points(hull *h, uint64_t seed)
 {
     double least = 1.9 / sqrt(h->point_count);
@@ -67,7 +68,7 @@ static void triangle_normal(const hull *h, const int *t, double out[3])
     normalize(out);
 }
 
-/* Tells whether all of the hull is behind the triangle. */
+/* Returns whether all points of the hull are behind the triangle's plane. */
 static bool is_outside(const hull *h, const int *t, const double *normal)
 {
     for (int i = 0; i < h->point_count; i++)
@@ -92,7 +93,7 @@ static void find_triangles(hull *h)
                 }
 }
 
-/* A sound hull about the origin. */
+/* Makes a valid hull around the origin. */
 static void make_hull(uint64_t seed, hull *h)
 {
     bool is_good = false;
@@ -106,7 +107,7 @@ static void make_hull(uint64_t seed, hull *h)
     }
 }
 
-/* The triangles around a point: in each the corner behind it leads to the next. */
+/* Lists the triangles around a point: the corner after the point in one triangle leads to the next triangle. */
 static int triangles_around(const hull *h, int point, int64_t out[MOST_TRIANGLES])
 {
     int first = -1, next = -1, count = 0;
@@ -158,7 +159,7 @@ void test_mesh_random(test_random_polyhedron kind, uint64_t seed, test_mesh *out
 enum { MOST_AROUND = 16, MOST_EDGES = 32 };
 
 typedef struct edge {
-    int64_t ends[2]; /* -1: a free place of the table */
+    int64_t ends[2]; /* -1: an empty slot of the table */
     int tet_count;
     int64_t tets[MOST_AROUND];
 } edge;
@@ -166,7 +167,7 @@ typedef struct edge {
 typedef struct tet_mesh {
     int n;
     int64_t point_count, tet_count, table_size;
-    double (*points)[3]; /* the lattice's corners, then the cubes' centres */
+    double (*points)[3]; /* the corners of the lattice, followed by the centres of the cubes */
     int64_t (*tets)[4];
     edge *table;
 } tet_mesh;
@@ -193,8 +194,8 @@ static void place_points(tet_mesh *m, double jitter)
     }
 }
 
-/* The face of a cube across an axis, on one side or the other, as two triangles with the cube's centre: by the diagonal
- * that a hash of the face says, as the cube beside it has it. */
+/* Adds two tets between the centre of a cube and its face across an axis, on the given side. A hash of the face chooses
+ * the diagonal that splits it, so that the neighbouring cube uses the same one. */
 static void add_face_tets(tet_mesh *m, const int cube[3], int axis, int side, int64_t centre)
 {
     int64_t around[4];
@@ -252,7 +253,7 @@ static bool tet_has(const int64_t *tet, int64_t point)
     return tet[0] == point || tet[1] == point || tet[2] == point || tet[3] == point;
 }
 
-/* Tells whether the tets have a common triangle. */
+/* Returns whether two tets have a common triangle. */
 static bool are_beside(const int64_t *one, const int64_t *other)
 {
     int common = 0;
@@ -260,7 +261,7 @@ static bool are_beside(const int64_t *one, const int64_t *other)
     return common == 3;
 }
 
-/* The edge's tets in their order around it. */
+/* Sorts the edge's tets into their order around it. */
 static void order_around(const tet_mesh *m, edge *e)
 {
     for (int i = 0; i + 1 < e->tet_count; i++)
@@ -283,7 +284,7 @@ static bool is_inner_point(const tet_mesh *m, int64_t point)
     return true;
 }
 
-/* The faces of the edges of inner points, noted at both ends: faces[MOST_EDGES point ...]. */
+/* Adds a face for each edge with an inner point, and lists it for both ends: faces[MOST_EDGES point ...]. */
 static void add_dual_faces(const tet_mesh *m, test_mesh *out, int64_t *faces, int *counts)
 {
     for (int64_t i = 0; i < m->table_size; i++) {
@@ -333,7 +334,7 @@ void test_mesh_dual(int n, double jitter, test_function *f, test_mesh *out)
     free(counts);
 }
 
-/* ---- both ---- */
+/* ---- both kinds ---- */
 
 void test_mesh_split_quads(test_mesh *mesh)
 {

@@ -44,7 +44,7 @@ static test_mesh_kind kind_of(mesh_form form)
     return form <= MESH_ROWS ? kinds[form] : TEST_MIXED;
 }
 
-/* Takes the faces of polyhedra as cells; some of them are polygons. */
+/* Makes a mesh whose cells are the faces of polyhedra; some of them are polygons. */
 static void take_faces_as_cells(test_mesh *part)
 {
     const int64_t count = part->face_count;
@@ -98,7 +98,7 @@ static void describe_hexes(formed_mesh *m)
     m->ids = test_allocate(m->part.vertex_count, sizeof *m->ids);
     for (int64_t v = 0; v < m->part.vertex_count; v++) {
         const double *p = m->part.coordinates + 3 * v;
-        int64_t id = 0; /* vertices of a lattice differ by more than a hundredth */
+        int64_t id = 0; /* distinct vertices of a lattice are more than a hundredth apart */
         for (int axis = 0; axis < 3; axis++) id = 1000 * id + (int64_t)(100 * (p[axis] + 2));
         m->ids[v] = id;
     }
@@ -158,8 +158,8 @@ void formed_fit_fields(formed_mesh *m)
     if (m->mesh.cell_count == 0 || m->mesh.face_count == 0) m->fields[FORMED_C].patch_count = 0;
 }
 
-/* The last faces in the order of owners are on the boundary, of the part at least: one of them, on the boundary of the
- * whole, is the patch. */
+/* Defines the patch of the boundary: the last faces in the order of owners are on the boundary of the part; the patch
+ * is one of them that is also on the boundary of the whole mesh. */
 static void describe_patch(formed_mesh *m)
 {
     const int64_t *offsets = m->faces.offsets;
@@ -205,7 +205,7 @@ static void describe_fields(formed_mesh *m)
     formed_fit_fields(m);
 }
 
-/* ---- all ------------------------------------------------------------------------------------------------------- */
+/* ---- the whole ------------------------------------------------------------------------------------------------- */
 
 void formed_create(mesh_form form, int side, int rank, int count, formed_mesh *out)
 {

@@ -1,6 +1,6 @@
-/* Hanging nodes (test_mesh_hanging.h): vertices are on the lattice of the smallest cells, and are made when a cell
- * first needs them. A vertex on a cube's boundary is an interpolation of the cube's corners, the same for all cubes
- * around it, because the map of a cube is bilinear on its faces. */
+/* Makes meshes with hanging nodes (test_mesh_hanging.h): vertices are on the lattice of the smallest cells, and are
+ * created when a cell first needs them. A vertex on a cube's boundary is an interpolation of the cube's corners, the
+ * same for all cubes around it, because the map of a cube is bilinear on its faces. */
 #include "test_mesh_hanging.h"
 
 #include <stdlib.h>
@@ -12,8 +12,8 @@ typedef struct hanging {
     int n, side;
     test_hanging_shape shape;
     test_function *f;
-    int64_t line;      /* vertices of the finest lattice along an axis */
-    int64_t *vertices; /* of the mesh, by place in that lattice; -1: not made */
+    int64_t line;      /* number of vertices of the finest lattice along an axis */
+    int64_t *vertices; /* number of the mesh's vertex by index in that lattice; -1: not created yet */
     test_mesh *mesh;
 } hanging;
 
@@ -23,7 +23,7 @@ const char *test_hanging_shape_name(test_hanging_shape shape)
     return names[shape];
 }
 
-/* The cube onto a ball of radius 1. */
+/* Maps the cube onto a ball of radius 1. */
 static void to_ball(const double p[3], double out[3])
 {
     for (int a = 0; a < 3; a++) {
@@ -32,7 +32,7 @@ static void to_ball(const double p[3], double out[3])
     }
 }
 
-/* About (1, 2, 3), by an angle of cosine 0.8, to 0.55 of the size. */
+/* Rotates about the axis (1, 2, 3) by an angle of cosine 0.8, and scales by 0.55. */
 static void rotate(const double p[3], double out[3])
 {
     const double length = sqrt(14), axis[3] = {1 / length, 2 / length, 3 / length};
@@ -54,13 +54,13 @@ static void map(const hanging *h, const double p[3], double out[3])
         memcpy(out, p, 3 * sizeof *out);
 }
 
-/* A place of the finest lattice in the cube [-1, 1]^3. */
+/* Computes the position of a lattice point of the finest lattice in the cube [-1, 1]^3. */
 static void lattice_place(const hanging *h, const int64_t at[3], double out[3])
 {
     for (int a = 0; a < 3; a++) out[a] = 2.0 * (double)at[a] / (double)(h->n * h->side) - 1;
 }
 
-/* The mean of the cube's corners at the place: position and value. */
+/* Interpolates position and value at a lattice point from the corners of its cube. */
 static void cube_mean(const hanging *h, const int64_t at[3], double position[3], double *value)
 {
     int64_t cube[3];
@@ -99,7 +99,7 @@ static int64_t vertex_at(hanging *h, const int64_t at[3])
     return *vertex;
 }
 
-/* The cells of a cube of the finest lattice from `at` on, so many of its cubes wide. */
+/* Adds the cells of a cube that begins at `at` and is `width` cubes of the finest lattice wide. */
 static void add_cells(hanging *h, test_mesh_kind kind, const int64_t at[3], int width)
 {
     int64_t corners[8];

@@ -1,7 +1,7 @@
-/* Hexagonal prisms (test_mesh_honeycomb.h).
+/* Makes hexagonal prisms (test_mesh_honeycomb.h).
  *
- * A layer is a wall of bricks, in every second row shifted by half a brick. The corners of a row's bricks stand in the
- * middle of the edges of those beside it, and are pulled towards them, which makes the bricks hexagons:
+ * A layer is a wall of bricks, whose every second row is shifted by half a brick. A corner of a row's bricks is in the
+ * middle of an edge of the neighbouring row, and is moved towards that row, which makes the bricks hexagons:
  *
  *      |     |     |                \   / \   /
  *      +--+--+--+--+                 \ /   \ /
@@ -16,7 +16,7 @@
 
 enum { MAX_CORNERS = 6 };
 
-/* A brick's corners around: their places in a level of vertices. */
+/* A brick's corners in order around it, as indices in a level of vertices. */
 typedef struct brick {
     int count;
     int64_t corners[MAX_CORNERS];
@@ -24,7 +24,7 @@ typedef struct brick {
 
 typedef struct wall {
     int n;
-    int64_t columns, level; /* vertices a line between rows, and a level between layers */
+    int64_t columns, level; /* number of vertices in a line between rows, and in a level between layers */
     brick *bricks;
     int64_t brick_count;
 } wall;
@@ -39,8 +39,8 @@ static void *allocate(int64_t count, size_t size)
     return p;
 }
 
-/* Makes the brick between columns low and high in a row; a line on the hull has no other bricks' corners in its middle.
- */
+/* Makes the brick between columns low and high of a row; a line on the hull has no corners of other bricks in the
+ * middle of its edges. */
 static brick make_brick(const wall *w, int row, int64_t low, int64_t high)
 {
     brick b = {.count = 0};
@@ -69,7 +69,7 @@ static void place_vertex(const wall *w, int layer, int line, int64_t column, dou
     p[0] = (double)column * side / 2 - 1;
     p[1] = line * side - 1;
     p[2] = layer * side - 1;
-    /* Up where the row above has its corners, in even columns of even rows. */
+    /* Moves up a vertex at which the row above has a corner, which is in even columns of even rows. */
     if (inner_row && inner_column) p[1] += (line + column) % 2 ? -0.15 * side : 0.15 * side;
     if (inner_row && inner_column && layer > 0 && layer < w->n)
         for (uint64_t a = 0; a < 3; a++) p[a] += jitter * side * (2 * test_uniform(index + a, 9) - 1);
@@ -91,7 +91,8 @@ static int64_t add_face(test_mesh *mesh, const int64_t *vertices, int count)
     return mesh->face_count - 1;
 }
 
-/* The quad above an edge of a brick: once, though two bricks have it. walls: the layer's, in the order of making. */
+/* Returns the quad above an edge of a brick, adding it only once for the two bricks that share it. first is the number
+ * of the layer's first quad. */
 static int64_t side_face(const wall *w, int layer, int64_t a, int64_t b, int64_t first, test_mesh *out)
 {
     const int64_t low = layer * w->level + (a < b ? a : b), high = layer * w->level + (a < b ? b : a);
@@ -110,7 +111,7 @@ static void add_layer(const wall *w, int layer, test_mesh *out)
         for (int k = 0; k < b->count; k++)
             out->connectivity[out->connectivity_count++] =
                 side_face(w, layer, b->corners[k], b->corners[(k + 1) % b->count], first, out);
-        /* Lids were made first, level by level. */
+        /* The horizontal faces were added first, level by level. */
         out->connectivity[out->connectivity_count++] = layer * w->brick_count + i;
         out->connectivity[out->connectivity_count++] = (layer + 1) * w->brick_count + i;
         out->types[out->cell_count++] = GRID_POLYHEDRON;

@@ -1,4 +1,4 @@
-/* Functions for the makers of test meshes: they fill the arrays of a test_mesh, which must have room. */
+/* Functions that generators of test meshes use: they fill the arrays of a test_mesh, which must be large enough. */
 #ifndef TEST_MESH_MAKE_H
 #define TEST_MESH_MAKE_H
 
@@ -6,29 +6,31 @@
 
 #include "test_meshes.h"
 
-/* Zeroed; running out of memory ends the process. */
+/* Allocates zeroed memory; ends the process if memory runs out. */
 void *test_allocate(int64_t count, size_t size);
 
-/* A hash of an index and a seed, the same on every machine. */
+/* Returns a hash of an index and a seed, the same on every machine. */
 uint64_t test_hash(uint64_t index, uint64_t seed);
 
-/* Room for so many of each; the mesh has none yet. Faces apart, for few meshes have any. */
+/* Allocate arrays for the given numbers of items in an empty mesh. Faces have their own function, because few meshes
+ * have any. */
 void test_mesh_allocate(test_mesh *mesh, int64_t vertices, int64_t cells, int64_t connectivity);
 void test_mesh_allocate_faces(test_mesh *mesh, int64_t faces, int64_t entries);
 
-/* These return the number of the new vertex, face or cell. */
+/* Each of these functions adds an item; those for vertices and faces return its number. */
 int64_t test_mesh_add_vertex(test_mesh *mesh, const double p[3]);
 int64_t test_mesh_add_face(test_mesh *mesh, const int64_t *vertices, int64_t count);
 
 void test_mesh_add_polyhedron(test_mesh *mesh, const int64_t *faces, int64_t count);
 
-/* A cell of some of the given vertices, picked by local indices. */
+/* Adds a cell whose vertices are picked from the given ones by local indices. */
 void test_mesh_add_cell(test_mesh *mesh, int type, const int64_t *vertices, const int *picks);
 
-/* A cube as a hex, two wedges, or six tets for any other kind. Corners by bits: bit 0: +x, bit 1: +y, bit 2: +z. */
+/* Adds a cube as a hex, two wedges, or six tets for any other kind. Corners are numbered by bits: bit 0: +x, bit 1: +y,
+ * bit 2: +z. */
 void test_mesh_add_cube(test_mesh *mesh, test_mesh_kind kind, const int64_t *corners);
 
-/* The faces of a cell: how many, and their vertices, -1 behind a triangle's. */
+/* The faces of a cell: their number, and their vertices; the fourth is -1 for a triangle. */
 typedef struct test_faces {
     int count;
     int vertices[6][4];
@@ -36,7 +38,7 @@ typedef struct test_faces {
 
 const test_faces *test_faces_of(int type);
 
-/* A mesh of tets to polyhedra of up to six of them. */
+/* Joins the tets of a mesh into polyhedra of up to six tets. */
 void test_mesh_grow_together(test_mesh *mesh);
 
 #endif

@@ -1,4 +1,4 @@
-/* Deals cells to ranks, and makes a rank's part of a mesh. */
+/* Distributes cells to ranks, and makes a rank's part of a mesh. */
 #include "test_mesh_make.h"
 
 #include <math.h>
@@ -43,7 +43,7 @@ void test_partition(const test_mesh *mesh, test_partition_kind kind, int n, int 
     }
 }
 
-/* The part's number of a vertex, given when first asked for. */
+/* Returns the part's number of a vertex, which is assigned at its first use. */
 static int64_t part_vertex(const test_mesh *mesh, int64_t *local, int64_t v, test_mesh *out)
 {
     if (local[v] >= 0) return local[v];

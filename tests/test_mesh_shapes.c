@@ -1,4 +1,4 @@
-/* Single cells, good and bad. */
+/* Makes single cells, valid and degenerate. */
 #include "test_mesh_make.h"
 
 #include <math.h>

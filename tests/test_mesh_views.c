@@ -1,4 +1,4 @@
-/* A mesh as a grid in a chosen layout. */
+/* Makes a grid of a mesh in a chosen layout. */
 #include "test_mesh_make.h"
 
 #include <math.h>

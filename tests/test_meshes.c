@@ -1,4 +1,4 @@
-/* Functions that make all meshes for tests and benchmarks. */
+/* Basic functions of all meshes for tests and benchmarks. */
 #include "test_mesh_make.h"
 
 #include <math.h>

@@ -1,9 +1,10 @@
-/* Meshes whose answers are known: jittered lattices of every cell kind, single cells good and bad, and what tests
- * do to them: mirror, renumber, cut into the parts of ranks. Shared by the tests and the benchmarks; knows grids only.
+/* Meshes with known results: jittered lattices of every kind of cell, single cells, valid and degenerate, and
+ * operations of tests on them: mirroring, renumbering, dividing into the parts of ranks. Tests and benchmarks share
+ * them; they depend only on grids.
  *
- * A test_mesh is double and int64 throughout and owns its arrays; a test_view shows it as a grid in a chosen layout.
- * All numbers come from a fixed hash, so that every machine has the same mesh. Running out of memory ends the process.
- */
+ * A test_mesh uses double and int64 throughout and owns its arrays; a test_view presents it as a grid in a chosen
+ * layout. All random numbers come from a fixed hash, so that every machine has the same mesh. The process ends if
+ * memory runs out. */
 #ifndef TEST_MESHES_H
 #define TEST_MESHES_H
 
@@ -15,32 +16,33 @@ typedef double test_function(const double position[3]);
 
 typedef struct test_mesh {
     int64_t vertex_count, cell_count, connectivity_count;
-    double *coordinates;                         /* vertex_count × 3 */
-    double *values;                              /* vertex_count */
-    int64_t *offsets;                            /* cell_count + 1 */
-    int64_t *connectivity;                       /* vertices; of polyhedra faces */
-    int64_t face_count, face_connectivity_count; /* 0 where there are no polyhedra */
-    int64_t *face_offsets;                       /* face_count + 1; NULL as well */
+    double *coordinates;                         /* vertex_count × 3 elements */
+    double *values;                              /* vertex_count elements */
+    int64_t *offsets;                            /* cell_count + 1 elements */
+    int64_t *connectivity;                       /* vertices; for polyhedra their faces */
+    int64_t face_count, face_connectivity_count; /* 0 if there are no polyhedra */
+    int64_t *face_offsets;                       /* face_count + 1 elements; NULL if there are no polyhedra */
     int64_t *face_connectivity;
-    unsigned char *types;  /* cell_count, VTK's ids */
-    unsigned char *ghosts; /* cell_count, 0 at first */
+    unsigned char *types;  /* cell_count elements: numbers of VTK's cell types */
+    unsigned char *ghosts; /* cell_count elements, initially 0 */
 } test_mesh;
 
 typedef enum test_mesh_kind {
-    TEST_TETS,      /* six conforming tets a cube, about its main diagonal */
-    TEST_HEXES,     /* with warped faces, where jittered */
-    TEST_WEDGES,    /* two a cube */
-    TEST_PYRAMIDS,  /* six a cube, about its centre */
-    TEST_POLYHEDRA, /* one to six tets of the tets' lattice grown together: concave, and not all star-shaped */
-    TEST_MIXED, /* all four others, conforming: every second cube a hex, wedges or tets, those between of pyramids and
-                   tets */
+    TEST_TETS,      /* six conforming tets per cube, around its main diagonal */
+    TEST_HEXES,     /* with warped faces, if jittered */
+    TEST_WEDGES,    /* two per cube */
+    TEST_PYRAMIDS,  /* six per cube, around its centre */
+    TEST_POLYHEDRA, /* each joins one to six tets of the tet lattice: concave, and not all star-shaped */
+    /* hexes, wedges, pyramids and tets, conforming: every second cube is a hex, wedges or tets, the cubes between
+     * consist of pyramids and tets */
+    TEST_MIXED,
     TEST_KIND_COUNT
 } test_mesh_kind;
 
 const char *test_mesh_kind_name(test_mesh_kind kind);
 
-/* The cube [-1, 1]^3 as n^3 cubes. Inner vertices are moved by up to jitter of a cube's side along each axis, by a hash
- * of the vertex's lattice index. */
+/* Divides the cube [-1, 1]^3 into n^3 cubes. Inner vertices are moved along each axis by up to jitter of a cube's side,
+ * by a hash of the vertex's lattice index. */
 void test_mesh_lattice(test_mesh_kind kind, int n, double jitter, test_function *f, test_mesh *out);
 
 typedef enum test_cell_shape {
@@ -49,10 +51,10 @@ typedef enum test_cell_shape {
     TEST_UNIT_WEDGE,
     TEST_UNIT_PYRAMID,
     TEST_SLIVER_TET,     /* 1e-4 thick */
-    TEST_WARPED_HEX,     /* no face plane */
-    TEST_TWISTED_HEX,    /* the upper quad turned by 50 degrees */
+    TEST_WARPED_HEX,     /* no face is plane */
+    TEST_TWISTED_HEX,    /* the upper quad is rotated by 50 degrees */
     TEST_HEX_AS_WEDGE,   /* two pairs of equal vertices */
-    TEST_HEX_AS_PYRAMID, /* the upper quad one vertex */
+    TEST_HEX_AS_PYRAMID, /* the upper quad is a single vertex */
     TEST_FLAT_TET,       /* zero volume */
     TEST_FLAT_HEX,       /* zero volume */
     TEST_POINT_HEX,      /* all vertices equal */
@@ -64,11 +66,11 @@ const char *test_cell_shape_name(test_cell_shape shape);
 void test_mesh_single(test_cell_shape shape, test_function *f, test_mesh *out);
 
 typedef enum test_polyhedron_shape {
-    TEST_L_PRISM,     /* the base a hexagon with a corner cut out */
-    TEST_U_PRISM,     /* not star-shaped, and the centre outside; a ray may enter twice */
+    TEST_L_PRISM,     /* the base is a hexagon with a concave corner */
+    TEST_U_PRISM,     /* not star-shaped, with the centre outside; a ray may enter it twice */
     TEST_SPIKES,      /* an octahedron with a spike on every face: concave, star-shaped */
-    TEST_BENT_SPIKES, /* the spikes bent over: not star-shaped */
-    TEST_CAVITY,      /* a cube with a cube cut out of its inside */
+    TEST_BENT_SPIKES, /* spikes that are bent over: not star-shaped */
+    TEST_CAVITY,      /* a cube with a cubic cavity inside */
     TEST_POLYHEDRON_COUNT
 } test_polyhedron_shape;
 
@@ -76,27 +78,29 @@ const char *test_polyhedron_name(test_polyhedron_shape shape);
 
 void test_mesh_polyhedron(test_polyhedron_shape shape, test_function *f, test_mesh *out);
 
-/* Make cells of the four types into polyhedra with the same vertices and faces, shared between them: a share of them
- * chosen by a hash, 1 for all. */
+/* Makes cells of the four types into polyhedra with the same vertices and faces, which neighbours share. share is the
+ * fraction of cells, chosen by a hash; 1: all. */
 void test_mesh_to_polyhedra(test_mesh *mesh, double share);
 
 void test_mesh_set_values(test_mesh *mesh, test_function *f);
 void test_mesh_free(test_mesh *mesh);
 
-/* Round coordinates and values to float32, so that layouts of both widths say the same. */
+/* Rounds coordinates and values to float32, so that layouts of both widths have the same numbers. */
 void test_mesh_round(test_mesh *mesh);
 
-/* Turn every cell (or, with every_second, a half chosen by hash) into its mirror image's vertex order: left-handed. */
+/* Reorders the vertices of every cell (or, with every_second, of half of the cells, chosen by a hash) to those of its
+ * mirror image: cells become left-handed. */
 void test_mesh_mirror(test_mesh *mesh, bool every_second);
 
-/* Another order of the cells and of the vertices. The same geometry and field. */
+/* Changes the order of the cells and of the vertices; geometry and field stay the same. */
 void test_mesh_shuffle(test_mesh *mesh, uint64_t seed);
 
-/* Reorders each cell's vertices by a random symmetry of its kind (rotations and mirrors); faces begin at another vertex
- * and run the other way, and a polyhedron's faces are in another order. Geometry and field stay the same. */
+/* Reorders each cell's vertices by a random symmetry of its kind (rotations and mirrors); a face begins at another
+ * vertex and has the opposite orientation, and a polyhedron's faces are in another order. Geometry and field stay the
+ * same. */
 void test_mesh_reorder_vertices(test_mesh *mesh, uint64_t seed);
 
-/* position * scale + offset. */
+/* Replaces each position by position * scale + offset. */
 void test_mesh_transform(test_mesh *mesh, double scale, const double offset[3]);
 
 typedef enum test_partition_kind {
@@ -108,16 +112,17 @@ typedef enum test_partition_kind {
 
 const char *test_partition_kind_name(test_partition_kind kind);
 
-/* owners (cell_count) gets each cell's rank: slabs along x, a hash of the cell, or cubes of side 2 / n in turn. */
+/* Computes owners (cell_count), each cell's rank: slabs along x, a hash of the cell, or cubes of side 2 / n in turn. */
 void test_partition(const test_mesh *mesh, test_partition_kind kind, int n, int ranks, int *owners);
 
-/* The cells of one rank with vertices of its own numbering. */
+/* Makes a mesh of the cells of one rank, with its own numbering of vertices. */
 void test_mesh_part(const test_mesh *mesh, const int *owners, int rank, test_mesh *out);
 
 typedef struct test_layout {
-    bool wide_coordinates, wide_indices, wide_values; /* 8-byte elements */
-    bool is_interleaved;                              /* coordinates xyzxyz..., values with a NaN after each */
-    bool with_types;                                  /* types and offsets given although all cells are of one kind */
+    bool wide_coordinates, wide_indices, wide_values; /* elements of 8 bytes */
+    bool is_interleaved;                              /* coordinates are xyzxyz..., and a NaN follows each value */
+    /* types and offsets are given although all cells are of one kind */
+    bool with_types;
 } test_layout;
 
 typedef struct test_view {
@@ -126,24 +131,24 @@ typedef struct test_view {
     void *storage[8];
 } test_view;
 
-/* Copies: the mesh may be freed. */
+/* Creates a view, which copies the mesh: the mesh may be freed. */
 void test_view_create(const test_mesh *mesh, test_layout layout, test_view *out);
 void test_view_free(test_view *view);
 
-/* sin 6x cos 6y + sin 6y cos 6z + sin 6z cos 6x */
+/* Returns sin 6x cos 6y + sin 6y cos 6z + sin 6z cos 6x. */
 double test_wave(const double position[3]);
-/* 0.3 x - 0.7 y + 0.5 z + 0.1, exact on every cell */
+/* Returns 0.3 x - 0.7 y + 0.5 z + 0.1, which is exact on every cell. */
 double test_linear(const double position[3]);
 
-/* The larger error. What is not a number counts as infinite, so that no later one hides it. */
+/* Returns the larger error. NaN counts as infinite, so that a later error does not hide it. */
 static inline double test_worse(double worst, double off)
 {
     return off <= worst ? worst : off == off ? off : (double)INFINITY;
 }
 
-/* A uniform number in [0, 1) of an index and a seed. */
+/* Returns a uniform number in [0, 1) for an index and a seed. */
 double test_uniform(uint64_t index, uint64_t seed);
-/* As above, in [low, high). */
+/* Returns a uniform number in [low, high) for an index and a seed. */
 double test_uniform_in(uint64_t index, uint64_t seed, double low, double high);
 
 #endif

@@ -1,5 +1,5 @@
-/* The mini-app's mesh: the cells fill the box without gaps or overlaps, whole faces meet whole faces, and partitions
- * lose and double nothing. */
+/* Checks the mini-app's mesh: the cells fill the box without gaps or overlaps, whole faces meet whole faces, and no
+ * cell of a partition is missing or occurs twice. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -45,12 +45,12 @@ static void check_box(const wave_lattice *lattice)
             double around = 0;
             int faces = wave_cell_shape_of(wave_mesh_type(&mesh, c))->face_count;
             for (int f = 0; f < faces; ++f) around += g.area[f][a];
-            /* six areas of at most 2 h^2, from coordinates of at most 2: 12 roundings of 2 h eps each */
+            /* six areas of at most 2 h^2, computed from coordinates of at most 2: 12 roundings of 2 h eps each */
             assert_true(fabs(around) <= 48 * h * 2.3e-16);
         }
     }
     double box = h * h * h * (double)wave_lattice_cube_count(lattice);
-    /* Each volume is rounded by some 20 operations on terms of about h^2 times the position's rounding (2 eps). */
+    /* Each volume is rounded by about 20 operations on terms of about h^2 times the rounding of a position (2 eps). */
     assert_true(fabs(sum - box) <= 40 * h * h * 2.3e-16 * mesh.own_cells + 1e-15 * box * mesh.own_cells);
     wave_mesh_free(&mesh);
 }
@@ -68,7 +68,7 @@ static void volumes_of_every_kind_fill_the_box_and_faces_meet(void **state)
     }
 }
 
-/* The centroid of a cell with flat faces, by cones from vertex 0 over each face's triangles. */
+/* Computes the centroid of a cell with flat faces, by tets from vertex 0 over each face's triangles. */
 static void exact_centroid(const wave_cell_shape *shape, double x[8][3], double centroid[3])
 {
     double volume = 0, e[3][3];
@@ -105,7 +105,7 @@ static void centroids_of_flat_cells_are_exact(void **state)
                 for (int i = 0; i < shape->vertex_count; ++i) wave_lattice_vertex(&lattice, cells[c].vertex[i], x[i]);
                 wave_cell_measure(shape, (const double(*)[3])x, cells[c].vertex, &g);
                 exact_centroid(shape, x, exact);
-                /* some 50 roundings of coordinates of at most 2 */
+                /* about 50 roundings of coordinates of at most 2 */
                 for (int a = 0; a < 3; ++a) assert_true(fabs(g.centroid[a] - exact[a]) <= 50 * 2 * 2.3e-16);
             }
         }
@@ -125,7 +125,7 @@ static void mixed_mesh_has_all_four_types(void **state)
     assert_true(seen[10] && seen[12] && seen[13] && seen[14]);
 }
 
-/* A hex beside tets leaves faces without a partner: the count that the other tests rely on must see it. */
+/* Checks the count of unmatched faces, on which the other tests rely: a hex next to tets has faces without a match. */
 static void faces_that_do_not_meet_are_counted(void **state)
 {
     (void)state;
@@ -134,7 +134,7 @@ static void faces_that_do_not_meet_are_counted(void **state)
     wave_partition partition = wave_partition_make(&lattice, WAVE_BLOCK, 1);
     wave_mesh mesh;
     assert_true(wave_mesh_create(&partition, 0, 4, &mesh));
-    /* Make the first tet share no vertex with any other cell. */
+    /* Give the first tet vertices that no other cell has. */
     int32_t *connectivity = mesh.connectivity;
     free(mesh.neighbours);
     connectivity[0] = connectivity[1];
@@ -177,7 +177,7 @@ static void partitions_give_each_cell_to_one_rank(void **state)
     }
 }
 
-/* The cells that a sends to b are those that b receives from a, in the same order. */
+/* Checks that the cells which a sends to b are those which b receives from a, in the same order. */
 static void sends_are_the_other_ranks_receives(void **state)
 {
     (void)state;

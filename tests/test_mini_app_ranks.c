@@ -1,5 +1,5 @@
-/* The mini-app on several ranks: each cell of each partition has, to the bit, the state that one rank alone computes.
- */
+/* Checks the mini-app on several ranks: each cell of each partition has, to the bit, the state that a single rank
+ * computes. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -47,7 +47,7 @@ static int by_id(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Counts cells (halo included) and own vertices whose state or position differs from that in the whole. */
+/* Counts cells (including the halo) and own vertices whose state or position differs from that in the whole mesh. */
 static int count_differences(const model *part, const model *whole)
 {
     int differences = 0;
@@ -80,7 +80,7 @@ static void compare(wave_cells cells, wave_partition_kind kind, const wave_setup
     free_model(&part);
     free_model(&whole);
     assert_int_equal(differences, 0);
-    assert_true(peak > 1e-3); /* there was a wave to compare */
+    assert_true(peak > 1e-3); /* the wave is not zero, so that the comparison means something */
 }
 
 static void every_partition_computes_the_same_bits(void **state)
@@ -104,7 +104,7 @@ static void other_arrays_and_walls_compute_the_same_bits(void **state)
     }
 }
 
-/* Vertices that ranks share must be drawn in one place: the library matches them by their bits. */
+/* Checks that vertices which ranks share are drawn at the same position: the library matches them by their bits. */
 static void moved_vertices_stay_together(void **state)
 {
     (void)state;

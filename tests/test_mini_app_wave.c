@@ -1,4 +1,5 @@
-/* The mini-app's physics on one rank: mass is conserved, energy falls, and the solution converges to a plane wave. */
+/* Checks the mini-app's physics on one rank: mass is conserved, energy decreases, and the solution converges to a plane
+ * wave. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,7 +20,7 @@ typedef struct model {
     wave_solver solver;
 } model;
 
-/* Speed and density are 1 everywhere. */
+/* Returns a setup with speed and density 1 everywhere. */
 static wave_setup plain_setup(int order)
 {
     const wave_medium uniform = {.count = 1, .bottom = {-INFINITY}, .speed = {1}, .density = {1}};
@@ -40,7 +41,8 @@ static void free_model(model *m)
     wave_mesh_free(&m->mesh);
 }
 
-/* A pulse along x: an exact solution travels at speed 1 with u = p / Z. At 5 widths it is e^-12.5 of its height. */
+/* Returns a pulse along x that is an exact solution, travelling at speed 1 with u = p / Z. At 5 widths it is e^-12.5 of
+ * its height. */
 static double pulse(double x, double time)
 {
     double r = (x + 0.35 - time) / 0.12;
@@ -58,7 +60,7 @@ static void set_pulse(model *m)
     wave_solver_start(&m->solver);
 }
 
-/* Mean |p - exact| over the box at time 0.6, over the pulse's own mean. */
+/* Returns the mean of |p - exact| over the box at time 0.6, divided by the pulse's own mean. */
 static double pulse_error(int n, wave_cells cells, int order)
 {
     const int size[3] = {n, 4, 4};
@@ -92,8 +94,8 @@ static void check_order(wave_cells cells, int order, double least, double most_e
     assert_true(e[2] <= most_error);
 }
 
-/* Fromm's scheme is of order 2. On the other cells the value at a vertex is exact for linear functions only, which
- * bounds the order by 2 too; between cell kinds and at walls it is of first order locally. */
+/* Checks the order of Fromm's scheme, which is 2. On the other cells the value at a vertex is exact only for linear
+ * functions, which limits the order to 2 too; between kinds of cells and at walls it is locally of first order. */
 static void plane_wave_converges_with_order_2_on_hexes(void **state)
 {
     (void)state;
@@ -118,7 +120,7 @@ static void plane_wave_converges_on_pyramids(void **state)
     check_order(WAVE_PYRAMIDS, 2, 1.8, 0.02);
 }
 
-/* Godunov's scheme is of order 1, reached from below as the pulse stops being flattened. */
+/* Checks the order of Godunov's scheme, which is 1; it is approached from below as the pulse is flattened less. */
 static void plane_wave_converges_with_order_1_by_the_first_order_scheme(void **state)
 {
     (void)state;
@@ -130,8 +132,8 @@ static double bell(double r)
     return exp(-0.5 * r * r);
 }
 
-/* A downward pulse 0.8 later: half of it was reflected at z = -1, where the impedance goes from 1 to 3 (R = (3 - 1) /
- * (3 + 1)), and 1 + R of its pressure has gone on, faster and so stretched by 1.5. */
+/* Returns a downward pulse after 0.8 time units: half of it was reflected at z = -1, where the impedance changes from 1
+ * to 3 (R = (3 - 1) / (3 + 1)), and 1 + R of its pressure was transmitted, faster and so stretched by 1.5. */
 static double parted_pulse(double z)
 {
     double width = 0.08;
@@ -166,20 +168,21 @@ static void interface_reflects_and_transmits_by_its_impedances(void **state)
             whole += m.solver.volume[c] * parted_pulse(x[2]);
         }
         print_message("cells %d: error %.4f behind an interface\n", kind, error / whole);
-        /* A width is 6.4 cubes; between their sizes the plane pulses above give 0.01 at 4.8 and 0.002 at 9.6. The
-         * reconstruction smears the kink at the interface over two cells: twice that. */
+        /* The width is 6.4 cubes; the plane pulses above have errors of 0.01 at 4.8 and 0.002 at 9.6 cubes. The
+         * reconstruction smears the kink at the interface over two cells, which doubles the error. */
         assert_true(error / whole <= 0.02);
         free_model(&m);
     }
 }
 
-/* Two cubes, one on the other, each with a material of its own: a step of first order is Riemann's problem between them
- * and its mirror at the two far walls, by the formula. */
+/* Checks a step of first order on two cubes of different materials, one on top of the other: it solves the Riemann
+ * problem between them and the mirrored ones at the two far walls, by the formula. */
 static void one_step_solves_riemanns_problem(void **state)
 {
     (void)state;
     const int size[3] = {1, 1, 2};
-    const double c[2] = {1.5, 1}, rho[2] = {2, 1}, p[2] = {0.3, -0.7}, u[2] = {0.4, 0.25}; /* lower, upper */
+    /* the lower cube, the upper cube */
+    const double c[2] = {1.5, 1}, rho[2] = {2, 1}, p[2] = {0.3, -0.7}, u[2] = {0.4, 0.25};
     wave_setup setup = plain_setup(1);
     model m;
     setup.medium = (wave_medium){.count = 2, .bottom = {-1, -2}, .speed = {c[1], c[0]}, .density = {rho[1], rho[0]}};
@@ -196,7 +199,7 @@ static void one_step_solves_riemanns_problem(void **state)
     for (int32_t i = 0; i < 2; ++i) {
         double q[4], out = i ? -1 : 1, wall = p[i] - out * rho[i] * c[i] * u[i], k = rho[i] * c[i] * c[i];
         wave_solver_get(&m.solver, i, q);
-        /* cubes of edge 1; some 30 roundings of values of at most 4.5 */
+        /* cubes of edge 1; about 30 roundings of values of at most 4.5 */
         assert_true(fabs(q[0] - (p[i] - dt * k * out * u_star)) <= 30 * 4.5 * 2.3e-16);
         assert_true(fabs(q[3] - (u[i] - dt / rho[i] * out * (p_star - wall))) <= 30 * 4.5 * 2.3e-16);
         assert_true(fabs(q[1]) + fabs(q[2]) <= 30 * 4.5 * 2.3e-16);
@@ -204,7 +207,7 @@ static void one_step_solves_riemanns_problem(void **state)
     free_model(&m);
 }
 
-/* Gaussian in pressure, at rest, a little off the middle. */
+/* Sets a Gaussian pressure at rest, slightly off the middle. */
 static void set_bump(model *m, double sharpness)
 {
     for (int32_t c = 0; c < m->mesh.own_cells; ++c) {
@@ -217,10 +220,10 @@ static void set_bump(model *m, double sharpness)
     wave_solver_start(&m->solver);
 }
 
-/* In a box with rigid walls nothing leaves: every flux is taken from one cell and given to another, with the same area
- * and, up to the rounding of the vertices' order, the same value. A step rounds V p / K of each cell by some 60 eps of
- * the terms, which are about as large as the cell's own; the 100 steps' errors have random signs, but are bounded as if
- * all had the same. */
+/* Checks that mass is conserved in a box with rigid walls: every flux leaves one cell and enters another, with the same
+ * area and, up to the rounding from the vertices' order, the same value. A step rounds V p / K of each cell by about 60
+ * eps of the terms, which are about as large as the cell's own value; the errors of the 100 steps have random signs,
+ * but the bound assumes equal signs. */
 static void mass_is_conserved_between_rigid_walls(void **state)
 {
     (void)state;
@@ -242,7 +245,8 @@ static void mass_is_conserved_between_rigid_walls(void **state)
     }
 }
 
-/* The source adds what it says: by the end of the wavelet, nothing; half way, the integral of its rate. */
+/* Checks that the source adds the volume it promises: nothing by the end of the wavelet; half way, the integral of its
+ * rate. */
 static void source_adds_the_volume_it_promises(void **state)
 {
     (void)state;
@@ -258,13 +262,13 @@ static void source_adds_the_volume_it_promises(void **state)
         injected += m.solver.time_step * wave_source_rate(&setup.source, m.solver.time + 0.5 * m.solver.time_step);
         wave_solver_step(&m.solver);
     }
-    /* The ball is sampled at cell centres no further apart than its radius: its sum is 1 within 2 exp(-2 pi^2) per
+    /* The ball is sampled at cell centres no farther apart than its radius: its sum is 1 to within 2 exp(-2 pi^2) per
      * axis, and 1.6e-5 is cut off at 5 radii. */
     assert_true(fabs(wave_solver_totals(&m.solver).mass / injected - 1) < 1e-4);
     free_model(&m);
 }
 
-/* What steers a source: a factor on all that it sends, and a pulse again and again. */
+/* Checks the controls of a source: a factor on its rate, and repetition of its pulse. */
 static void source_is_steered(void **state)
 {
     (void)state;
@@ -284,8 +288,9 @@ static void source_is_steered(void **state)
     }
 }
 
-/* Upwind fluxes only dissipate: for the first-order scheme within its time step this is a theorem, for any cells and
- * any layers. The second-order one is not proved to; it must not gain over the run. */
+/* Checks that energy does not increase. Upwind fluxes only dissipate: for the first-order scheme within its time step
+ * this is a theorem, for any cells and any layers. For the second-order scheme there is no proof; it must not gain
+ * energy over the run. */
 static void energy_never_rises(void **state)
 {
     (void)state;
@@ -312,9 +317,9 @@ static void energy_never_rises(void **state)
     }
 }
 
-/* A wall that absorbs sends back (1 - cos t) / (1 + cos t) of what comes at an angle t to its normal: from the middle
- * of the box at most 0.27 (in the corners), 0.02 to 0.03 of the energy over all directions. Rigid ones send back all,
- * and only the scheme dissipates. */
+/* Checks absorbing walls: such a wall reflects (1 - cos t) / (1 + cos t) of a wave that arrives at an angle t to its
+ * normal: from the middle of the box at most 0.27 (in the corners), which is 0.02 to 0.03 of the energy over all
+ * directions. Rigid walls reflect everything, and only the scheme dissipates. */
 static void absorbing_walls_let_a_wave_go(void **state)
 {
     (void)state;
@@ -334,7 +339,7 @@ static void absorbing_walls_let_a_wave_go(void **state)
     }
 }
 
-/* The signed volume of a tet as it is drawn. */
+/* Returns the signed volume of a tet at its drawn positions. */
 static double drawn_volume(const model *m, int32_t cell)
 {
     const float *x = m->solver.grid.coordinates.values;
@@ -349,7 +354,8 @@ static double drawn_volume(const model *m, int32_t cell)
            6;
 }
 
-/* The default swell must show, and turn no cell inside out: the pictures are to be of a wave, not of torn cells. */
+/* Checks that the default displacement of vertices is visible and inverts no cell: the pictures are to show a wave, not
+ * torn cells. */
 static void moving_mesh_swells_without_turning_cells_inside_out(void **state)
 {
     (void)state;
@@ -399,7 +405,7 @@ static void float_stays_near_double(void **state)
         peak[i] = wave_solver_totals(&m.solver).peak;
         free_model(&m);
     }
-    /* 50 steps of some 60 roundings of 6e-8, of values of at most 1 */
+    /* 50 steps of about 60 roundings of 6e-8, of values of at most 1 */
     assert_true(fabs(peak[0] - peak[1]) <= 50 * 60 * 6e-8);
 }
 

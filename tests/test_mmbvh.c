@@ -1,4 +1,4 @@
-/* Compares the tree with brute force over all cells in double, when it is built and refitted, and tests lack of memory,
+/* Compares the tree with brute force over all cells in double, after building and refitting, and checks lack of memory,
  * for both layouts and both builders. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -35,7 +35,7 @@ static mmbvh build_by(const lattice *l, const grid_field *field, int threads)
     return tree;
 }
 
-/* The box of a cell, in the tree's coordinates, in double. */
+/* Computes the box of a cell in the tree's coordinates, in double. */
 static void cell_box(const lattice *l, const mmbvh *tree, int64_t cell, double lower[3], double upper[3])
 {
     int64_t vertices[GRID_MAX_CELL_VERTICES];
@@ -53,7 +53,7 @@ static void cell_box(const lattice *l, const mmbvh *tree, int64_t cell, double l
     }
 }
 
-/* Rounds by the C library, not by the tree's own functions. */
+/* Rounds down by functions of the C library, not by the tree's own. */
 static float float_below(double x)
 {
     const float f = (float)x;
@@ -66,7 +66,7 @@ static float float_above(double x)
     return (double)f < x ? nextafterf(f, INFINITY) : f;
 }
 
-/* A leaf's box and range as brute force has them. */
+/* Computes a leaf's box and range by brute force. */
 static node_view leaf_by_hand(const lattice *l, const mmbvh *tree, const grid_field *field, int64_t index)
 {
     node_view leaf = view_node(tree, index);
@@ -97,8 +97,9 @@ static node_view leaf_by_hand(const lattice *l, const mmbvh *tree, const grid_fi
     return leaf;
 }
 
-/* The compact layout takes a bound down to a whole step, and one more where the quotient rounds the wrong way; an
- * extent up by at most 1/256 of itself and 16 steps, from where the lower bound is. */
+/* Checks a box's excess. The compact layout rounds a lower bound down to a whole step, and one step more if the
+ * quotient is rounded in the wrong direction. It rounds an extent, measured from the stored lower bound, up by at most
+ * 1/256 of itself and 16 steps. */
 static void assert_tight_box(const mmbvh *tree, const node_view *node, const node_view *expected)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -111,7 +112,7 @@ static void assert_tight_box(const mmbvh *tree, const node_view *node, const nod
     }
 }
 
-/* Boxes are no larger than they need be; mmbvh_check proves that they hold their cells. */
+/* Checks that boxes are no larger than necessary; mmbvh_check proves that they contain their cells. */
 static void assert_tight(const lattice *l, const mmbvh *tree, const grid_field *field)
 {
     for (int64_t i = 0; i < tree->node_count; i++) {
@@ -170,7 +171,7 @@ static void shifted_and_scaled_bounds_are_rounded_outward(void **state)
     free_lattice(&l);
 }
 
-/* 178,746 tets: enough that the root itself is split by chunks in parallel. */
+/* Checks 178,746 tets: enough that the root itself is split in chunks by several threads. */
 static void same_bytes_for_any_number_of_threads(void **state)
 {
     (void)state;
@@ -196,7 +197,8 @@ static void ghosts_are_not_in_the_tree(void **state)
     l.ghosts = calloc((size_t)l.g.cell_count, 3);
     int64_t ghosts = 0;
     for (int64_t cell = 0; cell < l.g.cell_count; cell++) {
-        const bool outer = cell < l.g.cell_count / 3; /* so that the others' bounds are smaller than all cells' */
+        /* makes the bounds of the remaining cells smaller than those of all cells */
+        const bool outer = cell < l.g.cell_count / 3;
         l.ghosts[3 * cell] = outer || hash_unit((uint64_t)cell) < 0.4 ? 2 : 0;
         ghosts += l.ghosts[3 * cell] != 0;
     }
@@ -217,7 +219,7 @@ static void ghosts_are_not_in_the_tree(void **state)
     free_lattice(&l);
 }
 
-/* Some vertices' values to NaN or infinity; returns how many cells have one. */
+/* Sets the values of some vertices to NaN or infinity; returns how many cells have such a vertex. */
 static int64_t poison(lattice *l)
 {
     for (int64_t v = 0; v < l->g.vertex_count; v++) {
@@ -289,7 +291,7 @@ static void no_field_gives_infinite_ranges(void **state)
     free_lattice(&l);
 }
 
-/* 29,791 hexes: more nodes than one task of a refit sweeps. */
+/* Checks 29,791 hexes: more nodes than one task of a refit processes. */
 static void refitted_ranges_equal_a_fresh_build(void **state)
 {
     (void)state;
@@ -310,7 +312,7 @@ static void refitted_ranges_equal_a_fresh_build(void **state)
     free_lattice(&l);
 }
 
-/* Tested for every kind and layout, with zeros of both signs, and in doubles with numbers that are no floats. */
+/* Checks every kind and layout, with zeros of both signs, and in doubles with numbers that are not exact in float. */
 static void refitted_ranges_are_tight_in_every_layout(void **state)
 {
     (void)state;
@@ -366,7 +368,8 @@ static void refitted_bounds_contain_moved_vertices_tightly(void **state)
     }
 }
 
-/* A further field's pairs are what the nodes would hold had the tree been refitted to it. */
+/* Checks that the pairs of a second field are the ranges that the nodes would have if the tree were refitted to that
+ * field. */
 static void assert_pairs_equal_refit(lattice *l, const mmbvh *tree, const grid_field *field)
 {
     float *pairs = malloc((size_t)tree->node_count * 2 * sizeof *pairs);
@@ -400,11 +403,11 @@ static void further_fields_have_ranges_beside_the_tree(void **state)
                         .component_stride = 8,
                         .component_count = 3,
                         .component = 1};
-    assert_pairs_equal_refit(&l, &tree, &field); /* a component of a vector at the vertices */
+    assert_pairs_equal_refit(&l, &tree, &field); /* for a component of a vector at the vertices */
     field.component = -1;
-    assert_pairs_equal_refit(&l, &tree, &field); /* its magnitude */
+    assert_pairs_equal_refit(&l, &tree, &field); /* for the magnitude of the vector */
     field.is_cell_centred = true;
-    assert_pairs_equal_refit(&l, &tree, &field); /* at the cells */
+    assert_pairs_equal_refit(&l, &tree, &field); /* for a field at the cells */
     field.component = 2;
     assert_pairs_equal_refit(&l, &tree, &field);
 
@@ -419,7 +422,7 @@ static void further_fields_have_ranges_beside_the_tree(void **state)
     free_lattice(&l);
 }
 
-/* count cells, all the same tet; vertices of n = 1 cubes serve. */
+/* Makes `count` cells, all the same tet; the vertices are those of a single cube. */
 static lattice make_coincident(int64_t count)
 {
     lattice l = make_lattice(1, LATTICE_TETS, (lattice_layout){0});
@@ -439,7 +442,8 @@ static void coincident_cells_are_halved(void **state)
         mmbvh tree = build_by(&l, &l.field, 2);
         const mmbvh_statistics s = assert_proved(&tree, &l.g, &l.field);
         const int64_t halvings = counts[i] > 7 ? (int64_t)ceil(log2((double)counts[i] / 7)) : 0;
-        /* Along the curve cells that coincide are told apart by their number, down to four neighbouring ones. */
+        /* Along the space-filling curve, coinciding cells are ordered by their number and split down to four
+         * consecutive ones. */
         const int64_t most = variant.builder == MMBVH_SAH ? halvings : (int64_t)ceil(log2((double)counts[i] + 1)) - 2;
         assert_true(s.depth <= (most > 0 ? most : 0) + 1);
         assert_int_equal(s.leaves, counts[i] == 0 ? 0 : counts[i] <= 7 ? 1 : s.leaves);
@@ -449,8 +453,8 @@ static void coincident_cells_are_halved(void **state)
     }
 }
 
-/* Boxes on the six half axes, each 17 times nearer to the origin than the one before: a plane between 16 equal bins
- * peels off hardly more than one of the 174. copies of each. */
+/* Checks the depth for boxes on the six half axes, each 17 times nearer to the origin than the previous one: a plane
+ * between 16 equal bins separates hardly more than one of the 174. copies is the number of copies of each box. */
 static void assert_depth_of_shrinking_boxes(int64_t copies)
 {
     enum { STEPS = 29, PLACES = 6 * STEPS };
@@ -468,7 +472,8 @@ static void assert_depth_of_shrinking_boxes(int64_t copies)
     base_error error = {0};
     mmbvh_statistics s = {0};
     if (mmbvh_check(&tree, NULL, NULL, &s, &error)) fail_msg("%s", error.message);
-    assert_true(variant.builder != MMBVH_SAH || s.depth > MMBVH_MAX_DEPTH - 32); /* or the test tests nothing */
+    /* otherwise the trees are not deep enough to test the limit */
+    assert_true(variant.builder != MMBVH_SAH || s.depth > MMBVH_MAX_DEPTH - 32);
     mmbvh_free(&tree);
     free(lower);
     free(upper);
@@ -479,10 +484,11 @@ static void depth_is_bounded_where_cells_shrink_without_end(void **state)
 {
     (void)state;
     assert_depth_of_shrinking_boxes(1);
-    assert_depth_of_shrinking_boxes(2000); /* deep before one thread takes over */
+    assert_depth_of_shrinking_boxes(2000); /* deep while several threads still build */
 }
 
-/* Every seventh box, from which the first planes are chosen, lies at 0, the others wherever from 1 to 2. */
+/* Checks boxes of which every seventh, the sample from which the first planes are chosen, lies at 0, and the others at
+ * random positions between 1 and 2. */
 static void planes_are_found_where_a_sample_finds_none(void **state)
 {
     (void)state;
@@ -503,7 +509,8 @@ static void planes_are_found_where_a_sample_finds_none(void **state)
     }
 }
 
-/* One cell far off on either side: the root's children are a leaf and all the rest, whichever way round. */
+/* Checks refitting with one cell far off on either side: one of the root's children is a leaf, the other has all other
+ * cells, in either order. */
 static void refit_reaches_all_below_a_leafs_sibling(void **state)
 {
     (void)state;
@@ -559,7 +566,7 @@ static void parent_tree_holds_every_mesh(void **state)
     }
 }
 
-/* Whoever descends only into boxes that hold the point meets every cell whose own box holds it. */
+/* Checks that a traversal which enters only boxes that contain a point reaches every cell whose own box contains it. */
 static void descent_to_a_point_misses_no_cell(void **state)
 {
     (void)state;
@@ -569,7 +576,7 @@ static void descent_to_a_point_misses_no_cell(void **state)
     for (int64_t n = 0; n < 200; n++) {
         double p[3];
         for (int axis = 0; axis < 3; axis++) p[axis] = 10 * hash_unit((uint64_t)(1000 + 3 * n + axis)) - 0.5;
-        if (n < 50) grid_vertex(&l.g, 13 * n, p); /* on the boxes' corners too */
+        if (n < 50) grid_vertex(&l.g, 13 * n, p); /* also at the corners of boxes */
         memset(met, 0, (size_t)l.g.cell_count * sizeof *met);
         int64_t stack[MMBVH_MAX_DEPTH + 1] = {0};
         for (int height = 1; height > 0;) {
@@ -594,9 +601,9 @@ static void descent_to_a_point_misses_no_cell(void **state)
     free_lattice(&l);
 }
 
-/* A tree that pays: on a lattice of n^3 cubes a ray crosses about 1.5 n of them (the mean chord of a cube is 2/3 of
- * its side, and it meets a plane's cells on three axes); a tree that tests 60 boxes and cells for each of them would be
- * no tree. */
+/* Checks that the tree is efficient: on a lattice of n^3 cubes a ray crosses about 1.5 n of them (the mean chord of a
+ * cube is 2/3 of its side, and the ray crosses planes of cells on three axes); a tree that tests 60 boxes and cells for
+ * each of them would be useless. */
 static void cost_grows_with_the_side_not_the_cells(void **state)
 {
     (void)state;
@@ -622,14 +629,15 @@ static void cost_of_a_tree_by_hand(void **state)
                            {.upper = {1, 2, 1}, .count = 3},
                            {.lower = {2, 0, 0}, .upper = {4, 1, 1}, .count = 2, .ref = 3}};
     const mmbvh tree = {.nodes = nodes, .node_count = 3, .cell_count = 5, .scale = 1};
-    /* Half areas 14, 5 and 5; 1 for the root's box, 2 for the pair, cells by probability. All exact in 1e-15. */
+    /* Half areas are 14, 5 and 5; the cost is 1 for the root's box, 2 for the pair, and the cells by their probability.
+     * All terms are exact to 1e-15. */
     assert_true(fabs(mmbvh_cost(&tree, NULL) - (3 + (3 * 5 + 2 * 5) / 14.0)) < 1e-14);
 }
 
 static void failed_allocations_give_an_error_and_leave_nothing(void **state)
 {
     (void)state;
-    lattice l = make_lattice(22, LATTICE_TETS, (lattice_layout){0}); /* 63,888 tets: a top and subtrees */
+    lattice l = make_lattice(22, LATTICE_TETS, (lattice_layout){0}); /* 63,888 tets: enough for a top and subtrees */
     for (int threads = 1; threads <= 2; threads++) {
         const int64_t held = base_memory_held(), before = base_memory_allocations();
         mmbvh tree = build_by(&l, &l.field, threads);
@@ -692,7 +700,7 @@ int main(void)
         cmocka_unit_test(failed_allocations_give_an_error_and_leave_nothing),
         cmocka_unit_test(wrong_arguments_are_refused),
     };
-    /* test_mmbvh_layout shows that both layouts hold the same tree, by either builder. */
+    /* test_mmbvh_layout checks that both layouts contain the same tree, for either builder. */
     static const mmbvh_options variants[] = {{.layout = MMBVH_COMPACT, .builder = MMBVH_SAH},
                                              {.layout = MMBVH_REFERENCE, .builder = MMBVH_SAH},
                                              {.layout = MMBVH_COMPACT, .builder = MMBVH_MORTON}};

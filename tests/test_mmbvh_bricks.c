@@ -1,5 +1,5 @@
-/* Trees over lattices whose cells are given by their indices: they are proved by mmbvh_check(), their leaves' ranges
- * are those of brute force over the cells, also where values are not finite, and small boxes fill their leaves. */
+/* Checks trees over lattices whose cells are given by their indices: mmbvh_check() proves them, the ranges of their
+ * leaves equal brute force over the cells, also if values are not finite, and small boxes fill their leaves. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +13,7 @@
 
 static const double no_shift[3] = {0, 0, 0};
 
-/* A rectilinear lattice, its values as floats and doubles, and its arrays' padding, which holds NaN. */
+/* A rectilinear lattice, its values as floats and doubles, and the padding of its arrays, which contains NaN. */
 typedef struct subject {
     grid_lattice lattice;
     grid g;
@@ -36,7 +36,7 @@ static grid_numbering number_along(const int64_t counts[3], int64_t padding, boo
         stride = outer;
     }
     *length = stride;
-    for (int axis = 0; axis < 3; axis++) /* along the axis of the largest stride there is no outer one */
+    for (int axis = 0; axis < 3; axis++) /* the axis of the largest stride has no outer stride */
         if (out.outer[axis] == (double)stride) out.outer[axis] = out.inverse_outer[axis] = 0;
     return out;
 }
@@ -65,7 +65,7 @@ static void set_values(subject *s, int turn)
             }
 }
 
-/* layers: the number of ghost layers on each side. */
+/* Makes a lattice; layers is the number of ghost layers on each side. */
 static void make(const int64_t cells[3], int64_t padding, bool is_reversed, int64_t layers, subject *s)
 {
     static const signed char hex[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
@@ -171,8 +171,9 @@ static void trees_are_proved_and_their_ranges_tight(void **state)
     check_lattice((const int64_t[]){12, 11, 10}, 3, true, 1);
 }
 
-/* Leaves have 3 x 2 x 1 cells where sides are powers of two, too. Of 24 bytes a node and 4 a cell, 6 cells a leaf take
- * 12 bytes each; the sides' remainders take less than another one. */
+/* Checks the memory of trees over small boxes, whose leaves have 3 x 2 x 1 cells even if sides are powers of two. With
+ * 24 bytes per node and 4 per cell, leaves of 6 cells take 12 bytes per cell; the remainders of the sides take less
+ * than another 12. */
 static void small_boxes_fill_their_leaves(void **state)
 {
     (void)state;

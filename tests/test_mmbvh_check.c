@@ -1,4 +1,5 @@
-/* mmbvh_check() on trees broken on purpose, one invariant at a time: each is found, and found to be the one. */
+/* Checks mmbvh_check() on trees that violate one invariant at a time: each violation is detected, and is reported as
+ * that one. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,8 +14,8 @@
 typedef struct fixture {
     lattice l;
     mmbvh tree;
-    int64_t leaf;  /* one of two cells or more */
-    int64_t inner; /* one below the root */
+    int64_t leaf;  /* a leaf with two cells or more */
+    int64_t inner; /* an inner node below the root */
 } fixture;
 
 static int set_up(void **state)
@@ -72,7 +73,7 @@ static void cell_that_is_not_there_is_found(void **state)
 static void missing_cell_is_found(void **state)
 {
     fixture *f = *state;
-    mmbvh_node *last = &f->tree.nodes[f->tree.node_count - 1]; /* all before it stays right */
+    mmbvh_node *last = &f->tree.nodes[f->tree.node_count - 1]; /* everything before the last node stays valid */
     assert_true(last->count > 1);
     last->count--;
     f->tree.cell_count--;
@@ -204,7 +205,7 @@ static void wrong_count_of_unusable_cells_is_found(void **state)
     assert_found(f, "unusable");
 }
 
-/* A comb: every left child a leaf of one cell, one level too deep. */
+/* Makes a comb: every left child is a leaf of one cell, and the tree is one level too deep. */
 static void too_deep_a_tree_is_found(void **state)
 {
     (void)state;

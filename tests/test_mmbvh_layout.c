@@ -1,5 +1,5 @@
-/* Tests what the layouts and builders promise besides a proved tree: boxes of 24 bytes that hold their cells and are
- * tight, grids that fit the mesh, cells of very different sizes told apart, and memory. */
+/* Checks what layouts and builders guarantee in addition to a valid tree: boxes of 24 bytes that contain their cells
+ * tightly, quantization grids that fit the mesh, resolution of cells of very different sizes, and memory. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -25,9 +25,9 @@ static mmbvh build(const lattice *l, mmbvh_layout layout, mmbvh_builder builder)
     return tree;
 }
 
-/* Boxes at random in a grid at random: sizes and distances from 1e-9 to 1e9, from the whole grid to a point. The stored
- * box holds the given one; its lower bound is off by a step and one for rounding, its extent by 1/256 and a sixteenth
- * of a step (mmbvh_compact.h). */
+/* Checks random boxes in a random grid: sizes and distances from 1e-9 to 1e9, from the whole grid to a point. The
+ * stored box must contain the given one; its lower bound is off by a step and one for rounding, its extent by 1/256 and
+ * a sixteenth of a step (mmbvh_compact.h). */
 static void compact_box_holds_and_is_tight(void **state)
 {
     (void)state;
@@ -83,8 +83,8 @@ static void box_beyond_the_grid_is_refused(void **state)
     }
 }
 
-/* Both layouts have the same nodes, leaf for leaf, with the same ranges to the bit, and each compact box holds the
- * other layout's. */
+/* Checks that both layouts have the same nodes, leaf for leaf, with the same ranges to the bit, and that each compact
+ * box contains that of the other layout. */
 static void layouts_hold_one_tree(void **state)
 {
     (void)state;
@@ -126,7 +126,7 @@ static void boxes_without_end_take_the_reference_layout(void **state)
     mmbvh_free(&tree);
 }
 
-/* Cells whose box holds the point, met by descent; all tested are counted. */
+/* Counts the cells tested by a traversal of the nodes whose boxes contain the point. */
 static int64_t cells_tested_at(const mmbvh *tree, const double p[3])
 {
     int64_t tested = 0, stack[MMBVH_MAX_DEPTH + 1] = {0};
@@ -142,9 +142,10 @@ static int64_t cells_tested_at(const mmbvh *tree, const double p[3])
     return tested;
 }
 
-/* Hexes of size 1, ten in the middle of each side shrunk to 2e-5: all ten are less than a step of the builder's first
- * grid, 9 / 32767. A point in a cell of a jittered lattice is in the boxes of a few leaves; without a finer grid the
- * 1000 cells that are small on all axes look alike, and a leaf holds any four of them. */
+/* Checks hexes of size 1, of which the ten in the middle of each side are shrunk to 2e-5: all ten together are smaller
+ * than a step of the builder's first grid, 9 / 32767. A point in a cell of a jittered lattice is in the boxes of a few
+ * leaves; without a finer grid the 1000 cells that are small on all axes have the same position, and a leaf contains
+ * any four of them. */
 static void cells_of_very_different_sizes_are_distinguished(void **state)
 {
     (void)state;
@@ -154,14 +155,14 @@ static void cells_of_very_different_sizes_are_distinguished(void **state)
         for (int64_t v = 0; v < l.g.vertex_count; v++) {
             double p[3];
             grid_vertex(&l.g, v, p);
-            /* Vertices 5 to 14 of a side shrink to the middle. */
+            /* Vertices 5 to 14 of a side are shrunk towards the middle. */
             for (int axis = 0; axis < 3; axis++) {
                 const double x = p[axis];
                 const double y = x < 5 ? x : x > 15 ? x - 10 + 2e-4 : 5 + (x - 5) * 2e-5;
                 put_number(&l.g.coordinates[axis], v, y);
             }
         }
-        /* The cells' numbers say nothing about their places. */
+        /* Shuffles the cells, so that their numbers do not depend on their positions. */
         for (int64_t cell = l.g.cell_count - 1; cell > 0; cell--) {
             const int64_t other = (int64_t)(hash_unit(seed++) * (double)(cell + 1));
             for (int k = 0; k < 8; k++) {
@@ -179,15 +180,15 @@ static void cells_of_very_different_sizes_are_distinguished(void **state)
             for (uint64_t axis = 0; axis < 3; axis++) p[axis] = 5 + 2e-4 * (0.1 + 0.8 * hash_unit(3 * n + axis));
             tested += cells_tested_at(&tree, p);
         }
-        /* A jittered hex's box is 1.3 to 1.6 times its cell on a side, a leaf's half as much again: a point is in some
-         * 4 leaves of 4 cells. The compact boxes are of steps as large as a cell. */
+        /* On a side, a jittered hex's box is 1.3 to 1.6 times its cell, and a leaf's box half as much again: a point is
+         * in about 4 leaves of 4 cells. The compact boxes have steps as large as a cell. */
         assert_true(layout == MMBVH_COMPACT || tested < 1000 * 20);
         mmbvh_free(&tree);
         free_lattice(&l);
     }
 }
 
-/* A vertex that no cell has stands a million times farther off than all others. */
+/* Checks a vertex without cells that is a million times farther away than all others. */
 static void vertices_of_no_cell_do_not_coarsen_the_tree(void **state)
 {
     (void)state;
@@ -205,7 +206,7 @@ static void vertices_of_no_cell_do_not_coarsen_the_tree(void **state)
         const mmbvh_options options = {.builder = (mmbvh_builder)builder};
         assert_int_equal(mmbvh_build(&far, &l.field, no_shift, 1, &options, &tree, NULL), INSITU_OK);
         assert_proved(&tree, &far, &l.field);
-        /* The grids' origins differ by a rounding of the guess and so may a plane or two. */
+        /* The origins of the grids differ by a rounding of the guess, and so may one or two planes. */
         assert_true(fabs(tree.built_cost / tight.built_cost - 1) < 0.01);
         assert_memory_equal(&tree.grid, &tight.grid, sizeof tree.grid);
         mmbvh_free(&tree);
@@ -223,7 +224,8 @@ static void scale_mesh(lattice *l, double scale)
     }
 }
 
-/* A mesh that grows a thousandfold and shrinks again: the tree's grid follows, and its cost stays the mesh's. */
+/* Checks a mesh that grows a thousandfold and shrinks again: the tree's grid is adapted, and the tree's cost stays the
+ * same. */
 static void refit_follows_a_mesh_that_grows_and_shrinks(void **state)
 {
     (void)state;
@@ -234,7 +236,7 @@ static void refit_follows_a_mesh_that_grows_and_shrinks(void **state)
         scale_mesh(&l, scales[i]);
         assert_int_equal(mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
         const mmbvh_statistics s = assert_proved(&tree, &l.g, &l.field);
-        /* Boxes are rounded otherwise on another grid: by 1/256 of an extent on three axes. */
+        /* Boxes are rounded differently on another grid: by 1/256 of an extent on three axes. */
         assert_true(fabs(s.cost / tree.built_cost - 1) < 3.0 / 256);
     }
     put_number(&l.g.coordinates[0], 5, INFINITY);
@@ -243,7 +245,8 @@ static void refit_follows_a_mesh_that_grows_and_shrinks(void **state)
     free_lattice(&l);
 }
 
-/* A tree along the curve is no worse than its kind: by half at most over the surface area heuristic's. */
+/* Checks that a tree built along the space-filling curve costs at most half more than one by the surface area
+ * heuristic. */
 static void curve_costs_little_more_than_planes(void **state)
 {
     (void)state;
@@ -257,7 +260,8 @@ static void curve_costs_little_more_than_planes(void **state)
     }
 }
 
-/* The tree of 178,746 tets takes 16 bytes a cell, and building it at most 2.5 times as much. */
+/* Checks that the tree of 178,746 tets takes 16 bytes per cell, and that building it takes at most 2.5 times as
+ * much. */
 static void memory_is_what_was_promised(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* Nodes of either layout, as the tests look at them and spoil them. */
+/* Functions by which tests read and corrupt nodes of either layout. */
 #ifndef TEST_MMBVH_NODES_H
 #define TEST_MMBVH_NODES_H
 

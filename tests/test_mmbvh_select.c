@@ -1,5 +1,5 @@
-/* The cells that can show, against all cells one by one in double: of every kind of cell and layout, with ghosts and
- * with values that are not finite. */
+/* Compares the selection of visible cells with brute force over all cells in double: for every kind of cell and layout,
+ * with ghosts and with values that are not finite. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,10 +11,10 @@
 #include "mmbvh.h"
 #include "test_meshes.h"
 
-enum { SIDE = 7, LARGE_SIDE = 15 /* cells for several blocks of several threads */, QUERIES = 5 };
+enum { SIDE = 7, LARGE_SIDE = 15 /* enough cells for several blocks of several threads */, QUERIES = 5 };
 
-/* One isovalue, several, the ranges that a transfer function shows, and the least and greatest of all values, which one
- * vertex has. */
+/* The queries: one isovalue, several isovalues, the ranges that a transfer function shows, and the least and greatest
+ * of all values, which only one vertex has. */
 static const mmbvh_interval at_one[] = {{0.25f, 0.25f}}, at_three[] = {{-1, -1}, {0.1f, 0.1f}, {0.9f, 0.9f}},
                             in_two[] = {{-0.4f, -0.3f}, {1, INFINITY}}, at_least[] = {{-2, -2}}, at_most[] = {{2, 2}};
 
@@ -27,7 +27,7 @@ static void make_queries(const grid_field *field, mmbvh_query queries[QUERIES])
     queries[4] = (mmbvh_query){field, 1, at_most};
 }
 
-/* Every fifth cell a ghost, and one value in two hundred not finite. */
+/* Makes a mesh in which every fifth cell is a ghost, and one of two hundred values is not finite. */
 static test_mesh make_mesh(test_mesh_kind kind, int side)
 {
     test_mesh mesh;
@@ -43,7 +43,7 @@ static test_mesh make_mesh(test_mesh_kind kind, int side)
     return mesh;
 }
 
-/* -1: not to be used; else whether the query selects it. */
+/* Returns -1 if the cell is unusable, else whether the query selects it. */
 static int expected_selection(const test_view *view, const mmbvh_query *query, int64_t cell)
 {
     double low = (double)INFINITY, high = -(double)INFINITY;
@@ -60,7 +60,7 @@ static int expected_selection(const test_view *view, const mmbvh_query *query, i
     return 0;
 }
 
-/* Returns how many cells are selected. */
+/* Compares the selected cells; returns their number. */
 static int64_t assert_selects(const test_view *view, const mmbvh_query *queries, int count)
 {
     mmbvh_selection selection;
@@ -114,7 +114,8 @@ static void just_the_cells_that_can_show_are_selected(void **state)
     }
 }
 
-/* Components, magnitudes, values of cells, integers, and doubles of which a float's rounding decides. */
+/* Checks components, magnitudes, values at cells, integers, and doubles whose rounding to float decides the
+ * selection. */
 static void fields_of_other_kinds_are_selected_by(void **state)
 {
     (void)state;
@@ -123,7 +124,8 @@ static void fields_of_other_kinds_are_selected_by(void **state)
         test_view view;
         test_view_create(&mesh, (test_layout){false}, &view);
         const int64_t count =
-            mesh.cell_count > mesh.vertex_count ? mesh.cell_count : mesh.vertex_count; /* cells' and vertices' */
+            /* enough values for cells and for vertices */
+            mesh.cell_count > mesh.vertex_count ? mesh.cell_count : mesh.vertex_count;
         double *vectors = malloc((size_t)count * 3 * sizeof *vectors);
         int32_t *integers = malloc((size_t)count * sizeof *integers);
         assert_true(vectors && integers);

@@ -1,4 +1,4 @@
-/* Any Morton keys come out in ascending order, compared with qsort(). */
+/* Checks that any Morton keys are sorted in ascending order, by comparison with qsort(). */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,7 +11,7 @@
 #include "memory.h"
 #include "mmbvh_morton.h"
 
-enum { COUNT = 300000 /* several digits' keys are then more than one thread sorts alone */ };
+enum { COUNT = 300000 /* so many that the keys of several digits exceed what one thread sorts alone */ };
 
 static uint64_t next_random(uint64_t *state)
 {
@@ -29,7 +29,7 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* A code of so many bits, of which a mesh may use any part. */
+/* Makes a code of the given number of bits; a mesh may use any part of the codes. */
 typedef uint64_t code_maker(uint64_t random, int64_t i, int bits);
 
 static uint64_t even(uint64_t random, int64_t i, int bits)
@@ -38,13 +38,13 @@ static uint64_t even(uint64_t random, int64_t i, int bits)
     return random & ((UINT64_C(1) << bits) - 1);
 }
 
-/* Smaller and smaller cells towards a corner: half the keys in half the box, and so on. */
+/* Returns codes of cells that get smaller towards a corner: half of the keys are in half of the box, and so on. */
 static uint64_t refined(uint64_t random, int64_t i, int bits)
 {
     return even(random, i, bits) >> (random >> 58) % (unsigned)bits;
 }
 
-/* All keys are the same, except one. */
+/* Returns codes that, except for one, are all in the lower half of the bits. */
 static uint64_t outlier(uint64_t random, int64_t i, int bits)
 {
     return i ? even(random, i, bits) >> bits / 2 : (UINT64_C(1) << bits) - 1;

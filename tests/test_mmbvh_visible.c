@@ -1,5 +1,5 @@
-/* Bounds refitted where something can be seen: against brute force over the cells that can, and against a whole refit.
- */
+/* Compares bounds that are refitted only for visible nodes with brute force over the visible cells, and with a whole
+ * refit. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +13,7 @@
 
 static const double no_shift[3] = {0, 0, 0};
 
-/* Two parts: of the nodes' own ranges, and of a second field's pairs. */
+/* The subject has two visibilities: by the nodes' own ranges, and by the pairs of a second field. */
 typedef struct subject {
     lattice l;
     mmbvh tree;
@@ -22,7 +22,7 @@ typedef struct subject {
     mmbvh_visible visible[2];
 } subject;
 
-/* Inward, so that the compact layout's grid still holds the mesh. */
+/* Moves vertices inwards, so that the grid of the compact layout still contains the mesh. */
 static void move(lattice *l, double by)
 {
     for (int64_t v = 0; v < l->g.vertex_count; v++) {
@@ -41,7 +41,7 @@ static subject make(lattice_kind kind, lattice_layout layout, mmbvh_layout nodes
     s.pairs = malloc((size_t)s.tree.node_count * 2 * sizeof *s.pairs);
     for (int64_t i = 0; i < s.tree.node_count; i++) {
         const node_view node = view_node(&s.tree, i);
-        s.pairs[2 * i] = node.lower[2]; /* as a field that is the height would have it */
+        s.pairs[2 * i] = node.lower[2]; /* the range of a field that equals the height */
         s.pairs[2 * i + 1] = node.upper[2];
     }
     return s;
@@ -82,7 +82,7 @@ static void grow(node_view *to, const node_view *by)
     }
 }
 
-/* The box of a leaf's cells as they lie now. */
+/* Computes the box of a leaf's cells at their current positions. */
 static node_view box_by_hand(const subject *s, int64_t leaf)
 {
     node_view box = view_node(&s->tree, leaf);
@@ -101,8 +101,9 @@ static node_view box_by_hand(const subject *s, int64_t leaf)
     return box;
 }
 
-/* Goes down as a traversal does; returns the bounds of all below that can be seen. The slack, as a share of the mesh's
- * size, is for float32 and the compact layout: 2 of its 2^20 steps and 1/256 of the box, which is as wide as a leaf. */
+/* Traverses the visible nodes below a node and checks that their bounds are contained in its own; returns their bounds.
+ * Single precision and the compact layout need a slack, relative to the mesh's size: 2 of its 2^20 steps and 1/256 of
+ * the box, which is as wide as a leaf. */
 static node_view assert_holds(const subject *s, int64_t i, int64_t *visited)
 {
     ++*visited;
@@ -123,7 +124,7 @@ static node_view assert_holds(const subject *s, int64_t i, int64_t *visited)
     return held;
 }
 
-/* Sums have a fixed order, so any number of threads makes the same tree and measures the same area. */
+/* Checks that any number of threads makes the same tree and computes the same area, since sums have a fixed order. */
 static void assert_same_by_one_thread(const subject *s, const mmbvh *before)
 {
     mmbvh again = *before;
@@ -171,7 +172,7 @@ static void check(subject *s)
     int64_t visited = 0;
     move(&s->l, 0.02);
     choose_visible(s);
-    /* Views are of each tree's own ranges, which are the same. */
+    /* Visibilities refer to each tree's own ranges, which are the same. */
     assert_int_equal(
         mmbvh_refit_visible_bounds(&s->tree, &s->l.g, s->visible, 2, &(mmbvh_options){.threads = 2}, &is_whole),
         INSITU_OK);
@@ -181,7 +182,7 @@ static void check(subject *s)
     assert_int_equal(mmbvh_refit_bounds(&whole, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
     assert_true(visited > 100 && visited < s->tree.node_count);
     assert_true(count_stale(s, &before, &whole) > s->tree.node_count / 10);
-    /* A whole refit catches up on nodes that were passed over. */
+    /* A whole refit updates also the nodes that were skipped. */
     assert_int_equal(mmbvh_refit_bounds(&s->tree, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
     assert_same_nodes(&s->tree, &whole);
     assert_int_equal(mmbvh_check(&s->tree, &s->l.g, &s->l.field, NULL, NULL), INSITU_OK);
@@ -202,8 +203,8 @@ static void bounds_hold_what_shows_and_stay_where_nothing_does(void **state)
         }
 }
 
-/* The area that refits keep up to date is what a pass over all nodes finds: n sums of positive doubles and as many
- * differences are off by at most 2 n 2^-53 of the largest sum. */
+/* Checks that the area which refits keep up to date equals that of a pass over all nodes: n sums of positive doubles
+ * and as many differences are off by at most 2 n 2^-53 of the largest sum. */
 static void area_is_carried_on(void **state)
 {
     (void)state;

@@ -1,6 +1,7 @@
-/* Volumes that let no light through before their end: what lies behind is left out, and nobody sees it. Black in front
- * and white behind, so that light that is left out shows where it is not next to none: pictures against brute force in
- * double, and against the same cells on several ranks. And it is left out: fewer cells are placed. */
+/* Checks volumes that absorb all light before their end: what lies behind is skipped, invisibly. The medium is black in
+ * front and white behind, so that light that is missing would show unless it is negligible. Pictures are compared with
+ * brute force in double, and with the same cells on several ranks. A further test checks that fewer cells are
+ * transformed. */
 #include "reference_integral.h"
 #include "test_effort.h"
 #include "test_render_fixture.h"
@@ -19,14 +20,14 @@ typedef enum method { SAMPLES, SEGMENTS, MAX_ERROR, METHOD_COUNT } method;
 static const char *const method_names[METHOD_COUNT] = {"samples", "segments", "max_error"};
 static const double max_error = 1e-2;
 
-/* From 0 at the mesh's corner next to the eye of CAMERA_OUTSIDE to 1 at the one behind. */
+/* A field from 0 at the mesh's corner next to the eye of CAMERA_OUTSIDE to 1 at the opposite corner. */
 static double front_to_back(const double position[3])
 {
     return 0.5 - (2.4 * position[0] + 1.6 * position[1] + 3 * position[2]) / (2 * (2.4 + 1.6 + 3));
 }
 
-/* The same optical depth everywhere, `depth` through a distance of 1; black up to the middle plane, white behind it.
- * Rays come to that plane with any light between all of theirs and none. */
+/* Sets a medium with a constant extinction, an optical depth of `depth` through a distance of 1; it is black up to the
+ * middle plane, and white behind it. At that plane rays have any fraction of their light from all to none. */
 static void set_medium(render_fixture *f, method how, double depth)
 {
     static const float opacity = 0.5f;
@@ -53,7 +54,7 @@ static void stage(render_fixture *f, test_mesh_kind kind, int n, method how, dou
     set_medium(f, how, depth);
 }
 
-/* Cells found for the picture, and for each tile. */
+/* The traversals: cells are found for the whole picture, or for each tile. */
 static const render_traversal traversals[2] = {RENDER_BINNED, RENDER_TILES};
 
 static void compare_samples(render_fixture *f, const char *what)
@@ -84,10 +85,10 @@ static void compare_integrals(render_fixture *f, double most, const char *what)
     if (!(worst <= most)) fail_msg("%s: off by %g", what, worst);
 }
 
-/* Light of less than 1e-7 of a ray's is left out, of colours up to 1. A thousand times as much would show as nearly
- * 1e-4, some ten times what samples may be off (fixture_usual_bounds), and segments: values at their ends are off by up
- * to 4e-7 of the function's domain (docs/development/decisions/volume.md), and colours by as many times that as there
- * are entries. */
+/* Compares pictures with the reference. The kernels skip what would change a ray of colours up to 1 by less than 1e-7.
+ * A thousand times as much, nearly 1e-4, would be detected: it is about ten times the error of samples
+ * (fixture_usual_bounds). For segments, values at their ends are off by up to 4e-7 of the function's domain
+ * (docs/development/decisions/volume.md), and colours by that times the number of table entries. */
 static void pictures_are_those_of_all_cells(void **state)
 {
     (void)state;
@@ -106,7 +107,8 @@ static void pictures_are_those_of_all_cells(void **state)
         }
 }
 
-/* Ranks leave out what is behind their own cells alone, which is less than what one rank does that has all. */
+/* Compares pictures of several ranks. A rank skips only what is behind its own cells, which is less than one rank skips
+ * that has all cells. */
 static void ranks_leave_out_what_nobody_sees(void **state)
 {
     (void)state;
@@ -160,8 +162,9 @@ static int64_t cells_placed(test_mesh_kind kind, render_traversal traversal, dou
     return placed;
 }
 
-/* Three of a ray's 24 cells or more take all light. A window as deep as there is room has all of them. Those that light
- * decides are no shallower than four, and tiles see a slanted face of two to three; the first tile has a deep one. */
+/* Checks that cells are skipped. Three of a ray's 24 cells or more absorb all light. A window as deep as memory allows
+ * contains all cells. Windows whose depth depends on the light are at least four cells deep, and a slanted face takes
+ * two to three cells in a tile; the first tile has a deep window. */
 static void few_cells_are_placed(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_MIXED};

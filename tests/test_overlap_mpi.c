@@ -1,9 +1,8 @@
-/* Cells that overlap, on any number of ranks: each adds its own sample. Two lattices in one another, and lattices whose
- * vertices were thrown about, dealt to ranks at random, must make the picture that one rank makes and that the
- * brute-force renderer makes, which knows nothing of cells' neighbours: it collects the samples of all cells. Meshes
- * that do not overlap must not have a single pixel that is drawn twice.
- *
- * Verdicts are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
+/* Checks cells that overlap, on any number of ranks: each cell adds its own sample. The meshes are two lattices inside
+ * each other, and lattices with displaced vertices. Distributed over ranks at random, they must give the picture of one
+ * rank and that of the brute-force renderer, which collects the samples of all cells without using their neighbours.
+ * Meshes that do not overlap must not have a single pixel that is drawn twice. Results are reduced before they are
+ * asserted, so that a failing rank does not leave the others waiting. */
 #include "memory.h"
 #include "reference_integral.h"
 #include "session_frame.h"
@@ -34,7 +33,7 @@ static void *grown(void *block, int64_t count, size_t size, const void *more, in
     return p;
 }
 
-/* The cells of both; more is freed. */
+/* Adds the cells of `more` to the mesh and frees `more`. */
 static void join(test_mesh *mesh, test_mesh *more)
 {
     for (int64_t cell = 0; cell < more->cell_count; cell++) {
@@ -64,7 +63,7 @@ static void join(test_mesh *mesh, test_mesh *more)
     test_mesh_free(more);
 }
 
-/* A lattice, and in it a smaller one of the next kind with another field. */
+/* Makes a lattice, and inside it a smaller one of the next kind with another field. */
 static void interpenetrating(test_mesh_kind kind, test_mesh *out)
 {
     test_mesh inner;
@@ -74,7 +73,8 @@ static void interpenetrating(test_mesh_kind kind, test_mesh *out)
     join(out, &inner);
 }
 
-/* A lattice of which every third vertex is somewhere else: cells turned inside out, in their neighbours and theirs. */
+/* Makes a lattice in which every third vertex is displaced: cells are inverted, and overlap neighbours and their
+ * neighbours. */
 static void tangled(test_mesh_kind kind, test_mesh *out)
 {
     test_mesh_lattice(kind, SIDE, 0.2, test_wave, out);
@@ -92,8 +92,8 @@ typedef struct drawing {
     fixture_camera camera;
     int frame;
     int64_t fragment_limit;
-    double max_error; /* > 0: by segments */
-    bool is_stepped;  /* the opacity */
+    double max_error; /* > 0: volumes are drawn by segments */
+    bool is_stepped;  /* the opacity has steps */
 } drawing;
 
 static const double surface_values[2] = {-0.2, 0.3};
@@ -108,7 +108,7 @@ typedef struct staged {
     render_volume_layer volumes[2];
 } staged;
 
-/* Whether scenes of surfaces alone have normals by differences. */
+/* Whether scenes with surfaces only use normals by differences. */
 static bool is_by_differences;
 
 static void stage(staged *s, const test_mesh *mesh, const drawing *d)
@@ -144,7 +144,7 @@ static void stage(staged *s, const test_mesh *mesh, const drawing *d)
     s->f.job.volume_count = 2;
 }
 
-static session_frame frame; /* the last one that was drawn */
+static session_frame frame; /* the last frame that was drawn */
 
 static int64_t draw(const test_mesh *mesh, const drawing *d, MPI_Comm comm, bool is_alone, image *out)
 {
@@ -170,7 +170,7 @@ static void free_image(image *picture)
     free(picture->depth);
 }
 
-/* Draws as the session would: all ranks draw, each its share. */
+/* Draws as the session does: every rank draws its share. */
 static int64_t draw_shares(const test_mesh *mesh, test_partition_kind partition, const drawing *d, image *out)
 {
     test_mesh share;
@@ -192,9 +192,10 @@ static void assert_everywhere(bool is_well)
 
 /* ---- comparisons --------------------------------------------------------------------------------------------- */
 
-/* Samples of one place mix alike on any ranks; elsewhere "over" rounds in other groups, to 1e-6. Segments are an open
- * end: the partition decides whether a pixel whose overlap is transparent is drawn twice, and the second drawing cuts
- * in other places. Both are within max_error; 2.7e-6 was measured for 1e-3. */
+/* Compares two pictures. Samples at the same position are mixed identically on any ranks; elsewhere "over" rounds
+ * differently if fragments are grouped differently, by up to 1e-6. Segments may differ more: the partition decides
+ * whether a pixel with a transparent overlap is drawn twice, and the second drawing cuts rays at other positions. Both
+ * pictures are within max_error of the integral; the measured difference was 2.7e-6 for 1e-3. */
 static bool same_images(const image *whole, const image *other, const drawing *d, const char *what)
 {
     int depths = 0;
@@ -213,7 +214,7 @@ static bool same_images(const image *whole, const image *other, const drawing *d
     return !depths && colour <= bound;
 }
 
-/* Tells whether rounding may turn one of the ray's decisions. */
+/* Returns whether rounding may change one of the ray's decisions. */
 static bool is_doubtful(const reference_ray *ray)
 {
     const double margin = fixture_usual_bounds.margin;
@@ -221,8 +222,9 @@ static bool is_doubtful(const reference_ray *ray)
            ray->sample_margin < margin || ray->eye_margin < margin;
 }
 
-/* Usually every fifth pixel, of a picture of 67 a row. Cells that overlap have many surfaces and faces in a pixel: a
- * tenth of the rays may be in doubt, of which map_failed and ambiguous ones are the most. */
+/* Compares with the brute-force renderer, in the usual run every fifth pixel of a picture 67 pixels wide. Overlapping
+ * cells have many surfaces and faces in a pixel: up to a tenth of the rays may be doubtful, most of which are
+ * map_failed or ambiguous. */
 static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
 {
     staged s;
@@ -251,8 +253,8 @@ static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *
     return !wrong && doubtful <= PIXELS / every / 10;
 }
 
-/* Every seventeenth pixel against the integral, usually every 151st: max_error holds in each where the truth, computed
- * to a thousandth of it, is not in doubt. */
+/* Compares every seventeenth pixel with the integral, in the usual run every 151st: max_error must hold for each whose
+ * reference, computed to a thousandth of it, is not doubtful. */
 static bool is_as_integrated(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
 {
     staged s;
@@ -284,11 +286,11 @@ static bool is_as_integrated(const test_mesh *mesh, const drawing *d, const imag
     return is_well;
 }
 
-/* Where opaque surfaces hide most of a mesh some 50 pixels overlap, elsewhere hundreds and more. */
+/* If opaque surfaces hide most of a mesh, about 50 pixels overlap; in other scenes hundreds and more do. */
 enum { FEWEST = 30 };
 
-/* Returns whether a case is drawn. By default every fourth one is on one rank, and every sixth one, others each, on 2,
- * 3 and 7 ranks. */
+/* Returns whether a case is drawn. By default every fourth case is drawn on one rank, and every sixth one, different
+ * cases, on 2, 3 and 7 ranks. */
 static bool is_due(int kind, int scene)
 {
     return test_is_whole() || (kind + scene + rank_count) % (rank_count == 1 ? 4 : 6) == 0;
@@ -305,10 +307,10 @@ static void compare(const test_mesh *mesh, const drawing *d, bool with_reference
         if (overlaps < FEWEST || alone < FEWEST)
             fprintf(stderr, "%s, scene %d: %d pixels overlap, %d alone\n", what, (int)d->scene, (int)overlaps,
                     (int)alone);
-        /* Segments of several volumes are not first drawn as if nothing overlapped. */
+        /* Segments of several volumes are drawn with separate fragments from the start, which reports no overlaps. */
         const bool is_found = (overlaps >= FEWEST && alone >= FEWEST) || (d->max_error > 0 && d->scene == TWO_VOLUMES);
         good = is_found && (rank_count == 1 || same_images(&whole, &ours, d, what));
-        /* This is slow, and once is enough, because the picture is the same on any number of ranks. */
+        /* The reference is slow, and one comparison suffices, since the picture is the same on any number of ranks. */
         if (with_reference && (rank_count == 1 || test_is_whole()))
             good = (d->max_error > 0 ? is_as_integrated : is_as_counted)(mesh, d, &ours, what) && good;
         if (rank_count > 1) free_image(&whole);
@@ -346,7 +348,7 @@ static void segments_in_one_another_are_as_integrated(void **state)
     }
 }
 
-/* Two fields in the cells of one mesh. */
+/* Checks two fields in the cells of one mesh. */
 static void segments_of_two_volumes_are_as_integrated(void **state)
 {
     (void)state;
@@ -361,7 +363,8 @@ static void segments_of_two_volumes_are_as_integrated(void **state)
     }
 }
 
-/* Hexes turned inside out have no inverse map that both sides would find: tets alone are counted. */
+/* Checks displaced lattices. Inverted hexes have no inverse map that both sides of a face would find: only tets are
+ * compared with the reference. */
 static void tangled_lattices_are_the_same_everywhere(void **state)
 {
     (void)state;
@@ -376,8 +379,8 @@ static void tangled_lattices_are_the_same_everywhere(void **state)
     }
 }
 
-/* Tells whether the turns of the last frame were as many as fragment_limit makes necessary: it is reached by steps of
- * 8, and one turn may make half of what the one before lets expect. */
+/* Returns whether the last frame took no more turns than fragment_limit requires: the number of pixels of a turn grows
+ * at most eightfold, and a turn may make half of the fragments that the previous turn predicted. */
 static bool are_passes_few(int64_t fragment_limit)
 {
     int64_t most = 0;
@@ -385,7 +388,7 @@ static bool are_passes_few(int64_t fragment_limit)
     return frame.turns > 1 && frame.turns <= 4 + 2 * (int)(most / fragment_limit);
 }
 
-/* Turns only change when a pixel is drawn. */
+/* Checks that turns only change the time at which a pixel is drawn. */
 static void draw_in_passes(const test_mesh *mesh, drawing d, int64_t fragment_limit)
 {
     image at_once, in_turns;
@@ -401,7 +404,8 @@ static void draw_in_passes(const test_mesh *mesh, drawing d, int64_t fragment_li
     assert_everywhere(is_few && is_same);
 }
 
-/* Rays of samples make as many fragments as is estimated before the first turn, those of segments far fewer. */
+/* Checks pictures drawn in turns. Rays of samples make as many fragments as estimated before the first turn, those of
+ * segments far fewer. */
 static void passes_make_the_same_bits(void **state)
 {
     (void)state;
@@ -412,7 +416,8 @@ static void passes_make_the_same_bits(void **state)
     test_mesh_free(&mesh);
 }
 
-/* Several cells hold a sample's point: the least of their values counts, on whichever ranks they are. */
+/* Checks normals by differences: if several cells contain a sample point, the least of their values is used, on
+ * whichever ranks they are. */
 static void differences_among_overlapping_cells_are_the_same_bits(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_TETS, TEST_MIXED};
@@ -443,11 +448,11 @@ static void nothing_overlaps(const test_mesh *mesh, test_partition_kind partitio
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             image drawn;
             const drawing d = {scene, camera, (int)camera, MANY, max_error, false};
-            /* This is open: a hit that rounding puts behind the face at its cell's end is within the next cell's
-             * segment, and if that is another rank's, the pixel is drawn twice and counts. Two volumes are mixed in all
-             * pixels. */
+            /* A known limitation: a hit that rounding puts behind the face at its cell's end is inside the next cell's
+             * segment, and if that belongs to another rank, the pixel is drawn twice and counts. Two volumes are mixed
+             * in all pixels. */
             if (scene != VOLUME && max_error > 0) continue;
-            /* Usually each scene from every other camera. */
+            /* The usual run draws each scene from every other camera. */
             if (!test_is_whole() && max_error == 0 && ((int)scene + (int)camera + rank_count) % 2) continue;
             const int64_t overlaps = draw_shares(mesh, partition, &d, &drawn);
             free_image(&drawn);
@@ -472,7 +477,7 @@ static void conforming_meshes_have_no_overlap(void **state)
         }
 }
 
-/* A cell that a ray goes through twice is not twice at any place. */
+/* Checks that a cell which a ray crosses twice does not count as two cells at the same point. */
 static void a_cell_does_not_overlap_itself(void **state)
 {
     (void)state;

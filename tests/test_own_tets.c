@@ -1,4 +1,4 @@
-/* Polyhedra and the tets that they are of (test_own_tets.h). */
+/* Compares polyhedra with the tets that they consist of (test_own_tets.h). */
 #include "test_own_tets.h"
 
 #include "reference_cell.h"
@@ -78,8 +78,8 @@ static void draw(const test_mesh *mesh, double cell_size, const double *value, i
     fixture_draw(f, out);
 }
 
-/* Tells, in double, whether the ray passes so near to an edge, or to the isovalue at a face of a tet, that rounding may
- * decide. */
+/* Returns, computed in double, whether the ray passes so near to an edge, or to the isovalue at a face of a tet, that
+ * rounding may decide. */
 static bool is_in_band(const reference_scene *scene, int x, int y)
 {
     reference_ray ray;

@@ -1,8 +1,8 @@
-/* One image from any number of ranks: each rank draws its part of a mesh, dealt in blocks, at random or as a
- * checkerboard, with vertices of its own numbering, and compositing makes the picture; rank 0 draws the whole alone and
- * compares. Surfaces have the same bits in depth and colours. Volumes by samples, by segments and to an error agree
- * within 1e-6, as fragments blend in other groups. Ranks without a cell, without a mesh, and ranks that hold the
- * others' cells as ghosts take part. */
+/* Checks that any number of ranks gives the same image: each rank draws its part of a mesh, distributed in blocks, at
+ * random or as a checkerboard, with its own numbering of vertices, and compositing makes the picture; rank 0 draws the
+ * whole mesh alone and compares. Surfaces have the same bits in depth and colours. Volumes by samples, by exact
+ * segments and by segments under max_error agree within 1e-6, because fragments are blended in different groups. Ranks
+ * without a cell, ranks without a mesh, and ranks that have the others' cells as ghosts are included. */
 #include "comp.h"
 #include "memory.h"
 #include "test_effort.h"
@@ -19,7 +19,7 @@
 typedef struct scene {
     const char *name;
     fixture_camera camera;
-    float opacity; /* of its surfaces; 0: it has none */
+    float opacity; /* opacity of its surfaces; 0: it has none */
     bool has_volume;
     render_integration integration;
     double max_error;
@@ -44,7 +44,7 @@ enum { SCENE_COUNT = sizeof scenes / sizeof scenes[0] };
 enum { WIDTH = 67, HEIGHT = 51, PIXELS = WIDTH * HEIGHT, SIDE = 4 };
 
 static int my_rank, rank_count;
-static double worst[SCENE_COUNT]; /* of rank 0 */
+static double worst[SCENE_COUNT]; /* on rank 0 only */
 
 static void draw(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool is_alone, image *out)
 {
@@ -59,7 +59,7 @@ static void draw(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool 
     if (scene->has_volume) fixture_set_volume(&f, 0.3);
     f.job.integration = scene->integration;
     f.job.max_error = scene->max_error;
-    f.job.extent = 3.5; /* the cube's diagonal is less */
+    f.job.extent = 3.5; /* the diagonal of the cube is shorter */
     f.job.is_alone = is_alone;
     assert_int_equal(render_frame(&f.job, &list, NULL, &error), INSITU_OK);
     out->width = WIDTH;
@@ -101,7 +101,7 @@ static bool same_images(const image *whole, const image *other, const scene *sce
     return !depths && colour <= bound;
 }
 
-/* Takes this rank's share; with ghosts, all cells, with those of others as ghosts. */
+/* Makes this rank's share of the mesh; with ghosts, all cells, of which those of other ranks are ghosts. */
 static void extract_rank_cells(const test_mesh *mesh, const int *owners, bool ghosts, test_mesh *out)
 {
     int *all = calloc((size_t)mesh->cell_count, sizeof *all);
@@ -169,7 +169,7 @@ static void checkerboards_make_the_whole_image(void **state)
     compare_partition(TEST_CHECKERBOARD);
 }
 
-/* All cells with the last rank, and one cell each for the ranks there are. */
+/* Checks ranks without cells: the last rank has all cells, or there are fewer cells than ranks. */
 static void empty_ranks_take_part(void **state)
 {
     (void)state;

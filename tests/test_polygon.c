@@ -1,7 +1,8 @@
-/* Polygons cut into triangles (polygon.h): each point of a polygon is in one triangle and no other point in any, held
- * against the polygon's winding; the same triangles wherever the list begins and whichever way it runs; those of the
- * reference; and convex polygons are fans. Simple polygons at random, combs, spirals, holes at the end of a bridge,
- * corners in a line or said twice, bent out of their plane. */
+/* Checks polygons cut into triangles (polygon.h): each point of a polygon is in exactly one triangle and no other point
+ * is in any, compared with the polygon's winding number; the triangles do not depend on the first corner or the
+ * direction of the list; they equal those of the reference; and convex polygons are fans. The polygons are random
+ * simple ones, combs, spirals, holes at the end of a bridge, polygons with collinear or repeated corners, and polygons
+ * bent out of their plane. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -31,7 +32,7 @@ static void add(polygon *p, double x, double y)
 
 /* ---- polygons ------------------------------------------------------------------------------------------------- */
 
-/* Star-shaped from the middle, with spikes. */
+/* Makes a star-shaped polygon with spikes around the origin. */
 static void make_star(uint64_t seed, int count, polygon *p)
 {
     for (int i = 0; i < count; i++) {
@@ -50,7 +51,7 @@ static void make_comb(int teeth, polygon *p)
     }
     add(p, teeth, 0);
     add(p, teeth, -1);
-    for (int i = teeth - 1; i >= 0; i--) add(p, i, -1); /* corners in a line */
+    for (int i = teeth - 1; i >= 0; i--) add(p, i, -1); /* collinear corners */
 }
 
 static void make_spiral(int turns, polygon *p)
@@ -64,14 +65,14 @@ static void make_spiral(int turns, polygon *p)
         }
 }
 
-/* A square with a square hole, to which a bridge leads there and back. */
+/* Makes a square with a square hole; a bridge leads to the hole and back. */
 static void make_bridge(polygon *p)
 {
     static const double at[10][2] = {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 1}, {1, 3}, {3, 3}, {3, 1}, {1, 1}};
     for (int i = 0; i < 10; i++) add(p, at[i][0], at[i][1]);
 }
 
-/* Corners said twice and three times, and amid edges: an L. */
+/* Makes an L with corners repeated two and three times, and with corners in the middle of edges. */
 static void make_untidy(polygon *p)
 {
     static const double at[14][2] = {{0, 0}, {1, 0}, {2, 0}, {2, 0}, {2, 1}, {1.5, 1}, {1, 1},
@@ -79,7 +80,7 @@ static void make_untidy(polygon *p)
     for (int i = 0; i < 14; i++) add(p, at[i][0], at[i][1]);
 }
 
-/* The U and the dart of our examples, then the makers above. */
+/* Makes polygon number `which`: the U and the dart of our examples, then the polygons of the functions above. */
 static void make_polygon(int which, polygon *p)
 {
     static const double u[8][2] = {{0, 0}, {3, 0}, {3, 3}, {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}};
@@ -103,13 +104,14 @@ static void make_polygon(int which, polygon *p)
 
 enum { POLYGONS = 300 };
 
-/* Into space, by a turn that depends on which, and, if bent, off the plane by up to a tenth of a unit. */
+/* Moves the polygon into space by a rotation that depends on `which`, and, if bent, off its plane by up to a tenth of a
+ * unit. */
 static void place(int which, bool is_bent, polygon *p)
 {
     const double a = 0.7 * which, b = 1.1 * which;
     for (int i = 0; i < p->count; i++) {
         const double x = p->plane[i][0], y = p->plane[i][1];
-        const double z = is_bent ? 0.1 * sin(3 * x + 2 * y) : 0; /* the same for corners in one place */
+        const double z = is_bent ? 0.1 * sin(3 * x + 2 * y) : 0; /* equal for corners at the same position */
         const double u = cos(a) * x - sin(a) * z, w = sin(a) * x + cos(a) * z;
         p->corners[i][0] = which == 0 ? x : 10 + u;
         p->corners[i][1] = which == 0 ? y : cos(b) * y - sin(b) * w;
@@ -146,7 +148,7 @@ static double polygon_area(const polygon *p)
     return sum;
 }
 
-/* How often the loop goes around the point. */
+/* Returns how often the loop winds around the point. */
 static int winding(const double (*loop)[2], const int *numbers, int count, const double at[2])
 {
     int turns = 0;
@@ -160,7 +162,7 @@ static int winding(const double (*loop)[2], const int *numbers, int count, const
     return turns;
 }
 
-/* Points are at random, so that none is on an edge. */
+/* Checks that random points, none of which is on an edge, are covered once. */
 static void assert_covered_once(const polygon *p, const cut *c, int which)
 {
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
@@ -196,8 +198,8 @@ static void polygons_are_covered_once(void **state)
             place(which, bent, &p);
             cut_polygon(&p, &c);
             for (int i = 0; i < c.count; i++) sum += area_of(&p, c.triangles[i]);
-            assert_true(fabs(sum - polygon_area(&p)) <= 1e-12 * p.count); /* roundings of numbers up to 60 */
-            /* Bent ones are looked at along another normal: a thin triangle may be turned over along this one. */
+            assert_true(fabs(sum - polygon_area(&p)) <= 1e-12 * p.count); /* roundings of numbers of at most 60 */
+            /* Bent polygons are triangulated with another normal: along this one a thin triangle may be reversed. */
             if (!bent) assert_covered_once(&p, &c, which);
         }
 }
@@ -209,8 +211,8 @@ static int compare_triangles(const void *a, const void *b)
     return memcmp(a, b, 9 * sizeof(double));
 }
 
-/* The triangles' places, each one's in order, then all. Those without area depend on which of the corners in one place
- * is taken. */
+/* Lists the triangles by their coordinates, sorted within each triangle and then among triangles. Triangles without
+ * area are skipped, since they depend on which of the corners at the same position is used. */
 static int list_places(const polygon *p, const cut *c, double (*out)[9])
 {
     int count = 0;

@@ -1,14 +1,15 @@
-/* Robust roots in polyhedra, on rays at random: every crossing is found, and every hit is one. The truth is brute force
- * in double over the tets that the cell's triangles and its centre span: each is clipped to the ray, and where the ray
- * is in the cell the field is the sum over the tets there, each with its sign.
+/* Checks robust roots in polyhedra on random rays: every crossing is found, and every hit is a crossing. The reference
+ * is brute force in double over the tets that the cell's triangles span with its centre: each tet is clipped to the
+ * ray, and inside the cell the field is the sum over the tets at the point, each with its sign.
  *
- * What rounding may decide. Places are off by some 3e-6 of the scene in all: vertices by half a unit of 1 along each
- * axis (1e-7), crossings of sheets by the roundings of their weights, 2.4e-7 along the ray and four times as much
- * across (kernel_cell.h), and where tets overlap sums are taken up to 16 times 2.4e-7 beside a sheet. So values are off
- * by that times the field's slope, and by some ten roundings of their own, 2e-6 of their range: this is the band. A
- * crossing is certain where the field passes from beyond the band on one side to beyond it on the other within one stay
- * of the ray in the cell. Each must have a hit, and a hit must be where the field comes within the band. Rays that pass
- * an edge of the cell at less than the error of places may miss the cell or not, and do not count. */
+ * What rounding may decide: positions are off by about 3e-6 of the scene in total. Vertices are off by half a unit in
+ * the last place of 1 along each axis (1e-7), and crossings of sheets by the roundings of their weights, 2.4e-7 along
+ * the ray and four times as much across (kernel_cell.h); if tets overlap, sums are evaluated up to 16 times 2.4e-7 next
+ * to a sheet. So values are off by that times the field's slope, and by about ten roundings of their own, 2e-6 of their
+ * range: this is the band. A crossing is certain if the field passes from outside the band on one side to outside the
+ * band on the other side within one interval of the ray in the cell. Each certain crossing must have a hit, and each
+ * hit must be where the field is within the band. Rays that pass an edge of the cell at less than the error of
+ * positions may miss the cell or not, and do not count. */
 #include "reference_cell.h"
 #include "reference_polyhedron.h"
 #include "test_mesh_dual.h"
@@ -26,19 +27,19 @@ enum { WIDTH = 40, HEIGHT = 25, MOST_POINTS = 16 * REFERENCE_MAX_TRIANGLES };
 
 static int64_t wanted_rays = 30000;
 
-/* A linear function of a place, by a gradient. */
+/* A linear function of the position, given by its gradient. */
 typedef struct linear {
     double at_origin, gradient[3];
 } linear;
 
 typedef struct tet {
-    linear inside[4]; /* at least 0 in the tet: the last on its triangle 0 */
+    linear inside[4]; /* at least 0 inside the tet: the last of them is 0 on triangle 0 */
     linear value;
-    double slope; /* the gradient's size */
+    double slope; /* length of the gradient */
     int sign;
 } tet;
 
-/* The cell in camera coordinates. */
+/* The cell and its tets in camera coordinates. */
 typedef struct subject {
     reference_cell cell;
     double values[REFERENCE_MAX_VERTICES], low, high;
@@ -47,14 +48,14 @@ typedef struct subject {
     bool is_star_shaped;
 } subject;
 
-/* A ray in a tet, from z[0] to z[1] with the values v; is_face: this end is on the cell's surface. */
+/* The part of a ray in a tet, from z[0] to z[1] with the values v; is_face: this end is on the cell's surface. */
 typedef struct interval {
     double z[2], v[2], slope;
     bool is_face[2];
     int sign;
 } interval;
 
-/* The field along a stay in the cell, jumps as two points in one place. */
+/* The field along an interval in the cell; a jump is two points at the same depth. */
 typedef struct path {
     int count;
     double z[MOST_POINTS], v[MOST_POINTS];
@@ -72,7 +73,8 @@ static double at_place(const linear *f, const double p[3])
     return f->at_origin + f->gradient[0] * p[0] + f->gradient[1] * p[1] + f->gradient[2] * p[2];
 }
 
-/* 1 at apex and 0 on the triangle of the others; false where there is no volume. */
+/* Makes the linear function that is 1 at apex and 0 on the triangle of the others; returns false if the tet has no
+ * volume. */
 static bool make_weight(const double *apex, const double *const base[3], linear *out)
 {
     double d[3][3], volume = 0;
@@ -168,7 +170,7 @@ static reference_line line_of(const render_camera *camera, int x, int y)
     return line;
 }
 
-/* value + slope z along the line. */
+/* Restricts f to the line: its value there is value + slope z. */
 static void direction_along_line(const linear *f, const reference_line *line, double *value, double *slope)
 {
     *value = at_place(f, (const double[3]){line->base[0], line->base[1], 0});
@@ -205,7 +207,7 @@ static double interval_at(const interval *s, double z)
     return s->v[0] + (z - s->z[0]) / (s->z[1] - s->z[0]) * (s->v[1] - s->v[0]);
 }
 
-/* The ray's spans, and their ends in order. */
+/* Computes the ray's intervals in the tets, and their ends in order. */
 static int intervals_of(const subject *s, const reference_line *line, interval *ray_intervals, double *ends)
 {
     int count = 0;
@@ -215,7 +217,7 @@ static int intervals_of(const subject *s, const reference_line *line, interval *
     return count;
 }
 
-/* The value of the face that is met at z. */
+/* Returns the value of the face that the ray meets at z. */
 static double face_value(const interval *ray_intervals, int count, double z)
 {
     double nearest = (double)INFINITY, value = 0;
@@ -237,7 +239,7 @@ static void add_point(path *p, double z, double v)
     p->v[p->count++] = v;
 }
 
-/* Add the field from one end of a tet to the next, where the place is in the cell. */
+/* Adds the field from one end of a tet to the next, if the part between them is inside the cell. */
 static bool add_piece(const interval *ray_intervals, int count, double z0, double z1, path *p)
 {
     const double middle = 0.5 * (z0 + z1);
@@ -259,7 +261,7 @@ static bool add_piece(const interval *ray_intervals, int count, double z0, doubl
     return true;
 }
 
-/* The next stay from the end number *next on; false where there is none. */
+/* Makes the next interval in the cell, from end number *next on; returns false if there is none. */
 static bool next_stay(const interval *ray_intervals, int count, const double *ends, int *next, path *p)
 {
     p->count = 0;
@@ -271,7 +273,7 @@ static bool next_stay(const interval *ray_intervals, int count, const double *en
     return p->count > 0;
 }
 
-/* Keeps the part of the path before the eye. */
+/* Removes the part of the path behind the eye. */
 static void cut_at_eye(path *p)
 {
     int first = 0;
@@ -304,7 +306,7 @@ typedef struct verify {
     tally *t;
 } verify;
 
-/* Hits in [from, to], a little more on both sides. */
+/* Returns whether there is a hit in [from, to], widened by the error of positions. */
 static bool has_hit(const verify *j, const ray_hits *hits, double from, double to)
 {
     for (int i = 0; i < hits->count; i++)
@@ -312,7 +314,7 @@ static bool has_hit(const verify *j, const ray_hits *hits, double from, double t
     return false;
 }
 
-/* Mark the hits that are beside a place where the path comes within the band. */
+/* Marks the hits that are near a depth at which the path comes within the band. */
 static void mark_hits(const verify *j, const path *p, double band, ray_hits *hits)
 {
     for (int i = 0; i < hits->count; i++)
@@ -326,7 +328,8 @@ static void mark_hits(const verify *j, const path *p, double band, ray_hits *hit
         }
 }
 
-/* Each certain crossing of the path; of an opaque surface, where a hit hides the rest, the first. */
+/* Checks that each certain crossing of the path has a hit; for an opaque surface, in which a hit hides the rest, only
+ * the first one. */
 static bool verify_path(const verify *j, const path *p, double band, const ray_hits *hits)
 {
     const bool is_inner = (p->v[0] >= j->iso) == (p->v[p->count - 1] >= j->iso);
@@ -351,7 +354,7 @@ static bool verify_path(const verify *j, const path *p, double band, const ray_h
     return true;
 }
 
-/* Where tets overlap, the slopes of a sum's terms add up, mostly three of them. */
+/* Returns the width of the band. If tets overlap, the slopes of a sum's terms add up, usually three of them. */
 static double band_of(const verify *j, const interval *ray_intervals, int count)
 {
     double steepest = 0;
@@ -392,7 +395,7 @@ static void hits_of(const render_fixture *f, const drawn_frame *drawn, int64_t p
 
 /* ---- frames ---- */
 
-/* Looks from a random side, now and then from the inside or without perspective. */
+/* Sets a camera at a random side, sometimes inside the mesh or orthographic. */
 static void view_from_random_side(render_fixture *f, uint64_t seed)
 {
     const double angle = test_uniform_in(0, seed, 0, 6.283), height = test_uniform_in(1, seed, -0.9, 0.9);
@@ -471,7 +474,7 @@ static void random_polyhedra_miss_no_crossing(void **state)
     }
 }
 
-/* Bases of prisms are moved out of their planes. */
+/* Checks concave polyhedra, also prisms whose bases are moved out of their planes. */
 static void concave_polyhedra_miss_no_crossing(void **state)
 {
     tally t = {.rays = 0};
@@ -491,7 +494,7 @@ static void concave_polyhedra_miss_no_crossing(void **state)
     assert_none_missed("concave cells", &t);
 }
 
-/* Tells whether the field passes the value on the ray. */
+/* Returns whether the field passes the value on the ray. */
 static bool passes(const subject *s, const reference_line *line, double value)
 {
     static interval ray_intervals[REFERENCE_MAX_TRIANGLES];
@@ -505,9 +508,9 @@ static bool passes(const subject *s, const reference_line *line, double value)
     return false;
 }
 
-/* Makes a prism on a hook with the centre in its stem: the tets of the hook's two sides, one of them with negative
- * sign, reach through the stem. Values are -1 on the inner side, else 1, and the sum at the stem's wall is some 1 + 1.5
- * / 4 + 0.5 / 6. */
+/* Makes a prism shaped as a hook with its centre in its stem: the tets of the hook's two sides, one of them with a
+ * negative sign, reach through the stem. Values are -1 on the inner side, else 1, and the sum at the stem's wall is
+ * about 1 + 1.5 / 4 + 0.5 / 6. */
 static void make_hook(test_mesh *out)
 {
     static const double base[8][2] = {{-1.2, -0.5}, {0, -0.5},   {0, 0.3},   {0.3, 0.3},
@@ -521,8 +524,8 @@ static void make_hook(test_mesh *out)
     test_mesh_split_quads(out);
 }
 
-/* Where tets overlap, their sum may pass the range of the vertices' values. No tree looks for an isovalue there: it has
- * no surface in the cell. */
+/* Checks that a sum over overlapping tets beyond the range of the vertices' values shows no surface: no tree finds the
+ * cell for an isovalue there, by definition. */
 static void sums_beyond_the_vertices_show_no_surface(void **state)
 {
     static const double value = 1.1;

@@ -1,5 +1,5 @@
-/* Draws decorations at random over pictures of 1 to 2200 pixels a side. A picture that takes more than ten seconds ends
- * the test by SIGALRM; colours stay numbers. */
+/* Draws random decorations over pictures of 1 to 2200 pixels a side. A picture that takes more than ten seconds ends
+ * the test by SIGALRM; colours must stay finite. */
 #include <cmath>
 #include <csetjmp>
 #include <cstdarg>
@@ -20,7 +20,7 @@ extern "C" {
 namespace
 {
 
-/* What was printed last tells the case that hung. */
+/* Prints the case first, so that the last line identifies a case that hangs. */
 void draw_and_check(int width, int height, const insitu_decorations &what)
 {
     std::vector<float> rgba(4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
@@ -43,7 +43,7 @@ void random_decorations_are_drawn_in_time(void **)
     }
 }
 
-/* Blocks that meet but for rounding once pushed each other for ever, at one height in twenty. */
+/* Checks a former error: blocks that touched up to rounding pushed each other forever, at one height in twenty. */
 void words_over_axes_are_drawn_at_every_height(void **)
 {
     const insitu_words words[] = {{"run 42", INSITU_BOTTOM_LEFT, 1}, {"t = 0.5", INSITU_BOTTOM_LEFT, 1}};

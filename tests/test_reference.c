@@ -1,4 +1,4 @@
-/* The reference renderer against closed forms: what judges the kernels is judged first. */
+/* Checks the reference renderer, which the kernels are compared with, against closed forms. */
 #include "reference_cell.h"
 #include "reference_render.h"
 #include "test_meshes.h"
@@ -9,7 +9,8 @@
 #include <string.h>
 #include <cmocka.h>
 
-/* A single cell seen by a camera at the origin that looks along z: camera coordinates are the world's. */
+/* Adds a vertex to a single cell seen by a camera at the origin that looks along z: camera coordinates equal world
+ * coordinates. */
 static int add_vertex(const test_mesh *mesh, int64_t v, int64_t *met, reference_cell *cell, double *values)
 {
     int at = 0;
@@ -79,7 +80,7 @@ static void crossings_of_unit_hex_are_those_of_its_slabs(void **state)
     test_mesh_free(&mesh);
 }
 
-/* Lines at random, through vertices, and through points of edges. */
+/* Returns a line that is random, passes through a vertex, or passes through a point of an edge. */
 static reference_line aimed_line(const reference_cell *cell, uint64_t i)
 {
     reference_line line = random_line(i);
@@ -110,7 +111,7 @@ static void crossings_of_every_shape_are_even(void **state)
     }
 }
 
-/* The intervals of a conforming lattice follow each other along a ray without gap or overlap. */
+/* Checks that the intervals of a conforming lattice follow each other along a ray without gap or overlap. */
 static void intervals_of_lattices_tile_the_ray(void **state)
 {
     (void)state;
@@ -141,7 +142,7 @@ static void intervals_of_lattices_tile_the_ray(void **state)
     }
 }
 
-/* A point inside: the mean of the vertices moved towards one of them. */
+/* Computes a point inside the cell: the mean of the vertices moved towards one of them. */
 static void inner_point(const reference_cell *cell, uint64_t i, double point[3])
 {
     double total = 0;
@@ -164,7 +165,7 @@ static void linear_field_is_exact_in_every_cell(void **state)
         double values[REFERENCE_MAX_VERTICES];
         test_mesh_single(shape, test_linear, &mesh);
         load_cell(&mesh, 0, &cell, values);
-        /* Rounding of values (1e-16) over the thinnest extent (1e-4) for the gradient. */
+        /* The error of the gradient is the rounding of values (1e-16) over the smallest extent (1e-4). */
         const double bound = shape == TEST_SLIVER_TET ? 1e-11 : 1e-12;
         for (uint64_t i = 0; i < 300; i++) {
             double point[3], value, gradient[3];
@@ -177,8 +178,8 @@ static void linear_field_is_exact_in_every_cell(void **state)
     }
 }
 
-/* A prism of which one base is a single vertex, given with all its faces: a hexagon of one vertex, quads of three, each
- * of them turned as the bits of turns say. */
+/* Loads a prism of which one base is a single vertex, with all its faces: a hexagon of one vertex and quads of three
+ * distinct vertices; the bits of turns decide their orientation. */
 static void load_collapsed_prism(unsigned turns, reference_cell *cell, double values[REFERENCE_MAX_VERTICES])
 {
     reference_polyhedron *p = &cell->poly;
@@ -204,7 +205,8 @@ static void load_collapsed_prism(unsigned turns, reference_cell *cell, double va
     reference_polyhedron_setup(cell);
 }
 
-/* A side from a vertex to itself has no direction by which to turn its faces alike. */
+/* Checks that such prisms are pyramids: an edge from a vertex to itself has no direction that could orient its
+ * faces. */
 static void collapsed_prisms_are_pyramids(void **state)
 {
     (void)state;
@@ -246,8 +248,8 @@ static void trilinear_field_is_exact_in_a_box(void **state)
     test_mesh_free(&mesh);
 }
 
-/* For any field the gradient agrees with central differences: their error is h²·f''' ~ 1e-9 and rounding 1e-15 / h ~
- * 1e-10. */
+/* Checks the gradient of any field against central differences: their error is h²·f''' ~ 1e-9, and rounding is 1e-15 /
+ * h ~ 1e-10. */
 static void gradient_agrees_with_differences(void **state)
 {
     (void)state;
@@ -276,7 +278,8 @@ static void gradient_agrees_with_differences(void **state)
     }
 }
 
-/* On plane faces the face's value is the limit of the interior's; two cells agree on a shared face to the bit. */
+/* Checks that on plane faces the face's value is the limit of the values inside, and that two cells agree on a shared
+ * face to the bit. */
 static void face_values_join_the_interior(void **state)
 {
     (void)state;
@@ -299,7 +302,7 @@ static void face_values_join_the_interior(void **state)
                 const double point[3] = {line.base[0] + line.slope[0] * c[k].z, line.base[1] + line.slope[1] * c[k].z,
                                          c[k].z};
                 assert_true(reference_interpolate(&cell, point, values, &value, NULL));
-                /* Near a collapsed vertex the map's inverse loses half of the digits. */
+                /* Near a collapsed vertex the inverse of the map loses half of the digits. */
                 assert_true(fabs(face - value) < (s < 4 ? 1e-11 : 1e-6));
             }
         }
@@ -358,7 +361,7 @@ static void frame_setup(frame_fixture *f, test_mesh_kind kind, bool is_orthograp
     if (is_orthographic) f->job.camera.half_height = 1.5;
 }
 
-/* Finds where the ray is inside the cube [-1, 1]^3. */
+/* Computes the interval of the ray inside the cube [-1, 1]^3. */
 static bool cube_interval(const double *base, const double *direction, double *low, double *high)
 {
     *low = 0;
@@ -391,13 +394,13 @@ static void isosurface_of_a_linear_field_is_its_plane(void **state)
             if (!inside) continue;
             hits++;
             if (ray.ambiguous) {
-                /* On a warped face the face's value is that of the bilinear patch, from which the split triangles
-                 * differ by up to a tenth of a cell here: a root between the two is found at the face. */
+                /* On a warped face the face's value is that of the bilinear patch, from which the two triangles differ
+                 * by up to a tenth of a cell here: a root between patch and triangles is moved to the face. */
                 assert_true(fabs(ray.hits[0].depth - z) < 0.1 * 2 / 3 * ray.hits[0].conditioning);
                 ambiguous++;
                 continue;
             }
-            /* Bisection ends at 2^-36 of a cell. */
+            /* Bisection stops at 2^-36 of a cell. */
             assert_true(fabs(ray.hits[0].depth - z) < 2e-11);
             const double scale = (slope > 0 ? -1 : 1) / sqrt(0.83);
             assert_true(fabs(ray.hits[0].normal[0] - 0.3 * scale) < 1e-12);

@@ -1,5 +1,5 @@
-/* The kernels against the reference, every ray: all cell kinds, cameras outside and inside, opaque and transparent
- * surfaces, volumes, and both. */
+/* Compares the kernels with the reference for every ray: all kinds of cells, cameras outside and inside, opaque and
+ * transparent surfaces, volumes, and both. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -15,7 +15,8 @@ static const double one_value[1] = {0.3};
 static const double four_values[4] = {-0.9, -0.2, 0.3, 1.1};
 static const double linear_values[3] = {-0.6, 0.1, 0.5};
 
-/* Fraction of rays with several roots in a cell or on whose cells a warped face contradicts the interior. */
+/* Bounds the fraction of rays with several roots in a cell, or on which a warped face contradicts the interior of the
+ * cell. */
 static void assert_few_ambiguous(const fixture_outcome *o, double share)
 {
     if ((double)o->ambiguous > share * (double)o->rays) fail_msg("%d of %d ambiguous", (int)o->ambiguous, (int)o->rays);
@@ -28,7 +29,7 @@ static const char *case_name(test_mesh_kind kind, fixture_camera camera, const c
     return name;
 }
 
-/* Coarse lattices for the kinds of many cells. */
+/* Returns the side of the lattice, which is smaller for kinds with many cells per cube. */
 static int lattice_side(test_mesh_kind kind)
 {
     return kind == TEST_HEXES ? 6 : kind == TEST_WEDGES ? 5 : 4;
@@ -87,8 +88,8 @@ static void transparent_surfaces_before_an_opaque_one_match_the_reference(void *
     }
 }
 
-/* Lights behind the scene shine along surfaces that turn away from them: half way between the eye and such a light
- * there are normals all the same, but no highlight. */
+/* Checks lights behind the scene, which shine along surfaces that face away from them: half way between the eye and
+ * such a light there are normals too, but there must be no highlight. */
 static void lights_behind_surfaces_leave_them_dark(void **state)
 {
     (void)state;
@@ -148,7 +149,7 @@ static double short_wave(const double p[3])
     return test_wave((const double[]){2 * p[0], 2 * p[1], 2 * p[2]});
 }
 
-/* Rays that cross more surfaces than a packet keeps: their fragments of volume end at every sample. */
+/* Checks rays that cross more surfaces than a packet can store: their volume fragments end at every sample. */
 static void volume_between_many_surfaces_matches_the_reference(void **state)
 {
     static const float colours[48] = {0.8f, 0.2f, 0.1f};
@@ -189,8 +190,9 @@ static double ray_linear(const render_camera *camera, int pixel, double *at_base
     return 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2];
 }
 
-/* The surface of a linear field is its plane, in cells with plane faces and in warped ones. Float32 positions and
- * values err by a few 6e-8 of the mesh's size (value 1.6 at most); the ray's slope turns that into depth. */
+/* Checks that the surface of a linear field is its plane, in cells with plane faces and in warped ones. Positions and
+ * values in float32 err by a few 6e-8 of the mesh's size (values are at most 1.6); the ray's slope turns that into
+ * depth. */
 static void compare_plane(test_mesh_kind kind, fixture_camera camera, bool is_warped)
 {
     render_fixture f;
@@ -219,8 +221,8 @@ static void linear_surface_is_a_plane_in_every_kind(void **state)
             for (int is_warped = 0; is_warped < 2; is_warped++) compare_plane(kind, camera, is_warped);
 }
 
-/* With constant opacity every ray's transmittance follows from the number of samples in the cube, on lattice lines as
- * well: no sample is lost or counted twice at a face, an edge or a vertex. */
+/* Checks that no sample is lost or counted twice at a face, an edge or a vertex, also on lattice lines: with constant
+ * opacity every ray's transmittance follows from the number of samples in the cube. */
 static void constant_volume_counts_every_sample_once(void **state)
 {
     (void)state;
@@ -244,7 +246,7 @@ static void constant_volume_counts_every_sample_once(void **state)
                     low = fmax(low, fmin(a, b));
                     high = fmin(high, fmax(a, b));
                 }
-                /* Within rounding of the cube's border a ray or sample may go either way. */
+                /* Within rounding of the cube's border a ray or sample may be inside or outside. */
                 if (fabs(high - low) < 1e-5 || (camera == CAMERA_ALONG_X && (fabs(base[1]) == 1 || fabs(base[2]) == 1)))
                     continue;
                 const double length = f.job.camera.is_orthographic ? 1 : sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
@@ -261,8 +263,8 @@ static void constant_volume_counts_every_sample_once(void **state)
         }
 }
 
-/* Rays through the vertices, along the edges and in the faces of a lattice meet a linear field's surface exactly once.
- */
+/* Checks that rays through the vertices, along the edges and in the faces of a lattice meet the surface of a linear
+ * field exactly once. */
 static void lattice_lines_have_no_holes(void **state)
 {
     (void)state;
@@ -290,13 +292,14 @@ static void lattice_lines_have_no_holes(void **state)
     }
 }
 
-/* ---- single cells, ugly ones too ---- */
+/* ---- single cells, including degenerate ones ---- */
 
 static void single_cells_match_the_reference(void **state)
 {
     (void)state;
     static const double values[3] = {-0.25, 0.1, 0.35};
-    /* A sliver's float32 rounding is 6e-8 of its length and 1e-3 of its thickness: margins and depths follow. */
+    /* The rounding to float32 is 6e-8 of a sliver's length and 1e-3 of its thickness, from which the margins and bounds
+     * of depth follow. */
     static const fixture_bounds thin = {.depth = 1e-2, .colour = 2, .excluded = 1, .margin = 1e-3};
     for (test_cell_shape shape = 0; shape < TEST_SHAPE_COUNT; shape++)
         for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {
@@ -315,7 +318,8 @@ static void single_cells_match_the_reference(void **state)
         }
 }
 
-/* A field across the thickness, whose surfaces lie along the sliver: met where the sliver is, and where it is known. */
+/* Checks surfaces that lie along a sliver, of a field across its thickness: hits must be inside the sliver, in pixels
+ * where the sliver is certain. */
 static void surfaces_along_slivers_match_the_reference(void **state)
 {
     (void)state;
@@ -355,8 +359,8 @@ static void left_handed_cells_match_the_reference(void **state)
     }
 }
 
-/* Far from the origin, in double: the same picture relative to the cells. The double coordinates themselves round by
- * 5.8e6 · 1e-16 = 6e-10 of cells of 2000 / 4 and the camera's as much. */
+/* Checks meshes far from the origin, in double: the picture must be the same relative to the cells. The double
+ * coordinates are rounded by 5.8e6 · 1e-16 = 6e-10 for cells of 2000 / 4, and those of the camera by as much. */
 static void far_coordinates_match_the_reference(void **state)
 {
     (void)state;
@@ -412,8 +416,8 @@ static void two_volumes_share_their_light(void **state)
     }
 }
 
-/* A value a cell: a volume of blocks. A sample near a face may be either cell's, which the margin leaves out: 2 · 1e-6
- * of each of some 20 cells a ray. */
+/* Checks values at cells: a volume of blocks. A sample near a face may belong to either cell, which the margin
+ * excludes: 2 · 1e-6 of each of about 20 cells on a ray. */
 static void cell_centred_volume_matches_the_reference(void **state)
 {
     (void)state;
@@ -438,7 +442,7 @@ static void cell_centred_volume_matches_the_reference(void **state)
         }
 }
 
-/* Values of any size: the transfer and the isovalue scale with them. */
+/* A field of very large values: the transfer function and the isovalue scale with them. */
 static double huge_wave(const double p[3])
 {
     return 1e30 * test_wave(p);
@@ -506,7 +510,7 @@ static void one_pixel_images_match_the_reference(void **state)
     }
 }
 
-/* Exchanges the tree for one whose nodes are of the reference layout. */
+/* Replaces the tree by one whose nodes have the reference layout. */
 static void build_reference_layout(render_fixture *f)
 {
     base_error error = {0};
@@ -517,7 +521,7 @@ static void build_reference_layout(render_fixture *f)
     f->ranges[0] = mmbvh_own_ranges(&f->trees[0]);
 }
 
-/* Where cells are smaller than pixels, tiles go down the trees themselves and leave out what is hidden. */
+/* Checks cells smaller than pixels: tiles then traverse the trees themselves and skip what is hidden. */
 static void surfaces_of_cells_smaller_than_pixels_match_the_reference(void **state)
 {
     (void)state;
@@ -564,7 +568,7 @@ int main(void)
         cmocka_unit_test(one_pixel_images_match_the_reference),
         cmocka_unit_test(surfaces_of_cells_smaller_than_pixels_match_the_reference),
     };
-    /* Tests that draw by themselves, by each instruction set. */
+    /* Tests that draw by themselves, run with each instruction set. */
     const struct CMUnitTest of_a_set[] = {
         cmocka_unit_test(volume_between_many_surfaces_matches_the_reference),
         cmocka_unit_test(constant_volume_counts_every_sample_once),

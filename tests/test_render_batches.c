@@ -1,7 +1,8 @@
-/* Tets of plain meshes, hexes, wedges and pyramids, which tiles trace as many at once as there are lanes
- * (kernel_batch.h, kernel_curved_batch.h), against the same cells taken one by one, as those of a layer with clips of
- * its own are: the same bits. Cells are of some pixels, of many and of one; the last ones lie beside each other in one
- * vector, and may hit one pixel. Usually a scene has every third camera, in turns: each kind meets each camera. */
+/* Checks tets of meshes without clips, hexes, wedges and pyramids, which tiles trace in batches of one cell per lane
+ * (kernel_batch.h, kernel_curved_batch.h). They must give the same bits as cells traced one by one, as are those of a
+ * layer with its own clips. Cells cover some pixels, many, or one; the last cells are next to each other in one vector,
+ * and may hit the same pixel. The usual run draws each scene from every third camera, alternating, so that each kind is
+ * drawn from each camera. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -32,7 +33,7 @@ static void create(render_fixture *f, const test_mesh *meshes, int count, int n,
 static void compare(render_fixture *f)
 {
     drawn_frame batches, alone;
-    /* A box that holds everything. It cuts one layer alone, as a clip of all layers would cut the rays. */
+    /* A box that contains everything. It clips one layer only, since a clip of all layers would cut the rays. */
     const render_clip everything = {.kind = RENDER_CLIP_BOX, .lower = {-1e6, -1e6, -1e6}, .upper = {1e6, 1e6, 1e6}};
     fixture_draw(f, &batches);
     f->job.clips = &everything;
@@ -66,7 +67,7 @@ static void batches_draw_what_single_cells_do(void **state)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++)
             for (int turn = 0; turn < 2 * (int)(sizeof kinds / sizeof *kinds); turn++) {
                 const int jittered = turn % 2;
-                /* not 0: opaque surfaces in cuboids have a way of their own (kernel_cuboids.h, test_hits.c) */
+                /* not 0, because opaque surfaces in cuboids have their own code (kernel_cuboids.h, test_hits.c) */
                 const double jitter = jittered ? 0.2 : 1e-4;
                 render_fixture f;
                 test_mesh mesh;
@@ -79,8 +80,8 @@ static void batches_draw_what_single_cells_do(void **state)
             }
 }
 
-/* Cells with any order of vertices, in arrays of all layouts; some have an edge without length, so that quads of theirs
- * are triangles and triangles nothing. */
+/* Checks cells with any order of vertices, in arrays of all layouts; some have an edge without length, so that some
+ * quads collapse to triangles and some triangles to an edge. */
 static void cells_are_numbered_anyhow(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
@@ -104,7 +105,7 @@ static void cells_are_numbered_anyhow(void **state)
         }
 }
 
-/* The cells of a batch are of one mesh and one layer. */
+/* Checks that all cells of a batch belong to one mesh and one layer. */
 static void meshes_and_layers_take_turns(void **state)
 {
     (void)state;
@@ -125,7 +126,7 @@ static void meshes_and_layers_take_turns(void **state)
         }
 }
 
-/* Each hit stands there twice. */
+/* Checks ties: each hit occurs twice. */
 static void ties_are_kept(void **state)
 {
     (void)state;
@@ -142,7 +143,8 @@ static void ties_are_kept(void **state)
     }
 }
 
-/* Cells with values of unusual size, from tiny ones to NaN, are found one by one, and in one vector with others. */
+/* Checks cells with values of extreme size, from tiny ones to NaN: they are traced one by one, and mixed with other
+ * cells in one vector. */
 static void odd_values_are_found_one_by_one(void **state)
 {
     static const float opacity[1] = {0.3f};
@@ -159,18 +161,18 @@ static void odd_values_are_found_one_by_one(void **state)
         create(&f, &mesh, 1, 7, CAMERA_OUTSIDE);
         if (as_volume) {
             fixture_set_volume(&f, 0.1);
-            f.transfer.opacity_count = 1; /* the same for all values, however large */
+            f.transfer.opacity_count = 1; /* the same opacity for all values, however large */
             f.transfer.opacities = opacity;
         } else {
-            fixture_add_surface(&f, values, 1, 1); /* of two, many hits would be tied */
+            fixture_add_surface(&f, values, 1, 1); /* with two isovalues, many hits would be tied */
         }
         compare(&f);
         test_mesh_free(&mesh);
     }
 }
 
-/* Contour lines are drawn over the isovalues' colours, and over a colour map; cells have the order of their
- * coordinates, whatever that of their vertices. */
+/* Checks contour lines, drawn over the colours of isovalues and over a colour map; the order of a cell's vertices is
+ * that of their coordinates, whatever order the mesh has. */
 static void lines_are_those_of_single_cells(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
@@ -193,7 +195,7 @@ static void lines_are_those_of_single_cells(void **state)
             .field = {&view.field, f.ranges}, .count = 3, .values = levels, .width = 2, .colours = white};
         f.surfaces[0].lines = &lines;
         if (turn % 4 > 1) {
-            fixture_set_volume(&f, 0.3); /* its colours serve the surface */
+            fixture_set_volume(&f, 0.3); /* the surface uses its colours */
             f.job.volume_count = 0;
             f.surfaces[0].colour_field = (render_field){&view.field, f.ranges};
             f.surfaces[0].colour_map = &f.transfer;

@@ -1,5 +1,6 @@
-/* Pictures must not change with threads, groups of samples, the order and numbering of cells and vertices, layouts, the
- * dealing of cells to parts and ranks, and ghosts; values that are not finite may change only their own cells. */
+/* Checks that pictures do not change with threads, groups of samples, the order and numbering of cells and vertices,
+ * layouts, the distribution of cells to parts and ranks, and ghosts; values that are not finite may change only their
+ * own cells. */
 #include "memory.h"
 #include "pixel_set.h"
 #include "test_render_fixture.h"
@@ -16,7 +17,7 @@ static const double values[2] = {-0.2, 0.3};
 static const double origin[3] = {0, 0, 0};
 static const test_layout wide = {.wide_coordinates = true, .wide_values = true};
 
-/* The scenes: an opaque surface, transparent ones, a volume, and mixtures. */
+/* The scenes: an opaque surface, transparent surfaces, a volume, and combinations. */
 typedef enum scene_kind { OPAQUE, TRANSPARENT, VOLUME, OPAQUE_VOLUME, TRANSPARENT_VOLUME, SCENE_COUNT } scene_kind;
 
 static void add_layers(render_fixture *f, scene_kind scene)
@@ -62,8 +63,8 @@ static void threads_do_not_change_a_bit(void **state)
 
 typedef struct received_tiles {
     fragment_list list;
-    unsigned char pixels[64 * 64]; /* how often a tile had them */
-    int width, refuse_after;       /* tiles; negative: never */
+    unsigned char pixels[64 * 64]; /* how many tiles contained the pixel */
+    int width, refuse_after;       /* number of tiles after which further ones are refused; negative: never */
     bool has_stray_pixel;
 } received_tiles;
 
@@ -111,7 +112,7 @@ static void compare_tiles_with_list(render_fixture *f)
     base_free(list.items);
 }
 
-/* Every pixel in one tile, and in the tile all that the list has of it. */
+/* Checks that every pixel is in one tile, and that the tile contains everything that the list has of it. */
 static void tiles_have_what_the_list_has(void **state)
 {
     (void)state;
@@ -147,8 +148,8 @@ static void refused_tiles_end_the_frame(void **state)
     assert_int_equal(base_memory_held(), held);
 }
 
-/* Cells are found for the picture at once and for a tile: the same cells are met, or at least those with a hit or
- * samples. */
+/* Draws with cells found for the whole picture, and with cells found for each tile. Both must meet the same cells, or
+ * at least the same cells with a hit or samples. */
 static void draw_by_traversals(render_fixture *f)
 {
     drawn_frame drawn[2];
@@ -161,7 +162,7 @@ static void draw_by_traversals(render_fixture *f)
     for (int i = 0; i < 2; i++) drawn_free(&drawn[i]);
 }
 
-/* Cells are of ten pixels and of three, and some of the pixels are left out. */
+/* Compares traversals for cells of ten pixels and of three, with some pixels left out. */
 static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fixture_camera camera, bool all)
 {
     enum { WIDTH = 61, HEIGHT = 47 };
@@ -194,7 +195,8 @@ static void traversals_do_not_change_a_bit(void **state)
         }
 }
 
-/* Groups only say how many samples are gathered before they are blended: the blend itself may round elsewhere. */
+/* Checks sizes of groups, which only decide how many samples are gathered before they are blended: only the rounding of
+ * the blend may differ. */
 static void sample_groups_draw_the_same(void **state)
 {
     (void)state;
@@ -241,7 +243,7 @@ static void order_and_numbering_do_not_change_a_bit(void **state)
         }
 }
 
-/* The largest difference of depth, in t; infinite where one has a hit and the other none. */
+/* Returns the largest difference of depth, in t; infinite if one has a hit and the other has none. */
 static double depth_difference(const drawn_frame *a, const drawn_frame *b)
 {
     double worst = 0;
@@ -253,9 +255,9 @@ static double depth_difference(const drawn_frame *a, const drawn_frame *b)
     return worst;
 }
 
-/* A cell written in another of its symmetries has the same faces, so exactly the same rays hit it. The map inside has
- * other coordinates and rounds differently: t to some 1e-7 times the conditioning, which is up to 30 among 61 × 47
- * rays. */
+/* Checks cells reordered by one of their symmetries: they have the same faces, so exactly the same rays hit them. The
+ * map inside has other coordinates and rounds differently: t is off by about 1e-7 times the conditioning, which is up
+ * to 30 among 61 × 47 rays. */
 static void reordered_cells_draw_the_same(void **state)
 {
     (void)state;
@@ -313,7 +315,7 @@ static void layouts_do_not_change_a_bit(void **state)
 
 /* ---- parts and ranks ---- */
 
-/* Deals the mesh's cells out. With ghosts, every part holds all cells, with those of others as ghosts. */
+/* Distributes the mesh's cells. With ghosts, every part has all cells, of which those of other parts are ghosts. */
 static void distribute(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts,
                        test_mesh *out)
 {
@@ -332,7 +334,8 @@ static void distribute(const test_mesh *mesh, test_partition_kind partition, int
     free(owners);
 }
 
-/* Volumes are blended in other groups: each fragment's colour rounds to 6e-8, a pixel has some 30. */
+/* Compares pictures up to rounding. Volumes are blended in different groups: each fragment's colour is rounded by 6e-8,
+ * and a pixel has about 30. */
 static void assert_same_to_rounding(const drawn_frame *whole, const drawn_frame *parts, scene_kind scene)
 {
     drawn_assert_same_depth(whole, parts);
@@ -373,8 +376,8 @@ static void compare_distributed(test_mesh_kind kind, scene_kind scene, test_part
     test_mesh_free(&mesh);
 }
 
-/* Draws two meshes that lie through each other, with windows of three samples, so that most cells lie in several, and
- * of all samples. Tets of narrow arrays are read by vectors. */
+/* Draws two overlapping meshes with windows of three samples, so that most cells are in several windows, and with one
+ * window of all samples. Tets in 4-byte arrays are read by vector instructions. */
 static void compare_volume_traversals(test_mesh_kind kind, scene_kind scene, fixture_camera camera, test_layout layout)
 {
     render_fixture f;
@@ -409,9 +412,9 @@ static void parts_and_ranks_draw_the_whole(void **state)
                 compare_distributed(kind, scene, partition, 2 + ((int)kind + (int)partition) % 4, false);
 }
 
-/* Samples exactly on the faces between ranks: the eye 3.125 from the middle of a lattice of half units, samples at (k +
- * 1/2) / 4, all of it exact in float32. Eight samples between x = 1 and x = -1, the first face's counted, the last
- * one's not. */
+/* Checks samples exactly on the faces between ranks: the eye is 3.125 from the middle of a lattice of half units, and
+ * samples are at (k + 1/2) / 4, all exact in float32. There are eight samples between x = 1 and x = -1; the one on the
+ * first face counts, the one on the last does not. */
 static void samples_on_faces_have_one_owner(void **state)
 {
     (void)state;
@@ -511,7 +514,7 @@ static bool touches(const test_mesh *mesh, int64_t cell)
     return false;
 }
 
-/* Draws by samples, by exact segments, or by segments to an error. */
+/* Draws by samples, by exact segments, or by segments under max_error; way is 0, 1 or 2. */
 static void draw_opaque_ends(const test_mesh *mesh, scene_kind scene, int way, drawn_frame *out)
 {
     static const float opaque_ends[3] = {0.6f, 0.1f, 0.5f};
@@ -520,12 +523,13 @@ static void draw_opaque_ends(const test_mesh *mesh, scene_kind scene, int way, d
     f.transfer.opacities = opaque_ends;
     f.job.integration = way ? RENDER_SEGMENTS : RENDER_SAMPLES;
     f.job.max_error = way == 2 ? 1e-3 : 0;
-    f.job.extent = 3.5; /* of the mesh with and without them: the error's share of a length */
+    /* the extent of the mesh with and without these cells: the allowed error per length must be equal */
+    f.job.extent = 3.5;
     fixture_draw(&f, out);
     fixture_free(&f);
 }
 
-/* Cells with a NaN or an infinity are as if they were not there, to the bit. */
+/* Checks that cells with a NaN or an infinity are treated as missing, to the bit. */
 static void cells_with_values_not_finite_are_not_there(void **state)
 {
     (void)state;
@@ -560,7 +564,7 @@ static double constant_field(const double p[3])
     return 0.3;
 }
 
-/* A constant field equal to an isovalue has no surface: nowhere does its side change. */
+/* Checks that a constant field equal to an isovalue has no surface: its side does not change anywhere. */
 static void constant_equal_to_the_isovalue_has_no_surface(void **state)
 {
     (void)state;
@@ -576,8 +580,9 @@ static void constant_equal_to_the_isovalue_has_no_surface(void **state)
     }
 }
 
-/* The field is x: whole planes of vertices hold the isovalue 0 exactly. A ray through an edge that lies in the surface
- * passes cells where the value is zero to rounding, on either side: its hits are an odd number at one place. */
+/* The field is x: whole planes of vertices have the isovalue 0 exactly. A ray through an edge that lies in the surface
+ * crosses cells where the value is zero up to rounding, on either side: its hits are an odd number at the same
+ * depth. */
 static double plane_field(const double p[3])
 {
     return p[0];
@@ -592,7 +597,7 @@ static void isovalue_at_vertices_leaves_no_hole(void **state)
             render_fixture f;
             drawn_frame drawn;
             int met = 0, several = 0;
-            if (camera == CAMERA_INSIDE) continue; /* looks away from the plane */
+            if (camera == CAMERA_INSIDE) continue; /* this camera looks away from the plane */
             fixture_create_lattice(&f, kind, 4, 0, plane_field);
             fixture_set_camera(&f, camera, 43, 41);
             fixture_add_surface(&f, zero, 1, 0.5f);
@@ -629,7 +634,7 @@ static void jitter_is_uniform_and_of_pixel_and_frame(void **state)
             sum += a;
             product += (a - 0.5) * (b - 0.5);
         }
-    /* 10,000 uniform numbers: the mean within 4 sigma of 0.0029, the correlation within 4 of 1/12/100. */
+    /* For 10,000 uniform numbers: the mean within 4 sigma of 0.0029, the correlation within 4 sigma of 1/12/100. */
     assert_true(fabs(sum / 10000 - 0.5) < 0.012);
     assert_true(fabs(product / 10000) < 0.0034);
 }

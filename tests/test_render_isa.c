@@ -1,10 +1,8 @@
-/* Every instruction set against the plain C kernels. A set that INSITU_ISA names is chosen once a process, so this
- * program runs itself to see that: with an argument it prints the set that it was given.
- *
- * The sets differ in how wide a packet is, which must change nothing, and in where a multiply and an add are fused,
- * which changes roundings: t by some 6e-8 times the conditioning, a colour by as much times the slopes of shading.
- *
- * Usually each scene is seen by one camera, another one for the next kind of mesh; in the whole test by all. */
+/* Compares every instruction set with the scalar kernels. The set that INSITU_ISA names is selected once per process,
+ * so this program runs itself to check the selection: with an argument it prints the selected set. The sets differ in
+ * the width of a packet, which must change nothing, and in fused multiply-adds, which change roundings: t by about 6e-8
+ * times the conditioning, a colour by as much times the slopes of shading. The usual run draws each scene from one
+ * camera, which changes with the kind of mesh; the whole test draws from all cameras. */
 #include "test_effort.h"
 #include "test_render_fixture.h"
 
@@ -26,8 +24,8 @@ enum {
 
 static const char *program;
 
-/* Draws by segments, with steps and a narrow ramp of the opacity: stretches are halved in double
- * (kernel_cell_segments.h), ray by ray, from the caller's coordinates. */
+/* Sets segments with steps and a narrow ramp of the opacity: they are halved in double (kernel_cell_segments.h), ray by
+ * ray, from the caller's coordinates. */
 static void set_steps(render_fixture *f)
 {
     static const double values[6] = {-0.7, -0.15, -0.15, 0.3, 0.301, 0.7};
@@ -52,7 +50,8 @@ static void draw_scene(int frame, float *numbers)
     if (scene == 3) set_steps(&f);
     if (scene == 4) {
         f.job.integration = RENDER_SEGMENTS;
-        f.job.max_error = frame / SCENES % CAMERA_PLANE ? 1e-3 : 1e-4; /* ways in parts (kernel_local_segments.h) */
+        /* rays are integrated in parts (kernel_local_segments.h) */
+        f.job.max_error = frame / SCENES % CAMERA_PLANE ? 1e-3 : 1e-4;
     }
     fixture_draw(&f, &drawn);
     memcpy(numbers, drawn.picture.rgba, 4 * WIDTH * HEIGHT * sizeof *numbers);
@@ -61,14 +60,14 @@ static void draw_scene(int frame, float *numbers)
     fixture_free(&f);
 }
 
-/* Whether a frame is drawn. */
+/* Returns whether a frame is drawn. */
 static bool is_due(int frame)
 {
     const int scene = frame % SCENES, camera = frame / SCENES % CAMERA_PLANE, kind = frame / (SCENES * CAMERA_PLANE);
     return test_is_whole() || (kind + scene) % CAMERA_PLANE == camera;
 }
 
-/* The largest difference of numbers first .. last; infinite where one is and the other is not. */
+/* Returns the largest difference of numbers first .. last; infinite if only one of them is infinite. */
 static double worst_difference(const float *a, const float *b, int first, int last)
 {
     double worst = 0;
@@ -99,7 +98,7 @@ static void every_set_draws_what_plain_draws(void **state)
     }
 }
 
-/* Returns the set that INSITU_ISA gives a process. */
+/* Computes the set that INSITU_ISA selects in a process. */
 static void set_of(const char *isa, char used[16])
 {
     char command[600];

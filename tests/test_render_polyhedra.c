@@ -1,6 +1,5 @@
-/* Polyhedra: against the reference (along the lines, too, where many of a cell's tets meet), against the same cells
- * given as tets and hexes, beside hexes, and dealt to ranks.
- */
+/* Compares polyhedra with the reference (also along the lines at which many of a cell's tets meet), with the same cells
+ * stored as tets and hexes, next to hexes, and distributed over ranks. */
 #include "reference_integral.h"
 #include "test_render_fixture.h"
 
@@ -28,7 +27,7 @@ static const char *case_name(const char *what, fixture_camera camera)
     return name;
 }
 
-/* Prisms on bases that are not convex, spikes, a cavity. */
+/* Compares prisms on concave bases, spikes, and a cell with a cavity. */
 static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bool is_linear)
 {
     test_mesh mesh;
@@ -56,8 +55,8 @@ static void shapes_match_the_reference(void **state)
 
 enum { AIMED_RAYS = 600 };
 
-/* A picture of one pixel, whose ray goes from a random side through a place on the line from a random vertex to the
- * mean of all, where the sheets of all of the vertex's edges meet. */
+/* Makes a picture of one pixel, whose ray comes from a random direction and passes through a point on the line from a
+ * random vertex to the mean of all vertices, where the sheets of all of the vertex's edges meet. */
 static void aim_at_spoke(render_fixture *f, const test_mesh *mesh, uint64_t ray)
 {
     const uint64_t vertex = (uint64_t)(test_uniform(ray, 1) * (double)mesh->vertex_count);
@@ -72,10 +71,11 @@ static void aim_at_spoke(render_fixture *f, const test_mesh *mesh, uint64_t ray)
     assert_true(render_camera_look_at(&f->job.camera, eye, target, (const double[]){0, 0, 1}, 1, 1, 1));
 }
 
-/* Where tets of the cell overlap, the field is a sum over those that hold the place, and rounding may put the ends of
- * neighbours in the wrong order, as it does on rays through the line that many of them share. A wrong sum would be off
- * by another tet's value, some tenths; float32's values err by some 1e-6, and so does the length in a steep stretch of
- * the function. As the field is continuous, the ray's own rounding changes the sum by no more than that. */
+/* Checks sums over overlapping tets. The field is a sum over the tets that contain the point, and rounding may swap the
+ * ends of neighbouring tets, as it does on rays through the line that many of them share. A wrong sum would be off by
+ * another tet's value, a few tenths; values in float32 err by about 1e-6, and so does the length of a segment in a
+ * steep part of the transfer function. Since the field is continuous, the ray's own rounding changes the sum by no more
+ * than that. */
 static void sums_through_spokes_match_the_reference(void **state)
 {
     static const test_polyhedron_shape shapes[3] = {TEST_L_PRISM, TEST_BENT_SPIKES, TEST_CAVITY};
@@ -130,7 +130,8 @@ static void set_volume(render_fixture *f)
     fixture_set_volume(f, 0.3);
 }
 
-/* Every sample counts the same: alpha is how many samples are in cells, and so the cells' intervals. */
+/* Sets a volume in which every sample has the same weight: alpha then depends only on the number of samples inside
+ * cells, and so on the cells' intervals. */
 static void set_constant_volume(render_fixture *f)
 {
     fixture_set_volume(f, 0.07);
@@ -177,7 +178,8 @@ static void tets_given_as_polyhedra_are_tets(void **state)
     }
 }
 
-/* Intervals have the same bits whichever of a face's cells is a polyhedron, so nothing is lost or counted twice. */
+/* Checks that intervals have the same bits whichever of a face's cells is a polyhedron, so that no sample is lost or
+ * counted twice. */
 static void intervals_of_polyhedra_are_those_of_the_types(void **state)
 {
     (void)state;
@@ -207,7 +209,8 @@ static void polyhedra_beside_other_cells_match_the_reference(void **state)
             }
 }
 
-/* Linear fields are exact, on warped faces too: the bound is that of linear_surface_is_a_plane_in_every_kind. */
+/* Checks linear fields, which are exact also with warped faces: the bound is that of
+ * linear_surface_is_a_plane_in_every_kind. */
 static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
 {
     (void)state;
@@ -237,7 +240,8 @@ static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
 
 enum { RANKS = 7 };
 
-/* is_turned: the cells' own orders change as well, which polyhedra do not see (a hex's inverse map does). */
+/* Draws the mesh on several ranks. If is_turned, each cell's vertices are reordered too, on which polyhedra do not
+ * depend (the inverse map of a hex does). */
 static void draw_distributed(const test_mesh *mesh, bool is_turned, scene_set *set, drawn_frame *out)
 {
     render_fixture parts[RANKS];
@@ -259,7 +263,8 @@ static void draw_distributed(const test_mesh *mesh, bool is_turned, scene_set *s
     free(owners);
 }
 
-/* Each cell on a random one of seven ranks, cells, vertices and faces numbered in another order on each. */
+/* Checks cells that are distributed at random over seven ranks, each with its own order of cells, vertices and
+ * faces. */
 static void random_ownership_changes_nothing(void **state)
 {
     (void)state;
@@ -282,7 +287,7 @@ static void random_ownership_changes_nothing(void **state)
     }
 }
 
-/* Under valgrind only the tests that a pattern names run. */
+/* Under valgrind only the tests that match a pattern are run. */
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {

@@ -1,11 +1,13 @@
-/* The robust root finder on random cubics: rays through a unit hex with random values, and with double and triple roots
- * made on purpose, against the exact cubic in long double. The kernels' headers are compiled here, plain.
+/* Checks the robust root finder on random cubics: rays through a unit hex with random values, also values constructed
+ * to have double and triple roots, against the exact cubic in long double. The kernels' headers are compiled here for
+ * the scalar instruction set.
  *
- * What rounding may decide: the field's eight coefficients are sums of up to 8 values of at most 1, rounded to float32
- * (half a unit of 1, 3 of 2, 3 of 4 and 1 of 8: 27 · 6e-8 = 1.6e-6), its evaluation rounds some ten times at the size
- * of its terms (6e-7 · 2), and coordinates are off by 2e-7 against slopes of at most some 4. So float32 cannot tell the
- * sign of F where |F| is below band = 4e-6. A crossing is certain where the cubic passes from beyond band on one side
- * to beyond band on the other: the first hit must not come after that, and every hit must lie within band of 0. */
+ * What rounding may decide: the eight coefficients of the field are sums of up to 8 values of at most 1, rounded to
+ * float32 (half a unit of 1, 3 of 2, 3 of 4 and 1 of 8: 27 · 6e-8 = 1.6e-6), its evaluation rounds about ten times at
+ * the size of its terms (6e-7 · 2), and coordinates are off by 2e-7 at slopes of at most about 4. So float32 cannot
+ * decide the sign of F if |F| is below band = 4e-6. A crossing is certain if the cubic passes from outside the band on
+ * one side to outside it on the other: the first hit must not be farther than that, and at every hit |F| must be within
+ * the band. */
 #include <math.h>
 
 #include "kernel_cell.h"
@@ -40,7 +42,7 @@ static void hex_corner(int i, int corner[3])
     corner[2] = i >= 4;
 }
 
-/* The field on ray lane as a polynomial of t. */
+/* Returns the field on the ray of a lane as a polynomial of t. */
 static cubic exact_cubic(const bundle *b, int lane)
 {
     const long double base[3] = {(long double)b->packet.origin_x[lane], (long double)b->packet.origin_y[lane], 0};
@@ -64,7 +66,7 @@ static long double at(const cubic *g, long double t)
     return ((g->c[3] * t + g->c[2]) * t + g->c[1]) * t + g->c[0];
 }
 
-/* Finds where g, which is monotone between low and high, passes v. */
+/* Finds where g, which is monotonic between low and high, passes v. */
 static long double pass(const cubic *g, long double low, long double high, long double v)
 {
     const bool rises = at(g, high) > at(g, low);
@@ -78,7 +80,7 @@ static long double pass(const cubic *g, long double low, long double high, long 
     return high;
 }
 
-/* The ends of the pieces on which g is monotone; returns how many ends, 2 to 4. */
+/* Computes the ends of the pieces on which g is monotonic; returns how many ends there are, 2 to 4. */
 static int monotone_ends(const cubic *g, long double low, long double high, long double ends[4])
 {
     const long double a = 3 * g->c[3], b = g->c[2], c = g->c[1], root = sqrtl(fmaxl(b * b - a * c, 0));
@@ -99,7 +101,7 @@ static int monotone_ends(const cubic *g, long double low, long double high, long
 
 typedef struct truth {
     bool certain;
-    long double certain_t; /* a hit must have come until here */
+    long double certain_t; /* the first hit must not be farther than this */
     int count;
     long double roots[3];
 } truth;
@@ -124,7 +126,7 @@ static truth find_truth(const cubic *g, long double low, long double high)
     return out;
 }
 
-/* Two points in the cube, not level. */
+/* Chooses two random points in the cube at different heights. */
 static void random_points(double from[3], double to[3])
 {
     do {
@@ -135,8 +137,8 @@ static void random_points(double from[3], double to[3])
     } while (fabs(to[2] - from[2]) < 0.2);
 }
 
-/* Rays near the first one, from 1e-7 to 1e-1 off, or anywhere. Bounds are of rays about the depth axis, as a tile's
- * are: half of the near ones are. */
+/* Aims rays near the first one, from 1e-7 to 1e-1 off, or anywhere. Bounds are made for rays around the depth axis, as
+ * those of a tile are: half of the near ones are such rays. */
 static void aim_all(bundle *b, bool is_near)
 {
     const double lean = is_near && uniform(0, 1) < 0.5 ? pow(10, uniform(-3, -1)) : 1;
@@ -156,7 +158,7 @@ static void aim_all(bundle *b, bool is_near)
     }
 }
 
-/* Largest value 1, as kernel_cell_relative() has it, in float32. */
+/* Scales the values in float32 to a maximum of 1, as kernel_cell_relative() does. */
 static void normalize(double values[8])
 {
     double largest = 0;
@@ -164,7 +166,7 @@ static void normalize(double values[8])
     for (int i = 0; i < 8; i++) values[i] = (double)(float)(values[i] / largest);
 }
 
-/* Shift the values so that the cubic of ray 0 turns at a depth of miss beyond 0. */
+/* Shifts the values so that the cubic of ray 0 has an extreme whose value is miss. */
 static void make_double_root(bundle *b, double miss)
 {
     const cubic g = exact_cubic(b, 0);
@@ -174,7 +176,7 @@ static void make_double_root(bundle *b, double miss)
     for (int i = 0; i < 8; i++) b->values[i] -= v + miss;
 }
 
-/* Add to the values a constant, a multiple of x and one of x y so that the cubic of ray 0 has a triple root, or, with
+/* Adds to the values a constant, a multiple of x and one of x y, so that the cubic of ray 0 has a triple root, or, with
  * spread, three close ones. */
 static void make_triple_root(bundle *b, double place, double spread)
 {
@@ -199,7 +201,7 @@ static void make_bundle(bundle *b, int64_t n)
     const double small = (uniform(0, 1) < 0.5 ? -1 : 1) * pow(10, uniform(-9, -1));
     memset(b, 0, sizeof *b);
     aim_all(b, kind >= 4);
-    /* Those of kind 3 mostly rise along the rays, so that many are known to be monotone. */
+    /* The values of kind 3 mostly increase along the rays, so that many cells are known to be monotonic. */
     for (int i = 0; i < 8; i++) b->values[i] = uniform(-1, 1) + (kind == 1 ? 0.6 : 0);
     for (int i = 0; i < 8 && kind == 3; i++) b->values[i] = 0.2 * b->values[i] + (i < 4 ? -0.7 : 0.7);
     if (kind == 4 || kind == 5) make_double_root(b, kind == 4 ? small : 0);
@@ -219,14 +221,14 @@ static void make_bundle(bundle *b, int64_t n)
 
 typedef struct count {
     int64_t rays, certain, missed, off, spurious;
-    double worst; /* residual */
+    double worst; /* largest residual at a hit */
 } count;
 
 static void verify_robust(count *c, const cubic *g, const truth *t, bool hit, long double at_t)
 {
     c->rays++;
     c->certain += t->certain;
-    /* t itself is rounded: half a unit of 2. */
+    /* t itself is rounded by half a unit in the last place of 2. */
     if (t->certain && (!hit || at_t > t->certain_t + 1.2e-7L)) c->missed++;
     if (!hit) return;
     const double residual = (double)fabsl(at(g, at_t));
@@ -236,8 +238,9 @@ static void verify_robust(count *c, const cubic *g, const truth *t, bool hit, lo
 
 typedef struct rates {
     count robust;
-    int64_t monotone;          /* packets in whose cells the field is known to be monotone along all rays */
-    int64_t further_crossings; /* further crossings that the robust search did not find, or found too many of */
+    int64_t monotone; /* number of packets in whose cells the field is known to be monotonic along all rays */
+    /* number of rays for which the robust search found a wrong number of further crossings */
+    int64_t further_crossings;
 } rates;
 
 static void verify_bundle(bundle *b, rates *r)
@@ -256,7 +259,7 @@ static void verify_bundle(bundle *b, rates *r)
             const cubic g = exact_cubic(b, lane);
             const truth truth = find_truth(&g, (long double)list[n].t_in[lane], (long double)list[n].t_out[lane]);
             verify_robust(&r->robust, &g, &truth, hit >> lane & 1, (long double)t[lane]);
-            /* Crossings alternate, so their number is odd where the faces differ. */
+            /* Crossings alternate, so their number is odd if the signs at both faces differ. */
             if (((int)hits[lane] & 1) != (int)(vm_bits(change) >> lane & 1)) r->further_crossings++;
         }
     }
@@ -282,7 +285,7 @@ static void robust_misses_no_first_root(void **state)
     assert_int_equal(b.thread.map_failures, 0);
 }
 
-/* The argument is the number of cubics. */
+/* The command's argument is the number of cubics. */
 int main(int argc, char **argv)
 {
     if (argc > 1) cubics = atoll(argv[1]);

@@ -1,20 +1,21 @@
-/* The robust root finder where a ray is curved in the cell's own coordinates: through warped, concave and twisted
- * hexes, twisted wedges and pyramids near their apex, with double and triple roots made on purpose, against the
- * reference's inverse map in double. The kernels' headers are compiled here, plain.
+/* Checks the robust root finder on rays that are curved in the cell's own coordinates: through warped, concave and
+ * twisted hexes, twisted wedges and pyramids near their apex, also with values constructed to have double and triple
+ * roots, against the reference's inverse map in double. The kernels' headers are compiled here for the scalar
+ * instruction set.
  *
- * The truth. The field along a ray is no polynomial, but smooth: it is halved into pieces until on each the cubic
- * through both ends' values and slopes has the middle's value and slope to 1e-9, where it errs by less still. Between
- * the pieces' ends and the cubics' turns the field is then monotone to 1e-9, and bisection finds where it passes a
- * level.
+ * Reference: the field along a ray is no polynomial, but smooth. It is halved into pieces until on each piece the cubic
+ * through the values and slopes at both ends has the value and slope of the middle to 1e-9; there it errs by even less.
+ * Between the ends of the pieces and the extremes of the cubics the field is then monotonic to 1e-9, and bisection
+ * finds where it passes a level.
  *
- * What rounding may decide. A polynomial of the eight coefficients c at coordinates in [0, 1] is evaluated in float32
- * with one rounding (6e-8) of a coefficient and up to six of sums and products on the way of each term: it errs by 7 *
- * 6e-8 sum |c|. The field's polynomial errs so, and so do those of the three positions; the ray's point is also rounded
- * three times at a size of 1.5, and by t itself. An error of the position moves the value by the field's gradient.
- * (Newton's method ends below a step of 5e-5, which leaves 1e-8.) band is the sum of both, for each cell and ray:
- * float32 cannot tell the sign of a field below it. A crossing is certain where the field passes from beyond band on
- * one side to beyond band on the other: the first hit must not come after that, and every hit must lie within band of
- * 0. */
+ * What rounding may decide: a polynomial with eight coefficients c at coordinates in [0, 1] is evaluated in float32
+ * with one rounding (6e-8) of each coefficient and up to six of the sums and products of each term: it errs by 7 * 6e-8
+ * sum |c|. The polynomials of the field and of the three coordinates have this error; the ray's point is also rounded
+ * three times at a size of 1.5, and by the rounding of t. An error of the position changes the value by the field's
+ * gradient times that error. (Newton's method ends below a step of 5e-5, which leaves 1e-8.) band is the sum of these
+ * errors for each cell and ray: float32 cannot decide the sign of a field below it. A crossing is certain if the field
+ * passes from outside the band on one side to outside it on the other: the first hit must not be farther than that, and
+ * at every hit the field must be within the band. */
 #include "reference_cell.h"
 #include "root_bundle.h"
 #include "test_meshes.h"
@@ -46,10 +47,10 @@ typedef struct ray_profile {
     const reference_cell *cell;
     const double *values;
     reference_line line;
-    double steepest[3]; /* the gradient's largest components */
+    double steepest[3]; /* largest magnitude of each component of the gradient */
     bool has_failed;
     int count;
-    knot knots[PROFILE_MAX]; /* the field is monotone from each to the next */
+    knot knots[PROFILE_MAX]; /* the field is monotonic from each knot to the next */
 } ray_profile;
 
 static knot ray_profile_at(ray_profile *c, double t)
@@ -68,11 +69,11 @@ static void ray_profile_add(ray_profile *c, knot k)
     c->knots[c->count++] = k;
 }
 
-/* The end b, and before it where the cubic of both ends turns. */
+/* Adds the extremes of the cubic between knots a and b, then b. */
 static void ray_profile_add_piece(ray_profile *c, knot a, knot b)
 {
     const double h = b.t - a.t, d0 = a.slope * h, d1 = b.slope * h, rise = b.f - a.f;
-    /* Its slope is d0 + 2 q u + 3 p u^2. */
+    /* The cubic's slope is d0 + 2 q u + 3 p u^2. */
     const double p = d0 + d1 - 2 * rise, q = 3 * rise - 2 * d0 - d1, square = q * q - 3 * p * d0;
     const double root = sqrt(fmax(square, 0)), w = -(q + (q < 0 ? -root : root));
     double turns[2] = {p != 0 ? w / (3 * p) : -1, w != 0 ? d0 / w : -1};
@@ -125,7 +126,7 @@ static double ray_profile_pass(ray_profile *c, const knot *from, const knot *to,
     return high;
 }
 
-/* Tells whether a crossing is certain, and until where a hit must have come. */
+/* Returns whether there is a certain crossing; *t is the depth that the first hit must not exceed. */
 static bool ray_profile_certain(ray_profile *c, double band, double *t)
 {
     int side = 0;
@@ -171,13 +172,13 @@ static void place_vertices(bent kind, reference_cell *cell)
         double p[3];
         for (int a = 0; a < 3; a++) p[a] = unit[i][a] + uniform(-amounts[kind], amounts[kind]);
         if ((kind == BENT_TWISTED || kind == BENT_WEDGE) && unit[i][2] > 0) twist(p, angle);
-        /* Almost to the plane of its neighbours. */
+        /* Moves a corner almost to the plane of its neighbours. */
         for (int a = 0; a < 3 && kind == BENT_CONCAVE && i == 6; a++) p[a] = dent + uniform(0, 0.1);
         for (int a = 0; a < 3; a++) cell->position[i][a] = cell->world[i][a] = (double)(float)p[a];
     }
 }
 
-/* A hex's or wedge's place, linear in each of its coordinates. */
+/* Computes the position of a point of a hex or wedge, which is linear in each of its coordinates. */
 static void cell_place(const reference_cell *cell, const double r[3], double out[3])
 {
     const int base = cell->count / 2;
@@ -212,7 +213,7 @@ static double cell_determinant(const reference_cell *cell, const double r[3])
     return sum;
 }
 
-/* Tells whether the cell is not folded, nor nearly so: in folded cells a point has several values, or none. */
+/* Returns whether the cell is not folded, nor nearly so: in folded cells a point has several values, or none. */
 static bool is_solid(const reference_cell *cell)
 {
     enum { STEPS = 5 };
@@ -227,7 +228,8 @@ static bool is_solid(const reference_cell *cell)
 
 /* ---- rays and values ---- */
 
-/* Two points, not level; at a pyramid the ray between them passes the apex by 1e-4 to 1e-1. */
+/* Chooses two points at different heights; in a pyramid the ray between them passes the apex at a distance of 1e-4 to
+ * 1e-1. */
 static void random_points(const reference_cell *cell, double from[3], double to[3])
 {
     do {
@@ -242,7 +244,7 @@ static void random_points(const reference_cell *cell, double from[3], double to[
     } while (fabs(to[2] - from[2]) < 0.2);
 }
 
-/* Rays near the first one, from 1e-7 to 1e-1 off, or anywhere. */
+/* Aims rays near the first one, from 1e-7 to 1e-1 off, or anywhere. */
 static void aim_all(bundle *b, const reference_cell *cell, bool is_near)
 {
     double from[3], to[3];
@@ -266,7 +268,7 @@ static reference_line line_of(const bundle *b, int lane)
                             {(double)b->packet.slope_x[lane], (double)b->packet.slope_y[lane]}};
 }
 
-/* Ray 0 in the cell. */
+/* Traces ray 0 through the cell; returns false if it misses. */
 static bool trace_first(const bundle *b, const reference_cell *cell, ray_profile *c)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
@@ -281,7 +283,7 @@ static void shift_values(bundle *b, const reference_cell *cell, double level, do
     for (int i = 0; i < cell->count; i++) b->values[i] += level + slope * cell->position[i][2];
 }
 
-/* Shift the values so that the field on ray 0 turns at a depth of miss beyond 0. */
+/* Shifts the values so that the field on ray 0 has an extreme whose value is miss. */
 static void make_double_root(bundle *b, const reference_cell *cell, ray_profile *c, double miss)
 {
     if (!trace_first(b, cell, c)) return;
@@ -292,8 +294,8 @@ static void make_double_root(bundle *b, const reference_cell *cell, ray_profile 
         }
 }
 
-/* Every cell can represent t as a field. Adding a multiple of it and a constant makes the field 0 at its steepest or
- * flattest point on ray 0, with the given slope there: a triple root, or three close ones. */
+/* Makes a triple root, or three close ones. Every cell can represent t as a field. Adding a multiple of t and a
+ * constant makes the field 0 at its steepest or flattest point on ray 0, with the given slope there. */
 static void make_triple_root(bundle *b, const reference_cell *cell, ray_profile *c, double slope)
 {
     if (!trace_first(b, cell, c)) return;
@@ -315,7 +317,7 @@ static void make_triple_root(bundle *b, const reference_cell *cell, ray_profile 
     }
 }
 
-/* Largest value 1, as kernel_cell_relative() has it, in float32. */
+/* Scales the values in float32 to a maximum of 1, as kernel_cell_relative() does. */
 static void normalize(double *values, int count)
 {
     double largest = 0;
@@ -346,7 +348,7 @@ static void make_bundle(bundle *b, reference_cell *cell, ray_profile *scratch, b
 
 typedef struct count {
     int64_t rays, certain, missed, off, differing, inverse_failures;
-    double worst, worst_band; /* residual in bands; band */
+    double worst, worst_band; /* largest residual relative to the band; largest band */
 } count;
 
 static double sum_of(const vf c[8])
@@ -373,7 +375,7 @@ static void verify_ray(count *n, const kernel_map *map, ray_profile *c, double l
     n->certain += certain;
     n->inverse_failures += c->has_failed;
     n->worst_band = fmax(n->worst_band, band);
-    /* t itself is rounded: half a unit of 2. */
+    /* t itself is rounded by half a unit in the last place of 2. */
     if (certain && (!hit || hit_t > certain_t + 1.2e-7)) n->missed++;
     if (!hit) return;
     const double residual = fabs(ray_profile_at(c, hit_t).f) / band;
@@ -381,8 +383,8 @@ static void verify_ray(count *n, const kernel_map *map, ray_profile *c, double l
     n->off += residual > 1;
 }
 
-/* Counts rays whose first crossing, or number of crossings, differs when they are traced alone: a ray's result must not
- * depend on the others of its packet. */
+/* Counts rays whose first crossing, or number of crossings, differs if they are traced alone: the result of a ray must
+ * not depend on the others of its packet. */
 static int64_t differ_alone(bundle *b, const kernel_curved *curved, const kernel_interval *i, vf t, vf hits)
 {
     int64_t differing = 0;
@@ -447,7 +449,7 @@ static void curved_rays_miss_no_first_root(void **state)
     }
 }
 
-/* The argument is the number of rays. */
+/* The command's argument is the number of rays. */
 int main(int argc, char **argv)
 {
     if (argc > 1) rays_wanted = atoll(argv[1]);

@@ -1,5 +1,5 @@
-/* Scene files: what a good one becomes, all defaults, and the messages about bad ones. Bad files are one good file with
- * one line replaced, so that nothing else in them can be the reason for the message. */
+/* Checks scene files: the result of a valid file, all defaults, and the messages about invalid ones. Invalid files are
+ * one valid file with one line replaced, so that only this line can cause the message. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,14 +18,14 @@
 #include "scene.h"
 #include "scene_document.h"
 
-/* sRGB's definition, in double, apart from the library's. */
+/* Converts by sRGB's definition, in double, independent of the library's. */
 static double linear(double s)
 {
     return s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4);
 }
 
-/* A colour's float32 steps: sRGB to float, pow, times a factor, each within 2^-24 relative; slope of the curve < 2.5.
- */
+/* The float32 roundings of a colour: sRGB to float, pow, multiplication by a factor, each within 2^-24 relative; the
+ * slope of the curve is < 2.5. */
 #define COLOUR_TOLERANCE 1e-6
 
 static void assert_near(double value, double expected, double tolerance)
@@ -189,7 +189,7 @@ static const char every_key[] =
     "parameters: {inflow: 2.5, _k-2: -1e-3, values: 3, color: 4, axis: 5}\n"
     "schedule: radix\n";
 
-/* Keys that exclude others of the file above. */
+/* Keys that cannot be combined with others of the file above. */
 static const char excluding_keys[] = "surface_error: 0.5\n"
                                      "images:\n"
                                      "- {name: a, layers: [volume: {field: p}], outputs: [{path: a.png}]}\n";
@@ -213,7 +213,7 @@ static void check_vector(const double v[3], double x, double y, double z)
     assert_near(v[2], z, 1e-15);
 }
 
-/* The whole table, to the bit. */
+/* Checks that the map has the whole table, to the bit. */
 static void check_built_in(const scene_colour_map *map, const char *name)
 {
     int count = 0;
@@ -416,13 +416,13 @@ static void scene_image_defaults_hold(void **state)
         const double *d = image->lights[i].direction;
         assert_false(image->lights[i].is_in_world);
         assert_near(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1, 1e-15);
-        assert_true(d[2] > 0); /* from the eye's side */
+        assert_true(d[2] > 0); /* the light comes from the eye's side */
     }
     assert_int_equal(image->outputs[0].format, SCENE_PNG8);
     scene_free(&s);
 }
 
-/* A scene's sampling, its number of volumes, and how they are then integrated. */
+/* Checks the integration method for a scene's sampling keys and its number of volumes. */
 static void sampling_is_by_what_is_said(void **state)
 {
     (void)state;
@@ -484,9 +484,9 @@ static void clips_are_of_the_image_and_of_layers(void **state)
     check_vector(clips[2].centre, 1, -2, 3);
     assert_true(clips[3].kind == SCENE_CLIP_BOX && !clips[3].is_outside);
     assert_true(image->isosurfaces[0].clips == 3 && image->isosurfaces[1].clips == 7);
-    assert_true(image->volumes[0].clips == 7); /* the same sphere stands once */
+    assert_true(image->volumes[0].clips == 7); /* identical spheres are stored once */
     assert_true(image->slices[0].clips == 11);
-    assert_true(image->surfaces[0].clips == 3); /* the box is that of all */
+    assert_true(image->surfaces[0].clips == 3); /* the image's box clips all layers */
     assert_int_equal(s.images[1].clip_count, 0);
     scene_free(&s);
 }
@@ -511,7 +511,7 @@ static void statistics_and_conditions_are_read(void **state)
     scene_free(&s);
 }
 
-/* Names of meshes are the simulation's: no short form is meant by them. */
+/* Checks warps by the names of meshes. These names are the simulation's: they have no short forms. */
 static void warps_are_read_by_their_meshes(void **state)
 {
     (void)state;
@@ -562,7 +562,8 @@ static void mirrors_are_read_by_their_meshes(void **state)
     scene_free(&s);
 }
 
-/* Names of parameters are the scene's own: no short form, and no other spelling, is meant by them. */
+/* Checks parameters by their names. These names are the scene's own: they have no short forms and no alternative
+ * spellings. */
 static void parameters_are_read_by_their_names(void **state)
 {
     (void)state;
@@ -612,8 +613,7 @@ static void surfaces_have_their_colours(void **state)
     scene_free(&s);
 }
 
-/* A normal of any length, and of numbers whose squares are none. */
-/* An entry of the list may be many planes: at offsets, or spread over the data. */
+/* Checks entries of the list that stand for many planes: at offsets, or spread over the data. */
 static void planes_come_in_numbers(void **state)
 {
     (void)state;
@@ -632,12 +632,14 @@ static void planes_come_in_numbers(void **state)
         const scene_plane *plane = &slice[0].planes[i];
         check_vector(plane->normal, i < 3, 0, i < 3 ? 0 : -1);
         assert_true(plane->has_point == (i < 3) && fabs(plane->offset - (i < 3 ? offsets[i] : 0)) <= 0);
-        assert_true(fabs(plane->extent_fraction - (i < 3 ? 0 : shares[i - 3])) <= 0); /* quarters are exact */
+        /* multiples of a quarter are exact */
+        assert_true(fabs(plane->extent_fraction - (i < 3 ? 0 : shares[i - 3])) <= 0);
     }
     assert_true(slice[1].plane_count == 1 && slice[1].planes[0].extent_fraction == 0);
     scene_free(&s);
 }
 
+/* Checks normals of any length, including components whose squares underflow or overflow. */
 static void slices_have_planes_of_unit_normals(void **state)
 {
     (void)state;
@@ -683,9 +685,10 @@ static void lines_are_of_what_colours_the_layer(void **state)
     const scene_lines *slice = &s.images[0].slices[0].lines, *iso = &s.images[0].isosurfaces[0].lines;
     const scene_lines *outer = &s.images[0].surfaces[0].lines;
     assert_true(slice->is_given && slice->is_of_colours && !slice->has_values && slice->count == 7);
-    assert_string_equal(slice->field.name, "w"); /* as the sweep has it */
+    assert_string_equal(slice->field.name, "w"); /* the field that the sweep sets */
     assert_true(slice->field.component == 1 && slice->field.mesh_count == 1 && slice->field.at_vertices);
-    assert_true(slice->width == 2 && fabsf(slice->colours[20] - 0.0100228F) < 1e-6F); /* 0.1 in linear light */
+    /* 0.1 in sRGB, converted to linear light */
+    assert_true(slice->width == 2 && fabsf(slice->colours[20] - 0.0100228F) < 1e-6F);
     assert_true(!iso->is_of_colours && iso->has_values && iso->count == 3 && iso->width == 4);
     assert_string_equal(iso->field.name, "r");
     assert_true(iso->values[0] == -1 && iso->values[1] == 2 && iso->values[2] == 3 && iso->field.component == 0);
@@ -761,26 +764,26 @@ static void scene_examples_are_good(void **state)
     assert_true(count > 0);
 }
 
-/* ---- bad files ---- */
+/* ---- invalid files ---- */
 
 static const char *const good_lines[] = {
-    /*  1 */ "threads: 1",
-    /*  2 */ "images:",
-    /*  3 */ "  - name: a",
-    /*  4 */ "    size: [64, 48]",
-    /*  5 */ "    every: 2",
-    /*  6 */ "    camera: {position: [0, 0, 5], focal: [0, 0, 0]}",
-    /*  7 */ "    background: [1, 1, 1]",
-    /*  8 */ "    lights: [{direction: [0, 0, 1]}]",
-    /*  9 */ "    layers:",
-    /* 10 */ "      - isosurface: {field: f, values: [1, 2]}",
-    /* 11 */ "      - volume: {field: f}",
-    /* 12 */ "    sampling: {step: 0.5}",
-    /* 13 */ "    outputs:",
-    /* 14 */ "      - path: a.png",
-    /* 15 */ "  - name: b",
-    /* 16 */ "    layers: [{volume: {field: f}}]",
-    /* 17 */ "    outputs: [{path: b.exr}]",
+    /* line 1 */ "threads: 1",
+    /* line 2 */ "images:",
+    /* line 3 */ "  - name: a",
+    /* line 4 */ "    size: [64, 48]",
+    /* line 5 */ "    every: 2",
+    /* line 6 */ "    camera: {position: [0, 0, 5], focal: [0, 0, 0]}",
+    /* line 7 */ "    background: [1, 1, 1]",
+    /* line 8 */ "    lights: [{direction: [0, 0, 1]}]",
+    /* line 9 */ "    layers:",
+    /* line 10 */ "      - isosurface: {field: f, values: [1, 2]}",
+    /* line 11 */ "      - volume: {field: f}",
+    /* line 12 */ "    sampling: {step: 0.5}",
+    /* line 13 */ "    outputs:",
+    /* line 14 */ "      - path: a.png",
+    /* line 15 */ "  - name: b",
+    /* line 16 */ "    layers: [{volume: {field: f}}]",
+    /* line 17 */ "    outputs: [{path: b.exr}]",
 };
 enum { good_line_count = sizeof good_lines / sizeof *good_lines };
 
@@ -792,9 +795,9 @@ enum { good_line_count = sizeof good_lines / sizeof *good_lines };
 #define AT "{position: [0, 0, 5], focal: [0, 0, 0]}"
 
 static const struct bad_file {
-    int line; /* replaced */
+    int line; /* number of the line that is replaced */
     const char *by;
-    int reported; /* the line in the message */
+    int reported; /* number of the line in the message */
     const char *words[3];
 } bad_files[] = {
     {1,
@@ -1292,7 +1295,7 @@ static void scene_huge_file_is_refused(void **state)
     test_free(text);
 }
 
-/* Each prefix of a good file is cut somewhere else: most are errors, none may be worse. */
+/* Checks every prefix of a valid file: most are errors; none may crash or leak. */
 static void scene_truncated_files_fail_cleanly(void **state)
 {
     (void)state;
@@ -1495,7 +1498,7 @@ static void schema_keys_have_help_and_defaults(void **state)
     check_mapping(&scene_top);
 }
 
-/* Argument: the folder of examples. */
+/* The command's argument is the folder of examples. */
 int main(int argument_count, char **arguments)
 {
     const struct CMUnitTest tests[] = {

@@ -1,4 +1,4 @@
-/* Colours of values in a scene: tables from lists and files, changes to them, and errors. */
+/* Checks colours of values in a scene: tables from lists and files, changes to them, and errors. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -28,7 +28,8 @@ static double srgb_of(float linear)
     return l <= 0.0031308 ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055;
 }
 
-/* A colour's float32 steps: sRGB to float, pow, a mean of two, each within 2^-24 relative; slope of the curve < 2.5. */
+/* The float32 roundings of a colour: sRGB to float, pow, the mean of two, each within 2^-24 relative; the slope of the
+ * curve is < 2.5. */
 #define COLOUR_TOLERANCE 1e-6
 
 static void check_colour(const float c[3], double r, double g, double b)
@@ -86,7 +87,7 @@ static insitu_status read_stored(const char *path, char **text, int64_t *size, b
     return base_fail(error, INSITU_ERROR_SCENE, "%s: cannot be read: no such file", path);
 }
 
-/* The keys after "field: f" of a surface's colour_by. */
+/* Parses a scene with the given keys after "field: f" of a surface's colour_by. */
 static insitu_status parse(const char *keys, scene_attachments *files, scene *s, base_error *error)
 {
     char text[2048];
@@ -133,7 +134,8 @@ static void every_map_is_found_by_its_name(void **state)
     }
 }
 
-/* Even points are entries; between them colours are straight in sRGB. */
+/* Checks a table made from a list: every other entry is a colour of the list; between them colours are linear in
+ * sRGB. */
 static void lists_become_tables_through_their_colours(void **state)
 {
     (void)state;
@@ -203,7 +205,8 @@ static void ranges_say_where_they_come_from(void **state)
     assert_true(r->is_fixed && r->low == -1 && r->high == 1e9);
 }
 
-/* CIELAB's greys are sRGB's; its lightness is 116 cbrt(Y) - 16 of luminance Y. */
+/* Checks tables from ParaView's files. The greys of CIELAB are those of sRGB; its lightness is 116 cbrt(Y) - 16 for a
+ * luminance Y. */
 static void files_of_paraview_become_tables(void **state)
 {
     (void)state;
@@ -235,7 +238,8 @@ static void files_of_paraview_become_tables(void **state)
     check_colour(entry(map, 1), 1, 0.5, 1);
     map = map_of(", map: {file: several.json, name: uneven}");
     check_colour(entry(map, 256), 1, 0, 0);
-    /* Moreland's own middle has a lightness of 88, the file's one of 88.1: less than a code. */
+    /* The middle of Moreland's own map has a lightness of 88, that of the file 88.1: the difference is less than a
+     * code. */
     const float *moreland = colour_map_table("cool_to_warm", &count);
     map = map_of(", map: {file: several.json, name: moreland}");
     for (int i = 0; i < 3; i++) {
@@ -245,7 +249,7 @@ static void files_of_paraview_become_tables(void **state)
     }
 }
 
-/* All other ranks parse the files that one rank has read. */
+/* Checks that one rank reads the files and that all other ranks parse its copy. */
 static void files_are_read_once_and_then_passed_on(void **state)
 {
     (void)state;
@@ -254,7 +258,7 @@ static void files_are_read_once_and_then_passed_on(void **state)
     scene_attachments files = {.read = read_stored};
     reads = 0;
     const char *keys = ", map: {file: one.json}}\n  - volume:\n      {field: f, map: {file: ../maps/one.json}";
-    assert_int_equal(parse(keys, &files, &s, &error), INSITU_ERROR_SCENE); /* another path, which is not there */
+    assert_int_equal(parse(keys, &files, &s, &error), INSITU_ERROR_SCENE); /* another path, at which there is no file */
     assert_non_null(strstr(error.message, "maps/scene.yaml:9: images[0].layers[1].volume.map.file: "
                                           "maps/../maps/one.json: cannot be read: no such file"));
     keys = ", map: {file: one.json}}\n  - volume:\n      {field: f, map: {file: one.json, name: red}";
@@ -274,7 +278,7 @@ static void files_are_read_once_and_then_passed_on(void **state)
     assert_non_null(strstr(error.message, "no file can be read here"));
 }
 
-/* Keys of line 7, and words that the message must hold after "maps/scene.yaml:7:
+/* Keys of line 7, and texts that the message must contain after "maps/scene.yaml:7:
  * images[0].layers[0].isosurface.colour_by." */
 static const char *const bad_keys[][3] = {
     {", map: jet", "map: \"jet\" is not allowed (did you mean turbo?), expected one of viridis, plasma",
@@ -378,7 +382,7 @@ static void volumes_refuse_what_only_surfaces_have(void **state)
     }
 }
 
-/* Each failed allocation of the library is an error that says so, and leaves nothing behind. */
+/* Checks that each failed allocation of the library is reported as such, and leaks nothing. */
 static void failed_allocations_are_errors_without_a_leak(void **state)
 {
     (void)state;

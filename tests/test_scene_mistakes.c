@@ -1,5 +1,5 @@
-/* Mistakes that newcomers make in scenes, one a row: each message names the file, the line at fault, the key, what was
- * found there and what to write. */
+/* Checks mistakes that newcomers make in scenes, one for each row: each message must name the file, the line of the
+ * error, the key, what was found there and what to write instead. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,7 +11,7 @@
 
 #include "scene.h"
 
-/* The scene that is right. */
+/* The correct scene. */
 static const char *const lines[] = {
     "images:",
     "  - name: heat",
@@ -31,10 +31,10 @@ static const char *const lines[] = {
 enum { line_count = sizeof lines / sizeof *lines };
 
 typedef struct mistake {
-    int line, count; /* so many lines from this on, counted from 1, are replaced */
+    int line, count; /* first replaced line, counted from 1, and number of replaced lines */
     const char *by;
-    int at;               /* the line in the message */
-    const char *words[3]; /* the key, unless the text is no YAML; what was found; what to write */
+    int at;               /* number of the line in the message */
+    const char *words[3]; /* the key, unless the text is no YAML; what was found; what to write instead */
 } mistake;
 
 static const mistake mistakes[] = {
@@ -1235,7 +1235,7 @@ static void the_scene_without_mistakes_is_taken(void **state)
     scene_free(&s);
 }
 
-/* The search for the line at fault reads each line a few times, whatever stands before it. */
+/* Checks the time to find a mistake after many lines: the search must read each line only a few times. */
 static void a_mistake_behind_many_lines_is_found(void **state)
 {
     (void)state;

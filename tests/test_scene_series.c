@@ -1,5 +1,5 @@
-/* Scenes that make many pictures: where an orbit's views stand, which variants a sweep has, how a camera moves, and
- * which databases there are. */
+/* Checks scenes that make many pictures: the positions of an orbit's views, the variants of a sweep, camera paths, and
+ * databases. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +13,7 @@
 #include "memory.h"
 #include "scene.h"
 
-/* Error of sines and cosines of angles in degrees, turned to radians: a few times 2^-53. */
+/* Error of sines and cosines of angles in degrees, converted to radians: a few times 2^-53. */
 #define ANGLE_TOLERANCE 1e-15
 
 static void parse_good(const char *text, scene *s)
@@ -49,7 +49,7 @@ static void orbits_go_around_coordinate_axes(void **state)
     (void)state;
     static const struct {
         const char *axis;
-        double up[3], views[4][3]; /* at 0, 90, 180 and 270 degrees */
+        double up[3], views[4][3]; /* eye positions at 0, 90, 180 and 270 degrees */
     } cases[] = {{"[0, 3, 0]", {0, 1, 0}, {{0, 0, 1}, {1, 0, 0}, {0, 0, -1}, {-1, 0, 0}}},
                  {"[0, 0, 1]", {0, 0, 1}, {{1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}}},
                  {"[-1, 0, 0]", {-1, 0, 0}, {{0, 1, 0}, {0, 0, -1}, {0, -1, 0}, {0, 0, 1}}}};
@@ -71,7 +71,7 @@ static void orbits_go_around_coordinate_axes(void **state)
     }
 }
 
-/* Angles between the views and with the axis, whatever the axis is. */
+/* Checks the angles between the views and with the axis, for any axis. */
 static void orbits_are_circles_about_any_axis(void **state)
 {
     (void)state;
@@ -137,7 +137,8 @@ static void sweeps_make_each_combination_once(void **state)
         assert_int_equal(image->isosurfaces[0].value_count, 1);
         assert_true(image->isosurfaces[0].values[0] == value + 1 && image->isovalue == value + 1);
         assert_true(image->isosurfaces[0].colours[value == 0 ? 0 : 1] == 1);
-        assert_true(image->isosurfaces == s.images[i - i % 2].isosurfaces); /* views share their layers */
+        /* both views of a variant share their layers */
+        assert_true(image->isosurfaces == s.images[i - i % 2].isosurfaces);
         assert_true(scene_is_first_variant(image) == (i == 0));
         const scene_placeholder_values moment = scene_placeholder_values_of(image, 5, 0);
         char expected[64], *path = scene_expand(image->outputs[0].path, &moment);
@@ -224,7 +225,7 @@ static void grids_number_their_cells(void **state)
     scene_free(&s);
 }
 
-/* Tells whether the montage has this inset and no other. */
+/* Returns whether the montage has this inset and no other. */
 static bool has_inset(const scene_montage *m, scene_anchor corner, int x, int y, int width, int height)
 {
     int count = 0;
@@ -233,7 +234,8 @@ static bool has_inset(const scene_montage *m, scene_anchor corner, int x, int y,
     return count == 1 && r->x == x && r->y == y && r->width == width && r->height == height;
 }
 
-/* Frames are a four-hundredth of 480 pixels wide, and the margins beside them a fiftieth of them, rounded up. */
+/* Checks insets: their frames are a four-hundredth of 480 pixels wide, and the margins next to them a fiftieth of 480,
+ * rounded up. */
 static void insets_lie_over_the_corners_of_grids(void **state)
 {
     (void)state;
@@ -262,7 +264,8 @@ static void insets_lie_over_the_corners_of_grids(void **state)
     scene_free(&s);
 }
 
-/* Words of 0.03 of the height: 0.03 * 24 * 9 = 6.48 pixels; of 0.1: 21.6. */
+/* Checks the width of strips of bars: text of 0.03 of the height has 0.03 * 24 * 9 = 6.48 pixels; text of 0.1 has
+ * 21.6. */
 static void strips_of_bars_are_as_wide_as_words_need(void **state)
 {
     (void)state;
@@ -317,7 +320,7 @@ static void paths_go_through_their_places_and_stay_at_the_ends(void **state)
     scene_free(&s);
 }
 
-/* Between two places, by cycles, the camera has gone 3 s^2 - 2 s^3 of the way. */
+/* Checks that between two positions, interpolated by cycles, the camera has moved 3 s^2 - 2 s^3 of the distance. */
 static void paths_of_two_places_ease_in_and_out(void **state)
 {
     (void)state;
@@ -328,15 +331,16 @@ static void paths_of_two_places_ease_in_and_out(void **state)
     for (int cycle = 0; cycle < 40; cycle++) {
         const double share = fmin(fmax((cycle - 10) / 20.0, 0), 1), way = share * share * (3 - 2 * share);
         const scene_camera at = scene_camera_at(&s.images[0].camera, cycle, 1e9);
-        check_vector(at.eye, way, 5 * way, 8); /* a coordinate that stays stays to the bit */
+        check_vector(at.eye, way, 5 * way, 8); /* a coordinate that does not change stays the same to the bit */
         check_vector(at.focal, 0, 0, -2 * way);
         assert_true(at.eye[2] == 8);
     }
     scene_free(&s);
 }
 
-/* The slope is the same on both sides of each place, by differences, and the path stays between neighbours. A cubic's
- * second derivative is below 12 times its rise, so a difference over h is off by less than 6 h of the rise. */
+/* Checks that the slope is the same on both sides of each position, by differences, and that the path stays between
+ * neighbouring positions. The second derivative of a cubic is below 12 times its rise, so a difference over h is off by
+ * less than 6 h of the rise. */
 static void paths_are_smooth_and_do_not_swing_out(void **state)
 {
     (void)state;
@@ -362,7 +366,7 @@ static void paths_are_smooth_and_do_not_swing_out(void **state)
         }
         assert_true(at.angle >= 30 && at.angle <= 50 && at.eye[2] == 8);
     }
-    /* x rises by 4 in 1, then by 2 in 3: the slope between is 12 / (7 / 4 + 5 / (2 / 3)). */
+    /* x rises by 4 in 1, then by 2 in 3: the slope at the position between them is 12 / (7 / 4 + 5 / (2 / 3)). */
     assert_near(scene_camera_at(c, 0, 1.5).eye[0], 2 - 12 / (1.75 + 7.5) / 8, 1e-14);
     scene_free(&s);
 }

@@ -1,4 +1,5 @@
-/* Short forms of a scene mean what their full forms mean, and words that are nearly right are named in messages. */
+/* Checks that short forms of a scene mean the same as their full forms, and that messages suggest the nearest word for
+ * misspelt ones. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -54,7 +55,7 @@ static void print_layers(char *to, const scene_image *image)
     }
 }
 
-/* Writes all that short forms are for. */
+/* Prints all values that have short forms. */
 static void print_image(char *to, const scene_image *image)
 {
     *to = '\0';
@@ -144,7 +145,7 @@ static void short_forms_mean_their_full_forms(void **context)
     }
 }
 
-/* A map's colours are read from the document, by their paths. */
+/* Checks the names of maps' colours, which are read from the document by their paths. */
 static void colours_of_maps_have_names(void **context)
 {
     (void)context;
@@ -197,7 +198,7 @@ static void far_words_are_not_guessed(void **context)
 {
     (void)context;
     static const char *const keys[] = {"field", "values", "opacity", "colour_by"};
-    assert_string_equal(scene_nearest_word("vlaues", keys, 4), "values"); /* a swap is one edit */
+    assert_string_equal(scene_nearest_word("vlaues", keys, 4), "values"); /* exchanging two letters is one edit */
     assert_string_equal(scene_nearest_word("opacty", keys, 4), "opacity");
     assert_null(scene_nearest_word("threshold", keys, 4));
     assert_null(scene_nearest_word("", keys, 4));

@@ -1,12 +1,12 @@
-/* Aims at what max_error takes the field for in strongly bent cells (kernel_local_budget.h): the polynomial through
- * its values at a ray's ends, quarters and middle. In random cells, values are chosen so that along the picture's
- * middle ray these five say as little as possible of what the field does between them:
+/* Checks max_error in strongly bent cells with fields that its approximation represents worst: the polynomial through
+ * the field's values at a ray's ends, quarters and middle (kernel_local_budget.h). In random cells, values are chosen
+ * so that along the picture's middle ray these five values reveal as little as possible of the field between them:
  *
- *     LEVEL   the polynomial is a cubic, as it is of cells that are hardly bent, and its mean as far off as can be
- *     BLIND   it is the ends' chord, although the field is not: of hexes alone, as others have too few values for that
+ *     LEVEL   the polynomial is a cubic, as for cells that are hardly bent, and its mean is as far off as possible
+ *     BLIND   it is the chord of the ends, but the field is not: for hexes only, as others have too few values for that
  *     ANY     the values are random
  *
- * The truth is the integral in double. */
+ * The reference is the integral in double. */
 #include "reference_cell.h"
 #include "test_effort.h"
 #include "test_step_fixture.h"
@@ -26,9 +26,10 @@ typedef enum bend_aim { LEVEL, BLIND, ANY, AIMS } bend_aim;
 static const test_cell_shape shapes[SHAPES] = {TEST_UNIT_HEX, TEST_UNIT_WEDGE, TEST_UNIT_PYRAMID};
 static const char *const aim_names[AIMS] = {"level", "blind", "any"};
 
-/* ---- what the looks say, as linear functions of the values at the vertices ---- */
+/* ---- the five values along a ray, as linear functions of the values at the vertices ---- */
 
-/* At the quarters and the middle how far the field is off the ends' chord, by vertex, and of that the mean. */
+/* The deviation of the field from the chord of its ends, for a value of 1 at each vertex: at the quarters and the
+ * middle, and its mean. */
 typedef struct chord_deviations {
     int count;
     double off[3][8], mean[8];
@@ -48,8 +49,8 @@ static void cell_of(const render_fixture *f, const test_mesh *mesh, reference_ce
         }
 }
 
-/* Tells whether the edges at every corner make a corner of one hand, as they do where no part of the cell is turned
- * over: the field has one value at a point then. */
+/* Returns whether the edges at every corner are right-handed. Then no part of the cell is inverted, and the field has
+ * one value at each point. */
 static bool is_unfolded(const test_mesh *mesh)
 {
     static const int hex[8][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
@@ -68,7 +69,7 @@ static bool is_unfolded(const test_mesh *mesh)
             const int b = (a + 1) % 3, c = (a + 2) % 3;
             det += edges[0][a] * (edges[1][b] * edges[2][c] - edges[1][c] * edges[2][b]);
         }
-        if (det < 0.05) return false; /* of 2.7 */
+        if (det < 0.05) return false; /* the determinant of the undistorted cell is 2.7 */
     }
     return true;
 }
@@ -76,7 +77,7 @@ static bool is_unfolded(const test_mesh *mesh)
 /* The orthographic camera's ray through the middle of the picture. */
 static const reference_line middle_line = {{0, 0}, {0, 0}};
 
-/* False where the ray does not cross the cell from one face to another. */
+/* Computes the deviations; returns false if the ray does not cross the cell once, from one face to another. */
 static bool sample_deviations(const reference_cell *cell, chord_deviations *out)
 {
     reference_crossing ends[REFERENCE_MAX_CROSSINGS];
@@ -93,7 +94,7 @@ static bool sample_deviations(const reference_cell *cell, chord_deviations *out)
         }
         for (int n = 0; n <= PLACES; n++) {
             const double share = (double)n / PLACES, off = field[n] - (field[0] + share * (field[PLACES] - field[0]));
-            mean += off * (n % 2 ? 4 : 2) / (3 * PLACES); /* Simpson; both ends have 0 */
+            mean += off * (n % 2 ? 4 : 2) / (3 * PLACES); /* Simpson's rule; both ends have a deviation of 0 */
             if (n % (PLACES / 4) == 0 && n > 0 && n < PLACES) out->off[4 * n / PLACES - 1][i] = off;
         }
         out->mean[i] = mean;
@@ -101,7 +102,7 @@ static bool sample_deviations(const reference_cell *cell, chord_deviations *out)
     return true;
 }
 
-/* Takes the part along b out of a. */
+/* Subtracts from a its projection onto b. */
 static void take_out(int count, const double b[8], double a[8])
 {
     double ab = 0, bb = 0;
@@ -109,7 +110,7 @@ static void take_out(int count, const double b[8], double a[8])
     for (int i = 0; i < count && bb > 1e-24; i++) a[i] -= ab / bb * b[i];
 }
 
-/* Values within 0 .. 1 for which the wanted functions are 0 and the mean is off by the most. */
+/* Computes values within 0 .. 1 for which the functions of the aim are 0 and the mean is off by the most. */
 static void aim_values(const chord_deviations *looks, bend_aim aim, double *values)
 {
     double found[3][8], largest = 0;
@@ -133,7 +134,7 @@ static void aim_values(const chord_deviations *looks, bend_aim aim, double *valu
 
 /* ---- pictures ---- */
 
-/* Draws one cell; false where the middle ray is not for the aim. */
+/* Draws one cell; returns false if the middle ray is unsuitable for the aim. */
 static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, double worst[3])
 {
     test_mesh mesh;
@@ -164,8 +165,8 @@ static bool verify_cell(test_cell_shape shape, bend_aim aim, uint64_t seed, doub
     return is_seen;
 }
 
-/* Hexes that are too bent for lanes, whose fields bend at one end of the way: how far these are off their chord at the
- * most does not tell how they are off in parts. */
+/* Hexes that are too bent for tracing in lanes, whose fields bend at one end of the ray: their largest deviation from
+ * the chord does not bound their deviation in parts. */
 static const uint64_t hard_seeds[] = {188, 1349};
 
 static void max_error_is_kept_where_looks_say_little(void **state)

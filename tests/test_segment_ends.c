@@ -1,5 +1,5 @@
-/* Errors of segments' ends, which steep functions and dense media magnify: in tets so thin that float32 does not tell
- * their ends apart, and in cells of every kind with random functions, alone and cut by surfaces. */
+/* Checks errors of segments' ends, which steep functions and dense media magnify: in tets so thin that their ends are
+ * equal in float32, and in cells of every kind with random functions, alone and cut by surfaces. */
 #include "comp.h"
 #include "reference_integral.h"
 #include "test_render_fixture.h"
@@ -14,7 +14,7 @@
 
 enum { SIDE = 9, PIXELS = SIDE * SIDE, LAYERS = 8 };
 
-/* Those of the picture's truth; NaN where rounding may decide otherwise. */
+/* Computes the colours of the reference picture; NaN if rounding may decide otherwise. */
 static void truth_of(const render_fixture *f, double rgba[4 * PIXELS])
 {
     reference_integral *scene = reference_integral_create(&f->job, 1e-9);
@@ -45,13 +45,13 @@ static void set_segments(render_fixture *f, double max_error)
 {
     fixture_set_volume(f, 1);
     f->job.integration = RENDER_SEGMENTS;
-    f->job.extent = 3.5; /* the scene's own diagonal is less */
+    f->job.extent = 3.5; /* the scene's own diagonal is shorter */
     f->job.max_error = max_error;
 }
 
 /* ---- thin tets ---- */
 
-/* A slab of layers of tets, seen from above. Places near 0.7 are rounded to 6e-8. */
+/* Makes a slab of layers of tets, seen from above. Coordinates near 0.7 are rounded by 6e-8. */
 static void make_layers(double thickness, test_mesh *out)
 {
     test_mesh_lattice(TEST_TETS, LAYERS, 0, test_wave, out);
@@ -62,10 +62,11 @@ static void make_layers(double thickness, test_mesh *out)
     }
 }
 
-/* Places on a ray are told apart from 6e-8 on, and cells in one place come in any order. So one cell's light may be
- * attenuated by the depth of the others there, 6e-8 / thickness of the whole, which is some 1, instead of the other way
- * round. The error is that times the difference of their colours, a tenth at most. If segments whose ends are one
- * number were left out, the slab would lose a few percent of layers of 1e-6, and half of those of 1e-7. */
+/* Checks that thin tets are not lost. Positions on a ray are distinct if they differ by at least 6e-8, and cells at the
+ * same position are in any order. So the light of one cell may be attenuated by the optical depth of the others there,
+ * 6e-8 / thickness of the whole, which is about 1, instead of attenuating theirs. The error is that times the
+ * difference of their colours, a tenth at most. If segments whose ends are equal were left out, the slab would lose a
+ * few percent of layers of 1e-6, and half of those of 1e-7. */
 static void thin_tets_are_not_lost(void **state)
 {
     (void)state;
@@ -97,7 +98,8 @@ static double bent_field(const double p[3])
     return 0.5 + 0.35 * sin(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) + 0.3 * sin(2.3 * p[2] + p[0]);
 }
 
-/* The worst of each error asked for, 1e-2 to 1e-4, of one mesh and function. Returns whether there is a step. */
+/* Finds the largest error for each max_error, 1e-2 to 1e-4, of one mesh and function. Returns whether the function has
+ * a step. */
 static bool verify(const test_mesh *mesh, uint64_t seed, bool step, float opacity, double worst[3])
 {
     static const double values[2] = {0.35, 0.6};
@@ -120,9 +122,9 @@ static bool verify(const test_mesh *mesh, uint64_t seed, bool step, float opacit
     return function.values[1] == function.values[2];
 }
 
-/* Where a medium begins or ends, float32's places are off by 1.2e-7, and light by that times the extinction: 5e-8 of
- * the depth across the scene as measured, which is 800 at most here. On tets, whose ends are exact, and elsewhere, the
- * error is far less than allowed. */
+/* Checks dense media. At the border of a medium, positions in float32 are off by 1.2e-7, and light by that times the
+ * extinction: the measured error is 5e-8 of the optical depth across the scene, which is at most 800 here. On tets,
+ * whose ends are exact, and inside media, the error is far less than allowed. */
 static void max_error_is_kept_in_dense_media(void **state)
 {
     static const float opacities[3] = {0, 0.4f, 1};
@@ -134,7 +136,7 @@ static void max_error_is_kept_in_dense_media(void **state)
             for (uint64_t seed = 0; seed < 6; seed++) {
                 test_mesh mesh;
                 test_mesh_lattice(kind, 2, 0.2, bent_field, &mesh);
-                /* The two densest media step, one for each camera. */
+                /* The two densest media have a step, one for each camera. */
                 steps += verify(&mesh, seed, seed % 5 == 0, opacities[surface], worst);
                 test_mesh_free(&mesh);
             }

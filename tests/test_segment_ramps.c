@@ -1,7 +1,7 @@
-/* Tests max_error where the opacity has a very narrow ramp and the field stays within it. There the rounding of a value
- * or of the ramp's ends to float32, 3e-8 of the function's domain, changes the opacity much: in a ramp a millionth of
- * the domain wide, by a tenth. Single cells are drawn, whose field is within the ramp and somewhat beyond it, or
- * constant, or in part at its end. */
+/* Checks max_error if the opacity has a very narrow ramp and the field stays within it. Then rounding a value or the
+ * ramp's ends to float32, by 3e-8 of the function's domain, changes the opacity much: by a tenth in a ramp a millionth
+ * of the domain wide. The test draws single cells whose field is within the ramp and slightly beyond it, or constant,
+ * or partly at the end of the ramp. */
 #include "test_effort.h"
 #include "test_step_fixture.h"
 
@@ -16,8 +16,8 @@
 enum { SIDE = 7, WIDTHS = 5, FIELDS = 3, SEEDS = 4 };
 static const double widths[WIDTHS] = {9e-3, 1e-3, 1e-4, 1e-5, 1e-6};
 
-/* A vertex's value as a share of the ramp: from a third below to a third above it; the ramp's begin for half of the
- * vertices (a hex's lower quad); or one value for all. */
+/* Returns a vertex's value as a fraction of the ramp: from a third below to a third above it; or the ramp's lower end
+ * for half of the vertices (a hex's lower quad); or one value for all. */
 static double share_of(int field, uint64_t vertex, uint64_t seed)
 {
     const double share = test_uniform_in(vertex, 100 * seed + 5, -0.3, 1.3);
@@ -25,27 +25,28 @@ static double share_of(int field, uint64_t vertex, uint64_t seed)
     return field == 2 ? test_uniform_in(0, 100 * seed + 5, 0.1, 0.9) : share;
 }
 
-/* Bounds how much light changes if a value is off by 4e-7 of the domain, as float32 leaves those of polyhedra. Opacity
- * a is off by that times its slope, extinction, -log(1 - a), by no more than 1 / (1 - a) of that. For light, let
- * extinction k be off by dk(s). With the transmittance T(s) up to s, light L = int c k T ds is off by int dk (c T -
- * int_s c k T) ds, whose bracket is T at most, for colours c in [0, 1]. So light is off by at most int dk T ds, which
- * is no more than dk times the length, and no more than the largest dk / k, as int k T ds <= 1. */
+/* Bounds how much light changes if a value is off by 4e-7 of the domain, which is the error of polyhedra's values in
+ * float32. Opacity a is off by that times its slope, and extinction, -log(1 - a), by at most 1 / (1 - a) times that.
+ * For light, let extinction k be off by dk(s). With the transmittance T(s) up to s, light L = int c k T ds is off by
+ * int dk (c T - int_s c k T) ds, whose bracket is at most T for colours c in [0, 1]. So light is off by at most int dk
+ * T ds, which is at most dk times the length, and at most the largest dk / k, since int k T ds <= 1. */
 static double rounding_of(const step_function *function, double width, double unit)
 {
     const double a = (double)function->opacities[1], b = (double)function->opacities[2], way = 1.8 * 1.24 * sqrt(3);
     const double off = 4e-7 * fabs(b - a) / width, seen = off / (1 - fmax(a, b)) * way / unit;
-    /* (1 - a) -log(1 - a) has one maximum. */
+    /* (1 - a) -log(1 - a) has one maximum, so its minimum is at an end. */
     const double share = fmin((1 - a) * -log1p(-a), (1 - b) * -log1p(-b));
     return share > 0 ? fmin(seen, off / share) : seen;
 }
 
-/* The worst of each error asked for. Ramps do not begin at float32's numbers. */
+/* The scenes: the cell alone, cut by a surface, or as a polyhedron. */
 typedef enum ramp_scene { ALONE, CUT, POLYHEDRON } ramp_scene;
 
-/* The share of light that a surface which cuts the cell takes. */
+/* Fraction of the light that the surface which cuts the cell absorbs. */
 #define FILM 1e-7f
 
-/* first, every: of the seeds. */
+/* Finds the largest error for each max_error, for seeds first, first + every and so on. Ramps do not begin at numbers
+ * that are exact in float32. */
 static void verify_ramp(test_cell_shape shape, ramp_scene scene, double width, uint64_t first, uint64_t every,
                         double worst[3])
 {
@@ -78,7 +79,8 @@ static void verify_ramp(test_cell_shape shape, ramp_scene scene, double width, u
     if (scene == POLYHEDRON) fprintf(stderr, "%.2g off in all; beyond what rounding may do, ", raw);
 }
 
-/* Usually a quarter of the seeds, which has each sort of field; another one for the next width and shape. */
+/* The usual run draws a quarter of the seeds, which includes each sort of field; the quarter changes with the width and
+ * shape. */
 static void verify_ramps(ramp_scene scene)
 {
     static const char *const how[] = {"", " cut by a surface", " as polyhedron"};
@@ -100,7 +102,8 @@ static void fields_within_a_narrow_ramp(void **state)
     verify_ramps(ALONE);
 }
 
-/* A surface that lets all but a ten-millionth through cuts the cell: the picture is the same. */
+/* Checks cells that are cut by a surface which transmits all but a ten-millionth of the light: the picture must be the
+ * same. */
 static void cut_fields_within_a_narrow_ramp(void **state)
 {
     (void)state;

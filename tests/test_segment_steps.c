@@ -1,8 +1,8 @@
-/* Tests max_error where the opacity has a step: a cell's field is curved along a ray, and may barely reach the step or
- * come back through it within the cell. Sampling would miss the little light beyond the step, or get its length wrong.
- * Cells are single ones, warped at random, and ones whose rays graze the step by a given amount; functions have steps
- * or ramps almost as steep. Usually every other pixel of a picture counts, and rays graze ramps in one type of cell,
- * another one for the next width. */
+/* Checks max_error if the opacity has a step: a cell's field is curved along a ray, and may barely reach the step or
+ * return through it within the cell. Sampling would miss the small amount of light beyond the step, or get its length
+ * wrong. The cells are single ones, warped at random, and ones whose rays pass the step by a given amount; functions
+ * have steps or ramps almost as steep. The usual run compares every other pixel of a picture, and uses grazing rays in
+ * one type of cell for each width, alternating. */
 #include "reference_cell.h"
 #include "test_effort.h"
 #include "test_step_fixture.h"
@@ -19,7 +19,7 @@
 
 enum { SAMPLES = 1000 };
 
-/* The field along the ray of a picture of one pixel, and how many of the samples it has. */
+/* Computes the field along the ray of a picture of one pixel; returns how many of the samples are inside the cell. */
 static int values_on_ray(const render_fixture *f, const test_mesh *mesh, int type, double values[SAMPLES])
 {
     const render_camera *camera = &f->job.camera;
@@ -53,8 +53,8 @@ static int values_on_ray(const render_fixture *f, const test_mesh *mesh, int typ
     return SAMPLES;
 }
 
-/* The largest value within the ray's stretch, or the smallest (sign -1): of the parabola through three samples. False
- * where it is at an end, or hardly more than there. */
+/* Computes the largest value within the ray's interval, or the smallest (sign -1): that of the parabola through three
+ * samples. Returns false if it is at an end, or hardly differs from that at an end. */
 static bool extreme_of(const double values[SAMPLES], double sign, double *at)
 {
     int best = 0;
@@ -67,9 +67,9 @@ static bool extreme_of(const double values[SAMPLES], double sign, double *at)
     return sign * (*at - values[0]) > 0.01 && sign * (*at - values[SAMPLES - 1]) > 0.01;
 }
 
-/* ---- the hex that was seen to be off by 2.8e-3 ---- */
+/* ---- a hex whose error was once 2.8e-3 ---- */
 
-/* Its picture with the opacity's ramp at 0.6, or a step. */
+/* Compares the hex's picture for a ramp of the opacity at 0.6, or a step. */
 static void verify_hex(step_function function, fixture_camera camera, double width, double unit)
 {
     test_mesh mesh;
@@ -95,8 +95,9 @@ static void a_hex_that_barely_reaches_a_step(void **state)
             verify_hex((step_function){.opacities = {0, 0, 0.9f, 0.9f}}, camera, 0, units[k]);
 }
 
-/* Along the middle ray, the hex's diagonal, the field is 0.2 - 0.4 s + 3 s^2 - 2 s^3: it falls to 0.186 and rises to
- * 0.8. At that dip it is off its chord by less than a sixth of what it is at a quarter, the half and three quarters. */
+/* Checks a cubic. Along the middle ray, the hex's diagonal, the field is 0.2 - 0.4 s + 3 s^2 - 2 s^3: it falls to 0.186
+ * and rises to 0.8. At this minimum its deviation from the chord is less than a sixth of that at a quarter, the half
+ * and three quarters. */
 static void a_cubic_that_dips_below_a_step(void **state)
 {
     static const double values[8] = {0.2, 0.2 / 3, 2.8 / 3, 0.2 / 3, 0.2 / 3, 2.8 / 3, 0.8, 2.8 / 3};
@@ -113,7 +114,7 @@ static void a_cubic_that_dips_below_a_step(void **state)
         for (int a = 0; a < 3; a++) {
             const double edges[3][3] = {{1 / 3.0, 0.5, 0}, {1 / 3.0, -0.25, 0.43}, {1 / 3.0, -0.25, -0.43}};
             const int corner[3] = {i % 4 == 1 || i % 4 == 2, i % 4 / 2, i / 4};
-            /* Rays avoid the corners themselves. */
+            /* Shift rays so that they avoid the corners themselves. */
             double along[3] = {-0.5, 1e-4, 2e-4};
             for (int e = 0; e < 3; e++)
                 for (int k = 0; k < 3; k++) along[k] += corner[e] * edges[e][k];
@@ -122,15 +123,15 @@ static void a_cubic_that_dips_below_a_step(void **state)
         }
     memcpy(mesh.values, values, sizeof values);
     step_begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
-    step_set_function(&f, &function, 0.187, 0, 0.005); /* not in the bin of bounds that 0.2 is in */
+    step_set_function(&f, &function, 0.187, 0, 0.005); /* in another bin of the bounds than 0.2 */
     step_verify(&f, 1, 1e-7, worst);
     step_assert_kept(worst, "a dip");
     fixture_free(&f);
     test_mesh_free(&mesh);
 }
 
-/* Returns how far beyond 0.6 the hex comes on the ray of a picture of one pixel, with the eye moved sideways and up.
- * NaN: its most is at an end. */
+/* Returns how far beyond 0.6 the field of the hex rises on the ray of a picture of one pixel, with the eye moved
+ * sideways and up; NaN if its maximum is at an end. */
 static double hex_past_step(render_fixture *f, const test_mesh *mesh, double sideways, double up)
 {
     static double values[SAMPLES];
@@ -142,7 +143,7 @@ static double hex_past_step(render_fixture *f, const test_mesh *mesh, double sid
     return most - 0.6;
 }
 
-/* Move the eye to where the hex comes to 0.6 and so much beyond. */
+/* Moves the eye to where the maximum of the field is 0.6 plus past. */
 static void move_eye_past_step(render_fixture *f, const test_mesh *mesh, double past)
 {
     const double step = 0.05;
@@ -192,11 +193,11 @@ static void a_ray_on_which_it_barely_does(void **state)
     }
 }
 
-/* ---- cells and functions at random ---- */
+/* ---- random cells and functions ---- */
 
 enum { KINDS = 4, SEEDS = 12 };
 
-/* By default a sixth of the seeds, other ones for the next kind. */
+/* By default a sixth of the seeds is drawn; the selection changes with the kind. */
 static void random_cells_and_steps(void **state)
 {
     const uint64_t every = (uint64_t)test_effort(6, 1);
@@ -228,11 +229,13 @@ static void random_cells_and_steps(void **state)
 
 /* ---- rays that graze a step ---- */
 
-/* Rays pass the step by 1e-2 of the function's domain down to less than float32 can tell; one does not reach it. */
+/* Rays pass the step by 1e-2 of the function's domain down to less than float32 resolves; the last one does not reach
+ * it. */
 enum { PASSES = 9 };
 static const double passes[PASSES] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 3e-7, 1e-7, 1e-8, -1e-7};
 
-/* A cell's field above a step, or (sign -1) below it, by each of them. Returns whether it has such an extreme. */
+/* Checks a cell's field that passes a step upwards, or (sign -1) downwards, by each of the amounts. Returns whether the
+ * field has such an extreme. */
 static bool graze(render_fixture *f, const double values[SAMPLES], double sign, double width, double worst[PASSES][3])
 {
     step_function function = {.opacities = {0, 0, 0.9f, 0.9f}};
@@ -247,7 +250,7 @@ static bool graze(render_fixture *f, const double values[SAMPLES], double sign, 
     return true;
 }
 
-enum { GRAZED = 3 }; /* hexes, wedges and pyramids; along a ray in a tet nothing bends */
+enum { GRAZED = 3 }; /* hexes, wedges and pyramids; along a ray in a tet the field is linear */
 
 static void graze_by_rays(int kind, int rays, double width)
 {
@@ -289,7 +292,7 @@ static void rays_that_graze_a_steep_ramp(void **state)
             if (test_is_whole() || kind == i % GRAZED) graze_by_rays(kind, test_effort(1, 2), widths[i]);
 }
 
-/* ---- all but a step ---- */
+/* ---- ramps almost as steep as a step ---- */
 
 static void steep_ramps_are_kept_as_steps_are(void **state)
 {
@@ -302,10 +305,10 @@ static void steep_ramps_are_kept_as_steps_are(void **state)
                            dense ? 0.005 : 0.1);
 }
 
-/* ---- the same rays everywhere ---- */
+/* ---- the same cuts of rays everywhere ---- */
 
-/* Cells in lanes cut a ray as cells alone do, which are taken so beside a transparent surface, here nowhere: only the
- * order of segments that begin at one place may differ. */
+/* Checks that cells traced in lanes cut a ray as single cells do. Next to a transparent surface, which is invisible
+ * here, cells are traced one by one: only the order of segments that begin at the same depth may differ. */
 static void lanes_cut_as_cells_alone_do(void **state)
 {
     static const double nowhere = 1e6;
@@ -332,7 +335,7 @@ static void lanes_cut_as_cells_alone_do(void **state)
     }
 }
 
-/* An argument: the tests to run, as cmocka matches names. */
+/* The optional argument selects the tests to run, by cmocka's pattern. */
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {

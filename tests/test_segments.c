@@ -1,5 +1,5 @@
-/* Compares volumes by segments with the adaptive integral: tets are exact, other cells of second order, and max_error
- * is kept; with surfaces, on parts of the mesh, and by every instruction set. */
+/* Compares volumes by segments with the adaptive integral: tets are exact, other cells are of second order, and
+ * max_error is kept; with surfaces, on parts of the mesh, and with every instruction set. */
 #include "comp.h"
 #include "reference_integral.h"
 #include "test_effort.h"
@@ -13,7 +13,8 @@
 #include <string.h>
 #include <cmocka.h>
 
-/* The truth of a fixture's picture: width * height * 4. Usually that of every other pixel, NaN for the others. */
+/* Returns the reference of a fixture's picture: width * height * 4 numbers. In the usual run only every other pixel is
+ * computed, and the others are NaN. */
 static double *truth_of(const render_fixture *f)
 {
     const int width = f->job.camera.width, height = f->job.camera.height, every = test_effort(2, 1);
@@ -34,7 +35,8 @@ static double *truth_of(const render_fixture *f)
     return rgba;
 }
 
-/* The largest difference of a channel, and the mean of all; pixels whose truth is NaN do not count. */
+/* Returns the largest difference of a channel and computes the mean of all; pixels whose reference is NaN do not
+ * count. */
 static double error_of_set(const render_fixture *f, const double *truth, double *mean)
 {
     drawn_frame drawn;
@@ -52,7 +54,7 @@ static double error_of_set(const render_fixture *f, const double *truth, double 
     return worst;
 }
 
-/* As above, the largest error of all instruction sets. */
+/* Returns the largest error of all instruction sets, as error_of_set() does for one. */
 static double error_of(const render_fixture *f, const double *truth, double *mean)
 {
     double worst = 0, most = 0;
@@ -73,8 +75,9 @@ static void set_segments(render_fixture *f, double step, double max_error)
     f->job.max_error = max_error;
 }
 
-/* The integral of a segment errs by 4.4e-7 of what it absorbs (kernel_integral.h), which sums to no more than 1 over a
- * ray; the ends are exact (kernel_exact.h), and sums of light are compensated. */
+/* Bound of the error of exact segments: the integral of a segment errs by 4.4e-7 of what it absorbs
+ * (kernel_integral.h), which adds up to at most 1 over a ray; the ends are exact (kernel_exact.h), and sums of light
+ * are compensated. */
 #define EXACT 1e-6
 
 static void tets_are_exact_for_every_camera(void **state)
@@ -93,19 +96,21 @@ static void tets_are_exact_for_every_camera(void **state)
     }
 }
 
-/* By default 32: a multiple of 16, so that steps, slivers and cameras meet. */
+/* Returns the number of random tets, by default 32: a multiple of 16, so that all combinations of steps, slivers and
+ * cameras occur. */
 static uint64_t random_tets(void)
 {
     return (uint64_t)test_effort(32, 80);
 }
 
-/* Steps of the opacity come in one of four seeds, with slivers and other tets and with every camera. */
+/* Returns whether the opacity has a step: for one of four groups of seeds, so that steps occur with slivers and other
+ * tets and with every camera. */
 static bool has_step(uint64_t seed)
 {
     return seed / 4 % 4 == 0;
 }
 
-/* Every fifth is a sliver. */
+/* Creates a tet and its fixture; every fifth tet is a sliver. */
 static void begin_random_tet(uint64_t seed, test_mesh *mesh, render_fixture *f)
 {
     const bool is_sliver = seed % 5 == 0;
@@ -119,9 +124,9 @@ static void begin_random_tet(uint64_t seed, test_mesh *mesh, render_fixture *f)
     set_segments(f, 1, 0);
 }
 
-/* Random tets, slivers among them, with random functions and unit distances from 1e-3 to 1e4 of the tet's size: optical
- * depths from 1e-8 to 1e3 and more, opacities that step and that rise to 0.99 within a tenth of the tet's values: ends
- * in float32 would be off by 1e-7 and magnified to 3.7e-6. */
+/* Checks random tets, including slivers, with random functions and unit distances from 1e-3 to 1e4 of the tet's size:
+ * optical depths from 1e-8 to more than 1e3, and opacities that have steps or rise to 0.99 within a tenth of the tet's
+ * values. Ends in float32 would be off by 1e-7, magnified to 3.7e-6. */
 static void random_tets_are_exact(void **state)
 {
     static const double most[3] = {0.5, 0.9, 0.99};
@@ -188,7 +193,7 @@ static void surfaces_cut_segments(void **state)
     }
 }
 
-/* Errors of steps 1/4, 1/8 ... of a cell, and the order seen between the first and the last. */
+/* Computes errors for steps of 1/4, 1/8 ... of a cell; returns the order observed between the first and the last. */
 static double order_of(render_fixture *f, const double *truth, render_integration how, int halvings)
 {
     double first = 0, last = 0;
@@ -215,15 +220,16 @@ static void orders_on_jittered_hexes(void **state)
     double *truth = truth_of(&f);
     const double segments = order_of(&f, truth, RENDER_SEGMENTS, 4), samples = order_of(&f, truth, RENDER_SAMPLES, 5);
     fprintf(stderr, "observed orders: segments %.2f, samples %.2f\n", segments, samples);
-    /* Third at the transfer function's points, fourth elsewhere; first in the intervals that are shorter than a step
-     * and not cut, of which each halving leaves half. */
+    /* The order is third at the transfer function's control points, fourth elsewhere. It is first in the intervals that
+     * are shorter than a step and are not cut, of which each halving leaves half. */
     assert_true(segments >= 2.5);
     assert_true(samples >= 0.95);
     free(truth);
     fixture_free(&f);
 }
 
-/* The tets and functions of above, where an error is allowed: by preintegration, in parts, and exactly in turns. */
+/* Checks the tets and functions of random_tets_are_exact() with an allowed error: by preintegration, in parts, and
+ * exactly, alternating. */
 static void random_tets_keep_max_error(void **state)
 {
     enum { DIGITS = 4 };
@@ -251,7 +257,8 @@ static void random_tets_keep_max_error(void **state)
     }
 }
 
-/* Rays and cells are the same, and segments as well: only the order of those that begin at one place may differ. */
+/* Compares pictures of tiles with those of single cells. Rays, cells and segments are the same: only the order of
+ * segments that begin at the same depth may differ. */
 static void verify_tiles(test_mesh_kind kind, int side, bool with_surface, double max_error)
 {
     static const double value = 0.5, nowhere = 1e6;
@@ -260,14 +267,14 @@ static void verify_tiles(test_mesh_kind kind, int side, bool with_surface, doubl
     double worst = 0;
     test_mesh mesh;
     test_mesh_lattice(kind, side, 0.2, test_wave, &mesh);
-    /* Narrow arrays: tets are placed several at once. */
+    /* Arrays have 4-byte elements, so that several tets are transformed at once. */
     fixture_create(&f, &mesh, 1, (test_layout){.is_interleaved = with_surface}, 2.0 / side, 1,
                    (const double[]){0, 0, 0});
     test_mesh_free(&mesh);
     fixture_set_camera(&f, CAMERA_OUTSIDE, 61, 47);
-    set_segments(&f, 0.02, max_error); /* more parts than a window has room for */
+    set_segments(&f, 0.02, max_error); /* more parts than a window can store */
     if (with_surface) fixture_add_surface(&f, &value, 1, 1);
-    /* Beside a transparent surface, which is nowhere here, cells are taken one by one. */
+    /* Next to a transparent surface, which is invisible here, cells are traced one by one. */
     fixture_add_surface(&f, &nowhere, 1, 0.5f);
     fixture_draw(&f, &drawn[0]);
     f.job.surface_count--;
@@ -293,15 +300,15 @@ static void lanes_have_what_cells_alone_have(void **state)
         for (int with_surface = 0; with_surface < 2; with_surface++) verify_tiles(kind, 9, with_surface, 0);
 }
 
-/* By float32 ends: tiles take tets of few pixels a ray and its tet a lane (kernel_tile_segments.h). A ray meets more tets
- * than a window has room for. */
+/* Checks segments with ends in float32: tiles trace tets of few pixels one ray-tet pair per lane
+ * (kernel_tile_segments.h). A ray crosses more tets than a window can store. */
 static void small_tets_are_the_same_in_lanes(void **state)
 {
     (void)state;
     for (int with_surface = 0; with_surface < 2; with_surface++) verify_tiles(TEST_TETS, 20, with_surface, 1e-2);
 }
 
-/* Usually each kind from one of the cameras. */
+/* The usual run draws each kind from one of the cameras. */
 static void max_error_is_kept_on_every_kind(void **state)
 {
     (void)state;
@@ -325,7 +332,8 @@ static void max_error_is_kept_on_every_kind(void **state)
         }
 }
 
-/* The cells dealt to ranks, each drawn alone, all fragments merged: only the rounding of "over" differs. */
+/* Checks cells distributed over ranks, each drawn alone, with all fragments merged: only the rounding of "over" may
+ * differ. */
 static void parts_make_the_whole(void **state)
 {
     static const double values[2] = {-0.2, 0.3};
@@ -370,7 +378,8 @@ static void parts_make_the_whole(void **state)
             }
 }
 
-/* Values far outside of the function's domain, as files have them for none, are held to 1e18 widths of it. */
+/* Checks values far outside of the function's domain, which files use for missing values: they are clamped to 1e18
+ * widths of the domain. */
 static void values_of_any_size_are_held(void **state)
 {
     static const double odd[] = {3e31, -3e31, 3e38, -3e38};
@@ -400,7 +409,8 @@ static void values_of_any_size_are_held(void **state)
         }
 }
 
-/* More meshes in one place than a window has room for: none is dropped. All have the same opacity throughout. */
+/* Checks more meshes at the same position than a window can store: none may be dropped. All have the same constant
+ * opacity. */
 static void overlapping_meshes_are_all_seen(void **state)
 {
     static const float constant[1] = {0.001f};
@@ -433,7 +443,7 @@ static void overlapping_meshes_are_all_seen(void **state)
         drawn_free(&drawn);
         fixture_free(&f);
     }
-    /* 100 times the logarithm of a number that is rounded to 6e-8. */
+    /* The bound is 100 times the logarithm of a number that is rounded by 6e-8. */
     for (int p = 0; p < 23 * 21; p++) assert_true(fabs(COPIES * log(clear[0][p]) - log(clear[1][p])) < 3e-5);
     free(many.offsets);
     free(many.connectivity);
@@ -442,8 +452,8 @@ static void overlapping_meshes_are_all_seen(void **state)
     test_mesh_free(&mesh);
 }
 
-/* A ray has the same bits whatever else is in its packet: pixels change neither with the picture's border nor with the
- * order of the cells, which changes that of the tree's leaves. */
+/* Checks that a ray has the same bits whatever else is in its packet: pixels depend neither on the picture's border nor
+ * on the order of the cells, which changes the order of the tree's leaves. */
 static void pictures_do_not_depend_on_the_order_of_cells(void **state)
 {
     (void)state;
@@ -478,7 +488,7 @@ int main(void)
         cmocka_unit_test(max_error_is_kept_on_every_kind),
         cmocka_unit_test(random_tets_keep_max_error),
     };
-    /* Tests that draw by themselves, by each instruction set. */
+    /* Tests that draw by themselves, run with each instruction set. */
     const struct CMUnitTest of_a_set[] = {
         cmocka_unit_test(lanes_have_what_cells_alone_have),
         cmocka_unit_test(small_tets_are_the_same_in_lanes),

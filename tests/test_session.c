@@ -1,5 +1,5 @@
-/* A session's life on any number of ranks: what is built when, what is borrowed and copied, empty ranks, scenes edited
- * on the way, ranks that disagree, memory that runs out. */
+/* Checks a session's life on any number of ranks: what is built when, what is borrowed or copied, empty ranks, scenes
+ * edited during a run, ranks that disagree, and lack of memory. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -38,7 +38,7 @@ static int covered_pixels(const caught_picture *picture)
     return count;
 }
 
-/* ---- due or not, built or not -------------------------------------------------------------------------------- */
+/* ---- due images, and rebuilds ------------------------------------------------------------------------------ */
 
 static void images_are_drawn_when_due(void **context)
 {
@@ -70,7 +70,7 @@ static void unchanged_input_rebuilds_nothing(void **context)
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
     everywhere(own_rank != 0 || same_pictures(&first, &caught[0]));
-    same.field.changed = INSITU_CHANGED_VALUES; /* as the caller says; the values say otherwise */
+    same.field.changed = INSITU_CHANGED_VALUES; /* what the caller states, although no values changed */
     everywhere(submit(session, &same) == INSITU_OK);
     step_draws(session, 2, 1);
     everywhere(report->build_ms == 0 && report->refit_ms == 0);
@@ -86,7 +86,7 @@ static void unchanged_input_rebuilds_nothing(void **context)
     insitu_destroy(&session);
 }
 
-/* One value of one rank that is another is enough, wherever it stands. */
+/* Checks that a single changed value on one rank, at any index, is detected. */
 static void changed_values_are_noticed(void **context)
 {
     (void)context;
@@ -108,7 +108,8 @@ static void changed_values_are_noticed(void **context)
     insitu_destroy(&session);
 }
 
-/* If everything is moved and scaled by powers of two, the picture stays the same, and its depth scales. */
+/* Checks that if everything is moved and scaled by powers of two, the picture stays the same, and its depth is
+ * scaled. */
 static void moved_mesh_gives_the_moved_picture(void **context)
 {
     (void)context;
@@ -226,13 +227,13 @@ static int64_t over_ranks(int64_t value)
     return sum;
 }
 
-/* Half of the lattice's pyramids are left-handed as they come: their bases are numbered alike on both sides of a cube.
- */
+/* Checks the count of left-handed cells. Half of the lattice's pyramids are left-handed from the start: their bases are
+ * numbered in the same way on both sides of a cube. */
 static void mirrored_cells_are_counted(void **context)
 {
     (void)context;
     for (int kind = 0; kind < TEST_KIND_COUNT; kind++) {
-        if (kind == TEST_POLYHEDRA) continue; /* have no hand */
+        if (kind == TEST_POLYHEDRA) continue; /* polyhedra have no handedness */
         insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
         session_input in;
         input_create(&in, (test_mesh_kind)kind, 3, TEST_BLOCK, own_rank, rank_count);
@@ -301,7 +302,7 @@ static void cells_of_one_rank_are_seen(void **context)
         insitu_mesh_defaults(&none);
         if (own_rank == holder)
             everywhere(submit(session, &all) == INSITU_OK);
-        else /* an empty mesh on odd ranks, none on even ones */
+        else /* odd ranks have an empty mesh, even ranks have none */
             everywhere(insitu_set_mesh(session, "m", own_rank % 2 ? &none : NULL) == INSITU_OK);
         step_draws(session, holder, 1);
         everywhere(own_rank != 0 || covered_pixels(&caught[0]) > 20);
@@ -317,7 +318,7 @@ static void cells_of_one_rank_are_seen(void **context)
     input_free(&all);
 }
 
-/* Every rank's part is cut in two, under names of its own: the picture is that of one mesh. */
+/* Checks that if every rank's part is divided into two meshes with separate names, the picture is that of one mesh. */
 static void meshes_of_many_names_make_one_picture(void **context)
 {
     (void)context;
@@ -349,7 +350,7 @@ static bool warns_of_overlaps(const insitu_session *session)
     return strstr(insitu_last_report(session)->warnings, "where cells overlap") != NULL;
 }
 
-/* Two meshes in one place, both on one rank or dealt: one picture, and a warning on every rank. */
+/* Checks two meshes at the same position, both on one rank or distributed: one picture, and a warning on every rank. */
 static void overlapping_meshes_make_one_picture(void **context)
 {
     (void)context;
@@ -371,7 +372,7 @@ static void overlapping_meshes_make_one_picture(void **context)
             everywhere(!has_part || insitu_set_field(session, name, &in[i].field) == INSITU_OK);
         }
         step_draws(session, turn, 1);
-        everywhere(warns_of_overlaps(session) == (turn == 0)); /* it is told once */
+        everywhere(warns_of_overlaps(session) == (turn == 0)); /* the warning is given once */
         if (own_rank != 0 || turn) continue;
         first = caught[0];
         caught_count = 0;
@@ -386,7 +387,7 @@ static void overlapping_meshes_make_one_picture(void **context)
     everywhere(insitu_set_mesh(session, "tets", &distributed[1].mesh) == INSITU_OK);
     everywhere(insitu_set_field(session, "tets", &distributed[1].field) == INSITU_OK);
     step_draws(session, 3, 1);
-    everywhere(warns_of_overlaps(session)); /* and again when it has ceased to be true */
+    everywhere(warns_of_overlaps(session)); /* and again after the overlap has disappeared and returned */
     free(first.rgba);
     free(first.depth);
     insitu_destroy(&session);
@@ -416,7 +417,7 @@ static void constant_fields_are_drawn(void **context)
     input_free(&in);
 }
 
-/* ---- what is wrong on all ------------------------------------------------------------------------------------ */
+/* ---- errors on all ranks ------------------------------------------------------------------------------------- */
 
 static void missing_field_leaves_the_other_picture(void **context)
 {
@@ -446,8 +447,9 @@ static void component_that_is_not_there_is_named(void **context)
     insitu_destroy(&session);
 }
 
-/* Images are due by multiples of a quarter, at times that are sums of 0.1: the tenth time is less than 1 by a rounding,
- * and counts as 1. A step that passes several multiples draws once, and one that stands still draws nothing. */
+/* Checks images that are due at multiples of a quarter, at times that are sums of 0.1: the tenth time is less than 1 by
+ * a rounding, and counts as 1. A step that passes several multiples draws once, and a step without progress in time
+ * draws nothing. */
 static void images_are_drawn_when_their_time_has_passed(void **context)
 {
     (void)context;
@@ -526,7 +528,8 @@ static void edited_scene_is_taken_and_a_broken_one_is_not(void **context)
     insitu_destroy(&session);
 }
 
-/* They are drawn for those who keep pictures in memory, and else a warning says that they are not. */
+/* Checks images without outputs: they are drawn if the caller keeps pictures in memory; otherwise a warning says that
+ * they are not drawn. */
 static void images_without_outputs_are_for_memory(void **context)
 {
     (void)context;
@@ -578,7 +581,7 @@ static insitu_status submit_both(insitu_session *session, insitu_field *cells)
     return status ? status : insitu_set_field(session, "m", cells);
 }
 
-/* Opening a pipe that nobody writes to would wait for ever. */
+/* Checks a pipe as scene: opening a pipe without a writer would block forever. */
 static void scene_that_is_no_file_is_reported(void **context)
 {
     (void)context;
@@ -622,7 +625,8 @@ static void memory_is_given_back(void **context)
     everywhere(session == NULL && base_memory_held() == before);
 }
 
-/* The last picture's memory serves the next one, larger or smaller, and no old pixels show. */
+/* Checks that the memory of the last picture is used again for the next one, larger or smaller, and that no old pixels
+ * show. */
 static void picture_memory_is_kept_to_a_limit(void **context)
 {
     (void)context;
@@ -654,7 +658,8 @@ static void picture_memory_is_kept_to_a_limit(void **context)
     insitu_destroy(&session);
 }
 
-/* Allocation n of a set and a step fails, on one rank or on all; then everything is as if it had not. */
+/* Makes allocation n of a set and a step fail, on one rank or on all; afterwards everything must be as if it had not
+ * failed. */
 static void failing_allocation_is_an_error_and_no_more(void **context)
 {
     (void)context;
@@ -682,7 +687,7 @@ static void failing_allocation_is_an_error_and_no_more(void **context)
                 break;
             }
             failures += status != INSITU_OK;
-            if (status != INSITU_OK && status != INSITU_ERROR_FIELD) /* a field may follow on a refused mesh */
+            if (status != INSITU_OK && status != INSITU_ERROR_FIELD) /* the field of a refused mesh may fail too */
                 reported_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
             everywhere(submit_both(session, &cells) == INSITU_OK);
             step_draws(session, n, 1);

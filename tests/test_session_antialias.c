@@ -1,5 +1,6 @@
-/* Antialiasing: pixels at edges are the mean of their samples, by the closed form of a plane's colours, all others the
- * sample at their centre to the bit, and so is the depth; on any ranks it is one picture. */
+/* Checks antialiasing: pixels at edges are the mean of their samples, compared with the closed form of a plane's
+ * colours; all others are the sample at their centre to the bit, and so is the depth; on any number of ranks the
+ * picture is the same. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,7 +23,7 @@ enum { SIDE = 4, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 
 /* ---- samples ------------------------------------------------------------------------------------------------- */
 
-/* There is one sample in each column and row of the grid, so their mean is the centre. */
+/* Checks that there is one sample in each column and row of the grid, so that their mean is the centre. */
 static void samples_are_spread_evenly(void **state)
 {
     (void)state;
@@ -39,9 +40,10 @@ static void samples_are_spread_evenly(void **state)
     }
 }
 
-/* ---- the truth ----------------------------------------------------------------------------------------------- */
+/* ---- the reference ------------------------------------------------------------------------------------------- */
 
-/* Adds what the ray through a place in the picture sees: the plane's colour within the cube. False near its border. */
+/* Adds the colour that the ray through a position in the picture sees: that of the plane inside the cube. Returns false
+ * near the plane's border. */
 static bool add_truth(const render_camera *c, double x, double y, double sum[4])
 {
     static const double normal[3] = {1. / 3, 2. / 3, -2. / 3};
@@ -69,8 +71,8 @@ static bool add_truth(const render_camera *c, double x, double y, double sum[4])
     return fabs(outside) > 1e-4;
 }
 
-/* Tolerance: a depth near 5 in single precision, by a cosine of at least 0.1, by the field's slope of 1 in 3.2 and the
- * table's of at most 12. */
+/* Returns whether a pixel is the mean of its samples. The tolerance is that of a depth near 5 in single precision,
+ * divided by a cosine of at least 0.1, times the field's slope of 1 in 3.2 and the table's slope of at most 12. */
 static bool is_mean(const float *rgba, int pixel, int count)
 {
     render_camera camera;
@@ -90,7 +92,7 @@ static bool is_mean(const float *rgba, int pixel, int count)
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
-/* scene: a file, from write_scene() on all ranks. */
+/* Draws one picture; scene is a file that write_scene() made on all ranks. */
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, int64_t *rays)
 {
     insitu_session *session = open_session(comm, scene);
@@ -103,7 +105,8 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     return picture;
 }
 
-/* plain: one sample a pixel. Edges are also counted by the rays that they took. */
+/* Checks a picture of count samples against plain, the picture with one sample for each pixel. rays is the number of
+ * traced rays, from which the number of edge pixels follows. */
 static bool is_truth(const caught_picture *picture, const caught_picture *plain, int count, int64_t rays)
 {
     unsigned char edges[PIXELS / 8] = {0};
@@ -147,7 +150,8 @@ static void edges_are_means_and_the_rest_is_as_before(void **state)
     input_free(&whole);
 }
 
-/* worst: of a channel. Depths are the same to the bit. */
+/* Compares the pictures of all ranks and of one; worst is the largest allowed difference of a channel. Depths must be
+ * the same to the bit. */
 static void check_on_ranks(const char *text, test_mesh_kind kind, double worst)
 {
     const char *scene = write_scene(text);

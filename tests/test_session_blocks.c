@@ -1,6 +1,6 @@
-/* Blocks of one mesh: lattices and lists of cells, with ghost layers, dealt out to ranks, are drawn as the same cells
- * in one list: no seam in means, normals, derived fields, outer surfaces, volumes and statistics. The list is dealt out
- * to the same ranks, cell by cell, by a rule of its own. */
+/* Checks blocks of one mesh: lattices and lists of cells, with ghost layers, distributed over ranks, are drawn as the
+ * same cells in one list: without a seam in means, normals, derived fields, outer surfaces, volumes and statistics. The
+ * cells of the list are distributed over the same ranks by another rule. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +17,7 @@ enum {
     MOST = (WIDE + 1) * (WIDE + 1) * (WIDE + 1)
 };
 
-static const int distribute[3] = {3, 2, 2}; /* blocks along each axis */
+static const int distribute[3] = {3, 2, 2}; /* number of blocks along each axis */
 
 static const char *const images[] = {
     "[{isosurface: {field: c, values: [0.55], normals: vertex}}]",
@@ -44,7 +44,7 @@ static const char *scene(void)
     return write_scene(text);
 }
 
-/* ---- the whole --------------------------------------------------------------------------------------------------- */
+/* ---- the whole mesh ---------------------------------------------------------------------------------------------- */
 
 static double place_of(int axis, int index)
 {
@@ -66,7 +66,7 @@ static double value_in(const int at[3])
 static const int corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                   {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 
-/* Arrays of a list of hexes or of a block. */
+/* The arrays of a list of hexes or of a block. */
 typedef struct cell_arrays {
     int64_t vertex_count, cell_count, connectivity_count;
     double (*places)[3], *f, *c;
@@ -121,7 +121,7 @@ static bool set_fields(insitu_session *session, int64_t number, const cell_array
     return set(session, number, &field) == INSITU_OK;
 }
 
-/* The cells whose number leaves this rank over. */
+/* Makes a list of every rank_count-th cell, from number own_rank on. */
 static void make_list(cell_arrays *a)
 {
     create(a, LINE * LINE * LINE, CELLS * CELLS * CELLS);
@@ -158,10 +158,10 @@ static bool set_list(insitu_session *session, const cell_arrays *a)
 /* ---- blocks ------------------------------------------------------------------------------------------------------ */
 
 typedef struct block {
-    int number, first[3], cells[3]; /* with a ghost layer, within the whole */
-    int own_first[3], own_end[3];   /* without it, in the block's indices */
+    int number, first[3], cells[3]; /* including the ghost layer, as indices in the whole mesh */
+    int own_first[3], own_end[3];   /* excluding the ghost layer, as indices in the block */
     cell_arrays a;
-    int64_t *ids; /* of vertices, in the whole */
+    int64_t *ids; /* ids of the block's vertices in the whole mesh */
 } block;
 
 static bool is_own(const block *b, const int at[3])
@@ -171,7 +171,7 @@ static bool is_own(const block *b, const int at[3])
     return true;
 }
 
-/* Values in ghost layers are wrong. */
+/* Fills a block; values in ghost layers are wrong on purpose. */
 static void fill_block(block *b)
 {
     const int wide[3] = {b->cells[0] + 1, b->cells[1] + 1, b->cells[2] + 1};
@@ -192,7 +192,7 @@ static void fill_block(block *b)
             b->a.hexes[8 * cell + i] =
                 at[0] + corners[i][0] + wide[0] * (at[1] + corners[i][1] + wide[1] * (at[2] + corners[i][2]));
         b->a.c[cell] = is_own(b, at) ? value_in(whole) : -40;
-        b->a.ghosts[cell] = is_own(b, at) ? 0 : 0x10000; /* its first byte is 0 */
+        b->a.ghosts[cell] = is_own(b, at) ? 0 : 0x10000; /* its lowest byte is 0 */
     }
 }
 
@@ -214,7 +214,8 @@ static void make_block(int number, block *b)
 
 static bool with_ids, are_in_slabs;
 
-/* Uniform, curvilinear, or a list of cells with flags, by turns. */
+/* Passes the block as a uniform lattice, a curvilinear lattice, or a list of cells with flags, depending on its
+ * number. */
 static insitu_status set_block(insitu_session *session, const block *b, unsigned changed)
 {
     insitu_lattice lattice = {.origin = {-1, -0.75, -0.5}, .spacing = {0.15, 0.1, 0.13}};
@@ -253,8 +254,8 @@ static bool submit_block(insitu_session *session, const block *b, unsigned chang
     return set_block(session, b, changed) == INSITU_OK && set_fields(session, b->number, &b->a, set_one_block_field);
 }
 
-/* The rank that has a block. The last one of several has none, or each has those of a slab, so that ranks share places
- * only where slabs meet. */
+/* Returns the rank that has a block. Of several ranks the last one has none; or each rank has the blocks of slabs, so
+ * that ranks share vertices only where slabs meet. */
 static int owner_of(int number)
 {
     if (are_in_slabs) return number % distribute[0] % rank_count;
@@ -347,7 +348,7 @@ static void ids_join_blocks(void **state)
     with_ids = are_in_slabs = false;
 }
 
-/* Every step they are on other ranks, and some stay. */
+/* Checks blocks that move to other ranks at every step, while some stay. */
 static void blocks_come_and_go(void **state)
 {
     (void)state;
@@ -369,7 +370,7 @@ static void blocks_come_and_go(void **state)
     insitu_destroy(&session);
 }
 
-/* A mesh is whole or of blocks, whichever is set last. */
+/* Checks that a mesh is whole or consists of blocks, depending on which is set last. */
 static void whole_and_blocks_replace_each_other(void **state)
 {
     cell_arrays list;
@@ -421,7 +422,7 @@ static void wrong_calls_are_reported_at_once(void **state)
     insitu_destroy(&session);
 }
 
-/* One block is spoilt; then it is mended, and the picture is the truth. */
+/* Checks one faulty block; after it is corrected, the picture equals the reference. */
 static void faults_of_one_block_are_reported_on_all_ranks(void **state)
 {
     const int corrupted = 5;
@@ -435,14 +436,14 @@ static void faults_of_one_block_are_reported_on_all_ranks(void **state)
     if (is_mine) insitu_set_block(session, "m", corrupted, &mesh);
     reported_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_ARGUMENT,
                         "mesh \"m[5]\": vertex_count is -1");
-    blocks[corrupted].a.hexes[77] = -4; /* by its number it is a list of cells */
+    blocks[corrupted].a.hexes[77] = -4; /* block 5 is a list of cells */
     if (is_mine) submit_block(session, &blocks[corrupted], INSITU_CHANGED_ALL);
     reported_everywhere(session, insitu_step(session, 1, 1), INSITU_ERROR_MESH, "mesh \"m[5]\": cell 9 ");
     blocks[corrupted].a.hexes[77] = blocks[corrupted].a.hexes[69] + 1;
     if (is_mine) insitu_set_block(session, "m", corrupted, NULL);
     destroy_block(&blocks[corrupted]);
     make_block(corrupted, &blocks[corrupted]);
-    if (is_mine) set_block(session, &blocks[corrupted], INSITU_CHANGED_ALL); /* without its fields */
+    if (is_mine) set_block(session, &blocks[corrupted], INSITU_CHANGED_ALL); /* the block is set without its fields */
     if (rank_count > 1 || is_mine)
         reported_everywhere(session, insitu_step(session, 2, 2), INSITU_ERROR_FIELD,
                             "mesh \"m[5]\": field \"c\" is not set, other blocks have it");

@@ -1,4 +1,4 @@
-/* Automatic cameras: the sphere or box that they fit is in the frame, and fills it. */
+/* Checks automatic cameras: the sphere or box that they fit is inside the frame and fills it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -23,7 +23,7 @@ static session_extent random_extent(void)
     const double size = pow(10, uniform(-3, 6));
     for (int a = 0; a < 3; a++) {
         e.lower[a] = size * uniform(-5, 5);
-        e.upper[a] = e.lower[a] + size * (rand() % 7 ? uniform(0.01, 1) : 0); /* flat at times */
+        e.upper[a] = e.lower[a] + size * (rand() % 7 ? uniform(0.01, 1) : 0); /* some boxes are flat */
         square += pow(e.upper[a] - e.lower[a], 2);
     }
     e.half_diagonal = 0.5 * sqrt(square);
@@ -39,8 +39,8 @@ static scene_image random_image(void)
     return image;
 }
 
-/* The borders of the bounds in the picture, -1 and 1 being the picture's; false where a corner is not before the eye.
- */
+/* Computes the bounds of the extent in the picture, whose borders are -1 and 1; returns false if a corner is not in
+ * front of the eye. */
 static bool borders(const render_camera *c, const session_extent *e, double low[2], double high[2])
 {
     const double half[2] = {c->half_height * c->width / c->height, c->half_height};
@@ -64,7 +64,7 @@ static bool borders(const render_camera *c, const session_extent *e, double low[
     return are_before;
 }
 
-/* The eye keeps off the nearest corner by a hundredth of the half diagonal, wherever else it were to stand. */
+/* Returns whether the eye is as close to the nearest corner as allowed: a hundredth of the half diagonal. */
 static bool is_close(const render_camera *c, const session_extent *e)
 {
     double nearest = INFINITY;
@@ -76,8 +76,8 @@ static bool is_close(const render_camera *c, const session_extent *e)
     return nearest < 0.0101 * e->half_diagonal;
 }
 
-/* The tighter of width and height is filled from border to border, the other lies within and in the middle. Rounding:
- * of bounds up to a thousand times as far from the origin as they are large. */
+/* Checks fitted boxes: the tighter of width and height is filled from border to border, the other is inside and
+ * centred. The bound is the rounding of bounds up to a thousand times as far from the origin as they are large. */
 static void check_box(bool is_orthographic)
 {
     srand(11);
@@ -111,13 +111,14 @@ static void a_box_fills_an_orthographic_frame(void **state)
     check_box(true);
 }
 
-/* The share of half a side that decorations leave: a colour bar takes 6.5 heights of words, a title 2.4, a ruler 3. */
+/* Returns the fraction of half a side that decorations leave free: a colour bar takes 6.5 heights of text, a title 2.4,
+ * a ruler 3. */
 static double left_by(double words, double size, int pixels)
 {
     return fmax(0.95 - 2 * words * size / pixels, 0.5);
 }
 
-/* Both borders of the tighter side are met, and none is passed. */
+/* Checks that the data reaches both borders of the tighter side and crosses none. */
 static void decorations_keep_their_room(void **state)
 {
     (void)state;
@@ -150,8 +151,8 @@ static void decorations_keep_their_room(void **state)
     }
 }
 
-/* The sphere around the bounds, seen from the eye, keeps off the room of bars and words, is as large as it can be, and
- * leaves the middle only where it must. */
+/* Checks that the sphere around the bounds, seen from the eye, does not overlap the space of bars and texts, is as
+ * large as possible, and is off-centre only if necessary. */
 static void a_sphere_keeps_off_decorations(void **state)
 {
     (void)state;
@@ -169,7 +170,7 @@ static void a_sphere_keeps_off_decorations(void **state)
         d->words = words, d->words_count = i % 4 ? 2 : 0;
         image.slices = slices, image.slice_count = i % 8;
         if (!session_make_camera(&extent, &image, &camera)) continue;
-        /* By labels of one line, 4 bars stand in a column of a picture of 33 lines. */
+        /* With one-line labels, 4 bars fit in a column of a picture 33 lines high. */
         const double columns = i % 5 && i % 3 ? 1 + (i % 8 > 4) : 0, lines = i % 5 && i % 4 ? 2 : 0;
         const double bars = fmin(2 * 6.5 * columns * 0.03 * image.height / image.width, 0.5);
         const double most[4] = {1 - bars, 1, 1 - 2 * lines * 0.03, 1 - 2 * lines * 0.03};
@@ -183,7 +184,7 @@ static void a_sphere_keeps_off_decorations(void **state)
         double half[2] = {camera.half_height * camera.width / camera.height, camera.half_height};
         bool is_filled[2];
         for (int side = 0; side < 4; side++) {
-            /* The distance of the centre from the border's plane, over the radius. */
+            /* The distance of the centre from the border's plane, divided by the radius. */
             const double x = side % 2 ? -centre[side / 2] : centre[side / 2], edge = most[side] * half[side / 2];
             ends[side] = camera.is_orthographic ? (edge - x) / extent.half_diagonal
                                                 : (edge * centre[2] - x) / hypot(1, edge) / extent.half_diagonal;
@@ -215,14 +216,14 @@ static void zoom_and_height_are_what_they_say(void **state)
     assert_true(fabs(camera.half_height - 1 / 0.95 / 2) < 1e-12);
     image.camera.height = 7;
     assert_true(session_make_camera(&extent, &image, &camera) && camera.half_height == 3.5);
-    /* An explicit camera's picture shows as much at the focal point either way. */
+    /* With both projections the picture of an explicit camera has the same size at the focal point. */
     image.camera = (scene_camera){
         .eye = {1, 1, 11}, .focal = {1, 1, 1}, .up = {0, 1, 0}, .angle = 90, .zoom = 1, .is_orthographic = true};
     assert_true(session_make_camera(&extent, &image, &camera));
     assert_true(camera.is_orthographic && fabs(camera.half_height - 10) < 1e-12);
 }
 
-/* Two axes of the data are across the picture, so that its first axis goes to the right and its second up. */
+/* Returns whether the picture's axes are two axes of the data: the first points right and the second up. */
 static bool is_faced(const session_extent *extent, const scene_image *image, int axis)
 {
     static const int right[3] = {1, 0, 0}, up[3] = {2, 2, 1};
@@ -245,9 +246,9 @@ static void flat_data_is_seen_from_the_front(void **state)
         image.camera =
             (scene_camera){.is_automatic = true, .angle = 40, .zoom = 1, .direction = {1, 0.8, 1.2}, .up = {0, 1, 0}};
         for (int a = 0; a < 3; a++) extent.upper[a] = a == axis ? 0 : 2 + a;
-        extent.half_diagonal = 4; /* of any size */
+        extent.half_diagonal = 4; /* the size does not matter */
         assert_true(session_flat_axis(&extent) == axis && is_faced(&extent, &image, axis));
-        extent.upper[axis] = 1.9e-6; /* less than a millionth of 2 */
+        extent.upper[axis] = 1.9e-6; /* less than a millionth of the size 2 */
         assert_true(is_faced(&extent, &image, axis));
         extent.upper[axis] = 5e-6;
         assert_true(session_flat_axis(&extent) == -1 && session_make_camera(&extent, &image, &camera));
@@ -258,7 +259,7 @@ static void flat_data_is_seen_from_the_front(void **state)
     }
 }
 
-/* Each key that the scene gives stays, and the others follow the data. */
+/* Checks that each key that the scene gives is used, and that the others are derived from the data. */
 static void keys_of_the_scene_come_before_flat_data(void **state)
 {
     (void)state;
@@ -283,7 +284,7 @@ static void keys_of_the_scene_come_before_flat_data(void **state)
     image.camera.up[0] = 1, image.camera.up[1] = 0;
     assert_true(session_make_camera(&flat, &image, &camera) && camera.up[0] == 1);
     image.camera = given;
-    image.camera.has_bounds = true; /* twice as large as the data */
+    image.camera.has_bounds = true; /* bounds twice as large as the data */
     image.camera.upper[0] = 4, image.camera.upper[1] = 2;
     assert_true(session_make_camera(&flat, &image, &camera));
     assert_true(fabs(camera.half_height - 1 / 0.95) < 1e-12 && fabs(camera.eye[0] - 2) < 1e-12);

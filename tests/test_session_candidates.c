@@ -1,5 +1,5 @@
-/* Trees over the candidates, the cells that can show: the same pictures, bit for bit, as of full trees, whatever
- * changes on the way, and the choice between the two. */
+/* Checks trees over the candidates, which are the cells that can be visible: they give the same pictures, bit for bit,
+ * as full trees, whatever changes during a run. Also checks the choice between both. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,7 +23,8 @@
 
 static const test_mesh_kind kinds[] = {TEST_TETS, TEST_MIXED, TEST_POLYHEDRA};
 
-/* The choice is not in the file: sessions of several choices read one file, and again when it changes. */
+/* Opens a session with the given choice of trees. The choice is not in the scene file, because sessions with several
+ * choices read the same file, and read it again after a change. */
 static insitu_session *open_tree(scene_tree tree, const char *scene)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
@@ -31,7 +32,7 @@ static insitu_session *open_tree(scene_tree tree, const char *scene)
     return session;
 }
 
-/* A step of the one and of the other, which have their meshes: is the picture the same? */
+/* Makes a step of both sessions, whose meshes are set, and checks that the pictures are the same. */
 static void step_both(insitu_session *full, insitu_session *other, int64_t cycle)
 {
     discard_pictures();
@@ -56,7 +57,7 @@ static void step_same(insitu_session *full, insitu_session *other, const session
     step_both(full, other, cycle);
 }
 
-/* Cells in the trees of all ranks. */
+/* Returns the number of cells in the trees of all ranks. */
 static int64_t tree_cells(const insitu_session *session)
 {
     int64_t own = session->meshes.count ? session->meshes.items[0]->tree.cell_count : 0, all = 0;
@@ -69,7 +70,7 @@ static void change_values(session_input *in, double by)
     for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] += by;
 }
 
-/* New values, moved vertices, a value that is no number, new cells; and a step with no change at all. */
+/* Compares trees for new values, moved vertices, a NaN, new cells, and a step without any change. */
 static void compare_trees(scene_tree tree, const char *images, test_mesh_kind kind)
 {
     const char *scene = write_scene(images);
@@ -110,7 +111,8 @@ static void partial_trees_draw_what_full_ones_do(void **context)
         }
 }
 
-/* Values in 0.1 alone show: a slice of the cells; the report says how many are left out. */
+/* Checks partial trees: only values in an interval 0.1 wide are visible, a slice of the cells; the report states how
+ * many cells are left out. */
 static void partial_trees_are_of_the_cells_that_show(void **context)
 {
     (void)context;
@@ -136,8 +138,8 @@ static void partial_trees_are_of_the_cells_that_show(void **context)
     input_free(&in);
 }
 
-/* As long as the cells change at every step, trees are partial. When they stop changing, the rent reaches a full tree's
- * price at last, and that tree then stays. */
+/* Checks the choice of trees. As long as the cells change at every step, trees are partial. When they stop changing,
+ * the accumulated extra cost of partial trees reaches the cost of a full tree, which is then built and kept. */
 static void standing_cells_get_a_full_tree(void **context)
 {
     (void)context;
@@ -170,7 +172,7 @@ static void standing_cells_get_a_full_tree(void **context)
     input_free(&in);
 }
 
-/* Where nearly everything shows, a partial tree would save nothing. */
+/* Checks that full trees are built if nearly all cells are visible, since a partial tree would save nothing. */
 static void full_trees_are_built_where_most_cells_show(void **context)
 {
     (void)context;
@@ -189,15 +191,16 @@ static void full_trees_are_built_where_most_cells_show(void **context)
     input_free(&in);
 }
 
-/* A ray's way through a tree built along a curve costs more than through one by the surface area heuristic. */
+/* Returns the cost of traversing the tree, which is higher for a tree along a space-filling curve than for one by the
+ * surface area heuristic. */
 static double tree_cost(const insitu_session *session)
 {
     return mmbvh_cost(&session->meshes.items[0]->tree, &(mmbvh_options){.threads = 1});
 }
 
-/* One of two sessions is told that nothing has changed: its first tree, by the heuristic, stays. The other's is built
- * again at each step, along a curve from the second on, and by the heuristic again after one that stayed. The pictures
- * are always the same. */
+/* Checks trees of a single step. The caller states to one of two sessions that nothing has changed: its first tree, by
+ * the surface area heuristic, is kept. The other session rebuilds its tree at each step, along a curve from the second
+ * step on, and by the heuristic again after a tree that was kept for a step. The pictures must always be the same. */
 static void trees_of_one_step_are_built_fast(void **context)
 {
     (void)context;
@@ -228,14 +231,14 @@ static void sway(session_input *in, double by)
     }
 }
 
-/* Cells stay and vertices move, with new values or without; then only values are new, which may show cells whose bounds
- * were not refitted. A second session builds its trees again at each step. Images a and b are due in turns from cycle 2
- * on. */
+/* Compares moving meshes: cells stay and vertices move, with or without new values; then only values are new, which may
+ * make cells visible whose bounds were not refitted. A second session rebuilds its trees at each step. Images a and b
+ * are due alternately from cycle 2 on. */
 static void compare_moving(const char *images, test_mesh_kind kind)
 {
     static const struct {
         double sway, change;
-        bool is_partial; /* bounds, if refits leave something out */
+        bool is_partial; /* whether bounds may be partial, if refits skip nodes */
     } steps[] = {{0, 0, false},      {0.05, 0, true}, {0.05, 0, true}, {0.05, 0.1, true},
                  {0, 0.3, false},    {0, 0.2, false}, {-0.1, 0, true}, {0, 0, true},
                  {0.05, -0.2, true}, {0, 0, true},    {0, 0.1, false}};
@@ -271,9 +274,10 @@ static void moving_vertices_are_drawn_as_by_new_trees(void **context)
             if (test_is_whole() || (i + kind) % 3 == 0) compare_moving(images[i], kinds[kind]);
 }
 
-/* The visible cells differ from step to step though values stay: two images with different layers of the mesh are due
- * in turns. The mesh drifts upward, and the camera looks where b's surface is at cycle 9: with the bounds from when
- * only a was drawn, it would be below the picture. */
+/* Checks that bounds refitted for one image are not used for another. The visible cells differ from step to step
+ * although values stay: two images with different layers of the mesh are due alternately. The mesh drifts upwards, and
+ * the camera looks at the position of b's surface at cycle 9: with the bounds from a step that drew only a, it would be
+ * below the picture. */
 #define CAMERA "    camera: {position: [2.3, 0, 0.56], focal: [0, 0, 0.56], up: [0, 0, 1], angle: 1.7}\n"
 static void bounds_of_one_image_do_not_serve_another(void **context)
 {

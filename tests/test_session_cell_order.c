@@ -1,6 +1,6 @@
-/* Cells whose vertices stand in another order than VTK's, or are the first of longer rows, as codes of finite elements
- * hold them: they draw the pictures of the same cells in VTK's order, to the bit. The report tells what is copied for
- * it, no more is copied than needed, and all ranks are told what is wrong on one. */
+/* Checks cells whose vertices are in another order than VTK's, or are the first of longer rows, as finite-element codes
+ * store them: they give the pictures of the same cells in VTK's order, to the bit. The report states what is copied for
+ * that, no more is copied than necessary, and an error on one rank is reported on all. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +21,8 @@ static const char scene_text[] =
 
 /* ---- orders --------------------------------------------------------------------------------------------------- */
 
-/* The place of VTK's n-th vertex, by where it is in the unit cell and by how a face is run around. */
+/* Returns the index, in the given order, of VTK's n-th vertex, from its position in the unit cell and the direction
+ * around a face. */
 static int place_in(insitu_vertex_order order, int type, int n)
 {
     const int x = n % 4 == 1 || n % 4 == 2, y = n % 4 / 2, z = n / 4;
@@ -52,7 +53,7 @@ static const insitu_cell_type type_of_kind[] = {[TEST_TETS] = INSITU_TET,
                                                 [TEST_WEDGES] = INSITU_WEDGE,
                                                 [TEST_PYRAMIDS] = INSITU_PYRAMID};
 
-/* Arrays that the description is moved to. */
+/* The arrays that the description is changed to. */
 typedef struct moved {
     void *connectivity;
     float *coordinates, *values;
@@ -72,8 +73,8 @@ static void put(const moved *m, bool is_narrow, int64_t i, int64_t value)
         ((int64_t *)m->connectivity)[i] = value;
 }
 
-/* Moves connectivity of one type without offsets into rows of ROW entries, of which those behind the vertices are no
- * indices. The last row is short. */
+/* Moves connectivity of one type without offsets into rows of ROW entries; the entries after the vertices are no
+ * indices. The last row is shorter. */
 static void move_connectivity(session_input *in, layout how, moved *m)
 {
     const test_mesh *part = &in->part;
@@ -157,7 +158,7 @@ static void free_drawing(drawing *d)
     for (int i = 0; i < PICTURES; i++) free(d->pictures[i].rgba), free(d->pictures[i].depth);
 }
 
-/* Tells whether any cell is another one in this order. */
+/* Returns whether any cell is reordered in this order. */
 static bool has_reordered(const test_mesh *part, insitu_vertex_order order)
 {
     bool turned = false;
@@ -203,7 +204,8 @@ static void every_order_and_layout_draws_the_same(void **state)
     }
 }
 
-/* Hexes of which half are given by their faces: those are recognised beside those that stand in another order. */
+/* Checks hexes of which half are given by their faces: these are recognised as hexes, next to those in another
+ * order. */
 static void recognised_cells_go_with_any_order(void **state)
 {
     (void)state;
@@ -225,7 +227,7 @@ static void recognised_cells_go_with_any_order(void **state)
     input_free(&in);
 }
 
-/* The lower quads of hexes, as shells in a table of nodes. */
+/* Checks the lower quads of hexes as shells in a table of nodes. */
 static void quads_are_shells_in_any_order(void **state)
 {
     (void)state;
@@ -252,8 +254,8 @@ static void quads_are_shells_in_any_order(void **state)
     input_free(&in);
 }
 
-/* If the named order is wrong, there is a warning; with the right one the cells are drawn, whatever the caller says of
- * changes. A mesh that moves keeps its copy. */
+/* Checks a wrong order and its correction: the wrong order gives a warning; with the correct one the cells are drawn,
+ * whatever the caller states about changes. A mesh that moves keeps its copy. */
 static void the_order_may_be_set_right(void **state)
 {
     (void)state;
@@ -272,7 +274,7 @@ static void the_order_may_be_set_right(void **state)
         free_drawing(&drawn);
     }
     insitu_destroy(&session);
-    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC); /* back again */
+    reorder_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC); /* back to the wrong order */
     drawing drawn = draw(&in);
     everywhere(drawn.is_warned);
     free_drawing(&drawn);
@@ -335,7 +337,7 @@ static void vertex_in_row(session_input *in)
     in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     ((int64_t *)corrupted.connectivity)[3 * ROW + 2] = -5;
 }
-/* Cut to 4 bytes it would be a good index. */
+/* If it were truncated to 4 bytes, it would be a valid index. */
 static void far_vertex_in_row(session_input *in)
 {
     in_rows(in);

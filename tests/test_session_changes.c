@@ -1,4 +1,4 @@
-/* Arrays that a caller says have not changed, but that lie elsewhere, are read again. */
+/* Checks that arrays which a caller states are unchanged, but which have another address, are read again. */
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -16,7 +16,7 @@ static const char scene_text[] = "images:\n"
                                  "      - path: a_{cycle}.exr\n";
 
 static session_input input;
-static const char *scene; /* written once: an edit would make sessions forget */
+static const char *scene; /* written once, because sessions discard their state after an edit */
 
 static void create_input(void)
 {
@@ -33,7 +33,7 @@ static insitu_session *open_and_draw(void)
     return session;
 }
 
-/* ---- spoilt elsewhere ----------------------------------------------------------------------------------------- */
+/* ---- faulty arrays at another address ------------------------------------------------------------------------- */
 
 typedef union element {
     double real;
@@ -41,14 +41,14 @@ typedef union element {
     unsigned char byte;
 } element;
 
-/* An array of the mesh that is given anew in another place, with one element another. */
+/* An array of the mesh that is passed again at another address, with one different element. */
 typedef struct moved_array {
     const char *name;
-    size_t place; /* of its insitu_array in insitu_mesh */
-    size_t bytes; /* of an element */
-    int64_t at;   /* where the element is another */
+    size_t place; /* offset of its insitu_array in insitu_mesh */
+    size_t bytes; /* size of an element */
+    int64_t at;   /* index of the different element */
     element value;
-    const char *words; /* of the error */
+    const char *words; /* text of the error */
 } moved_array;
 
 static const moved_array moved_arrays[] = {
@@ -71,7 +71,7 @@ static int64_t element_count(const insitu_mesh *mesh, size_t place)
     return mesh->vertex_count;
 }
 
-/* The array in memory of its own; coordinates stay interleaved, so that the last element is one number. */
+/* Copies the array into its own memory; coordinates stay interleaved, so that the last element is one number. */
 static char *copy_elsewhere(insitu_mesh *mesh, const moved_array *moved)
 {
     insitu_array *array = (insitu_array *)((char *)mesh + moved->place);
@@ -104,7 +104,7 @@ static void corrupted_arrays_elsewhere_are_reported(void **context)
 
 /* ---- other pictures ------------------------------------------------------------------------------------------- */
 
-/* The picture of the session's next step is the one of a session that gets all as it now is. */
+/* Checks that the picture of the session's next step equals that of a session which gets everything as it now is. */
 static void next_picture_is(insitu_session *session, const session_input *now, insitu_session *fresh)
 {
     const size_t pixels = (size_t)48 * 36;
@@ -118,7 +118,8 @@ static void next_picture_is(insitu_session *session, const session_input *now, i
     free(first.depth);
 }
 
-/* now: the input with something elsewhere. Only the mesh, or only the field, is set again, as unchanged. */
+/* Checks the picture if something has moved to another address. Only the mesh, or only the field, is set again, as
+ * unchanged; now is the moved input. */
 static void check_picture(const session_input *now, bool is_field)
 {
     insitu_session *session = open_and_draw(), *fresh = open_session(MPI_COMM_WORLD, scene);
@@ -138,8 +139,8 @@ static void vertices_elsewhere_are_drawn_there(void **context)
     const size_t count = 3 * (size_t)input.part.vertex_count;
     double *moved = malloc(count * sizeof *moved);
     assert_non_null(moved);
-    for (size_t i = 0; i < count; i++)
-        moved[i] = 64 * input.part.coordinates[i]; /* far: the space is new, as the fresh one's */
+    for (size_t i = 0; i < count; i++) /* far away: the picture's space is new, as that of the fresh session */
+        moved[i] = 64 * input.part.coordinates[i];
     insitu_mesh_interleaved(&now.mesh, moved, INSITU_FLOAT64);
     check_picture(&now, false);
     free(moved);
@@ -179,7 +180,8 @@ static void invert_values(void)
     for (int64_t v = 0; v < input.part.vertex_count; v++) input.part.values[v] = 0.5 - input.part.values[v];
 }
 
-/* Values that change in place, and are said not to have or are not set again, are drawn as they are, with a warning. */
+/* Checks values that change in place but are stated to be unchanged or are not set again: they are drawn as they are,
+ * with a warning. */
 static void values_that_change_without_a_word_are_reported(void **context)
 {
     (void)context;

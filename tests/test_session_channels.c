@@ -1,5 +1,6 @@
-/* The numbers that an EXR may hold beside colours: the nearest surface's normal, value, layer and number, by closed
- * form on planes in a cube of every type of cell; dealt at random they are the same to the bit as on one rank. */
+/* Checks the numbers that an EXR file may contain besides colours: the nearest surface's normal, value, layer and
+ * number. They are compared with closed forms on planes in a cube of every type of cell; if cells are distributed at
+ * random, they are the same to the bit as on one rank. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,8 +13,8 @@
 enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 enum { NX, NY, NZ, VALUE, LAYER, SURFACE, CHANNELS };
 
-/* Layer 0 is a volume, layer 1 two planes of a slice, layer 2 two clear isosurfaces, which f colours none of; layer 3
- * one that f colours. test_linear() is 0.3 x - 0.7 y + 0.5 z + 0.1. */
+/* The layers: 0 is a volume, 1 two planes of a slice, 2 two transparent isosurfaces, none of which f colours, and 3 an
+ * isosurface that f colours. test_linear() is 0.3 x - 0.7 y + 0.5 z + 0.1. */
 #define SCENE(more)                                                                                                    \
     "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n"                                         \
     "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n" more "    layers:\n"                          \
@@ -28,7 +29,7 @@ typedef struct plane {
     double normal[3], distance;
     int layer, surface;
     bool has_isovalue;
-    double isovalue; /* else the field at the place is the value */
+    double isovalue; /* the value, unless it is the field at the hit */
 } plane;
 
 static const plane planes[] = {{{1, 0, 0}, -0.4, 1, 0, false, 0},
@@ -43,7 +44,8 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* The pixel's ray meets the plane there, in the cube; false where it does not. close: set where rounding decides. */
+/* Computes the depth at which the pixel's ray meets the plane inside the cube; returns false if it does not. close is
+ * set if rounding decides. */
 static bool meet(const plane *p, const double base[3], const double direction[3], double *depth, bool *close)
 {
     *depth = (p->distance - dot(p->normal, base)) / dot(p->normal, direction);
@@ -56,8 +58,8 @@ static bool meet(const plane *p, const double base[3], const double direction[3]
     return is_within;
 }
 
-/* Normals round by some units of 6e-8; the value of a place by its gradient of 0.91 times the place's 1.5e-5, as
- * test_session_surfaces.c derives it. */
+/* Compares a pixel's numbers. Normals are rounded by some units of 6e-8; a value has an error of its gradient of 0.91
+ * times the position's 1.5e-5, which test_session_surfaces.c derives. */
 static bool is_as_expected(const caught_picture *picture, int pixel, const plane *p, const double place[3],
                            const double direction[3])
 {

@@ -1,5 +1,6 @@
-/* Databases as they are written: every byte of the table, the same on any ranks; runs that begin again or are killed;
- * and pictures of orbits, sweeps and paths, which are those of scenes that ask for each alone. */
+/* Checks databases as they are written: every byte of the table, the same on any number of ranks; runs that are
+ * restarted or killed; and pictures of orbits, sweeps and paths, which equal those of scenes that define each picture
+ * explicitly. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,7 +38,7 @@ static void remove_files(void)
     unlink("out/a.cdb/index.html");
 }
 
-/* The values, a little elsewhere in each mesh that a field stands for. */
+/* Sets a second field with values that differ from the first. */
 static void set_second_field(insitu_session *session, const session_input *in, double *values)
 {
     insitu_field g = in->field;
@@ -66,7 +67,7 @@ static void run_steps(const char *scene, const session_input *in, int first, int
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
 
-/* The table that swept writes at these cycles. */
+/* Makes the table that the scene `swept` writes for cycles first to end - 1. */
 static void expect_table(int first, int end, char text[MOST])
 {
     static const double values[] = {0.25, -0.5}, elevations[] = {-20, 10.5};
@@ -77,7 +78,7 @@ static void expect_table(int first, int end, char text[MOST])
                                      i % 2 * 180, elevations[i / 2 % 2], values[i / 4], cycle, i % 4, values[i / 4]);
 }
 
-/* The table's lines as a list of a script. */
+/* Converts the table's lines to a list in a script. */
 static void expect_script(const char *table, char text[MOST])
 {
     size_t size = (size_t)snprintf(text, MOST, "cinemaTable([\n");
@@ -122,8 +123,8 @@ static void tables_have_a_line_a_picture(void **state)
     input_free(&in);
 }
 
-/* An image without an orbit or a sweep has nothing in their columns; names that hold commas are in quotes, and
- * one that a spreadsheet would take for a formula is no longer one. */
+/* Checks a table of several images: an image without an orbit or a sweep has empty cells in their columns; names that
+ * contain commas are quoted, and one that a spreadsheet would interpret as a formula is changed. */
 static void tables_of_several_images_have_all_columns(void **state)
 {
     (void)state;
@@ -157,16 +158,16 @@ static void runs_that_begin_again_go_on_with_the_table(void **state)
     make_input(&in);
     remove_files();
     run_steps(swept, &in, 0, 7);
-    run_steps(swept, &in, 3, 7); /* the first picture is of cycle 4 */
+    run_steps(swept, &in, 3, 7); /* the first picture is that of cycle 4 */
     everywhere(is_table(0, 7));
     read_file("out/a.cdb/data.csv", MOST, text);
-    if (own_rank == 0) text[strlen(text) - 9] = '\0'; /* the last line is torn */
+    if (own_rank == 0) text[strlen(text) - 9] = '\0'; /* truncates the last line */
     put_file("out/a.cdb/data.csv", text);
     run_steps(swept, &in, 7, 9);
     expect_table(0, 9, text);
     static char found[MOST];
     read_file("out/a.cdb/data.csv", MOST, found);
-    if (own_rank == 0) { /* all but the torn line */
+    if (own_rank == 0) { /* all lines except the truncated one */
         char *torn = strstr(text, "\n6,3,180,10.5,-0.5") + 1, *after = strchr(torn, '\n') + 1;
         memmove(torn, after, strlen(after) + 1);
     }
@@ -179,7 +180,8 @@ static void runs_that_begin_again_go_on_with_the_table(void **state)
     input_free(&in);
 }
 
-/* Lines between the session's first cycle and its first picture are from an earlier run. */
+/* Checks that lines between the session's first cycle and its first picture, which come from an earlier run, are
+ * removed. */
 static void lines_go_from_the_first_step_on(void **state)
 {
     (void)state;
@@ -200,7 +202,7 @@ static void lines_go_from_the_first_step_on(void **state)
     input_free(&in);
 }
 
-/* A simulation that goes back in time, and one that draws a cycle twice. */
+/* Checks a simulation that goes back in time, and one that draws a cycle twice. */
 static void steps_that_go_back_drop_what_was_after(void **state)
 {
     (void)state;
@@ -219,7 +221,7 @@ static void steps_that_go_back_drop_what_was_after(void **state)
     input_free(&in);
 }
 
-/* ---- what fails ------------------------------------------------------------------------------------------------ */
+/* ---- failures -------------------------------------------------------------------------------------------------- */
 
 static void tables_that_cannot_be_written_are_reported_and_written_later(void **state)
 {
@@ -244,7 +246,7 @@ static void tables_that_cannot_be_written_are_reported_and_written_later(void **
     reported_everywhere(session, insitu_step(session, 4, 2), INSITU_ERROR_IO, "cinema: out/a.cdb/data.js", "written");
     if (own_rank == 0) rmdir("out/a.cdb/data.js");
     everywhere(insitu_step(session, 6, 3) == INSITU_OK);
-    everywhere(is_table(4, 7)); /* what could not be written at cycle 4 is there */
+    everywhere(is_table(4, 7)); /* the lines that could not be written at cycle 4 are included */
     insitu_destroy(&session);
     input_free(&in);
 }
@@ -269,7 +271,8 @@ static void pictures_that_cannot_be_written_have_no_line(void **state)
     input_free(&in);
 }
 
-/* The table has only whole lines of whole steps, whichever allocation of rank 0's fails; and then it goes on. */
+/* Checks that the table has only whole lines of whole steps, whichever allocation of rank 0 fails, and that it is
+ * continued afterwards. */
 static void tables_stay_whole_where_memory_runs_out(void **state)
 {
     (void)state;
@@ -307,9 +310,9 @@ static void tables_stay_whole_where_memory_runs_out(void **state)
     input_free(&in);
 }
 
-/* ---- news ------------------------------------------------------------------------------------------------------ */
+/* ---- reports --------------------------------------------------------------------------------------------------- */
 
-/* Compares a database's news with a pattern, in which # stands for a stamp of the scene's file. */
+/* Compares a database's report with a pattern, in which # stands for a time stamp of the scene's file. */
 static bool report_matches(const char *path, const char *pattern)
 {
     static char text[MOST];
@@ -324,8 +327,8 @@ static bool report_matches(const char *path, const char *pattern)
     return !*at;
 }
 
-/* report.json tells what a program that watches the run cannot know otherwise: warnings, errors of steps and of edits.
- */
+/* Checks report.json, which contains what a program that watches the run cannot find out otherwise: warnings, and
+ * errors of steps and of edits. */
 static void reports_have_warnings_and_edits(void **state)
 {
     (void)state;
@@ -360,7 +363,7 @@ static void reports_have_warnings_and_edits(void **state)
     everywhere(report_matches(news, expected));
     if (own_rank == 0) unlink(news);
     everywhere(insitu_step(session, 1, 0) ==
-               INSITU_OK); /* nothing is due, nothing is new, but what was never asked for */
+               INSITU_OK); /* no image is due and nothing has changed, but the report was removed */
     static char text[MOST];
     read_file(news, MOST, text);
     everywhere(own_rank != 0 ||
@@ -369,7 +372,7 @@ static void reports_have_warnings_and_edits(void **state)
     everywhere(insitu_step(session, 1, 0) == INSITU_OK);
     everywhere(own_rank != 0 || access(news, F_OK) != 0);
     write_scene("images:\n  - nmae: \"x\"\n");
-    everywhere(insitu_step(session, 1, 0) == INSITU_OK); /* an edit is told at once */
+    everywhere(insitu_step(session, 1, 0) == INSITU_OK); /* an edit is reported at once */
     read_file(news, MOST, text);
     everywhere(own_rank != 0 ||
                (strstr(text, "\"error\": \"") && strstr(text, ".yaml:2: images[0]: the key \\\"nmae\\\" is unknown") &&
@@ -387,7 +390,7 @@ static void reports_have_warnings_and_edits(void **state)
 
 /* ---- pictures -------------------------------------------------------------------------------------------------- */
 
-/* Rank 0's pictures of a scene at one cycle, kept while another is drawn. */
+/* Rank 0's pictures of a scene at one cycle, kept while another scene is drawn. */
 typedef struct picture_set {
     int count;
     caught_picture items[MAX_CAUGHT];
@@ -397,7 +400,7 @@ static void keep_pictures(picture_set *set)
 {
     set->count = caught_count;
     memcpy(set->items, caught, sizeof caught);
-    caught_count = 0; /* they are the set's now */
+    caught_count = 0; /* the pictures now belong to the set */
 }
 
 static void free_pictures(picture_set *set)
@@ -405,7 +408,7 @@ static void free_pictures(picture_set *set)
     for (int i = 0; i < set->count; i++) free(set->items[i].rgba), free(set->items[i].depth);
 }
 
-/* The scenes draw the same pictures, in their order, to the bit; and not all of them are alike. */
+/* Checks that two scenes draw the same pictures in the same order, to the bit, and that not all pictures are equal. */
 static void draws_as(const char *one, const char *other, int cycle, int count)
 {
     picture_set set;
@@ -440,7 +443,7 @@ static void sweeps_draw_what_each_image_alone_would(void **state)
              0, 2);
 }
 
-/* Directions whose sines and cosines are exact, or the same doubles. */
+/* Compares orbits with single cameras. The sines and cosines of the directions are exact, or are the same doubles. */
 static void orbits_draw_what_each_camera_alone_would(void **state)
 {
     (void)state;
@@ -465,7 +468,7 @@ static void paths_draw_what_a_camera_there_would(void **state)
     draws_as(path, "images:\n" IMAGE("a", STANDS("[2, 3, 4]", "[0, 1, 0]"), SURFACE, "{path: a.png}"), 70, 1);
 }
 
-/* A condition and once are the image's, of all its pictures; steps draw all or none of them. */
+/* Checks that a condition and once apply to all pictures of an image: a step draws all or none of them. */
 static void conditions_hold_for_all_pictures_of_an_image(void **state)
 {
     (void)state;
@@ -492,8 +495,8 @@ static void conditions_hold_for_all_pictures_of_an_image(void **state)
     input_free(&in);
 }
 
-/* An isovalue that the field does not reach is told once, though each picture has one value and is drawn at each step.
- */
+/* Checks that an isovalue which the field does not reach is reported once, though each picture has its own isovalue and
+ * is drawn at each step. */
 static void warnings_of_swept_isovalues_are_reported_once(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
-/* Clipping: every layer is drawn only where planes, boxes and spheres leave it, by closed form: the cube's surface,
- * isosurfaces that are planes, and a medium of one opacity by all methods, cut by the image's clip, by the layer's own,
- * and beside a layer that is whole. This is tested on cells of every type; dealt at random, the picture is the same as
- * on one rank. */
+/* Checks clipping: every layer is drawn only where planes, boxes and spheres leave it. Pictures are compared with
+ * closed forms: the cube's surface, isosurfaces that are planes, and a medium of constant opacity by all methods,
+ * clipped by the image's clip, by the layer's own, and next to a layer that is not clipped. Cells of every type are
+ * tested; if they are distributed at random, the picture is the same as on one rank. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,19 +25,19 @@ static const half_space clips[] = {
 static const half_space corner[] = {{{-1, 0, 0}, -0.1}, {{1, 0, 0}, 5},  {{0, -1, 0}, 0.2},
                                     {{0, 1, 0}, 5},     {{0, 0, -1}, 0}, {{0, 0, 1}, 5}};
 
-/* The region that is left: within the half spaces and the ball, without the hole, which is a ball that is cut out. */
+/* The visible region: inside the half spaces and the ball, outside the hole, which is a ball that is cut out. */
 typedef struct region {
-    const char *text; /* of the scene's clip */
+    const char *text; /* text of the scene's clip */
     const half_space *planes, *hole;
     size_t plane_count, hole_count;
-    double radius; /* 0: there is no ball */
+    double radius; /* 0 if there is no ball */
     bool is_outside;
 } region;
 
 static const double ball[3] = {0.5, 0.4, 0.6};
 
 static const region regions[] = {
-    /* x + 2 y + 2 z <= 0.9, and a box that leaves out x < -0.7 and y > 0.8. */
+    /* x + 2 y + 2 z <= 0.9, and a box that excludes x < -0.7 and y > 0.8. */
     {.text = "{planes: [{normal: [1, 2, 2], point: [0, 0, 0], offset: 0.3}], box: [[-0.7, -5, -5], [5, 0.8, 5]]}",
      .planes = clips,
      .plane_count = sizeof clips / sizeof *clips},
@@ -50,7 +50,7 @@ enum { REGIONS = sizeof regions / sizeof *regions };
 
 static const half_space cube[] = {{{1, 0, 0}, 1},  {{-1, 0, 0}, 1}, {{0, 1, 0}, 1},
                                   {{0, -1, 0}, 1}, {{0, 0, 1}, 1},  {{0, 0, -1}, 1}};
-/* test_linear() is 0.3 x - 0.7 y + 0.5 z + 0.1: its isosurface 0.2. */
+/* The isosurface 0.2 of test_linear(), 0.3 x - 0.7 y + 0.5 z + 0.1. */
 static const half_space linear = {{0.3, -0.7, 0.5}, 0.1};
 
 static double dot(const double a[3], const double b[3])
@@ -111,7 +111,7 @@ static interval cube_range(const ray *r)
     return cut(r, cube, 6);
 }
 
-/* ---- what is to be seen -------------------------------------------------------------------------------------- */
+/* ---- the expected pictures ----------------------------------------------------------------------------------- */
 
 enum { MOST = 3 };
 
@@ -120,7 +120,7 @@ static bool is_at(double depth, interval s)
     return fabs(depth - s.begin) < 1e-4 || fabs(depth - s.end) < 1e-4;
 }
 
-/* Keeps the depths of crossings within the region, in order; -1: rounding decides. */
+/* Keeps the depths of crossings inside the region, in order; returns their number, or -1 if rounding decides. */
 static int keep(const region *g, const ray *r, const double *depths, int count, double out[MOST])
 {
     const interval within = visible_interval(g, r), hole = hole_interval(g, r);
@@ -153,7 +153,7 @@ static int see_plane(const region *g, const ray *r, double out[MOST])
 
 typedef int see_function(const region *g, const ray *r, double out[MOST]);
 
-/* Surfaces of an opacity: the nearest depth, and opacity by their number. */
+/* Checks surfaces of constant opacity: the depth of the nearest one, and the opacity from their number. */
 static bool has_surfaces(const caught_picture *picture, const region *g, see_function *see, double opacity)
 {
     int hits = 0, behind = 0;
@@ -167,7 +167,7 @@ static bool has_surfaces(const caught_picture *picture, const region *g, see_fun
         hits += count > 0;
         behind += count == 1;
         if (fabs((double)picture->rgba[4 * pixel + 3] - alpha) < 1e-6 &&
-            (own == depth || fabs(own - depth) < 1.5e-5)) /* as in test_session_surfaces.c */
+            (own == depth || fabs(own - depth) < 1.5e-5)) /* the bound of test_session_surfaces.c */
             continue;
         fprintf(stderr, "pixel %d: opacity %g, depth %g; expected %g, %g\n", pixel,
                 (double)picture->rgba[4 * pixel + 3], own, alpha, depth);
@@ -181,8 +181,8 @@ static double length_of(interval s)
     return fmax(s.end - s.begin, 0);
 }
 
-/* Half of the light goes through a length of 1. What is kept reaches further by 2e-6 of half the diagonal, which is
- * 4e-6, over its slant. */
+/* Checks a medium in which half of the light passes a length of 1. The visible region extends by 2e-6 of half the
+ * diagonal, which is 4e-6, divided by the cosine to its border. */
 static bool has_medium(const caught_picture *picture, const region *g, double media, double tolerance)
 {
     int hits = 0;
@@ -216,12 +216,13 @@ static bool is_clear_plane(const caught_picture *p, const region *g)
 {
     return has_surfaces(p, g, see_plane, 0.25);
 }
-/* A ray that grazes the ball has its length to the square root of what the ball is moved by: 4e-6 of it is 0.004. */
+/* The length of a ray that grazes the ball has an error of about the square root of the ball's error: 0.004 for
+ * 4e-6. */
 static bool is_exact_medium(const caught_picture *p, const region *g)
 {
     return has_medium(p, g, 1, g->radius > 0 ? 4e-3 : 1e-4);
 }
-/* A step of 0.01 is 0.0069 of the light, at either end of a ray and of the hole. */
+/* A step of 0.01 absorbs 0.0069 of the light, at either end of a ray and of the hole. */
 static bool is_sampled_medium(const caught_picture *p, const region *g)
 {
     return has_medium(p, g, 1, g->hole_count || g->is_outside ? 0.028 : 0.014);
@@ -235,15 +236,15 @@ static bool is_double_sampled_medium(const caught_picture *p, const region *g)
     return has_medium(p, g, 2, g->hole_count || g->is_outside ? 0.056 : 0.028);
 }
 
-/* Each layer ends where its own clip may follow. */
+/* The text of each layer ends where its own clip may follow. */
 #define MEDIUM "      - volume: {field: f, range: [-9, 9], opacity: [[0, 0.5], [1, 0.5]], unit_distance: 1%s}\n"
-/* This layer shows nowhere, and keeps the others' clip from being that of all layers. */
+/* A layer that is invisible, and is not clipped, so that the others' clip is not that of all layers. */
 #define WHOLE "      - isosurface: {field: f, values: [99]}\n"
 
 typedef struct clip_case {
     const char *name, *scene;
     bool (*is_right)(const caught_picture *picture, const region *g);
-    double tolerance; /* between ranks; 0: the same bits */
+    double tolerance; /* between ranks; 0 means the same bits */
 } clip_case;
 
 static const clip_case cases[] = {
@@ -264,7 +265,7 @@ static const clip_case cases[] = {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-/* Where the clip stands: at the image, at the layers, or at the layers beside one that is whole. */
+/* Where the clip is defined: for the image, for the layers, or for the layers next to one that is not clipped. */
 typedef enum clip_place { OF_IMAGE, OF_LAYERS, BESIDE_A_WHOLE, PLACES } clip_place;
 
 static const char *scene_of(const clip_case *c, const region *g, clip_place place)
@@ -311,8 +312,8 @@ static void verify(test_mesh_kind kind, const clip_case *c, const region *g, cli
     free_caught(&alone);
 }
 
-/* Two of the region and place pairs a case, others for each kind of mesh: over all kinds, every case has all of them.
- */
+/* Checks two pairs of a region and a position of the clip for each case, different ones for each kind of mesh: over all
+ * kinds, every case is checked with all pairs. */
 static void verify_all(test_mesh_kind kind, const session_input inputs[2])
 {
     for (int i = 0; i < CASES; i++)
@@ -326,7 +327,7 @@ static void layers_are_clipped(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
-        session_input inputs[2]; /* whole, and this rank's */
+        session_input inputs[2]; /* the whole mesh, and this rank's part */
         memset(inputs, 0, sizeof inputs);
         test_mesh_lattice(kind, SIDE, 0.2, test_linear, &inputs[0].part);
         input_describe(&inputs[0]);
@@ -338,7 +339,7 @@ static void layers_are_clipped(void **state)
     }
 }
 
-/* A slice in a clipping plane is seen whole, and in front of all else. */
+/* Checks that a slice in a clipping plane is visible as a whole, and in front of everything else. */
 static void slices_in_the_clipping_plane_are_seen(void **state)
 {
     (void)state;

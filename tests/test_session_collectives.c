@@ -1,4 +1,4 @@
-/* Counts how often all ranks wait for each other in a step: MPI's collective calls, where the library makes them. */
+/* Counts how often all ranks synchronize in a step: the collective MPI calls of the library. */
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +11,7 @@ enum { MOST_IDLE = 1 };
 
 static int calls;
 
-/* MPI's own names, of which the library's calls find these first. */
+/* Functions with MPI's own names, to which the library's calls are linked. */
 int MPI_Allreduce(const void *send, void *receive, int count, MPI_Datatype type, MPI_Op op, MPI_Comm comm)
 {
     calls++;
@@ -73,7 +73,7 @@ int MPI_Alltoallv(const void *send, const int counts[], const int places[], MPI_
 
 typedef struct counted_scene {
     const char *name, *layer;
-    int most; /* calls of a drawn step */
+    int most; /* maximum number of calls of a step that draws */
 } counted_scene;
 
 static const counted_scene scenes[] = {
@@ -81,19 +81,19 @@ static const counted_scene scenes[] = {
     {"transparent isosurfaces", "      - isosurface: {field: f, values: [-0.2, 0.1], opacity: 0.5}\n", 6},
     {"volume",
      "      - volume: {field: f, map: viridis, range: [-1, 1], opacity: [[0, 0], [1, 0.5]], unit_distance: 1}\n", 6},
-    /* Where the plane lies in the cells. */
+    /* One more call: where the plane lies in the cells. */
     {"slice", "      - slice: {field: f, range: [-1, 1], planes: [{normal: [1, 2, 3]}]}\n", 7},
-    /* The extremes; whether cells with a volume count, and six digits. */
+    /* Two more calls: the extremes of the values; whether cells with a volume count, and six digits. */
     {"slice by its extremes", "      - slice: {field: f, planes: [{normal: [1, 2, 3]}]}\n", 8},
     {"slice by percentiles", "      - slice: {field: f, range: {percentile: [2, 98]}, planes: [{normal: [1, 2, 3]}]}\n",
      14},
-    /* Which faces are stale; whether there is room for their values. */
+    /* Two more calls: which faces are stale; whether there is memory for their values. */
     {"outer surface", "      - surface: {colour_by: {field: f, range: [-1, 1]}}\n", 8},
-    /* Which values are stale; values to their homes, and means back. */
+    /* Three more calls: which values are stale; values to their homes, and means back. */
     {"isosurface of a cell field", "      - isosurface: {field: c, values: [0.1]}\n", 9},
-    /* What layers ask for; vertices to neighbours, the largest gradient, and sums back. */
+    /* Four more calls: what layers need; vertices to neighbours, the largest gradient, and sums back. */
     {"vertex normals", "      - isosurface: {field: f, values: [0.1], normals: vertex}\n", 10},
-    /* Ranges and boxes; hits to neighbours, and samples back. */
+    /* Four more calls: ranges and boxes; hits to neighbours, and samples back. */
     {"differences", "      - isosurface: {field: f, values: [0.1], normals: differences}\n", 10},
 };
 
@@ -108,8 +108,8 @@ static const char *scene_of(const counted_scene *s)
     return write_scene(text);
 }
 
-/* The third and the fourth step, when all is known of meshes that stay as they are. The writer's thread calls no MPI.
- */
+/* Counts the calls of the third and the fourth step, when everything about an unchanged mesh is known. The writer's
+ * thread makes no MPI calls. */
 static void count_steps(const counted_scene *s)
 {
     session_input in;
@@ -150,7 +150,8 @@ static void a_step_waits_few_times(void **state)
     session_writes_behind = false;
 }
 
-/* Whichever way fragments go, the picture is the same, and the report has the way and its bytes. */
+/* Checks that the picture is the same with every schedule of fragments, and that the report states the schedule and its
+ * bytes. */
 static void schedules_change_no_bit_and_are_reported(void **context)
 {
     static const char *const names[] = {"auto", "direct", "nodes", "radix", "binary"};

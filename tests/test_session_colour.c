@@ -1,6 +1,6 @@
-/* Sources of colour ranges, over all ranks: pictures by each source are to the bit those by the range that brute force
- * over the whole mesh finds. Ranges over a run widen and outlive the session, and a broken file of them is an error.
- * All ranks have colour maps from files. */
+/* Checks sources of colour ranges over all ranks: pictures with each source equal, to the bit, those with the range
+ * that brute force finds over the whole mesh. Ranges over a run widen and outlive the session, and a corrupt file of
+ * them is an error. All ranks have colour maps from files. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +16,7 @@ static const test_mesh_kind kind = TEST_MIXED;
 static char folder[512], image_name[32];
 static session_input block, distributed;
 
-/* A coloured surface and a volume, both with the keys. */
+/* Returns a scene with a coloured surface and a volume, each with its keys. */
 static const char *scene_with(const char *surface_keys, const char *volume_keys)
 {
     static char text[2048];
@@ -46,7 +46,8 @@ static caught_picture draw(const session_input *in, const char *surface_keys, co
     return picture;
 }
 
-/* The largest difference of a channel; frees both. Surfaces are the same bits, volumes to 1e-6 on several ranks. */
+/* Compares two pictures by the largest difference of a channel and frees both. Surfaces have the same bits; volumes
+ * agree to 1e-6 on several ranks. */
 static void assert_alike(caught_picture *a, caught_picture *b, double allowed)
 {
     double worst = 0;
@@ -68,7 +69,7 @@ static int compare_values(const void *left, const void *right)
 typedef struct truth {
     double least, most, least_positive;
     int64_t count, positive;
-    double *middles; /* sorted */
+    double *middles; /* middle of the range of each cell's values, sorted */
 } truth;
 
 static truth find_truth(void)
@@ -94,7 +95,8 @@ static truth find_truth(void)
     return t;
 }
 
-/* Nearest rank: the least value that percent of count values, after the first `skipped`, are no greater than. */
+/* Returns the percentile by the nearest rank: the least value such that percent of the values, without the first
+ * `skipped`, are at most as large. */
 static double percentile(const truth *t, int64_t skipped, double percent)
 {
     const int64_t count = t->count - skipped, rank = (int64_t)ceil(percent / 100 * (double)count);
@@ -172,10 +174,10 @@ static void ranges_over_a_run_widen_and_outlive_it(void **state)
     }
     insitu_destroy(&session);
     everywhere(own_rank != 0 || access(ranges_file(), R_OK) == 0);
-    /* Another session goes on; volumes alone, as the surface's colours are of another field. */
+    /* Another session continues the range. Only volumes are compared, since another field colours the surface. */
     caught_picture again = draw(&distributed, "", run);
     assert_alike(&again, &fixed, 0);
-    /* For another field there is no range yet. */
+    /* There is no range for another field yet. */
     caught_picture other = draw(&distributed, "", ", component: magnitude, range: run"), fresh;
     fresh = draw(&distributed, "", ", component: magnitude");
     assert_alike(&other, &fresh, 0);
@@ -185,7 +187,8 @@ static void ranges_over_a_run_widen_and_outlive_it(void **state)
     remove_ranges();
 }
 
-/* Every kind of layer that has colours of a field: the same picture as by the data, and a line in the file. */
+/* Checks every kind of layer with colours of a field: the picture equals that with the data's range, and the file has a
+ * line for it. */
 static void every_kind_of_layer_has_a_range_over_a_run(void **state)
 {
     (void)state;
@@ -265,8 +268,8 @@ static void assert_colour(const render_transfer *t, double value, const float ex
             fail_msg("value %g, channel %d: %g, expected %g", value, c, colour[c], (double)expected[c]);
 }
 
-/* Within a sixteenth of a band from its border the colour may be the neighbour's; colours outside begin one entry
- * beyond the ends. */
+/* Checks volumes with bands and outside colours. Within a sixteenth of a band from its border the colour may be that of
+ * the neighbouring band; outside colours begin one entry beyond the ends. */
 static void volumes_have_bands_and_colours_outside(void **state)
 {
     (void)state;
@@ -305,7 +308,7 @@ static void volumes_have_bands_and_colours_outside(void **state)
     }
 }
 
-/* Render takes them as straight along the scale. */
+/* Checks control points of the opacity on a logarithmic scale: the renderer interpolates linearly along the scale. */
 static void points_of_the_opacity_are_where_the_scale_has_them(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
-/* Concave polygons as shells and as faces of polyhedra under `surface`: what is covered, its depth, value, light, edges
- * and clips, by closed form; and for any dealing the same to the bit as on one rank. */
+/* Checks concave polygons as shells and as faces of polyhedra under `surface`: coverage, depth, value, light, edges and
+ * clips, compared with closed forms; with any distribution of cells the picture is the same to the bit as on one
+ * rank. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +12,7 @@
 
 enum { SIZE = 240, PIXELS = SIZE * SIZE, TILES = 9, MOST_CORNERS = 64, MOST_ENTRIES = 512 };
 
-/* A pixel is 1/100 wide; looked at along z from z = 5. */
+/* A pixel is 1/100 wide; the view is along z from z = 5. */
 #define IMAGE(more, layer)                                                                                             \
     "images:\n  - name: a\n    size: [240, 240]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, 5], "     \
     "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2.4}\n" more                                   \
@@ -46,7 +47,7 @@ static void make_comb(tile *t)
         add(t, (i + 0.5) / 6, 1 - 0.05 * (i % 3));
     }
     add(t, 1, 0.3);
-    for (int i = 6; i >= 0; i--) add(t, i / 6., 0); /* in a line */
+    for (int i = 6; i >= 0; i--) add(t, i / 6., 0); /* collinear corners */
 }
 
 static void make_star(tile *t)
@@ -57,7 +58,8 @@ static void make_star(tile *t)
     }
 }
 
-/* Polygons in the unit square: convex and concave ones, a hole at the end of a bridge, corners said twice. */
+/* Makes polygons in the unit square: convex and concave ones, one with a hole at the end of a bridge, and ones with
+ * repeated corners. */
 static void make_tiles(tile tiles[TILES])
 {
     static const double u[8][2] = {{0, 0}, {1, 0}, {1, 1}, {0.67, 1}, {0.67, 0.33}, {0.33, 0.33}, {0.33, 1}, {0, 1}};
@@ -93,7 +95,7 @@ typedef struct shells {
     unsigned char types[TILES];
 } shells;
 
-/* The rank's tiles, on the plane z = 0.3 x + 0.2 y; each tile's list begins where the rank says. */
+/* Makes the rank's polygons on the plane z = 0.3 x + 0.2 y; the first corner of each polygon depends on the rank. */
 static void make_shells(const tile tiles[TILES], int rank, int ranks, shells *out)
 {
     *out = (shells){0};
@@ -143,9 +145,9 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shells *s)
     return picture;
 }
 
-/* ---- what is to be seen --------------------------------------------------------------------------------------- */
+/* ---- the expected pictures ------------------------------------------------------------------------------------ */
 
-/* How often the loop goes around the place, and how far the place is from the loop, at least. */
+/* Returns how often the loop winds around the point, and computes the point's distance from the loop. */
 static int winding(const tile *t, const double at[2], double *distance)
 {
     int turns = 0;
@@ -163,7 +165,7 @@ static int winding(const tile *t, const double at[2], double *distance)
 
 typedef struct truth {
     bool is_hit;
-    double margin; /* from the nearest edge */
+    double margin; /* distance from the nearest edge */
     double depth, value;
 } truth;
 
@@ -181,7 +183,7 @@ static truth truth_at(const tile tiles[TILES], int pixel)
 
 typedef bool verify_function(const truth *t, const double at[2], const float *rgba, float depth);
 
-/* Depths and colours to what test_session_surfaces.c derives. */
+/* Checks depths and colours to the bounds that test_session_surfaces.c derives. */
 static bool is_value(const truth *t, const double at[2], const float *rgba, float depth)
 {
     (void)at;
@@ -191,7 +193,8 @@ static bool is_value(const truth *t, const double at[2], const float *rgba, floa
     return rgba[3] == 1 && fabs((double)depth - t->depth) < 1.5e-5 && fabs((double)rgba[0] - grey) < 1e-4;
 }
 
-/* One plane seen along one direction has one brightness, 1 ulp of which a normal's rounding may change by some. */
+/* Checks the light: a plane seen along one direction has one brightness, to a few units in the last place from the
+ * rounding of normals. */
 static bool is_lit(const truth *t, const double at[2], const float *rgba, float depth)
 {
     static float first;
@@ -202,7 +205,7 @@ static bool is_lit(const truth *t, const double at[2], const float *rgba, float 
     return rgba[0] > 0.1f && fabsf(rgba[0] - first) < 1e-5f;
 }
 
-/* Lines of three pixels: black on the edges, and none elsewhere. */
+/* Checks black lines, three pixels wide, on the edges and nowhere else. */
 static bool is_lined(const truth *t, const double at[2], const float *rgba, float depth)
 {
     (void)at;
@@ -289,8 +292,8 @@ static void concave_shells_are_what_they_are(void **state)
 
 /* ---- polyhedra ------------------------------------------------------------------------------------------------ */
 
-/* Upright prisms from z = -0.4 to 0.45, the top moved by 0.1 along y: the top is where its polygon is, and behind
- * nothing is nearer. */
+/* Checks upright prisms from z = -0.4 to 0.45 whose top is shifted by 0.1 along y: the top must be visible in its
+ * polygon, and nothing may be nearer. */
 static void concave_prisms_have_their_tops(void **state)
 {
     (void)state;

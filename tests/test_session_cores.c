@@ -1,4 +1,4 @@
-/* A rank's share of the cores, however ranks are bound: by arithmetic, and of this machine's. */
+/* Checks a rank's share of the cores for any binding of ranks: by arithmetic, and on this machine. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,7 +12,7 @@
 
 enum { MOST_CORES = 128, MOST_RANKS = 16 };
 
-/* A rank that may run on the cores from first on. */
+/* The cores that a rank may use: count of them, from first on. */
 typedef struct binding {
     int first, count;
 } binding;
@@ -29,7 +29,7 @@ static void check_shares(const binding *ranks, int rank_count, const int *expect
         assert_int_equal(session_share_of_cores(own[r], counts, MOST_CORES), expected[r]);
 }
 
-/* All ranks alike. */
+/* Checks the share of ranks with the same binding. */
 static void check_alike(binding one, int rank_count, int expected)
 {
     binding ranks[MOST_RANKS];
@@ -48,7 +48,7 @@ static void ranks_share_what_they_may_run_on(void **context)
     check_alike((binding){0, 64}, 8, 8);
     check_alike((binding){0, 64}, 7, 9);
     check_alike((binding){0, 2}, 8, 1);
-    check_alike((binding){40, 12}, 3, 4); /* a container's cores */
+    check_alike((binding){40, 12}, 3, 4); /* the cores of a container */
     check_shares((const binding[]){{0, 32}, {32, 32}, {0, 32}, {32, 32}}, 4, (const int[]){16, 16, 16, 16});
     check_shares((const binding[]){{0, 4}, {4, 4}, {8, 4}}, 3, (const int[]){4, 4, 4});
     check_shares((const binding[]){{0, 1}, {0, 4}}, 2, (const int[]){1, 3});

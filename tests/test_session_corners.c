@@ -1,7 +1,7 @@
-/* Fields with a value at each corner of each cell. On discontinuous meshes they draw the pictures of the mesh whose
- * vertices the caller doubled, to the bit: with fields at vertices and cells beside them, by an index, in rows, in
- * another order of vertices, with ids, as values and coordinates change. Averaged, they draw those of the means at
- * vertices by brute force. Errors are returned on all ranks. */
+/* Checks fields with a value at each corner of each cell. On discontinuous meshes the pictures equal, to the bit, those
+ * of a mesh whose vertices the caller duplicated: with fields at vertices and cells beside them, through an index, in
+ * rows, with another order of vertices, with ids, and when values and coordinates change. Averaged fields draw the
+ * pictures of the means at vertices by brute force. Errors are returned on all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,14 +40,14 @@ typedef struct form {
     bool is_by_index, is_in_rows, is_lexicographic, has_ids;
 } form;
 
-/* The fields as plain arrays: of the shared vertices, of the corners, of the cells. */
+/* The fields as plain arrays: at the shared vertices, at the corners, and at the cells. */
 typedef struct values {
     int64_t corners;
     double *at_vertices, *at_corners, *at_cells, *gathered;
-    double *distributed; /* corners' values as the form has them */
-    int64_t *index;      /* NULL: none */
+    double *distributed; /* the corners' values in the layout of the form */
+    int64_t *index;      /* NULL if there is none */
     int64_t distributed_count;
-    double *coordinates; /* of the doubled mesh */
+    double *coordinates; /* of the mesh with duplicated vertices */
     int64_t *connectivity, *ids, *doubled_ids;
 } values;
 
@@ -65,7 +65,7 @@ static int64_t *integers(int64_t count)
     return out;
 }
 
-/* One number of the cell, whichever rank has it. */
+/* Returns a number that depends only on the cell, not on its rank. */
 static double own_of(const test_mesh *part, int64_t cell)
 {
     double sum = 0;
@@ -121,7 +121,8 @@ static values make_values(const form *of, const test_mesh *part)
     v.connectivity = integers(corners);
     v.ids = integers(part->vertex_count);
     v.doubled_ids = integers(corners);
-    for (int64_t i = 0; i < places; i++) v.index[i] = -1; /* of rows' rests: not looked at */
+    /* entries after the corners of a row, which must not be read */
+    for (int64_t i = 0; i < places; i++) v.index[i] = -1;
     fill(&v, of, part, 1);
     double_vertices(&v, part);
     return v;
@@ -134,7 +135,7 @@ static void free_values(values *v)
     free(v->coordinates), free(v->connectivity), free(v->ids), free(v->doubled_ids);
 }
 
-/* Each cell's vertices in lexicographic order: a turn that is its own inverse. */
+/* Changes each cell's vertices to lexicographic order; the permutation is its own inverse. */
 static void sort_hex_vertices(test_mesh *part)
 {
     for (int64_t i = 0; i + 3 < part->connectivity_count; i += 4) {
@@ -220,7 +221,7 @@ static void scale_coordinates(session_input *in, values *v, double scale)
     for (int64_t i = 0; i < 3 * v->corners; i++) v->coordinates[i] *= scale;
 }
 
-/* Draws the mesh as it is, with other values, and with other coordinates. */
+/* Draws the mesh unchanged, with other values, and with other coordinates. */
 static drawing draw(session_input *in, values *v, const form *of, bool is_doubled)
 {
     drawing out = {.copied = 0};
@@ -261,11 +262,11 @@ static void check(test_mesh_kind kind, const form *of)
 {
     session_input in = {0};
     input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
-    if (of->has_ids && rank_count > 1) return input_free(&in); /* the ids are of one rank */
+    if (of->has_ids && rank_count > 1) return input_free(&in); /* the ids are unique only within one rank */
     if (of->is_lexicographic) sort_hex_vertices(&in.part);
     values v = make_values(of, &in.part);
     drawing doubled = draw(&in, &v, of, true), discontinuous = draw(&in, &v, of, false);
-    /* coordinates and an index a corner, g, and f where it is not read in place */
+    /* for each corner: coordinates, an index, and g; also f if it cannot be read in place */
     const int64_t tuples = 3 * 8 + 4 + 8 + (of->is_by_index || of->is_in_rows ? 8 : 0);
     everywhere(discontinuous.copied == doubled.copied + tuples * v.corners);
     compare(&doubled, &discontinuous, STEPS);
@@ -300,8 +301,8 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The mean over all corners of the whole mesh in one place, summed in their order by size, as the means of cells are.
- */
+/* Returns the mean over all corners of the whole mesh at one position, summed by increasing size, as means of cells
+ * are. */
 static double mean_at(const test_mesh *whole, const double at[3])
 {
     double found[256], sum = 0;
@@ -396,7 +397,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     input_free(&in);
 }
 
-/* These are seen by a step; the centring is one on all ranks. */
+/* Checks errors that a step detects; the centring is the same on all ranks. */
 static void wrong_array_contents_are_reported_on_all_ranks(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Deep pictures: of every pixel what lies behind each other, in order and without overlaps, which blended in double are
- * the flat picture; of surfaces and of reproducible volumes, the samples of one rank to the bit, on any partition. */
+/* Checks deep pictures: the samples of every pixel are in order and do not overlap, and blended in double they give the
+ * flat picture. For surfaces and for reproducible volumes, any partition gives the samples of one rank to the bit. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +9,7 @@
 
 enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 
-/* Colours of 0 and 1 are the same in sRGB and in linear light. */
+/* The colours are 0 and 1, which are the same in sRGB and in linear light. */
 #define SCENE(layers, more)                                                                                            \
     "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 1, 0, 0.5]\n" more "    layers:\n" layers           \
     "    outputs: [{path: flat.exr}, {path: deep.exr, deep: true}]\n"
@@ -47,9 +47,10 @@ enum { CASES = sizeof cases / sizeof *cases, ANTIALIASED = 1 };
 
 /* ---- one picture ---------------------------------------------------------------------------------------------- */
 
-/* A float's rounding takes 2^-24 of at most 1. A sample takes a product, a sum and another product in compositing, and
- * the deep picture's A is a difference: four roundings. For mixed stretches the flat picture multiplies the
- * transmittance of a run of them as one number: two more. The background is a product and a sum. */
+/* Returns the bound of a pixel's error. A float's rounding is 2^-24 of at most 1. A sample takes a product, a sum and
+ * another product in compositing, and the deep picture's A is a difference: four roundings. For mixed segments the flat
+ * picture multiplies the transmittance of a run of them as one number: two more. The background takes a product and a
+ * sum. */
 static double bound_of(int64_t samples)
 {
     return ldexp((double)(6 * samples + 2), -24);
@@ -65,7 +66,7 @@ static bool is_in_order(const insitu_deep_sample *samples, int64_t count)
     return true;
 }
 
-/* Returns how far the flat pixel is from what the samples make over the background. */
+/* Returns how far the flat pixel is from the samples blended over the background. */
 static double distance(const insitu_deep_sample *samples, int64_t count, const double behind[4], const float *flat)
 {
     double rgba[4] = {0, 0, 0, 0}, worst = 0;
@@ -94,7 +95,7 @@ static bool is_the_flat_picture(const caught_picture *deep, const caught_picture
     return shown > 0 || strcmp(name, "nothing") == 0;
 }
 
-/* The nearest surface's depth is the first sample's, for there is no volume. */
+/* Checks that the nearest surface's depth is that of the first sample, since there is no volume. */
 static bool has_depths(const caught_picture *deep, const caught_picture *flat)
 {
     for (int p = 0; p < PIXELS; p++) {

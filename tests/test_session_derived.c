@@ -1,6 +1,6 @@
-/* Derived fields: gradients of linear functions are exact on every cell type; expressions are compared with C; values
- * of curved functions converge by the square of the cells' size; any partition gives the same bits; what does not
- * change is not made anew; and what is wrong is told to all ranks. */
+/* Checks derived fields: gradients of linear functions are exact on every cell type; expressions are compared with C;
+ * values for curved functions converge with the square of the cell size; any partition gives the same bits; unchanged
+ * fields are not computed again; and errors are reported on all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +13,7 @@
 
 enum { SIDE = 3, MOST_TEXT = 1 << 14 };
 
-/* Statistics that need the fields, and an image that is never drawn. */
+/* A scene with statistics that need the fields, and an image that is never drawn. */
 #define SCENE(fields, name)                                                                                            \
     "fields: {" fields "}\nimages:\n  - name: a\n    size: [8, 6]\n    when: {field: " name ", above: 1e30}\n"         \
     "    layers: [{isosurface: {field: " name ", values: [0.1]}}]\n    outputs: [{path: a.png}]\n"
@@ -22,7 +22,7 @@ enum { SIDE = 3, MOST_TEXT = 1 << 14 };
 
 typedef void vector_function(const double position[3], double out[3]);
 
-/* A field of 3 components, with one number between tuples, of either width; its arrays are the test's own. */
+/* A field of 3 components in a stride of 4 numbers, of either width; the test owns its arrays. */
 typedef struct vector_field {
     void *values;
     insitu_field field;
@@ -112,7 +112,7 @@ static void linear(const double p[3], double out[3])
     for (int c = 0; c < 3; c++) out[c] = slopes[c][0] * p[0] + slopes[c][1] * p[1] + slopes[c][2] * p[2] + 2 - c;
 }
 
-/* The middle root of det(M - x) by bisection between the extremes of its derivative. */
+/* Returns det(M - x), whose middle root is found by bisection between the extremes of its derivative. */
 static double determinant_less(const double m[3][3], double x)
 {
     const double a = m[0][0] - x, b = m[1][1] - x, c = m[2][2] - x;
@@ -126,7 +126,7 @@ static double middle_root(const double m[3][3])
     const double second = m[0][0] * m[1][1] + m[0][0] * m[2][2] + m[1][1] * m[2][2] - m[0][1] * m[1][0] -
                           m[0][2] * m[2][0] - m[1][2] * m[2][1];
     const double half = sqrt(trace * trace / 9 - second / 3);
-    double low = trace / 3 - half, high = trace / 3 + half; /* the determinant rises between */
+    double low = trace / 3 - half, high = trace / 3 + half; /* the determinant increases between them */
     for (int i = 0; i < 200; i++) {
         const double middle = 0.5 * (low + high);
         if (determinant_less(m, middle) < 0)
@@ -143,7 +143,7 @@ typedef struct expected_value {
     double value;
 } expected_value;
 
-/* By the tensors S and W themselves. */
+/* Computes the quantities from the tensors S and W themselves. */
 static void find_tensors(double *q, double *lambda2, double *strain)
 {
     double s[3][3], w[3][3], m[3][3] = {{0}}, of_s = 0, of_w = 0;
@@ -200,14 +200,14 @@ static double worst_of_linear(const insitu_session *session, const test_mesh *me
     return worst;
 }
 
-/* Doubles: what is left is rounding, 1e-15 over the shortest edge, and a sliver's at most 1e-10; results of floats are
- * off by the float's last bit of a value near 1 over an edge of 0.2: 6e-8 * 2 / 0.2. */
+/* Checks linear velocities. With doubles only rounding remains, 1e-15 over the shortest edge, at most 1e-10 for a
+ * sliver; results in float are off by the last bit of a value near 1 over an edge of 0.2: 6e-8 * 2 / 0.2. */
 static void linear_velocities_are_exact(void **state)
 {
     (void)state;
     for (int kind = 0; kind < 2 * TEST_KIND_COUNT; kind++) {
         session_input in = {0};
-        if (kind == TEST_KIND_COUNT + TEST_POLYHEDRA) continue; /* they are some */
+        if (kind == TEST_KIND_COUNT + TEST_POLYHEDRA) continue; /* these cells are polyhedra already */
         test_mesh_lattice((test_mesh_kind)(kind % TEST_KIND_COUNT), SIDE, 0.2, test_wave, &in.part);
         if (kind >= TEST_KIND_COUNT) test_mesh_to_polyhedra(&in.part, kind == TEST_KIND_COUNT + TEST_MIXED ? 0.5 : 1);
         input_describe(&in);
@@ -290,7 +290,7 @@ static int64_t find_vertex(const test_mesh *whole, const double place[3])
     return -1;
 }
 
-/* Marks the vertices of cells that are no ghosts; others need no values. */
+/* Marks the vertices of cells that are no ghosts; other vertices need no values. */
 static bool *find_used(const insitu_session *session, const char *mesh)
 {
     const grid *g = &session_find_mesh(&session->meshes, mesh)->cells;
@@ -323,7 +323,8 @@ static bool has_same_bits(const insitu_session *parts, const char *mesh, const i
 #define PARTITION_SCENE                                                                                                \
     SCENE("q: {q_criterion: u}, w: {vorticity: u}, l: {lambda2: u}, mixed: q + w.z + l + c.x", "mixed")
 
-/* Threads, ranks, other numbers of vertices and cells, turned cells, and ghosts do not matter. */
+/* Checks that threads, ranks, the numbering of vertices and cells, the order of a cell's vertices, and ghosts do not
+ * change the results. */
 static void partitions_do_not_show(void **state)
 {
     (void)state;
@@ -363,7 +364,8 @@ static void partitions_do_not_show(void **state)
 
 /* ---- several meshes ---------------------------------------------------------------------------------------------- */
 
-/* Blocks of one mesh, on any ranks, are as the mesh whole: their border has the gradients of both sides. */
+/* Checks that blocks of one mesh, on any ranks, give the same fields as the whole mesh: gradients at a block's border
+ * use both sides. */
 static void blocks_show_no_seam(void **state)
 {
     (void)state;
@@ -405,8 +407,8 @@ static void blocks_show_no_seam(void **state)
 
 enum { SHEET = 4 };
 
-/* A sheet on the plane z = 0.3 x + 0.2 y, of quads and, in every second square, triangles: its gradients are those of
- * space without what is across it. */
+/* Checks a sheet on the plane z = 0.3 x + 0.2 y, of quads and, in every second square, triangles: its gradients are
+ * those in space without the component normal to the sheet. */
 static void gradients_of_shells_lie_in_them(void **state)
 {
     (void)state;
@@ -464,8 +466,8 @@ static void gradients_of_shells_lie_in_them(void **state)
     insitu_destroy(&session);
 }
 
-/* Velocities of cells are means at the vertices first, exact in a lattice but at its border; those of corners are exact
- * as they are. */
+/* Checks velocities at cells and corners. Those at cells are first averaged at the vertices, which is exact in a
+ * lattice except at its border; those at corners are exact. */
 static void velocities_of_cells_and_corners_are_taken(void **state)
 {
     (void)state;
@@ -539,7 +541,7 @@ static void what_stays_is_not_made_again(void **state)
     step_again(session, &u, INSITU_CHANGED_VALUES, 2);
     everywhere(version_of(session, "d") > of_d && version_of(session, "e") > of_e);
     everywhere(in.part.cell_count == 0 || fabs(value_of(session, "d", 0, 0) - 2 * trace) < 1e-9);
-    /* A mesh twice as long has half the slopes; values alone stay. */
+    /* A mesh twice as long has half the slopes; a field that depends only on values is not computed again. */
     const int64_t before = version_of(session, "x");
     for (int64_t i = 0; i < 3 * in.part.vertex_count; i++) in.part.coordinates[i] *= 2;
     in.mesh.changed = INSITU_CHANGED_GEOMETRY;
@@ -552,7 +554,7 @@ static void what_stays_is_not_made_again(void **state)
     input_free(&in);
 }
 
-/* An edited scene has its own derived fields, also under names of the old one. */
+/* Checks that an edited scene has its own derived fields, even if their names are those of the previous scene. */
 static void an_edited_scene_has_its_own(void **state)
 {
     (void)state;
@@ -575,7 +577,7 @@ static void an_edited_scene_has_its_own(void **state)
     input_free(&in);
 }
 
-/* ---- what is wrong ----------------------------------------------------------------------------------------------- */
+/* ---- errors ------------------------------------------------------------------------------------------------------ */
 
 typedef struct wrong_case {
     const char *fields, *words[3];
@@ -596,7 +598,8 @@ static const wrong_case wrong[] = {
     {"u: f + 1, q: f / 2", {"", "", ""}},
 };
 
-/* Each is told in the step, to all ranks alike, with the line; an image of other fields is drawn all the same. */
+/* Checks that each error is reported by the step, on all ranks, with its line, and that an image of other fields is
+ * still drawn. */
 static void wrong_input_is_reported_on_all_ranks(void **state)
 {
     (void)state;
@@ -631,8 +634,8 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     input_free(&in);
 }
 
-/* A name that the simulation has, too; one that is nearly a derived field's; and a field whose components differ on one
- * rank. */
+/* Checks a name that the simulation uses too, one that is similar to a derived field's, and a field whose components
+ * differ on one rank. */
 static void clashes_are_reported_on_all_ranks(void **state)
 {
     (void)state;
@@ -650,7 +653,7 @@ static void clashes_are_reported_on_all_ranks(void **state)
     reported_everywhere(session, status, INSITU_ERROR_FIELD, "no mesh has the field \"sped\" (did you mean speed?)",
                         "there are: ");
     insitu_destroy(&session);
-    /* It may come later. */
+    /* The simulation may set the field later. */
     session = open_stepped(MPI_COMM_WORLD, SCENE("late: u.x + 1", "late"), &in, &u);
     insitu_field late = in.field;
     late.name = "late";

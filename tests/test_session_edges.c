@@ -1,5 +1,6 @@
-/* Edges of outer surfaces: every pixel is covered by lines as far as the projected edges of the face that its ray hits
- * say, for all types of cells and for faces of more than four corners; one picture on any ranks. */
+/* Checks edges of outer surfaces: lines cover every pixel according to the projected edges of the face that its ray
+ * hits, for all types of cells and for faces with more than four corners; the picture is the same on any number of
+ * ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -35,7 +36,7 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* ---- the truth ----------------------------------------------------------------------------------------------- */
+/* ---- the reference ------------------------------------------------------------------------------------------- */
 
 typedef struct polygon {
     int count;
@@ -47,7 +48,7 @@ typedef struct body {
     polygon *faces;
 } body;
 
-/* The faces in the border of the cube from -1 to 1, or all faces of all cells. */
+/* Makes a body of the faces on the border of the cube from -1 to 1, or of all faces of all cells. */
 static body make_body(const grid *g, bool is_cube)
 {
     body out = {0};
@@ -75,7 +76,7 @@ static void cross(const double a[3], const double b[3], double out[3])
     for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-/* The depth at which a ray meets a convex face; infinity: it does not. */
+/* Returns the depth at which a ray meets a convex face; infinity if it misses the face. */
 static double meet(const polygon *face, const double base[3], const double direction[3])
 {
     double u[3], v[3], normal[3], from[3], at[3];
@@ -99,7 +100,7 @@ static double meet(const polygon *face, const double base[3], const double direc
     return depth;
 }
 
-/* A point in the picture, in pixels, and its depth. */
+/* Projects a point into the picture, in pixels; returns its depth. */
 static double project(const render_camera *c, const double point[3], double out[2])
 {
     double from[3];
@@ -111,7 +112,7 @@ static double project(const render_camera *c, const double point[3], double out[
 }
 
 /* Bounds the distance of a line's middle from the pixel's, in pixels. The library divides an edge's offset from the ray
- * by the hit's depth instead of the edge's own; the error is no more than the two depths differ. */
+ * by the hit's depth instead of the edge's own; the error is bounded by the difference of the two depths. */
 static void bound_distance(const render_camera *c, const polygon *face, const double pixel[2], double hit,
                            double bounds[2])
 {
@@ -130,8 +131,8 @@ static void bound_distance(const render_camera *c, const polygon *face, const do
     }
 }
 
-/* The white that lines leave of a pixel, with room for single precision: places round by some 5e-7 of scenes of size 5,
- * a 15,000th of a pixel, but more on a slant. */
+/* Checks the white that lines leave in a pixel. The tolerance is single precision: positions are rounded by about 5e-7
+ * in scenes of size 5, a 15,000th of a pixel, but more on slanted faces. */
 static bool is_pixel(const render_camera *c, const body *b, const caught_picture *picture, int pixel, bool *has_line)
 {
     double base[3], direction[3], nearest = INFINITY, bounds[2];
@@ -165,7 +166,7 @@ static bool is_truth(const caught_picture *picture, const body *b, bool is_flat)
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
-/* The body is given where the caller wants it. */
+/* Draws a picture; also makes the body if b is not NULL. */
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, body *b)
 {
     insitu_session *session = open_drawn(comm, scene, in);
@@ -201,8 +202,8 @@ static void lines_are_where_edges_are(void **state)
     }
 }
 
-/* A prism over a regular polygon of six corners, whose fan has three inner lines; turned, so that its least corner is
- * now this and now that. */
+/* Checks a prism over a regular hexagon, whose fan has three inner lines that must not be drawn; it is rotated, so that
+ * its least corner changes. */
 static void faces_of_many_corners_have_no_other_lines(void **state)
 {
     (void)state;
@@ -268,7 +269,7 @@ static void any_ranks_draw_one_picture(void **state)
     }
 }
 
-/* 24 squares a side on some 10 pixels: white as without lines. */
+/* Checks 24 squares a side on about 10 pixels: the picture must be white, as without lines. */
 static void lines_fade_on_small_faces(void **state)
 {
     (void)state;
@@ -290,9 +291,9 @@ static void lines_fade_on_small_faces(void **state)
 
 enum { ACROSS = 65 };
 
-/* Draws along an axis with rays on lines of the lattice, all numbers exact: pixels of 1/32, the middle one at 0.
- * Surfaces are half opaque, so that a front and a back that are hit once each leave a quarter. Pixels on the rim are
- * half open. */
+/* Draws along an axis with rays on lines of the lattice, where all numbers are exact: pixels are 1/32 wide, with the
+ * middle one at 0. Surfaces have opacity 0.5, so that a front and a back that are hit once each leave a quarter of the
+ * light. Pixels on the border of the picture are not checked, since the surface covers half of them. */
 static bool is_closed_along(const session_input *in, int axis, int side, const char *edges)
 {
     char text[512];
@@ -316,7 +317,7 @@ static bool is_closed_along(const session_input *in, int axis, int side, const c
     return holes == 0;
 }
 
-/* This rank's part of a lattice that is not jittered. */
+/* Makes this rank's part of a lattice without jitter. */
 static void make_exact_part(test_mesh_kind kind, session_input *in)
 {
     test_mesh whole;

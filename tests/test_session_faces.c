@@ -1,8 +1,7 @@
-/* A user's errors in the faces of polyhedra, on one rank alone: every rank gets the same message, with the rank, the
- * mesh, the cell, the face and the value; nothing is drawn; and once it is put right the next step draws.
- *
- * A rank's faces and vertices are numbered in the order in which its cells first use them: cell 0 has face 0 first, and
- * no cell before it. */
+/* Checks a user's errors in the faces of polyhedra, on one rank only: every rank gets the same message, with the rank,
+ * the mesh, the cell, the face and the value; nothing is drawn; and after the correction the next step draws. A rank's
+ * faces and vertices are numbered in the order in which its cells first use them: cell 0 begins with face 0, and no
+ * cell precedes it. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -23,7 +22,7 @@ static const char scene_text[] = "images:\n"
 static insitu_session *session;
 static session_input input;
 
-/* ---- told by the set call already ---------------------------------------------------------------------------- */
+/* ---- errors that the set call detects ------------------------------------------------------------------------ */
 
 static void no_face_offsets(session_input *in)
 {
@@ -51,7 +50,7 @@ static void one_type_without_offsets(session_input *in)
     in->mesh.cell_type = INSITU_POLYHEDRON;
 }
 
-/* ---- told by the step ---------------------------------------------------------------------------------------- */
+/* ---- errors that the step detects ---------------------------------------------------------------------------- */
 
 static void no_faces_at_all(session_input *in)
 {
@@ -110,13 +109,14 @@ static void face_left_out(session_input *in)
 {
     in->part.connectivity[0] = in->part.connectivity[1];
 }
-/* The first face a further time, in the place of the next cell's first, which is then open; cell 0 comes before it. */
+/* Gives cell 0 its first face again, taken from the entries of the next cell, which then lacks a face; cell 0 is
+ * checked first. */
 static void face_once_more(session_input *in)
 {
     in->part.connectivity[in->part.offsets[1]] = in->part.connectivity[0];
     in->part.offsets[1]++;
 }
-/* The last face of the first cell that has more than four. */
+/* Removes the last face of the first cell with more than four faces. */
 static void face_missing(session_input *in)
 {
     int64_t cell = 0;
@@ -131,12 +131,12 @@ static void cell_without_faces(session_input *in)
 {
     in->part.offsets[1] = in->part.offsets[0];
 }
-/* The face goes there and back: a, b, a. */
+/* Makes a face that goes back and forth: a, b, a. */
 static void vertex_twice_apart(session_input *in)
 {
     in->part.face_connectivity[2] = in->part.face_connectivity[0];
 }
-/* a, b, b: the face is the edge. */
+/* Makes a face a, b, b, which is only an edge. */
 static void vertex_twice_beside(session_input *in)
 {
     in->part.face_connectivity[2] = in->part.face_connectivity[1];
@@ -264,7 +264,7 @@ static void corrupted_faces_are_reported_at_the_step(void **context)
         corrupted_is_reported_on_all_ranks(session, &input, &at_the_step[i]);
 }
 
-/* A ghost is not drawn: its vertices may be anywhere, its faces must be faces all the same. */
+/* Checks ghosts, which are not drawn: their coordinates may be anything, but their faces must be valid. */
 static void ghosts_are_proved_but_for_coordinates(void **context)
 {
     (void)context;
@@ -277,10 +277,10 @@ static void ghosts_are_proved_but_for_coordinates(void **context)
     corrupted_is_reported_on_all_ranks(session, &input, &ghost);
 }
 
-/* ---- cells of no volume -------------------------------------------------------------------------------------- */
+/* ---- cells without volume ------------------------------------------------------------------------------------ */
 
-/* The part with flat cells beside every third: its first face before and behind, closed by faces that are points, or
- * four faces that are points. Returns how many. */
+/* Adds a flat cell next to every third cell of the part: the cell's first face twice, as front and back, closed by
+ * faces that are points, or four faces that are points. Returns the number of flat cells. */
 static int64_t add_flat_cells(const test_mesh *part, test_mesh *out)
 {
     int *all = test_calloc((size_t)part->cell_count + 1, sizeof *all);
@@ -335,8 +335,8 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
     test_free(before);
 }
 
-/* The first allocation of a step that checks polyhedra, and need not recognise any, is for their edges. If it fails,
- * the cells are unchecked, and the next step must check them again. */
+/* Checks a failing allocation. The first allocation of a step that checks polyhedra, and need not recognise any, is for
+ * their edges. If it fails, the cells remain unchecked, and the next step must check them again. */
 static void check_without_memory_is_reported_and_repeated(void **context)
 {
     (void)context;

@@ -1,7 +1,7 @@
-/* Files that the library reads, continues and replaces, where something else has been put in their place: pipes,
- * devices, folders, sockets, links and huge files, before the first step or between two; and folders that are missing,
- * are taken away or cannot be made. No call waits, every failure names the file and the reason on all ranks, links are
- * replaced as pictures replace them, and a step is well again when the thing is gone. */
+/* Checks files that the library reads, appends to or replaces if something else has taken their place: pipes, devices,
+ * directories, sockets, links and huge files, before the first step or between two steps; and directories that are
+ * missing, are removed or cannot be created. No call may block, every failure is reported with the file and the reason
+ * on all ranks, links are replaced as for pictures, and the step succeeds after the obstacle has been removed. */
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
@@ -37,7 +37,7 @@ static void begin(const char *what, const char *plant, const char *when)
     alarm(SECONDS);
 }
 
-/* ---- what is put in a file's place ----------------------------------------------------------------------------- */
+/* ---- what replaces a file -------------------------------------------------------------------------------------- */
 
 typedef enum plant {
     PIPE,
@@ -65,7 +65,8 @@ static void put_socket(const char *path)
     close(file);
 }
 
-/* The file itself, if there is one, is kept as "victim", which a link may lead to. Rank 0. */
+/* Puts the obstacle at the path, on rank 0. The file itself, if there is one, is renamed to "victim", to which a link
+ * may lead. */
 static void put_plant(plant p, const char *path)
 {
     unlink("victim");
@@ -100,7 +101,7 @@ static void remove_plant(const char *path)
     if (unlink(path) != 0) rmdir(path);
 }
 
-/* Removes whatever has this name, if anything. */
+/* Removes any file or directory of this name. */
 static void forget(const char *name)
 {
     char command[100];
@@ -156,11 +157,11 @@ static void colour_maps_are_regular_files(void **state)
 
 /* ---- files that the library writes ----------------------------------------------------------------------------- */
 
-/* Kinds of files that are read again or appended to. */
+/* A kind of file that is read again or appended to. */
 typedef struct own_file {
     const char *name, *path, *header;
     char scene[512];
-    bool is_appended; /* else it is replaced at each step */
+    bool is_appended; /* false: it is replaced at each step */
 } own_file;
 
 enum { OWN_COUNT = 3 };
@@ -182,7 +183,7 @@ static void name_scenes(const char *folder)
     snprintf(own_files[2].scene, 512, IMAGE, SURFACE, output);
 }
 
-/* A step whose values are larger than the last one's, so that ranges widen. */
+/* Makes a step whose values are larger than the last one's, so that ranges widen. */
 static insitu_status step(insitu_session *session, int cycle)
 {
     input_renew(&input);
@@ -192,7 +193,7 @@ static insitu_status step(insitu_session *session, int cycle)
     return insitu_step(session, cycle, cycle);
 }
 
-/* The file is a regular one with whole lines. */
+/* Checks that the file is a regular one with whole lines. */
 static void assert_written(const own_file *file)
 {
     char text[MOST];
@@ -203,8 +204,8 @@ static void assert_written(const own_file *file)
     everywhere(own_rank != 0 || (strchr(text, '\n')[1] && text[strlen(text) - 1] == '\n'));
 }
 
-/* A pipe, a folder and a socket are refused, at whichever step; a huge file where it is to be read. Links are replaced
- * at the next writing. */
+/* Returns the text of the expected error, or NULL. A pipe, a directory and a socket are refused at any step; a huge
+ * file only if it is read. Links are replaced when the file is next written. */
 static const char *refusal_of(const own_file *file, plant p, bool is_later)
 {
     if (p == HUGE_FILE) return is_later ? NULL : "has more than";
@@ -237,7 +238,7 @@ static void plant_in_run(const own_file *file, plant p, bool is_later)
     if (p != HUGE_FILE || !file->is_appended || !is_later) assert_written(file);
     read_file("victim", MOST, after);
     everywhere(strcmp(before, after) == 0 && (own_rank != 0 || access("own.cdb/nowhere", F_OK) != 0));
-    read_file(file->path, MOST, after); /* lines of a linked file are continued */
+    read_file(file->path, MOST, after); /* the lines of a linked file are continued */
     const bool has_first = strstr(after, "\n0,0,") != NULL;
     everywhere(own_rank != 0 || p != LINK_TO_FILE || file == &own_files[1] || has_first);
     insitu_destroy(&session);
@@ -252,7 +253,7 @@ static void plants_are_refused_or_replaced(void **state)
             for (int is_later = 0; is_later < 2; is_later++) plant_in_run(&own_files[i], p, is_later);
 }
 
-/* A link to the ranges of another run is read before it is replaced. */
+/* Checks that a link to the ranges of another run is read before it is replaced. */
 static void linked_ranges_are_read(void **state)
 {
     (void)state;
@@ -275,7 +276,7 @@ static void linked_ranges_are_read(void **state)
     insitu_destroy(&session);
 }
 
-/* ---- folders --------------------------------------------------------------------------------------------------- */
+/* ---- directories ----------------------------------------------------------------------------------------------- */
 
 static void missing_folders_are_made(void **state)
 {
@@ -297,7 +298,8 @@ static void missing_folders_are_made(void **state)
     }
 }
 
-/* Nothing can be made in a regular file; in a folder without the right to write, by users who need it. */
+/* Checks directories that cannot be created: inside a regular file, and, for users without root's rights, inside a
+ * directory without write permission. */
 static void folders_that_cannot_be_made_are_reported(void **state)
 {
     (void)state;
@@ -324,7 +326,7 @@ static int begin_tests(void **state)
 {
     (void)state;
     if (!enter_folder("files")) return 1;
-    forget("scene.yaml map.json own.cdb pipe victim blocked"); /* which an interrupted test leaves */
+    forget("scene.yaml map.json own.cdb pipe victim blocked"); /* files that an interrupted test leaves */
     input_create(&input, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     return 0;
 }

@@ -1,6 +1,6 @@
-/* Fields whose values a function makes: it is called once in a step that needs the field, for a picture, a statistic or
- * a condition, and in no other; it may communicate; its values draw the same pictures as the same values given. Its
- * errors are returned on all ranks. */
+/* Checks fields whose values a function computes: it is called once in a step that needs the field, for a picture, a
+ * statistic or a condition, and in no other step; it may communicate; its values draw the same pictures as values that
+ * are passed directly. Its errors are returned on all ranks. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +20,7 @@ static const char scene_text[] =
         IMAGE("b", "4", "{isosurface: {field: f, values: [0.1], colour_by: {field: g}}}")
             IMAGE("c", "3", "{surface: {colour_by: {field: g}}}");
 
-/* A fill's input and results. */
+/* The input and results of a fill function. */
 typedef struct maker {
     const session_input *in;
     double *values, scale;
@@ -34,7 +34,8 @@ static insitu_status make(void *data, insitu_field *field)
 {
     maker *m = data;
     int one = 1, ranks = 0;
-    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD); /* ends only where all ranks call it */
+    /* completes only if all ranks call the function */
+    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
     const int64_t count = m->in->part.vertex_count;
     for (int64_t i = 0; i < count; i++) m->values[i] = ranks == rank_count ? m->scale * m->in->part.values[i] : 0;
     m->calls++;
@@ -67,7 +68,7 @@ static insitu_field describe(const char *name, maker *m, bool is_filled)
     return field;
 }
 
-/* Pictures one after the other, as rank 0 has them. */
+/* Consecutive pictures, as rank 0 receives them. */
 typedef struct album {
     int count;
     float *pixels;
@@ -81,7 +82,7 @@ static void keep(album *out)
         memcpy(out->pixels + (size_t)out->count++ * PIXELS * 4, caught[i].rgba, PIXELS * 4 * sizeof(float));
 }
 
-/* The values change at each step. */
+/* Draws pictures with values that change at each step. */
 static album draw(const session_input *in, bool is_filled)
 {
     static const char *const names[] = {"f", "g", "h"};
@@ -90,7 +91,7 @@ static album draw(const session_input *in, bool is_filled)
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     everywhere(insitu_set_mesh(session, "m", &in->mesh) == INSITU_OK);
     for (int i = 0; i < 3; i++) {
-        const int k = own_rank % 2 ? 2 - i : i; /* ranks set them in different orders */
+        const int k = own_rank % 2 ? 2 - i : i; /* ranks set the fields in different orders */
         makers[k] = make_maker(in, k + 1);
         const insitu_field field = describe(names[k], &makers[k], is_filled);
         everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
@@ -193,18 +194,18 @@ static void errors_are_reported_on_all_ranks(void **state)
     input_free(&in);
 }
 
-/* ---- calls that a fill must not make ---------------------------------------------------------------------------- */
+/* ---- calls that a fill function must not make ------------------------------------------------------------------- */
 
 enum { CALLS = 9 };
 static const char *const calls[CALLS] = {"insitu_set_mesh",      "insitu_set_mesh",    "insitu_set_field",
                                          "insitu_step",          "insitu_destroy",     "insitu_keep_pictures",
                                          "insitu_last_pictures", "insitu_last_report", "insitu_set_field"};
 
-/* A fill that makes one of the calls on its session, and gives values all the same. */
+/* A fill function that makes one of the calls on its own session, and returns values nevertheless. */
 typedef struct caller {
     maker values;
     insitu_session *session;
-    int call; /* -1: none */
+    int call; /* -1: no call */
     bool is_refused;
 } caller;
 
@@ -248,7 +249,7 @@ static void calls_of_a_fill_are_refused(void **state)
     f.session = open_session(MPI_COMM_WORLD, write_scene(text));
     everywhere(insitu_set_mesh(f.session, "m", &in.mesh) == INSITU_OK);
     for (int i = 0; i < 2; i++) everywhere(insitu_set_field(f.session, "m", &fields[i]) == INSITU_OK);
-    for (int i = 0; i < 2 * CALLS; i++) { /* on the last rank, then on all */
+    for (int i = 0; i < 2 * CALLS; i++) { /* on the last rank, then on all ranks */
         char words[128];
         const bool calls_now = i >= CALLS || own_rank == rank_count - 1;
         snprintf(words, sizeof words, "field \"f\": its fill called %s() of its session", calls[i % CALLS]);

@@ -192,7 +192,7 @@ void corrupted_is_reported_on_all_ranks(insitu_session *session, session_input *
     const insitu_status at_once = submit(session, in);
     everywhere(at_once == (is_bad && c->at_once ? c->status : INSITU_OK));
     everywhere(!is_bad || !c->at_once || strstr(insitu_error(session), c->words[0]) != NULL);
-    for (int again = 0; again < 2; again++) { /* it stays wrong until it is mended */
+    for (int again = 0; again < 2; again++) { /* the error remains until it is corrected */
         discard_pictures();
         const insitu_status status = insitu_step(session, 1, 0);
         reported_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
@@ -228,7 +228,7 @@ void all_are_reported(session_input *in, const corrupted_case *cases, size_t cou
 
 double mean_of(const double *values, int count)
 {
-    double sum = 0, rest = 0; /* Knuth's two-sum: together they have twice the digits */
+    double sum = 0, rest = 0; /* Knuth's two-sum: both together have twice the precision */
     for (int i = 0; i < count; i++) {
         const double next = sum + values[i], added = next - sum;
         rest += (sum - (next - added)) + (values[i] - added);
@@ -301,7 +301,7 @@ caught_picture draw_scene(MPI_Comm comm, const char *scene, const session_input 
     return draw_once(&session, in);
 }
 
-/* Either array may be missing, in both pictures. */
+/* Compares two arrays; either may be missing, but then in both pictures. */
 static bool same_bytes(const void *a, const void *b, size_t bytes)
 {
     return a && b ? memcmp(a, b, bytes) == 0 : a == b;
@@ -389,7 +389,7 @@ double session_load_image_library(void)
     return library_loaded.ms;
 }
 
-/* False: no memory. */
+/* Copies a deep picture; returns false if memory runs out. */
 static bool catch_deep(const insitu_deep *deep, size_t pixels, caught_picture *out)
 {
     int64_t count = 0;

@@ -1,5 +1,5 @@
-/* A step under hostile floating-point settings: traps armed as gfortran's -ffpe-trap does, and small numbers flushed.
- */
+/* Checks a step under unusual floating-point settings: enabled traps, as by gfortran's -ffpe-trap, and subnormal
+ * numbers flushed to zero. */
 #define _GNU_SOURCE
 #include <fenv.h>
 #include <omp.h>
@@ -15,7 +15,7 @@
 
 enum { TRAPS = FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW, THREADS = 3 };
 
-/* Kept from the optimizer, so that the divisions happen where they stand. */
+/* Volatile, so that the optimizer does not move or remove the divisions. */
 static volatile double zero = 0;
 
 static void divide_by_zero_on(int threads)
@@ -29,7 +29,7 @@ static void divide_by_zero_on(int threads)
     }
 }
 
-/* As the session does before its first region of so many threads. */
+/* Starts threads as the session does before its first region with this number of threads. */
 static void start_threads(const session_guard *guard, int threads)
 {
     session_guard_suspend(guard);
@@ -47,7 +47,8 @@ static void enable_traps(void)
     feenableexcept(TRAPS);
 }
 
-/* Counts the threads of a team that have the traps, and those with the flag of a division by zero, and disarms all. */
+/* Counts the threads of a team whose traps are enabled, and those with the flag of a division by zero, and disables all
+ * traps. */
 static void count_enabled(int threads, int *armed, int *flagged)
 {
     int traps = 0, flags = 0;
@@ -66,18 +67,18 @@ static void traps_are_off_inside_and_on_again_after(void **state)
     (void)state;
     session_guard guard;
     int armed, flagged;
-    enable_traps(); /* where workers take the calling thread's settings */
+    enable_traps(); /* for OpenMP libraries whose workers inherit the calling thread's settings */
 #pragma omp parallel num_threads(THREADS)
-    enable_traps(); /* where they keep their own */
+    enable_traps(); /* for OpenMP libraries whose workers keep their own settings */
     session_guard_begin(&guard);
-    divide_by_zero_on(THREADS); /* unguarded, this ends the process */
+    divide_by_zero_on(THREADS); /* without the guard, this terminates the process */
     session_guard_end(&guard);
     count_enabled(THREADS, &armed, &flagged);
     assert_int_equal(armed, THREADS);
     assert_int_equal(flagged, 0);
 }
 
-/* More threads than any team before had. */
+/* Checks a team with more threads than any team before. */
 static void threads_first_needed_inside_are_as_the_callers_own(void **state)
 {
     (void)state;
@@ -95,7 +96,7 @@ static void threads_first_needed_inside_are_as_the_callers_own(void **state)
     assert_int_equal(flagged, 0);
 }
 
-/* Rounding of a worker is its own again between regions, and to nearest within them. */
+/* Checks that the rounding mode of a worker is restored between regions, and is to nearest inside them. */
 static void workers_have_their_own_between_regions(void **state)
 {
     (void)state;
@@ -112,7 +113,7 @@ static void workers_have_their_own_between_regions(void **state)
             region_leave();
         }
     }
-    fesetround(FE_UPWARD); /* LLVM's workers take the caller's at every begin of a region */
+    fesetround(FE_UPWARD); /* LLVM's workers inherit the caller's mode at every begin of a region */
 #pragma omp parallel num_threads(THREADS) reduction(+ : upward)
     upward += fegetround() == FE_UPWARD;
     session_guard_end(&guard);
@@ -134,7 +135,8 @@ static void rounding_is_to_nearest_inside(void **state)
     fesetround(FE_TONEAREST);
 }
 
-/* OpenMP may give teams of any size where the caller has allowed it; a step's are all of one. */
+/* Checks the size of teams: OpenMP may choose any size if the caller has enabled that; all teams of a step have the
+ * same size. */
 static void teams_are_of_one_size_inside(void **state)
 {
     (void)state;

@@ -1,7 +1,8 @@
-/* Cell values on cubes that are refined here and there, covered ones given as ghosts: an isosurface goes on over
- * hanging nodes, whether all cells are one mesh or each level is a mesh of its own. The distance from the middle has a
- * sphere for an isosurface, by closed form; a ray through a slit would show its back, or nothing. The same picture to
- * the bit on any ranks, in either form. And what makes meshes one, and what does not. */
+/* Checks cell values on cubes of which some are refined, with covered cells given as ghosts: an isosurface is
+ * continuous at hanging nodes, whether all cells are one mesh or each level is its own mesh. The distance from the
+ * middle has a sphere as isosurface, in closed form; a ray through a gap would show the sphere's back, or nothing. The
+ * picture must be the same to the bit on any number of ranks, in either form. Also checks which meshes are treated as
+ * one. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +13,7 @@
 
 enum { SIZE = 200, PIXELS = SIZE * SIZE, SIDE = 8, LEVELS = 3, CUTS = 4, LINE = SIDE * CUTS * CUTS + 1 };
 
-/* Looked at along z from z = 5; a pixel is 1/100 wide. */
+/* A view along z from z = 5; a pixel is 1/100 wide. */
 static const char scene_text[] =
     "images:\n  - name: a\n    size: [200, 200]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, 5], "
     "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2}\n    layers:\n"
@@ -22,23 +23,24 @@ typedef enum amr_shape {
     PLAIN,
     TURNED,
     BENT,
-    ROUGH, /* turned, and the same vertex has other last bits in each level: for a mesh a level */
+    /* rotated, and coordinates of the same vertex differ in their last bits between levels, if each level is a mesh */
+    ROUGH,
     SHAPES
 } amr_shape;
 
 typedef struct amr {
-    int cuts; /* a cell into so many along each axis */
+    int cuts; /* number of parts of a refined cell along each axis */
     amr_shape shape;
-    insitu_cell_type type; /* hexes, or what a cube is cut into */
+    insitu_cell_type type; /* hexes, or the type into which a cube is divided */
     bool is_by_level;      /* each level is a mesh */
-    int rank, ranks;       /* whose cells are given */
+    int rank, ranks;       /* the rank whose cells are made, and the number of ranks */
 } amr;
 
-/* Arrays of one mesh on one rank. */
+/* The arrays of one mesh on one rank. */
 typedef struct part {
     insitu_cell_type type;
     int64_t vertex_count, cell_count;
-    int64_t *vertices; /* of the finest lattice; -1: none yet */
+    int64_t *vertices; /* number of each vertex of the finest lattice; -1: not made yet */
     double *coordinates, *values;
     int64_t *connectivity;
     unsigned char *ghosts;
@@ -68,20 +70,20 @@ static void part_free(part *p)
 static void place_of(const amr *a, int level, const double at[3], double out[3])
 {
     memcpy(out, at, 3 * sizeof *out);
-    if (a->shape == TURNED || a->shape == ROUGH) { /* no coordinate is exact */
+    if (a->shape == TURNED || a->shape == ROUGH) { /* rotates, so that no coordinate is exact */
         out[0] = 0.8 * at[0] - 0.6 * at[1];
         out[1] = 0.48 * at[0] + 0.64 * at[1] - 0.6 * at[2];
         out[2] = 0.36 * at[0] + 0.48 * at[1] + 0.8 * at[2];
     }
     for (int axis = 0; axis < 3 && a->shape == ROUGH; axis++) out[axis] *= 1 + level * 0x1p-52;
-    if (a->shape == BENT) { /* bilinear in every cube, so that hanging vertices are on quads */
+    if (a->shape == BENT) { /* a map that is bilinear in every cube, so that hanging vertices are on quads */
         out[0] += 0.2 * at[1] * at[2];
         out[1] += 0.1 * at[0] * at[2];
     }
 }
 
-/* Cells that cubes are cut into, by corners of which each bit is a coordinate. The diagonals of a cube's squares are
- * those of the smaller cubes' squares on them. */
+/* The cells into which a cube is divided, by the cube's corners, whose bits are coordinates. The diagonals of a cube's
+ * squares coincide with those of the smaller cubes' squares on them. */
 typedef struct cutting {
     int cells, corners;
     int places[6][8];
@@ -96,7 +98,7 @@ static const cutting *cutting_of(insitu_cell_type type)
     return type == INSITU_TET ? &tets : type == INSITU_WEDGE ? &wedges : &hexes;
 }
 
-/* Gets the number of the vertex at a place of the finest lattice. */
+/* Returns the number of the vertex at a position in the finest lattice. */
 static int64_t vertex_at(const amr *a, part *p, int level, const int at[3])
 {
     const int64_t index = at[0] + LINE * (at[1] + LINE * (int64_t)at[2]);
@@ -129,7 +131,7 @@ static void add_cube(const amr *a, part *p, int level, const int at[3], int widt
     }
 }
 
-/* Half of the cubes, in blocks, and of their parts those beside. */
+/* Returns whether a cube is refined: half of the cubes, in blocks, are, and of their parts those next to them. */
 static bool is_refined(const amr *a, int level, const int at[3], int width)
 {
     double middle[3];
@@ -205,8 +207,8 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const amr *a)
     return picture;
 }
 
-/* Pixels at which the front of the sphere is not seen. The surface in a cell is off the sphere by less than half the
- * largest cell's diagonal, 0.22; inside of 0.6 the front and the back are 0.8 apart. */
+/* Counts pixels in which the front of the sphere is invisible. The surface inside a cell is off the sphere by less than
+ * half the largest cell's diagonal, 0.22; inside a radius of 0.6 the front and the back are 0.8 apart. */
 static int count_slits(const caught_picture *picture)
 {
     int slits = 0;
@@ -251,7 +253,8 @@ static void cell_values_continue_across_hanging_nodes(void **state)
     check(4, BENT, INSITU_HEX);
 }
 
-/* Triangles are flat, so that bent ones have their hanging vertices elsewhere. */
+/* Checks cells with triangles in shapes with plane faces: triangles are flat, so that hanging vertices of bent shapes
+ * are not on them. */
 static void cell_values_continue_across_triangles(void **state)
 {
     (void)state;
@@ -259,10 +262,10 @@ static void cell_values_continue_across_triangles(void **state)
     check(4, PLAIN, INSITU_WEDGE);
 }
 
-/* ---- what makes meshes one ------------------------------------------------------------------------------------- */
+/* ---- which meshes are one -------------------------------------------------------------------------------------- */
 
-/* A box of so many hexes along each axis, of which a rank has every so many-th. All values are value, but those of the
- * least layer along z, if rest is another. */
+/* A box with the given number of hexes along each axis; a rank has every rank_count-th of them. All values are `value`,
+ * except those of the lowest layer along z, which are `rest` if that is different. */
 typedef struct box {
     double lower[3], upper[3];
     int counts[3];
@@ -299,7 +302,7 @@ static int count_covered(const caught_picture *picture)
     return count;
 }
 
-/* givers: ranks that give their part of the second. */
+/* Draws the boxes as meshes; the first `givers` ranks pass their part of the second mesh. */
 static caught_picture draw_boxes(const char *layers, const box *boxes, int count, int givers)
 {
     static const char *const names[] = {"a", "b"};
@@ -318,8 +321,8 @@ static caught_picture draw_boxes(const char *layers, const box *boxes, int count
     return picture;
 }
 
-/* Two materials, each of one value: where one layer shows both, the field rises from one to the other between them;
- * where each has a layer of its own there is no value between. */
+/* Checks two materials, each with one value: if one layer shows both, the field increases from one to the other between
+ * them; if each has its own layer, there is no value between. */
 static void a_layer_makes_meshes_one(void **state)
 {
     static const box boxes[] = {{{-1, -1, -1}, {1, 1, 0}, {2, 2, 2}, 0, 0}, {{-1, -1, 0}, {1, 1, 1}, {2, 2, 2}, 1, 1}};
@@ -339,8 +342,8 @@ static void a_layer_makes_meshes_one(void **state)
     free_caught(&both);
 }
 
-/* A fine mesh that overlaps a coarse one along a wall: its vertices on the wall lie on the coarse cells' faces there,
- * which look the same way, and do not hang on them. No two vertices are in one place. */
+/* Checks a fine mesh that overlaps a coarse one along a wall: its vertices on the wall lie on faces of the coarse
+ * cells, which have the same orientation, and do not hang on them. No two vertices have the same position. */
 static void vertices_on_a_common_wall_do_not_hang(void **state)
 {
     static const box boxes[] = {{{-0.7, -0.7, 0}, {0.7, 0.7, 0.6}, {5, 5, 3}, 1, 0},
@@ -354,8 +357,8 @@ static void vertices_on_a_common_wall_do_not_hang(void **state)
     free_caught(&both);
 }
 
-/* Values of one mesh, and its part on the last rank, come and go: the other's means are those of a session that never
- * knew another state. */
+/* Checks that the values of one mesh, and its part on the last rank, may appear and disappear: the other mesh's means
+ * equal those of a new session. */
 static void means_follow_the_other_mesh(void **state)
 {
     static const char layers[] = "      - isosurface: {field: f, values: [0.25]}\n";

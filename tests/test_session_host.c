@@ -1,8 +1,7 @@
-/* Tests a session in difficult processes: ones that can start few threads or none, whose OpenMP gives smaller teams
- * than asked for, or that trap floating-point exceptions.
- *
- * The number of cores, the start of threads and (GNU's) parallel regions are replaced here, so that any machine can
- * have any limit. If OpenMP itself fails to start a thread, the process ends. */
+/* Checks a session in difficult processes: ones that can start few threads or none, whose OpenMP makes smaller teams
+ * than requested, or that trap floating-point exceptions. The test replaces the functions for the number of cores, for
+ * starting threads and for (GNU's) parallel regions, so that any machine can have any limit. If OpenMP itself fails to
+ * start a thread, the process ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -73,14 +72,15 @@ VISIBLE int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, 
     return code;
 }
 
-/* Allows so many more threads than there are now. */
+/* Allows the given number of additional threads. */
 static void allow_threads(int more)
 {
     atomic_store(&most_threads, atomic_load(&live_threads) + more);
 }
 
-/* GNU's OpenMP ends threads that a next region does not need; LLVM's keeps them. */
-static int other_threads; /* MPI's */
+/* Ends idle threads: GNU's OpenMP ends threads that the next region does not need, LLVM's keeps them. other_threads is
+ * the number of MPI's threads. */
+static int other_threads; /* threads of MPI */
 
 static void end_threads(void)
 {
@@ -127,7 +127,7 @@ VISIBLE void GOMP_parallel_loop_nonmonotonic_dynamic(void (*body)(void *), void 
 /* ---- a session ------------------------------------------------------------------------------------------------ */
 
 static session_input input;
-static caught_picture expected; /* by one thread */
+static caught_picture expected; /* drawn by one thread */
 
 static const char *scene_by(int threads)
 {
@@ -153,7 +153,7 @@ static insitu_session *open_by(int threads)
     return session;
 }
 
-/* A step draws what one thread draws. */
+/* Checks that a step draws the picture of one thread. */
 static void step_draws_the_same(insitu_session *session, int cycle)
 {
     const size_t pixels = (size_t)120 * 90;
@@ -197,7 +197,7 @@ static void threads_are_at_most_the_cores(void **context)
 {
     (void)context;
     cores = 3;
-    allow_threads(3 - 1 + 4); /* what the step may try for these */
+    allow_threads(3 - 1 + 4); /* the session tries to start the missing threads and four spare ones */
     insitu_session *session = open_by(1024);
     step_draws_the_same(session, 0);
     everywhere(
@@ -256,8 +256,9 @@ static void threads_that_ended_are_tried_again(void **context)
     insitu_destroy(&session);
 }
 
-/* A team waits at each region's end for a thread that has lost its core, so there are few. Nothing else is new than the
- * values: their ranges are refitted (on small trees by one thread), cells are binned, tiles are traced. */
+/* Checks the number of parallel regions of a step. At the end of each region the team waits for threads that have lost
+ * their core, so regions should be few. Only the values are new: their ranges are refitted (on small trees by one
+ * thread), cells are binned, and tiles are traced. */
 static void a_step_opens_few_regions(void **context)
 {
     (void)context;

@@ -1,5 +1,6 @@
-/* Meshes whose indices begin at 1, as Fortran has them: the pictures are to the bit those from 0, for all types of
- * cells, in arrays of 8 bytes with offsets and of 4 bytes without; and errors name indices as the caller has them. */
+/* Checks meshes whose indices begin at 1, as in Fortran: the pictures equal, to the bit, those with indices from 0, for
+ * all types of cells, in arrays of 8 bytes with offsets and of 4 bytes without; and errors state indices as the caller
+ * counts them. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +25,7 @@ static void add_to(int64_t *indices, int64_t count, int64_t base)
     for (int64_t i = 0; i < count; i++) indices[i] += base;
 }
 
-/* Renumbers the whole part: connectivity and offsets, and for polyhedra also faces. */
+/* Makes all indices of the part begin at 1: connectivity and offsets, and for polyhedra also faces. */
 static void count_from_one(session_input *in)
 {
     test_mesh *part = &in->part;
@@ -35,7 +36,7 @@ static void count_from_one(session_input *in)
     in->mesh.index_base = 1;
 }
 
-/* The arrays that kernels for many cells at once take. */
+/* The 4-byte arrays that kernels for several cells at once read. */
 typedef struct narrow_arrays {
     float *coordinates, *values;
     int32_t *connectivity;
@@ -113,7 +114,7 @@ static void pictures_are_those_from_zero(void **state)
     check(TEST_HEXES, true);
 }
 
-/* Each is wrong on the last rank alone. */
+/* Checks errors of which each is on the last rank only. */
 static void errors_count_from_one_too(void **state)
 {
     (void)state;
@@ -141,7 +142,7 @@ static void errors_count_from_one_too(void **state)
     input_free(&in);
 }
 
-/* Each wrong in one place of the last rank's connectivity. */
+/* Checks errors of which each is a single wrong entry in the last rank's connectivity. */
 static void wrong_indices_are_reported(insitu_session *session, const session_input *in, int32_t *place, int64_t cell)
 {
     const int32_t wrong[] = {0, (int32_t)in->part.vertex_count + 1, -1, INT32_MIN, INT32_MAX}, good = *place;
@@ -159,7 +160,7 @@ static void wrong_indices_are_reported(insitu_session *session, const session_in
     everywhere(insitu_step(session, 9, 0) == INSITU_OK);
 }
 
-/* Many cells of packed arrays are looked at together. One amid them is wrong, or the last. */
+/* Checks packed arrays, of which many cells are checked together: an entry in the middle, or the last one, is wrong. */
 static void errors_of_many_cells_are_reported(void **state)
 {
     (void)state;

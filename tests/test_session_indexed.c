@@ -1,6 +1,6 @@
-/* Fields whose values stand in another order than the mesh's vertices or cells, as in vectors of degrees of freedom:
- * found by an index they draw the pictures of the same values in order, to the bit, at each step and as they change.
- * All ranks are told what is wrong with an index on one. */
+/* Checks fields whose values are in another order than the mesh's vertices or cells, as in vectors of degrees of
+ * freedom: with an index they draw the pictures of the same values in order, to the bit, at each step and when they
+ * change. An error in one rank's index is reported on all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +11,7 @@
 
 enum { SIDE = 4, PIXELS = 64 * 48, PICTURES = 4, STEPS = 4 };
 
-/* A condition has the values read before images are planned. */
+/* With a condition, the values are read before images are planned. */
 #define SCENE(condition)                                                                                               \
     "images:\n  - name: a\n    size: [64, 48]\n    background: [0, 0, 0, 0]\n    layers:\n"                            \
     "      - isosurface: {field: f, values: [0.1, 0.3], opacity: 0.6, colour_by: {field: f, map: turbo}}\n"            \
@@ -30,11 +30,11 @@ static const char conditional_scene[] = SCENE("    when: {field: f, above: -5}\n
 /* ---- fields --------------------------------------------------------------------------------------------------- */
 
 typedef struct form {
-    bool at_cells, is_narrow; /* float and int32, the index with other numbers between */
+    bool at_cells, is_narrow; /* float and int32, with other numbers between the elements of the index */
     int components, base;
 } form;
 
-/* One field twice: in order, and by an index among more values, which are not numbers. */
+/* One field in two forms: in order, and by an index into a longer array whose other values are NaN. */
 typedef struct twice {
     form of;
     int64_t places, count;
@@ -137,7 +137,7 @@ static void step_and_catch(insitu_session *session, int cycle, caught_picture ou
     caught_count = 0;
 }
 
-/* Draws values as they are, halved in the same arrays, set as unchanged, and as they were again. */
+/* Draws the values as they are, halved in the same arrays, set as unchanged, and restored. */
 static drawing draw(const session_input *in, twice *t, bool is_by_index)
 {
     drawing out = {.copied = 0};
@@ -169,7 +169,7 @@ static void compare(drawing *a, drawing *b)
             differ = differ || !same_pictures(&a->pictures[0][i], &a->pictures[step][i]);
         }
     everywhere(same);
-    everywhere(differ); /* the values of the second step are seen */
+    everywhere(differ); /* the picture of the second step differs from the first */
     for (int step = 0; step < STEPS && own_rank == 0; step++)
         for (int i = 0; i < PICTURES; i++) {
             free(a->pictures[step][i].rgba), free(a->pictures[step][i].depth);
@@ -202,7 +202,7 @@ static void an_index_draws_what_values_in_order_draw(void **state)
         for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) check(kind, &forms[i]);
 }
 
-/* A field that no scene asks for is neither copied nor checked. */
+/* Checks that a field which no scene uses is neither copied nor checked. */
 static void an_index_that_nobody_needs_is_left_alone(void **state)
 {
     (void)state;
@@ -241,7 +241,7 @@ static void index_large(session_input *in)
 {
     by_index(in);
     corrupted[7] = in->part.vertex_count;
-    corrupted[9] = -1; /* the first is told */
+    corrupted[9] = -1; /* the first error is reported */
 }
 static void index_far(session_input *in)
 {
@@ -319,7 +319,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     free(corrupted);
 }
 
-/* The centring is one on all ranks, so this cannot be the last one's alone. */
+/* Checks fields at cells. The centring is the same on all ranks, so this error cannot be on the last one only. */
 static void cells_are_reported_too(void **state)
 {
     (void)state;
@@ -334,15 +334,15 @@ static void cells_are_reported_too(void **state)
         reported_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
                             "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
     corrupted[in.part.cell_count - 1] = 0;
-    step_is_good(session, 2); /* mended in place, for nothing was taken of it */
+    step_is_good(session, 2); /* corrected in place, since nothing was copied */
     insitu_destroy(&session);
     input_free(&in);
     free(corrupted);
     corrupted = NULL;
 }
 
-/* All cells are the first rank's: the others have no vertex, and hand over their halves of the vector all the same, by
- * an index at no address. */
+/* Checks ranks without vertices: the first rank has all cells; the others pass their parts of the vector too, with a
+ * NULL index. */
 static void ranks_without_vertices_have_values(void **state)
 {
     (void)state;

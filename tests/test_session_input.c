@@ -1,5 +1,5 @@
-/* A user's errors in a mesh or a field, on one rank alone: every rank gets the same message, which names the rank and
- * the fault; nothing is drawn; and once it is put right the next step draws. */
+/* Checks a user's errors in a mesh or a field, on one rank only: every rank gets the same message, which states the
+ * rank and the error; nothing is drawn; and after the correction the next step draws. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -17,7 +17,7 @@ static const char scene_text[] = "images:\n"
 static insitu_session *session;
 static session_input input;
 
-/* ---- spoilt meshes ------------------------------------------------------------------------------------------- */
+/* ---- corrupted meshes ---------------------------------------------------------------------------------------- */
 
 static void index_too_large(session_input *in)
 {
@@ -134,7 +134,7 @@ static void changed_unknown(session_input *in)
     in->mesh.changed = 64;
 }
 
-/* ---- spoilt fields ------------------------------------------------------------------------------------------- */
+/* ---- corrupted fields ---------------------------------------------------------------------------------------- */
 
 static void values_too_few(session_input *in)
 {
@@ -265,7 +265,7 @@ static void field_of_two_centrings_is_refused(void **context)
     everywhere(submit(session, &input) == INSITU_OK);
     insitu_field other = input.field;
     other.centring = INSITU_CELL;
-    other.count = input.part.cell_count; /* fewer than vertices: the array is long enough */
+    other.count = input.part.cell_count; /* fewer than the vertices: the array is long enough */
     everywhere(own_rank != 1 || insitu_set_field(session, "m", &other) == INSITU_OK);
     const insitu_status status = insitu_step(session, 11, 0);
     reported_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"", "another centring");
@@ -276,7 +276,7 @@ static void field_of_two_centrings_is_refused(void **context)
 static void nan_where_no_drawn_cell_is_is_fine(void **context)
 {
     (void)context;
-    /* The mesh gets one vertex more, of no cell. */
+    /* Adds to the mesh one vertex that no cell uses. */
     double *coordinates = test_calloc((size_t)input.part.vertex_count * 3 + 3, sizeof *coordinates);
     double *values = test_calloc((size_t)input.part.vertex_count + 1, sizeof *values);
     memcpy(coordinates, input.part.coordinates, (size_t)input.part.vertex_count * 3 * sizeof *coordinates);
@@ -315,7 +315,7 @@ static void value_that_is_not_finite_is_counted(void **context)
     everywhere(submit(session, &input) == INSITU_OK);
 }
 
-/* Every vertex somewhere else: folded cells, some points of which have no coordinates in them. */
+/* Displaces every vertex: cells are folded, and some of their points have no coordinates in the cell. */
 static void inverse_maps_that_fail_are_counted(void **context)
 {
     (void)context;
@@ -330,7 +330,7 @@ static void inverse_maps_that_fail_are_counted(void **context)
     everywhere(submit(session, &input) == INSITU_OK);
 }
 
-/* Makes cells of one type, with indices of 4 bytes instead of 8. */
+/* Changes the mesh to cells of one type, with indices of 4 bytes instead of 8. */
 static void make_plain(session_input *in)
 {
     char *indices = (char *)in->part.connectivity;
@@ -343,11 +343,11 @@ static void make_plain(session_input *in)
     in->mesh.cell_type = INSITU_HEX;
 }
 
-/* Cells of one type are looked at several at once. */
+/* Checks the message for cells of one type, which are checked several at once. */
 static void bad_cell_of_a_mesh_of_one_type_is_named(void **context)
 {
     (void)context;
-    int64_t cells = input.part.cell_count; /* rank 0's */
+    int64_t cells = input.part.cell_count; /* number of rank 0's cells */
     MPI_Bcast(&cells, 1, MPI_INT64_T, 0, MPI_COMM_WORLD);
     for (int cell = 0; cell < 20 && cell < cells; cell += 3) {
         char words[64];
@@ -365,14 +365,14 @@ static void bad_cell_of_a_mesh_of_one_type_is_named(void **context)
     everywhere(submit(session, &input) == INSITU_OK);
 }
 
-/* ---- cells of no volume -------------------------------------------------------------------------------------- */
+/* ---- cells without volume ------------------------------------------------------------------------------------ */
 
-/* A cell is the affine image of its type's corners. Points, lines and repeated faces have a volume of 0 to the bit;
- * what oblique ones have is rounding. */
+/* The kinds of flat cells. A cell is an affine image of its type's reference cell. Points, lines and repeated faces
+ * have a volume of 0 to the bit; the volume of oblique ones is rounding error. */
 typedef enum flatness { GOOD, SLIVER, OBLIQUE, REPEATED_FACE, LINE, POINT, FLATNESS_COUNT } flatness;
 
-/* TILTED: the first cells, none of whose volumes is 0 by design: beside such a one, cells are not looked at several at
- * once. */
+/* TILTED: number of the first cells, none of which has a volume of exactly 0. Several cells are checked at once only if
+ * none of them is exactly flat. */
 enum { FLAT_TYPES = 4, TILTED = 240, FLAT_CELLS = TILTED + 64, FLAT_CORNERS = 8 * FLAT_CELLS };
 
 static const insitu_cell_type flat_types[FLAT_TYPES] = {INSITU_TET, INSITU_HEX, INSITU_WEDGE, INSITU_PYRAMID};
@@ -389,8 +389,8 @@ static flatness flatness_of(int cell)
     return (flatness)(cell < TILTED ? cell % (OBLIQUE + 1) : cell % FLATNESS_COUNT);
 }
 
-/* Coordinates along x and y are multiples of 2^-40, along z of 2^-16, which floats hold: sums are exact, and flat cells
- * are flat to the bit. */
+/* Returns a coordinate. Along x and y they are multiples of 2^-40, along z of 2^-16, which are exact in float: sums are
+ * exact, and flat cells are flat to the bit. */
 static double flat_coordinate(int type, int cell, int corner, int axis)
 {
     const flatness how = flatness_of(cell);
@@ -398,7 +398,7 @@ static double flat_coordinate(int type, int cell, int corner, int axis)
     double v[4];
     for (int i = 0; i < 4; i++)
         v[i] = unit * floor((2 * test_uniform((uint64_t)(16 * cell + 4 * axis + i), 31) - 1) / unit);
-    if (how == SLIVER) v[3] = v[1] - v[2] + 0x1p-16 * floor(8 * v[3]); /* 1e-4 thin */
+    if (how == SLIVER) v[3] = v[1] - v[2] + 0x1p-16 * floor(8 * v[3]); /* 1e-4 thick */
     if (how == OBLIQUE) v[3] = v[1] - v[2];
     if (how == REPEATED_FACE) v[3] = 0;
     if (how == LINE) v[2] = v[3] = v[1];
@@ -407,8 +407,8 @@ static double flat_coordinate(int type, int cell, int corner, int axis)
     return v[0] + at[0] * v[1] + at[1] * v[2] + at[2] * v[3];
 }
 
-/* Cells of one type are looked at several at once, with types one by one, of mixed coordinates in another way again;
- * and the first eight alone, whose volumes are small, but not 0. */
+/* Checks the count of flat cells: of one type, which are checked several at once; with types, checked one by one; with
+ * coordinates of mixed widths, checked by other code; and the first eight alone, whose volumes are small but not 0. */
 static void flat_cells_are_counted(void **context)
 {
     (void)context;
@@ -451,7 +451,8 @@ static void flat_cells_are_counted(void **context)
     everywhere(insitu_last_report(session)->cells_flat == 0);
 }
 
-/* A step's failure can be read until the next step, unless a call fails in between, whose message is newer. */
+/* Checks that the message of a failed step remains until the next step, unless a call fails in between, whose message
+ * replaces it. */
 static void message_stays_until_the_next_step(void **context)
 {
     (void)context;
@@ -474,7 +475,7 @@ static void message_stays_until_the_next_step(void **context)
 /* ---- other images ---------------------------------------------------------------------------------------------- */
 
 #define OF(name, layer) "  - {name: " name ", size: [24, 16], layers: [" layer "], outputs: [{path: " name ".exr}]}\n"
-/* What is on meshes of any name, and what is on "m" alone. */
+/* Images of layers on meshes of any name, and of layers on mesh "m" only. */
 static const char several[] =
     "images:\n" OF("f", "{isosurface: {field: f, values: [0.1]}}") OF("g", "{isosurface: {field: g, values: [0.1]}}")
         OF("m", "{surface: {mesh: m, colour_by: {field: f}}}") OF("s", "{surface: {}}");
@@ -497,11 +498,11 @@ static void fill_fails(session_input *in)
 }
 static void index_is_wrong(session_input *in)
 {
-    in->field.index = in->mesh.connectivity; /* of as many vertices as it has, but its last value is lacking */
+    in->field.index = in->mesh.connectivity; /* as many values as the mesh has vertices, but the last one is missing */
     in->field.count = 1;
 }
 
-/* Hands over the mesh "n" with the field "g", which may be wrong. */
+/* Passes the mesh "n" with the field "g", which may be faulty. */
 static void submit_other(const session_input *in)
 {
     insitu_field g = in->field;
@@ -510,7 +511,7 @@ static void submit_other(const session_input *in)
         (void)insitu_set_field(session, "n", &g);
 }
 
-/* Draws, and tells whether rank 0 has pictures of these names alone, in this order. */
+/* Makes a step and checks that rank 0 has pictures with exactly these names, in this order. */
 static void step_draws(const char *names, insitu_status expected, const char *words)
 {
     char drawn[8] = "";

@@ -1,5 +1,5 @@
-/* Ranks on nodes of different kinds: every rank has another instruction set, and the picture is that of the rank with
- * the lowest alone. */
+/* Checks ranks on nodes of different kinds: every rank has another instruction set, and the picture must be that of the
+ * rank with the lowest one. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,7 +27,7 @@ static const char *scene_of(const char *layer)
     return write_scene(text);
 }
 
-/* Rank 0's picture of the whole, by itself. */
+/* Returns rank 0's picture of the whole mesh, drawn without the other ranks. */
 static caught_picture draw_alone(const char *scene, test_mesh_kind kind)
 {
     caught_picture picture = {0};
@@ -81,8 +81,9 @@ static void ranks_of_several_instruction_sets_draw_what_the_lowest_draws(void **
 static int begin_tests(void **state)
 {
     (void)state;
-    static const char *const sets[] = {"plain", "none", "sse4.2"}; /* none: the best is used, and told on all ranks */
-    setenv("INSITU_ISA", sets[own_rank % 3], 1);                   /* before the library first looks */
+    /* none is not a set: the best one is used, and a warning is given on all ranks */
+    static const char *const sets[] = {"plain", "none", "sse4.2"};
+    setenv("INSITU_ISA", sets[own_rank % 3], 1); /* before the library first reads the variable */
     return 0;
 }
 

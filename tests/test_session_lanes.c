@@ -1,7 +1,7 @@
-/* Cells in lanes (session_lanes.h) against each cell alone in long double, for all types, layouts and instruction sets;
- * what is unusual is left to be looked at alone, and no index that is out of range is followed: beside the coordinates
- * stand pages that must not be touched. And the check's runs (session_tally.h), of mixed cells too, against cell by
- * cell. */
+/* Compares cells in lanes (session_lanes.h) with each cell alone in long double, for all types, layouts and instruction
+ * sets. Unusual cells must be left to the code for single cells, and no index that is out of range may be used: the
+ * coordinates are next to pages that cannot be read. Also compares the checks of several cells (session_tally.h),
+ * including mixed cells, with checks cell by cell. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,9 +17,9 @@
 #include "session_tally.h"
 #include "test_meshes.h"
 
-enum { SIDE = 7 /* cells for a block and a part of one, but no multiple of eight of hexes */, LAYOUTS = 16 };
+enum { SIDE = 7 /* cells for a block and part of another, but no multiple of eight hexes */, LAYOUTS = 16 };
 
-/* As session_tally.c derives it: the share of its box that rounding may leave of a volume. */
+/* The fraction of the volume of a cell's box that is rounding error, as session_tally.c derives it. */
 static const double rounding_share = 0x1p-46;
 
 static test_layout layout_of(int i)
@@ -28,10 +28,10 @@ static test_layout layout_of(int i)
         .wide_coordinates = i & 1, .wide_indices = i & 2, .is_interleaved = i & 4, .with_types = i & 8};
 }
 
-/* ---- a cell alone -------------------------------------------------------------------------------------------- */
+/* ---- single cells -------------------------------------------------------------------------------------------- */
 
-/* Of a prism's corner, or of a pyramid's base's, the next and the last around, and that above or below; right-handed.
- */
+/* Finds the neighbours of a corner of a prism, or of a pyramid's base: the next and the previous one around, and the
+ * one above or below; in right-handed order. */
 static void neighbours_of(int type, int corner, int out[3])
 {
     const int around = type == GRID_WEDGE ? 3 : 4;
@@ -51,8 +51,8 @@ static long double determinant_at(long double p[][3], int corner, const int to[3
            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
 }
 
-/* The mean over the corners of the volume that a cell with that corner and parallel edges would have: 6 tets make such
- * a hex, 3 a wedge, and a pyramid is a third of the prism over its base. */
+/* Returns the mean over the corners of the volume that a cell with this corner and parallel edges would have: 6 tets
+ * make such a hex, 3 a wedge, and a pyramid is a third of the prism over its base. */
 static long double volume_of(int type, long double p[][3])
 {
     if (type == GRID_TET) return determinant_at(p, 0, (const int[]){1, 2, 3}) / 6;
@@ -71,7 +71,7 @@ typedef struct truth {
     double lower[3], upper[3];
     long double least, sizes;
     int64_t inverted;
-    long double box; /* the largest of a cell */
+    long double box; /* the largest volume of a cell's box */
 } truth;
 
 static void add_cell(const grid *g, int64_t cell, truth *t)
@@ -92,7 +92,7 @@ static void add_cell(const grid *g, int64_t cell, truth *t)
         box *= (long double)high - (long double)low;
     }
     const long double volume = volume_of(grid_cell_type(g, cell), p), size = fabsl(volume);
-    assert_true(size > (long double)rounding_share * box); /* so that its sign is certain */
+    assert_true(size > (long double)rounding_share * box); /* so large that its sign is certain */
     t->least = size < t->least ? size : t->least;
     t->sizes += cbrtl(size);
     t->inverted += volume < 0;
@@ -107,7 +107,7 @@ static truth truth_of(const grid *g, int64_t first, int64_t count)
     return t;
 }
 
-/* A root by Halley's method is off by 1e-14 at most, and a sum of n by n roundings. */
+/* Compares the sums: a root by Halley's method is off by at most 1e-14, and a sum of n by n roundings. */
 static void assert_sums(const lane_sums *sums, const truth *t, int64_t count)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -121,7 +121,8 @@ static void assert_sums(const lane_sums *sums, const truth *t, int64_t count)
 
 /* ---- all types and layouts ----------------------------------------------------------------------------------- */
 
-/* A part of the cells mirrored, so that some are inverted; far from the origin, where coordinates are doubles. */
+/* Makes a view in which some cells are mirrored, so that they are inverted; coordinates in double are far from the
+ * origin. */
 static test_view view_of(test_mesh_kind kind, test_layout layout, int64_t base)
 {
     test_mesh mesh;
@@ -166,7 +167,8 @@ static void sums_are_those_of_cells_alone(void **state)
     (void)state;
     const int64_t counts[] = {0, 1, 7, 8, 9, 40, 301};
     for (test_mesh_kind kind = TEST_TETS; kind <= TEST_PYRAMIDS; kind++)
-        for (int i = 0; i < LAYOUTS / 2; i++) { /* lanes are told where cells stand, so that offsets do not matter */
+        /* the range of cells is an argument of the lanes' code, so that layouts with offsets need no test */
+        for (int i = 0; i < LAYOUTS / 2; i++) {
             test_view view = view_of(kind, layout_of(i), i & 1);
             view.cells.ghosts = NULL;
             for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) assert_run(&view.cells, (int64_t)k, counts[k]);
@@ -175,7 +177,7 @@ static void sums_are_those_of_cells_alone(void **state)
         }
 }
 
-/* Connectivity with other numbers between its entries. */
+/* Checks connectivity with other numbers between its entries. */
 static void strided_connectivity_is_the_same(void **state)
 {
     (void)state;
@@ -196,7 +198,7 @@ static void strided_connectivity_is_the_same(void **state)
     }
 }
 
-/* ---- what is unusual ----------------------------------------------------------------------------------------- */
+/* ---- unusual cells ------------------------------------------------------------------------------------------- */
 
 static void make_ghost(grid *g, int64_t cell)
 {
@@ -240,7 +242,7 @@ static void unusual_cells_are_left_alone(void **state)
             for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
                 int64_t taken, alone, again, none;
                 const lane_sums sums = sums_of(isa, &cells, &taken, &alone);
-                assert_true(taken <= place && taken % LANES == 0); /* a vertex may have other cells before this one */
+                assert_true(taken <= place && taken % LANES == 0); /* earlier cells may use the changed vertex too */
                 assert_true(alone > 0 && taken + alone <= cells.count);
                 if (make[m] == make_ghost || make[m] == make_stray) assert_true(taken + alone > place);
                 const lane_cells before = {&view.cells, GRID_TET, 0, taken, 0};
@@ -253,7 +255,7 @@ static void unusual_cells_are_left_alone(void **state)
         }
 }
 
-/* Memory with a page before it and a page behind it that cannot be read; the numbers end, or begin, at one of them. */
+/* Memory between two pages that cannot be read; the numbers begin or end at one of the pages. */
 typedef struct guarded {
     char *pages;
     size_t page, inner;
@@ -292,7 +294,7 @@ static void assert_not_followed(const grid *g, void *index, int64_t cell, int64_
 static void wrong_indices_are_not_followed(void **state)
 {
     (void)state;
-    for (int i = 0; i < 16; i++) { /* widths, index base, and at which end the numbers are */
+    for (int i = 0; i < 16; i++) { /* bits: the widths, the index base, and the end at which the numbers are */
         const int64_t base = i >> 2 & 1;
         test_view view = view_of(TEST_HEXES, layout_of(i & 3), base);
         grid *g = &view.cells;
@@ -318,7 +320,7 @@ static void wrong_indices_are_not_followed(void **state)
     }
 }
 
-/* ---- runs ---------------------------------------------------------------------------------------------------- */
+/* ---- several cells ------------------------------------------------------------------------------------------- */
 
 static void runs_are_cells_one_by_one(void **state)
 {
@@ -344,7 +346,7 @@ static void runs_are_cells_one_by_one(void **state)
             assert_int_equal(all.inverted_count, each.inverted_count);
             assert_int_equal(all.flat_count, 0);
             assert_true(fabs(all.size_sum - each.size_sum) <=
-                        1e-12 * each.size_sum); /* 4000 roundings, and roots' 1e-14 */
+                        1e-12 * each.size_sum); /* 4000 roundings, and the 1e-14 of roots */
             test_view_free(&view);
         }
 }

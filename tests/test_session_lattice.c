@@ -1,7 +1,7 @@
-/* Structured blocks: the pictures, statistics and counts of a lattice are those of the same cells handed over as hexes,
- * to the bit, for uniform, rectilinear and curvilinear coordinates, for arrays in any order with padding, for ghost
- * layers and for blanked cells. Padding holds values that are not finite, so that a picture that read them would have
- * holes. */
+/* Checks structured blocks: the pictures, statistics and counts of a lattice equal, to the bit, those of the same cells
+ * passed as hexes, for uniform, rectilinear and curvilinear coordinates, for arrays in any order with padding, for
+ * ghost layers and for blanked cells. Padding contains values that are not finite, so that a picture that used them
+ * would have holes. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +12,7 @@
 typedef enum place_form { UNIFORM, RECTILINEAR, RECTILINEAR_FLOAT, CURVILINEAR, CURVILINEAR_FLOAT, FORMS } place_form;
 typedef enum array_order { PACKED, FORTRAN_PADDED, C_PADDED, ORDERS } array_order;
 
-/* Cells along the axes of the whole lattice, which ranks share along k. */
+/* Numbers of cells along the axes of the whole lattice, which is divided among ranks along k. */
 static const int64_t whole[3] = {9, 7, 12};
 static const double origin[3] = {0.1, -0.3, 1.7}, spacing[3] = {0.1, 0.07, 0.13};
 
@@ -29,20 +29,20 @@ static const char *const images[] = {
 };
 enum { IMAGES = sizeof images / sizeof images[0] };
 
-/* A rank's block: its cells and vertices, ghost layers and padding included, in the whole lattice's indices. */
+/* A rank's block: its cells and vertices, including ghost layers and padding, in the whole lattice's indices. */
 typedef struct block {
     place_form form;
-    int64_t first[3], cells[3];       /* with the ghost layers */
-    int64_t own_first[3], own_end[3]; /* without them, in the block's indices */
+    int64_t first[3], cells[3];       /* including the ghost layers */
+    int64_t own_first[3], own_end[3]; /* excluding the ghost layers, in the block's indices */
     int64_t vertex_strides[3], cell_strides[3], vertex_count, cell_count;
     double *places[3];
     float *narrow[3];
     double *axes[3], *f, *c;
     float *narrow_axes[3];
     unsigned char *ghosts;
-    int32_t *wide_ghosts; /* nonzero ones have a first byte of 0 */
+    int32_t *wide_ghosts; /* nonzero flags have a lowest byte of 0 */
     int64_t hex_count, *hexes;
-    int64_t *hex_cells; /* the number of each hex's cell in the block */
+    int64_t *hex_cells; /* number in the block of each hex's cell */
     double *hex_values;
     insitu_lattice lattice;
 } block;
@@ -151,7 +151,7 @@ static void fill_cells(block *b, bool blanking)
             }
 }
 
-/* Rank's share of the layers along k; rank_count may exceed them. */
+/* Makes the rank's share of the layers along k; rank_count may exceed the number of layers. */
 static void make_block(block *b, place_form form, array_order order, bool layers, bool blanking)
 {
     int64_t vertices[3];
@@ -159,7 +159,7 @@ static void make_block(block *b, place_form form, array_order order, bool layers
     for (int axis = 0; axis < 3; axis++) {
         const int64_t first = axis < 2 ? 0 : whole[2] * own_rank / rank_count;
         const int64_t end = axis < 2 ? whole[axis] : whole[2] * (own_rank + 1) / rank_count;
-        const int64_t low = layers ? 1 : 0, high = layers ? 2 : 0; /* the layers reach beyond the domain, too */
+        const int64_t low = layers ? 1 : 0, high = layers ? 2 : 0; /* the ghost layers extend beyond the domain too */
         b->first[axis] = first - low;
         b->cells[axis] = end - first + low + high;
         b->own_first[axis] = low;
@@ -268,7 +268,7 @@ static bool set_hexes(insitu_session *session, const block *b)
     return insitu_set_mesh(session, "m", &mesh) == INSITU_OK && set_fields(session, b, b->hex_values, b->hex_count);
 }
 
-/* The first images alone: a tree over the cells that they show. */
+/* Returns a scene with the first `count` images: trees contain only cells that they show. */
 static const char *some_images(int count)
 {
     static char text[4096];
@@ -294,7 +294,8 @@ static int covered(const caught_picture *p)
     return count;
 }
 
-/* Returns the bytes that a lattice takes: a number for each index along each axis, unless vertices have coordinates. */
+/* Returns the bytes that a lattice copies: a number for each index along each axis, unless vertices have
+ * coordinates. */
 static int64_t bytes_of_axes(const block *b)
 {
     int64_t bytes = 0;
@@ -303,7 +304,7 @@ static int64_t bytes_of_axes(const block *b)
     return bytes;
 }
 
-/* Hexes are drawn first, then the lattice. */
+/* Compares the pictures of hexes, which are drawn first, with those of the lattice. */
 static void compare(place_form form, array_order order, bool layers, bool blanking, int count)
 {
     block b;
@@ -332,9 +333,9 @@ static void compare(place_form form, array_order order, bool layers, bool blanki
         assert_true(is_same(&caught[i], &caught[count + i]));
     }
     everywhere(strcmp(statistics[0], statistics[1]) == 0);
-    everywhere(strcmp(left_out[0], left_out[1]) == 0); /* it has the number of cells that trees are without */
+    everywhere(strcmp(left_out[0], left_out[1]) == 0); /* the message with the number of cells that trees leave out */
     everywhere(count > 1 || strstr(left_out[1], "cells show nothing"));
-    /* the first image shows values as they are given, so that no cell and no vertex has a byte of its own */
+    /* the first image shows the values as they are passed, so that no bytes are allocated per cell or vertex */
     everywhere(count > 1 || reports[1].bytes_copied == bytes_of_axes(&b));
     const int64_t own =
         (b.own_end[0] - b.own_first[0]) * (b.own_end[1] - b.own_first[1]) * (b.own_end[2] - b.own_first[2]);
@@ -357,7 +358,8 @@ static void lattices_are_their_hexes(void **state)
 
 enum { SHEET = 6 };
 
-/* A sheet without cells along one axis: uniform, or its vertices' places; packed, i fastest. */
+/* Draws a sheet without cells along one axis: uniform, or with the vertices' coordinates; arrays are packed, i
+ * fastest. */
 static caught_picture draw_sheet(int flat, bool is_lattice, bool is_uniform)
 {
     static const char scene[] =
@@ -420,7 +422,7 @@ static void sheets_across_any_axis_are_their_quads(void **state)
         }
 }
 
-/* A cube whose three axes run downwards is left-handed throughout: nothing is wrong with it. */
+/* Checks that a cube whose three axes point downwards, so that all its cells are left-handed, causes no warning. */
 static void left_handed_blocks_are_no_warning(void **state)
 {
     (void)state;

@@ -1,8 +1,8 @@
-/* Structured blocks that are wrong, and blocks that change. A wrong description on one rank is the same error on all
- * ranks, in which the axis and the number stand, and no harm is left once it is right again. After each change from one
- * form or place to another, a session draws the picture of a twin, to which each block is a new mesh. (The twin has
- * drawn as many pictures, as sessions keep the origin of their coordinates while the cells stay about where they were.)
- */
+/* Checks faulty structured blocks, and blocks that change. A faulty description on one rank gives the same error on all
+ * ranks, which states the axis and the number, and has no effect after the correction. After each change of form or
+ * position, a session draws the picture of a second session, to which each block is a new mesh. (The second session has
+ * drawn as many pictures, because sessions keep the origin of their coordinates while the cells stay approximately in
+ * place.) */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +18,7 @@ static const char blocks_scene[] = "images:\n  - name: a\n    size: [32, 24]\n  
                                    "    camera: {position: [9, 14, 11], focal: [5, 2, 2], up: [0, 0, 1]}\n"
                                    "    outputs: [{path: a.exr}]\n";
 
-/* A rank's block, side by side along i, with all that its forms need. Strides leave the lattice packed. */
+/* A rank's block, side by side along i, with the arrays of all forms. Strides of 0 mean that the lattice is packed. */
 typedef struct block {
     insitu_lattice lattice;
     insitu_mesh mesh;
@@ -140,7 +140,7 @@ static bool is_same(const caught_picture *a, const caught_picture *b)
            memcmp(a->depth, b->depth, pixels * sizeof(float)) == 0;
 }
 
-/* ---- wrong blocks ----------------------------------------------------------------------------------------------- */
+/* ---- faulty blocks ---------------------------------------------------------------------------------------------- */
 
 #define SPOIL(name, ...)                                                                                               \
     static void name(block *b)                                                                                         \
@@ -355,11 +355,12 @@ SPOIL(make_lattice_again, {
 SPOIL(make_quads, (make_uniform(b), b->lattice.cells[2] = 0))
 SPOIL(make_cells, b->lattice.cells[2] = NK)
 
-/* The arrays are longer than the block: padding at their end has no vertices. */
+/* Changes the block to one smaller than the arrays: the padding at their end has no vertices. */
 SPOIL(fewer_layers, (make_curvilinear(b), b->lattice.cells[2] = NK - 1))
 SPOIL(shorter_rows, b->lattice.cells[0] = 2)
 
-/* What the caller names as changed; fields are set again where the mesh is another one, and where it says so. */
+/* A change, and what the caller states as changed; fields are set again if the mesh is a different one, and if
+ * sets_fields is set. */
 typedef struct change {
     const char *name;
     void (*make)(block *b);

@@ -1,7 +1,7 @@
-/* Cells that are not drawn, of every type and dealt to any ranks. A cell whose own value is not finite shows no
- * isosurface of the values that its neighbours give to the vertices, as if it were flagged as a ghost. A cell without
- * volume shows none, though the field before it differs from that behind, as if it were not there. Both hold to the
- * bit. */
+/* Checks cells that are not drawn, of every type and distributed over any number of ranks. A cell whose own value is
+ * not finite shows no isosurface of the values that its neighbours give to the vertices, as if it were flagged as a
+ * ghost. A cell without volume shows none either, although the field in front of it differs from that behind it, as if
+ * it did not exist. Both hold to the bit. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@ static const char volume_scene[] = IMAGE("      - volume: {field: f, range: [-1,
 static const char *const scenes[] = {surface_scene, clear_scene, volume_scene};
 enum { SCENES = sizeof scenes / sizeof *scenes };
 
-/* Hexes and mixed cells as polyhedra too. */
+/* All kinds, and hexes and mixed cells as polyhedra too. */
 enum { MESHES = TEST_KIND_COUNT + 1 };
 
 static void make_mesh(int kind, test_mesh *out)
@@ -49,7 +49,7 @@ static void draw(insitu_session *session, const session_input *in, int cycle, ca
     caught_count = 0;
 }
 
-/* Tells whether all channels differ by the bound at most, and the picture shows something. */
+/* Returns whether all channels differ by at most the bound, and the picture is not empty. */
 static bool are_same(const caught_picture *a, const caught_picture *b, double bound)
 {
     int shown = 0;
@@ -72,7 +72,8 @@ static void free_picture(caught_picture *picture)
 
 /* ---- cells without a value of their own ---------------------------------------------------------------------- */
 
-/* The cell's value: from its corners' places in the wave; for a polyhedron, from one of each face. */
+/* Returns the cell's value: computed from its corners' positions in the wave; for a polyhedron, from one vertex of each
+ * face. */
 static double cell_value(const test_mesh *part, int64_t cell)
 {
     double sum = 0;
@@ -129,7 +130,8 @@ static void cells_without_a_value_of_their_own_are_not_there(void **context)
         for (int i = 0; i < SCENES; i++) verify_lacking(kind, scenes[i]);
 }
 
-/* The means at vertices stay as they are: of cells of one value some lose theirs, others get it back. */
+/* Checks cells that lose their value while the means at vertices stay the same: of cells with equal values some lose
+ * theirs, and others get theirs back. */
 static void cells_that_lose_their_value_are_gone_at_the_next_step(void **context)
 {
     (void)context;
@@ -162,10 +164,10 @@ static void cells_that_lose_their_value_are_gone_at_the_next_step(void **context
     test_mesh_free(&whole);
 }
 
-/* ---- cells of no volume -------------------------------------------------------------------------------------- */
+/* ---- cells without volume ------------------------------------------------------------------------------------ */
 
-/* The place of a flat cell's i-th vertex: hexes and wedges have a face before and behind, bent as it may be; tets and
- * pyramids lie in the plane of the first three corners. */
+/* Computes the position of vertex i of a flat cell: hexes and wedges have a possibly bent face as front and as back;
+ * tets and pyramids are in the plane of the first three corners. */
 static void flat_place(int type, double corners[4][3], int i, double place[3])
 {
     static const double in_plane[5][2] = {{0, 0}, {0.5, 0}, {0.5, 0.5}, {0, 0.5}, {0.2, 0.1}};
@@ -180,7 +182,7 @@ static void flat_place(int type, double corners[4][3], int i, double place[3])
     }
 }
 
-/* A flat cell of vertices of its own, the field -1 at one half of them and 1 at the other. */
+/* Adds a flat cell with its own vertices; the field is -1 at one half of them and 1 at the other. */
 static void add_flat_cell(test_mesh *mesh, int type, double corners[4][3])
 {
     const int count = grid_type_vertices(type);
@@ -194,7 +196,8 @@ static void add_flat_cell(test_mesh *mesh, int type, double corners[4][3])
     test_mesh_add_cell(mesh, type, vertices, (const int[]){0, 1, 2, 3, 4, 5, 6, 7});
 }
 
-/* Adds beside every hex a flat cell on one of its faces. as_polyhedra: all cells become polyhedra, with plane faces. */
+/* Adds next to every hex a flat cell on one of its faces. as_polyhedra: all cells become polyhedra, with plane
+ * faces. */
 static void add_flat_cells(test_mesh *mesh, bool as_polyhedra)
 {
     static const int types[4] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_TET};
@@ -247,7 +250,8 @@ static void flat_cells_between_differing_fields_change_no_pixel(void **context)
         for (int i = 0; i < SCENES; i++) verify_flat(as_polyhedra, scenes[i]);
 }
 
-/* Vertices move, and the arrays are the same: hexes lie flat at one step and stand at the next. */
+/* Checks vertices that move while the arrays stay the same: hexes are flat at one step and have a volume at the
+ * next. */
 static void cells_that_rise_from_flatness_are_drawn(void **context)
 {
     (void)context;

@@ -1,6 +1,6 @@
-/* Levels of refinement in blocks of one mesh: which cells finer blocks cover, and the values at hanging vertices,
- * against brute force on whole numbers; a sphere without slits, the same to the bit on any ranks, also on such as have
- * nothing of a level; and blocks that come and go. */
+/* Checks levels of refinement in blocks of one mesh: which cells finer blocks cover, and the values at hanging
+ * vertices, against brute force on integers; a sphere without gaps, the same to the bit on any number of ranks,
+ * including ranks that have no block of a level; and blocks that appear and disappear. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@
 
 enum { SIZE = 200, PIXELS = SIZE * SIZE, SIDE = 8, LEVELS = 3, MOST_BLOCKS = 64, GRIDS = 3 };
 
-/* Looked at along z from z = 5; a pixel is 1/100 wide. */
+/* A view along z from z = 5; a pixel is 1/100 wide. */
 static const char scene_text[] =
     "images:\n  - name: a\n    size: [200, 200]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, 5], "
     "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 2}\n    layers:\n"
@@ -26,15 +26,15 @@ typedef struct box {
     int level, lower[3], upper[3];
 } box;
 
-/* How blocks of a mesh are laid out and dealt out. */
+/* The layout of a mesh's blocks and their distribution over ranks. */
 typedef struct levels {
-    int refinement[LEVELS]; /* of each level */
-    int grid;               /* which boxes */
+    int refinement[LEVELS]; /* cells per coarsest cell along each axis, for each level */
+    int grid;               /* number of the set of boxes */
     bool is_of_cells;
-    bool is_by_level; /* each rank has blocks of one level alone */
+    bool is_by_level; /* each rank has blocks of one level only */
     bool has_layers;  /* some blocks have ghost layers */
-    bool is_mixed;    /* every other block is given by its vertices' coordinates, */
-    double off;       /* which are larger by this share */
+    bool is_mixed;    /* every other block is given by the coordinates of its vertices */
+    double off;       /* relative excess of these coordinates */
     int rank, ranks;
     int count;
     box boxes[MOST_BLOCKS];
@@ -49,7 +49,7 @@ static void add_box(levels *l, int level, const int lower[3], const int upper[3]
     memcpy(b->upper, upper, sizeof b->upper);
 }
 
-/* Adds a box in two blocks. */
+/* Adds a box as two blocks. */
 static void add_halves(levels *l, int level, const int lower[3], const int upper[3], int axis)
 {
     int middle[3], low[3];
@@ -60,7 +60,7 @@ static void add_halves(levels *l, int level, const int lower[3], const int upper
     add_box(l, level, low, upper);
 }
 
-/* Level 2 lies beside level 1, beside level 0 and at the border of the domain. */
+/* Makes boxes of which level 2 is next to level 1, next to level 0 and at the border of the domain. */
 static void make_levels(levels *l)
 {
     static const int fine[GRIDS][4][2][3] = {
@@ -81,14 +81,16 @@ static int owner_of(const levels *l, int block)
     return (int)(test_uniform((uint64_t)(block + 100 * l->grid), 8) * l->ranks);
 }
 
-/* ---- brute force, on the lattice of the finest level's cells ----------------------------------------------------- */
+/* ---- brute force, on the lattice of the finest level's cells, in integers
+ * ----------------------------------------- */
 
 static int finest(const levels *l)
 {
     return l->refinement[LEVELS - 1];
 }
 
-/* The distance from the middle of the domain, [-1, 1]^3; at twice a place, so that middles of cells are whole. */
+/* Returns the distance from the middle of the domain, [-1, 1]^3; the coordinates are doubled, so that middles of cells
+ * are integers. */
 static double distance_at(const levels *l, const int twice[3])
 {
     double square = 0;
@@ -99,7 +101,7 @@ static double distance_at(const levels *l, const int twice[3])
     return sqrt(square);
 }
 
-/* The finest level of a box that has the place, of twice the coordinates, within; -1: none. */
+/* Returns the finest level of a box that contains the point with these doubled coordinates; -1: none. */
 static int level_at(const levels *l, const int twice[3])
 {
     int level = -1;
@@ -114,8 +116,8 @@ static int level_at(const levels *l, const int twice[3])
     return level;
 }
 
-/* The cell of a level, by its least corner, around a place beside the vertex, in the direction of the bits; false where
- * no drawn cell of that level is there. */
+/* Finds the cell of a level, by its lowest corner, that touches the vertex in the direction given by the bits; returns
+ * false if there is no drawn cell of that level. */
 static bool cell_beside(const levels *l, int level, const int vertex[3], int bits, int lower[3])
 {
     const int width = finest(l) / l->refinement[level];
@@ -150,7 +152,8 @@ static double mean_around(const levels *l, const int vertex[3])
     return sum / count;
 }
 
-/* Finds the largest drawn cell that has the vertex on its border, but not as a corner; false where there is none. */
+/* Finds the largest drawn cell that has the vertex on its border, but not as a corner; returns false if there is
+ * none. */
 static bool hangs(const levels *l, const int vertex[3], int *width, int lower[3])
 {
     for (int level = 0; level < LEVELS; level++)
@@ -161,7 +164,7 @@ static bool hangs(const levels *l, const int vertex[3], int *width, int lower[3]
     return false;
 }
 
-/* The value at a vertex: what is interpolated in the cell that it hangs on, else the vertex's own. */
+/* Returns the value at a vertex: that interpolated in the cell on which it hangs, else the vertex's own. */
 static double value_at(const levels *l, const int vertex[3])
 {
     const int twice[3] = {2 * vertex[0], 2 * vertex[1], 2 * vertex[2]};
@@ -181,9 +184,9 @@ static double value_at(const levels *l, const int vertex[3])
     return value;
 }
 
-/* How far the library's value at a vertex may be off: sums of at most 64 products of weights and values below 2, of up
- * to three levels, by less than 200 roundings of 2; the mean of equal values, which all blocks have at a vertex that
- * does not hang, not at all. */
+/* Returns the allowed error of the library's value at a vertex. Interpolated values are sums of at most 64 products of
+ * weights and values below 2, of up to three levels, with less than 200 roundings of 2. A vertex that does not hang has
+ * the same value in all blocks, whose mean is exact. */
 static double error_at(const levels *l, const int vertex[3])
 {
     int width, lower[3];
@@ -195,21 +198,21 @@ static double error_at(const levels *l, const int vertex[3])
 typedef struct block {
     insitu_lattice lattice;
     int64_t vertex_count, cell_count;
-    double *values, (*places)[3]; /* places NULL: it is uniform */
-    int16_t *flags;               /* of cells; NULL: none */
+    double *values, (*places)[3]; /* places is NULL if the block is uniform */
+    int16_t *flags;               /* flags of cells; NULL if there are none */
 } block;
 
 typedef enum layer_kind { NO_LAYER, OUTSIDE_INTERIOR, FLAGGED } layer_kind;
 
-/* The ghost layer of a block, a cell wide. Finer blocks cover what their flagged cells lie over, so that only those of
- * the coarsest level are flagged. */
+/* Returns the kind of a block's ghost layer, which is one cell wide. Finer blocks cover the cells below their flagged
+ * cells, so that only blocks of the coarsest level have flagged layers. */
 static layer_kind layer_of(const levels *l, int number)
 {
     const layer_kind kind = (layer_kind)(number % 3);
     return !l->has_layers || (kind == FLAGGED && l->boxes[number].level) ? NO_LAYER : kind;
 }
 
-/* Tells whether a cell (is_vertex: a vertex) with these indices is of the block without its layer. */
+/* Returns whether a cell (is_vertex: a vertex) with these indices belongs to the block without its layer. */
 static bool is_inner(const block *b, int layer, const int at[3], bool is_vertex)
 {
     for (int axis = 0; axis < 3; axis++)
@@ -227,7 +230,7 @@ static void make_flags(block *b)
             is_inner(b, 1, (const int[]){i % wide[0], i / wide[0] % wide[1], i / wide[0] / wide[1]}, false) ? 0 : 256;
 }
 
-/* The coordinates that the uniform block has, but for a share of them. */
+/* Makes the coordinates of the uniform block, increased by a fraction of them. */
 static void make_places(block *b, double off)
 {
     const insitu_lattice *l = &b->lattice;
@@ -242,7 +245,7 @@ static void make_places(block *b, double off)
     for (int axis = 0; axis < 3; axis++) b->lattice.origin[axis] = b->lattice.spacing[axis] = 0;
 }
 
-/* Values in ghost layers are wrong. */
+/* Makes a block; values in ghost layers are wrong on purpose. */
 static void make_block(const levels *l, int number, block *out)
 {
     const box *b = &l->boxes[number];
@@ -298,7 +301,7 @@ static bool set_block(insitu_session *session, int number, const levels *l, cons
            insitu_set_block_field(session, "m", number, &field) == INSITU_OK;
 }
 
-/* Arrays of all blocks; of other ranks' they are not made. */
+/* Makes the arrays of this rank's blocks; those of other ranks stay empty. */
 static void make_blocks(const levels *l, block blocks[MOST_BLOCKS])
 {
     for (int i = 0; i < l->count; i++) {
@@ -324,9 +327,9 @@ static bool submit_levels(insitu_session *session, const levels *l, const block 
     return is_set;
 }
 
-/* ---- what is drawn ----------------------------------------------------------------------------------------------- */
+/* ---- results ----------------------------------------------------------------------------------------------------- */
 
-/* Compares the values that are drawn with brute force. */
+/* Compares the drawn values with brute force. */
 static bool are_values_true(const insitu_session *session, const levels *l)
 {
     const session_parts parts = session_find_parts(&session->meshes, "m");
@@ -390,8 +393,8 @@ static int64_t count_ghosts(const levels *l)
     return count;
 }
 
-/* Pixels at which the front of the sphere is not seen. The surface in a cell is off the sphere by at most half the
- * largest cell's diagonal, 0.217; inside of 0.6 the front and the back are 0.8 apart. */
+/* Counts pixels in which the front of the sphere is invisible. The surface inside a cell is off the sphere by at most
+ * half the largest cell's diagonal, 0.217; inside a radius of 0.6 the front and the back are 0.8 apart. */
 static int count_slits(const caught_picture *picture)
 {
     int slits = 0;
@@ -413,7 +416,7 @@ static caught_picture take_step(insitu_session *session, int cycle)
     return pop_caught_picture();
 }
 
-/* Draws the levels in a session of their own. */
+/* Draws the levels in a new session. */
 static caught_picture draw(MPI_Comm comm, const char *scene, const levels *l, bool *is_true)
 {
     block blocks[MOST_BLOCKS];
@@ -457,9 +460,9 @@ static void check(levels l)
 
 /* ---- tests ------------------------------------------------------------------------------------------------------ */
 
-/* By default each set of ratios is on one or on several ranks, and has values of cells or of vertices, in turn.
- *
- * With the ratio of 3, vertices of every other block differ from those at the same places in their last bits. */
+/* Checks spheres. By default each set of ratios is drawn on one or on several ranks, and with values at cells or at
+ * vertices, alternating. With the ratio of 3, vertices of every other block differ in their last bits from those at the
+ * same positions. */
 static void a_sphere_continues_across_levels(void **state)
 {
     static const int refinements[][LEVELS] = {{1, 2, 4}, {1, 4, 8}, {1, 2, 8}, {1, 3, 6}};
@@ -483,8 +486,8 @@ static const char walls_text[] =
     "focal: [0, 0, 0], up: [0, 1, 0], projection: orthographic, height: 4}\n    layers:\n"
     "      - surface: {colour: [1, 0.5, 0.25], opacity: 0.3}\n    outputs: [{path: a.exr}]\n";
 
-/* A transparent surface of levels is that of one block of the domain: its planes are the same but for rounding, which
- * no colour depends on, and a wall would show in it. */
+/* Checks that a transparent surface of levels equals that of one block of the domain: its planes are the same up to
+ * rounding, on which no colour depends, and a wall between levels would be visible in it. */
 static void outer_surfaces_have_no_wall_between_levels(void **state)
 {
     static const int domain[2][3] = {{0, 0, 0}, {SIDE, SIDE, SIDE}};
@@ -515,7 +518,8 @@ static void outer_surfaces_have_no_wall_between_levels(void **state)
     }
 }
 
-/* At every step some blocks of another grid of levels take the place of the last one's, on other ranks. */
+/* Checks blocks that change: at every step some blocks of another grid of levels replace those of the last one, on
+ * other ranks. */
 static void levels_come_and_go(void **state)
 {
     const char *scene = write_scene(scene_text);
@@ -553,7 +557,8 @@ static void levels_come_and_go(void **state)
     free_blocks(&last, held);
 }
 
-/* A block of the finest level goes: blocks whose covered cells stay are not made anew, and keep their trees. */
+/* Checks the removal of a block of the finest level: blocks whose covered cells stay the same are not made again, and
+ * keep their trees. */
 static void blocks_beside_a_change_stay(void **state)
 {
     levels l = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count}, rest;
@@ -589,7 +594,7 @@ static void blocks_beside_a_change_stay(void **state)
     free_blocks(&l, blocks);
 }
 
-/* Level 1 ends within a cell of level 0. */
+/* Checks a level 1 that ends inside a cell of level 0. */
 static void blocks_that_do_not_fit_are_reported(void **state)
 {
     levels l = {.refinement = {1, 2, 4}, .rank = own_rank, .ranks = rank_count};
@@ -621,8 +626,8 @@ static void blocks_that_do_not_fit_are_reported(void **state)
     free_blocks(&l, blocks);
 }
 
-/* A block of cubes that are 1 / of of a cell of the coarsest level, of which [-1, 1]^3 has 4^3; with the values of a
- * plane z = 0.1 at 0.72. */
+/* Makes a block of cubes that are 1 / of of a cell of the coarsest level, which has 4^3 cells in [-1, 1]^3; the plane z
+ * = 0.1 has the value 0.72. */
 static block make_nested(int of, int first, int cells)
 {
     block out = {.vertex_count = (int64_t)(cells + 1) * (cells + 1) * (cells + 1),
@@ -641,7 +646,7 @@ static block make_nested(int of, int first, int cells)
     return out;
 }
 
-/* Counts the pixels that do not show the plane, which is 4.9 away. */
+/* Counts the pixels that do not show the plane, at a depth of 4.9. */
 static int count_holes(const caught_picture *picture)
 {
     int holes = 0;
@@ -650,8 +655,8 @@ static int count_holes(const caught_picture *picture)
     return holes;
 }
 
-/* The finest block begins in the middle of a cell of the coarsest level, which the level between them covers. Without
- * that level it is an error. */
+/* Checks that the finest block may begin in the middle of a cell of the coarsest level if the level between covers that
+ * cell. Without the level between it is an error. */
 static void levels_between_let_finer_ones_begin_within_a_cell(void **state)
 {
     static const int of[3] = {1, 2, 4}, first[3] = {0, 2, 6}, cells[3] = {4, 4, 4};

@@ -1,8 +1,7 @@
-/* Shadows and ambient occlusion. Shadows have outlines in closed form: a ball's worth of a slice throws an ellipse on
- * another, and an isosurface that is a plane darkens what is behind it. Ambient occlusion in a corner of two planes is
- * a segment of a disk, and ray by ray what planes in double say; so it is in a valley of an isosurface. And all of it
- * is the same to the bit on any partition, of all kinds of cells.
- */
+/* Checks shadows and ambient occlusion. Outlines of shadows have a closed form: a disk cut from a slice by a ball casts
+ * an ellipse on another slice, and an isosurface that is a plane darkens what is behind it. Ambient occlusion in a
+ * corner of two planes is a segment of a disk, and is compared ray by ray with planes in double; so is that in a valley
+ * of an isosurface. All pictures are the same to the bit with any partition, for all kinds of cells. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -38,7 +37,7 @@ static void camera_ray(int pixel, double base[3], double direction[3])
     render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, base, direction);
 }
 
-/* Finds where the pixel's ray is at the depth. */
+/* Computes the position on the pixel's ray at the depth. */
 static void place_at(int pixel, double depth, double out[3])
 {
     double base[3], direction[3];
@@ -51,7 +50,7 @@ static void normal_at(const caught_picture *picture, int pixel, double out[3])
     for (int a = 0; a < 3; a++) out[a] = (double)picture->data[a * PIXELS + pixel];
 }
 
-/* A mesh of its own on every rank's session: the whole of it on one rank, or dealt. */
+/* Makes a mesh for every rank's own session, the whole mesh, or a rank's part of it. */
 static void make_jittered(session_input *in, test_mesh_kind kind, double jitter, test_function *f,
                           test_partition_kind distributed, int rank, int count)
 {
@@ -74,7 +73,7 @@ static void make_part(session_input *in, test_mesh_kind kind, test_function *f, 
 
 /* ---- shadows in closed form ---------------------------------------------------------------------------------- */
 
-/* A floor, a disk above it, and light from the side. Material: ambient 0.2, diffuse 0.8. */
+/* A floor, a disk above it, and light from the side. The material has ambient 0.2, diffuse 0.8. */
 static const double to_light[3] = {2. / 7, 6. / 7, 3. / 7};
 #define FLOOR                                                                                                          \
     "      - slice: {field: f, map: {colours: [[0.5, 0.5, 0.5], [1, 1, 1]]}, planes: [{normal: [0, 1, 0], point: [0, " \
@@ -85,7 +84,7 @@ static const double to_light[3] = {2. / 7, 6. / 7, 3. / 7};
     "0.25, 0]}], " MATTE ", clip: {sphere: {centre: [0.1, 0.25, -0.2], radius: 0.5}}" more "}\n"
 #define LIGHT(more) "    lights: [{direction: [2, 6, 3], in: world" more "}]\n"
 
-/* 1 in the light, 0 in the shadow, -1 where rounding decides or the floor is not seen. */
+/* Returns 1 in the light, 0 in the shadow, -1 if rounding decides or the floor is invisible. */
 static int floor_light(int pixel, double depth)
 {
     double place[3], across = 0;
@@ -102,7 +101,7 @@ typedef struct tally {
     int lit, dark, wrong;
 } tally;
 
-/* lit: by the shadowless picture's own light, beside which nothing is measured. */
+/* Verifies the floor's light; lit is the picture without shadows, to which its light is relative. */
 static tally verify_floor(const caught_picture *shadowed, const caught_picture *lit)
 {
     tally out = {0};
@@ -148,14 +147,14 @@ static void disks_throw_ellipses(void **context)
     }
 }
 
-/* Half way between the eye and this light is the floor's normal, but the light is below the floor. */
+/* The vector half way between the eye and this light is the floor's normal, but the light is below the floor. */
 #define BELOW(more) "    lights: [{direction: [-3, -0.3, -4], in: world" more "}]\n"
 #define GLOSSY                                                                                                         \
     "      - slice: {field: f, planes: [{normal: [0, 1, 0], point: [0, -0.5, 0]}],\n"                                  \
     "                material: {ambient: 0.2, diffuse: 0.4, specular: 1, shininess: 2}}\n"
 
-/* A transparent disk, a disk that is cut away, a light that casts none, one below that casts none and has no highlight.
- */
+/* Checks that none of these changes the picture: a transparent disk, a disk that is clipped away, a light without
+ * shadows, and a light below the floor that has neither shadow nor highlight. */
 static void transparent_layers_cast_no_shadow(void **context)
 {
     static const char *const scenes[][2] = {
@@ -181,7 +180,7 @@ static void transparent_layers_cast_no_shadow(void **context)
         free_caught(&shadowed);
         free_caught(&lit);
         input_free(&in);
-        /* Colours are lit in double here, in float there: of a few products below 1, 5e-7. */
+        /* Colours are shaded in double here and in float there: a few products below 1 differ by 5e-7. */
         if (worst > 5e-7) fprintf(stderr, "scene %zu: off by %g\n", i, worst);
         everywhere(worst <= 5e-7);
     }
@@ -192,12 +191,12 @@ static void transparent_layers_cast_no_shadow(void **context)
 #define BARE "material: {ambient: 0.6, diffuse: 0.1, specular: 0}"
 #define DARK "    lights: [{direction: [0, 0, 1], intensity: 0}]\n"
 
-/* Two planes at right angles in the cube. */
+/* Two perpendicular planes in the cube. */
 typedef struct corner {
     struct {
         double normal[3], distance;
     } planes[2];
-    double least; /* what is met nearer than this may count or not */
+    double least; /* surfaces nearer than this may count or not */
 } corner;
 
 static const corner slices = {{{{0, 0.8, 0.6}, -0.4}, {{0.8, -0.36, 0.48}, -0.3}}, 0};
@@ -209,14 +208,15 @@ static double above(const corner *c, int plane, const double place[3])
     return n[0] * place[0] + n[1] * place[1] + n[2] * place[2] - c->planes[plane].distance;
 }
 
-/* Tells whether something is met within the radius: 1, 0, or -1 where rounding decides, or the corner's least. */
+/* Returns whether the ray meets a plane within the radius: 1, 0, or -1 if rounding or the corner's least distance
+ * decides. */
 static int corner_blocks(const corner *c, const double from[3], const double d[3])
 {
     for (int i = 0; i < 2; i++) {
         const double ahead[3] = {from[0] + d[0], from[1] + d[1], from[2] + d[2]};
         const double height = above(c, i, from), way = height / (height - above(c, i, ahead));
         double most = 0;
-        if (fabs(height) < 1e-5) continue; /* it begins there */
+        if (fabs(height) < 1e-5) continue; /* the ray begins on this plane */
         if (fabs(way - radius) < 1e-4) return -1;
         if (!(way > 0 && way < radius)) continue;
         for (int a = 0; a < 3; a++) most = fmax(most, fabs(from[a] + way * d[a]));
@@ -228,10 +228,11 @@ static int corner_blocks(const corner *c, const double from[3], const double d[3
 
 typedef struct sky {
     int pixels, wrong, undecided_rays;
-    double sum; /* of the shares that are open, as drawn */
+    double sum; /* sum of the unoccluded fractions as drawn */
 } sky;
 
-/* Everything by AO alone: the picture is the unoccluded one times the share. */
+/* Verifies pictures lit by ambient light only: the picture is the unoccluded one times the fraction of unoccluded
+ * rays. */
 static sky verify_sky(const corner *c, const caught_picture *drawn, const caught_picture *plain)
 {
     sky out = {0};
@@ -281,14 +282,14 @@ static void corners_are_as_dark_as_disk_segments(void **context)
                 double at[3];
                 if (!isfinite(drawn.depth[p])) continue;
                 place_at(p, (double)drawn.depth[p], at);
-                /* The angle is taken from the plane that the place is not on. */
+                /* The angle is measured from the plane on which the position is not. */
                 const double ratio = fmax(fabs(above(&slices, 0, at)), fabs(above(&slices, 1, at))) / radius;
                 expected += ratio < 1 ? 1 - (acos(ratio) - ratio * sqrt(1 - ratio * ratio)) / acos(-1.0) : 1;
                 count++;
             }
-            /* A pixel's share is off by no more than that of 16 independent rays, 1/8. The mean over the pixels is off
-             * by a root of their number less, five times that at most. At the cube's ends the planes end, in a tenth of
-             * the pixels at most. */
+            /* The fraction of a pixel is off by no more than that of 16 independent rays, 1/8. The error of the mean
+             * over the pixels is smaller by the root of their number, and is allowed five times that. At the cube's
+             * faces the planes end, in at most a tenth of the pixels. */
             const double off = fabs(s.sum - expected) / count;
             is_right = s.wrong == 0 && s.pixels > 200 && s.undecided_rays < s.pixels / 10 &&
                        off < 5 * 0.125 / sqrt(count) + 0.02;
@@ -305,16 +306,16 @@ static void corners_are_as_dark_as_disk_segments(void **context)
 
 #define VALLEY "      - isosurface: {field: f, values: [-0.3], " BARE "}\n"
 
-/* A valley along y whose ground lies between cells: every cell's field is linear, of most kinds of cells, and the
+/* A valley along y whose bottom is between cells: the field is linear in every cell, for most kinds of cells, and the
  * isosurface is two planes. */
 static double valley_field(const double p[3])
 {
     return p[2] - fabs(p[0]);
 }
 
-/* Cells are up to half a unit wide. Of an isosurface, what is nearer than a fifth of its cell need not hide anything
- * (session_layers.c), and all else does: so too where the other side is just beyond that, in the pixels that are
- * counted as near. */
+/* Checks valleys. Cells are up to half a unit wide. A surface of an isosurface nearer than a fifth of its cell need not
+ * hide anything (session_layers.c), but everything farther must: so also in the pixels counted as near, in which the
+ * other side is just beyond that distance. */
 static void valleys_are_dark_to_the_ground(void **context)
 {
     static const double root = 0.70710678118654752;
@@ -322,7 +323,7 @@ static void valleys_are_dark_to_the_ground(void **context)
     (void)context;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         session_input in = {0};
-        if (kind == TEST_POLYHEDRA) continue; /* some of these lie on both sides of the ground */
+        if (kind == TEST_POLYHEDRA) continue; /* some polyhedra have parts on both sides of the bottom */
         make_jittered(&in, kind, 0, valley_field, TEST_RANDOM, own_rank, rank_count);
         caught_picture drawn =
             draw(MPI_COMM_WORLD, IMAGE(DARK "    ambient_occlusion: {samples: 16, radius: 0.4}\n", VALLEY), &in);
@@ -373,7 +374,8 @@ static double difference(const caught_picture *a, const caught_picture *b)
     return worst;
 }
 
-/* most: 0 where there are surfaces alone, which are one picture to the bit. */
+/* Compares the picture of all ranks with that of one; most is the allowed difference, 0 if there are only surfaces,
+ * which are the same to the bit. */
 static void verify_partition(const char *scene, const session_input *whole, const session_input *part, double most,
                              const char *what)
 {
@@ -395,7 +397,7 @@ static void lit_pictures_are_the_same_on_any_partition(void **context)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (test_partition_kind distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
             session_input whole = {0}, part = {0};
-            /* At random the last rank is left without cells. */
+            /* In random partitions the last rank has no cells. */
             const int count = distributed == TEST_RANDOM && rank_count > 1 ? rank_count - 1 : rank_count;
             make_part(&whole, kind, test_wave, TEST_BLOCK, 0, 1);
             make_part(&part, kind, test_wave, distributed, own_rank, count);
@@ -407,7 +409,7 @@ static void lit_pictures_are_the_same_on_any_partition(void **context)
         }
 }
 
-/* Every rank has all cells, those of others as ghosts. */
+/* Checks that ghosts cast no shadow: every rank has all cells, of which those of other ranks are ghosts. */
 static void ghost_cells_cast_nothing(void **context)
 {
     session_input whole = {0}, part = {0};

@@ -1,6 +1,6 @@
-/* Contour lines of sessions: on every layer that has them, of fields at vertices, in cells and derived, the picture has
- * the same bits on all ranks as on one, and lines are seen in it. On outer surfaces they are where the field's formula
- * has them. */
+/* Checks contour lines in sessions: on every layer that supports them, for fields at vertices, at cells and derived,
+ * the picture has the same bits on all ranks as on one, and lines are visible in it. On outer surfaces their positions
+ * follow the field's formula. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,7 +33,7 @@ static const struct lines_case {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-/* A field in cells: of each the mean of its first four vertices' x and y. */
+/* Returns values at cells: the mean of x and y of the first four vertices of each cell. */
 static double *cell_values(const test_mesh *mesh)
 {
     double *values = malloc((size_t)(mesh->cell_count + 1) * sizeof *values);
@@ -112,8 +112,8 @@ static void lines_are_the_same_on_all_ranks(void **state)
 
 /* ---- outer surfaces ---------------------------------------------------------------------------------------------- */
 
-/* The share of a pixel that a line of a value covers on the front of the cube, z = 1, seen from there: the field is
- * linear, and a pixel is `size` wide. */
+/* Returns the fraction of a pixel that a line of a value covers on the front of the cube, z = 1, seen from the front:
+ * the field is linear, and a pixel is `size` wide. */
 static double front_share(double x, double y, double size, double level)
 {
     const double at[3] = {x, y, 1}, right[3] = {x + 1, y, 1}, up[3] = {x, y + 1, 1};
@@ -121,7 +121,7 @@ static double front_share(double x, double y, double size, double level)
     return fmin(fmax(1.25 - fabs(value - level) / (slope * size), 0), 1);
 }
 
-/* Values in float are off by 1e-7, and the change of the field from one pixel to the next is 0.04. */
+/* Compares the coverage. Values in float are off by 1e-7, and the field changes by 0.04 from one pixel to the next. */
 static bool are_on_front(const caught_picture *picture)
 {
     const double size = 2.4 / HEIGHT;
