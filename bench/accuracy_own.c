@@ -18,7 +18,7 @@ typedef struct studio {
     fragment_list fragments;
     float *image;   /* size × size × 4 */
     float *chosen;  /* count × 4: chosen pixels of the last frame */
-    double *depths; /* count */
+    double *depths; /* count: depths of these pixels */
     int count;
 } studio;
 

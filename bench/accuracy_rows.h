@@ -38,7 +38,7 @@ typedef struct accuracy_row {
     const char *status; /* "ok", or why there are no figures */
     double first;
     int runs;
-    double *frames; /* printing sorts these */
+    double *frames; /* printing sorts the times */
     accuracy_error error;
 } accuracy_row;
 

@@ -1,5 +1,5 @@
-/* Makes the subjects. The lattices are those of bench_render; the views, isovalues and ranges of the real grids were
- * published with them. */
+/* Makes the subjects. The lattices are those of bench_render. The views, isovalues and ranges of the real grids are
+ * taken from the collection in which these grids were published. */
 #include "accuracy_subject.h"
 
 #include <stdio.h>

@@ -21,7 +21,7 @@ struct accuracy_truth {
     accuracy_scene surface;
     render_part kept;
     reference_scene *reference;
-    reference_ray *rays; /* count */
+    reference_ray *rays; /* count elements */
 };
 
 static void *must(void *p)

@@ -35,7 +35,7 @@ typedef struct accuracy_error {
     double residual;
 } accuracy_error;
 
-/* rgba: count × 4 */
+/* These compute the error of a picture from its values in the chosen pixels; rgba: count × 4. */
 accuracy_error accuracy_volume_error(const accuracy_truth *truth, accuracy_opacity meaning, const float *rgba);
 accuracy_error accuracy_surface_error(const accuracy_truth *truth, const double *depths);
 

@@ -84,7 +84,7 @@ static void time_frame(bench_scene *s, int number, bench_series *series)
  * so samples are compared with the same samples in double. */
 static void print_dense_error(bench_scene *s, const picture *p)
 {
-    free(s->integrals); /* these are of the usual transfer function */
+    free(s->integrals); /* integrals of the usual transfer function */
     s->integrals = NULL;
     if (p->max_error > 0)
         bench_scene_integral_error(s, p->name);

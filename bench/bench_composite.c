@@ -194,7 +194,8 @@ static void run_own(bench *b, comp_schedule schedule, int number, measure *m)
     base_error error = {0};
     if (have->count) memcpy(list.items, have->items, bytes);
     b->group.schedule = schedule;
-    /* All ranks are on one node, which the automatic choice detects. Fixed schedules assume nodes of four ranks. */
+    /* All ranks are on one node, which the automatic choice detects. Fixed schedules assume nodes of four ranks if the
+     * number of ranks is a multiple of four. */
     b->group.nodes = (comp_nodes){schedule != COMP_AUTOMATIC && rank_count % 4 == 0 ? 4 : 1, false};
     base_memory_reset_peak();
     const int64_t held = base_memory_held();

@@ -38,7 +38,8 @@ static const bench_group layers = {"bench_layers",
                                     {BENCH_SMOOTH, BENCH_LAYER_NONE},
                                     {BENCH_DIFFERENCES, BENCH_LAYER_NONE}}};
 
-/* The slice, the surface and the isosurface are measured again in turns with their versions with contour lines. */
+/* The slice, the surface and the isosurface are measured once more in this group, in turns with their versions with
+ * contour lines. */
 static const bench_group flow = {"bench_layers flow",
                                  false,
                                  12,

@@ -1,8 +1,8 @@
 /* The scene of the benchmarks of speed: a mesh with its field, seen by one camera, as an isosurface and as a volume.
  *
  * The mesh is the cube [-1, 1]^3 of n^3 jittered cubes, each given as a hex or as six tets. Its field, sin 6x cos 6y +
- * sin 6y cos 6z + sin 6z cos 6x, is smooth and has an isosurface with many folds, and no part of the mesh is free of
- * it. Errors end the process. */
+ * sin 6y cos 6z + sin 6z cos 6x, is smooth, has an isosurface with many folds, and leaves no empty outer region whose
+ * cells could be skipped. Errors end the process. */
 #ifndef BENCH_SCENE_H
 #define BENCH_SCENE_H
 
@@ -33,7 +33,7 @@ typedef struct bench_scene {
     mmbvh tree;
     fragment_list fragments;
     bench_pixels *pixels; /* NULL until an error is computed */
-    double *integrals;    /* integrals of these pixels, × 4; NULL until they are computed */
+    double *integrals;    /* integrals of `pixels`, × 4; NULL until they are computed */
     render_job job;       /* camera, space, light, and a step of half a cube's side; no layers */
     render_part part;
     mmbvh_ranges ranges;

@@ -7,8 +7,8 @@
 
 #include "session_image.h"
 
-/* Number of steps before the measured ones. A mesh that does not move takes up to MOST_WARM_UP steps, until the session
- * has decided to build its full tree. */
+/* Least and largest number of steps before the measured ones. Unless each step has a new mesh, steps are taken until
+ * the session no longer builds trees, as it builds the full tree only after some steps. */
 enum { WARM_UP = 8, MOST_WARM_UP = 60 };
 
 static const char *const part_names[BENCH_PARTS] = {"prepare", "build", "refit", "trace", "composite"};

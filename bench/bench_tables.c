@@ -59,8 +59,8 @@ static void measure_volume(bench_scene *s, const char *name, const bench_command
     bench_scene_integral_error(s, name);
 }
 
-/* Measures traversal by tiles, and groups of each size. The sample window of a tile has at most as many samples as a
- * group. */
+/* Measures traversal by tiles with the default sample group, and then with groups of each size. The sample window of a
+ * tile has at most as many samples as a group. */
 static void measure_groups(bench_scene *s, const char *prefix, const bench_command *command)
 {
     char name[64];

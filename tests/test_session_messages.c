@@ -416,8 +416,8 @@ static void likely_mistakes_are_reported_once(void **context)
     for (size_t i = 0; i < sizeof warnings / sizeof warnings[0]; i++) check_warning(&warnings[i]);
 }
 
-/* Checks that a warning is given once, not repeated in the next step, absent once its cause is gone, and given again if
- * the cause returns or the scene is edited. */
+/* Checks that a warning is given once, is not repeated in the next step, and is given again if its cause disappears and
+ * then returns, or if the scene is edited. */
 static void warnings_come_back_with_what_they_are_about(void **context)
 {
     (void)context;

@@ -210,8 +210,8 @@ static bool is_covered(const placed_picture *panel, int x, int y, int width, int
     return panel->covered_count == 1 && r->x == x && r->y == y && r->width == width && r->height == height;
 }
 
-/* Checks on rank 0 that the second panel's decorations get the rectangle of the inset and its frame to avoid, and that
- * those of the first panel, over which there is no inset, get no rectangle. */
+/* Checks the areas that decorations must avoid, on rank 0. For the second panel this is the rectangle of the inset and
+ * its frame; the first panel has no inset over it and thus no such area. */
 static bool keeps_clear(void)
 {
     return placed_count >= 2 && placed[0].covered_count == 0 &&

@@ -444,9 +444,9 @@ static void means_follow_values_on_the_boundary(void **state)
 
 /* ---- a linear field ---------------------------------------------------------------------------------------------- */
 
-/* The mean of a linear function over faces is its value at the mean of their centres: at the vertex itself within a
- * wall; moved by h / 4 from both walls at an edge, and by h / 3 from all three walls at a corner. Four values of size 2
- * and their sum are off by a few roundings of 2.2e-16 × 2. */
+/* The mean of a linear function over faces is its value at the mean of the faces' centres. For a vertex within a wall
+ * this is the vertex itself; at an edge it is moved by h / 4 away from both walls, and at a corner by h / 3 from all
+ * three walls. Four values of size 2 and their sum are off by a few roundings of 2.2e-16 × 2. */
 static void linear_fields_are_exact_amid_walls(void **state)
 {
     (void)state;

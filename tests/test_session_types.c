@@ -214,7 +214,8 @@ static void types_and_flags_of_any_type_are_the_same(void **state)
         for (int64_t c = 0; c < in.mesh.cell_count; c++) {
             char *to = (char *)(uintptr_t)in.mesh.ghosts.data + c * (size_of(as->type) + as->gap);
             put(to, as->type, in.part.ghosts[c] ? flag : 0);
-            if (i % 2) in.part.types[c] = (unsigned char)((in.part.types[c] + 35) % 60); /* map's inverse */
+            /* Applies the inverse of the map, which adds 25 modulo 60. */
+            if (i % 2) in.part.types[c] = (unsigned char)((in.part.types[c] + 35) % 60);
         }
         if (i % 2) in.mesh.cell_type_map = map;
         if (i % 2) in.mesh.cell_type_map_count = 60;

@@ -63,7 +63,7 @@ typedef struct block {
     insitu_field field;
 } block;
 
-/* Makes block `number` of those of all ranks, which are stacked along z; blocks of quads are stacked along y.
+/* Makes the block with this number. The blocks of all ranks are stacked along z, and blocks of quads along y.
  * Curvilinear blocks have padding along x. */
 void make_block(lattice_form form, int number, block *out);
 

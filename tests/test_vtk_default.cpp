@@ -146,8 +146,8 @@ void a_solid_whose_outside_shows_the_field_is_drawn_whole(void **)
     for (int y = 80; y < 140; y++) assert_false(is_near(p.at(112, y), background));
 }
 
-/* If a field rises along the first axis and is seen from the front, each column has one colour, and colours rise to the
- * right. With lighting or perspective this would not be so. */
+/* A field that rises along the first axis is seen from the front. Each column must have one colour, and colours must
+ * rise to the right; lighting or perspective would make colours vary within a column. */
 void flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map(void **)
 {
     write_lattice("x.vtu", 0, [](auto &at) { return at[1]; });
