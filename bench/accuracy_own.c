@@ -1,5 +1,5 @@
-/* The rows of libinsitu at each of its settings. A frame is timed from the trees to the finished pixels, including
- * compositing on one rank. */
+/* Measures libinsitu at each of its settings. The time of a frame is that from the trees to the finished pixels,
+ * including compositing on one rank. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,14 +11,14 @@
 
 enum { MAX_RUNS = 64, FEW_RUNS = 3 };
 
-/* The pictures of one subject. */
+/* Buffers for the pictures of one subject. */
 typedef struct studio {
     const accuracy_context *context;
     accuracy_scene scene;
     fragment_list fragments;
     float *image;   /* size × size × 4 */
-    float *chosen;  /* count × 4: the chosen pixels of the last frame */
-    double *depths; /* count */
+    float *chosen;  /* count × 4: chosen pixels of the last frame */
+    double *depths; /* count: depths of these pixels */
     int count;
 } studio;
 
@@ -74,7 +74,7 @@ static void close_studio(studio *s)
     free(s->depths);
 }
 
-/* Merges each pixel's fragments, which one rank makes in one run. */
+/* Merges the fragments of each pixel. Those of a pixel are contiguous, as one rank makes them all. */
 static void finish(studio *s)
 {
     const float nothing[4] = {0, 0, 0, 0};
@@ -87,7 +87,7 @@ static void finish(studio *s)
     }
 }
 
-/* Draws a frame; returns its seconds. */
+/* Draws a frame and returns its time in seconds. */
 static double draw(studio *s)
 {
     base_error error;
@@ -110,7 +110,7 @@ static bool needs_another_run(const accuracy_effort *effort, int runs, double to
     return runs == 0 || total < effort->seconds || (runs < FEW_RUNS && total < 4 * effort->seconds);
 }
 
-/* Draws once, then again for the times, and compares the picture with the truth. */
+/* Draws a first frame, repeats it for the times, and compares the picture with the true values. */
 static void measure(studio *s, accuracy_row *row)
 {
     double frames[MAX_RUNS], total = 0;
@@ -133,7 +133,7 @@ void accuracy_surface_rows(const accuracy_context *context)
     close_studio(&s);
 }
 
-/* Names a number of cells as a fraction. */
+/* Writes a number of cells, as a fraction if it is below 1. */
 static void name_cells(char *name, size_t bytes, double cells)
 {
     if (cells >= 1)
@@ -164,7 +164,7 @@ static void group_rows(studio *s)
     s->scene.job.sample_group = 64;
 }
 
-/* The rows of means over frames of different jitter, whose times add up. */
+/* Measures means over frames with different jitter. The time of a mean is the sum of its frames' times. */
 static void frame_rows(studio *s)
 {
     const size_t channels = 4 * (size_t)s->count;
@@ -207,7 +207,7 @@ static void max_error_rows(studio *s)
     s->scene.job.max_error = 0;
 }
 
-/* Groups change the time alone, alike for all kinds of cells, so they are measured on linear ones. */
+/* Sample groups change only the time, and equally for all kinds of cells, so they are measured only on linear cells. */
 static void sample_rows(studio *s)
 {
     step_rows(s, "samples", 4, 1.0 / 16);
@@ -222,7 +222,7 @@ void accuracy_volume_rows(const accuracy_context *context)
     accuracy_scene_volume(&s.scene, context->subject);
     if (!is_brief) sample_rows(&s);
     s.scene.job.integration = RENDER_SEGMENTS;
-    /* A linear cell is one segment, whatever the step. */
+    /* A linear cell is one segment for any step, so one step suffices. */
     step_rows(&s, "segments", is_linear || is_brief ? 1 : 4, is_linear || is_brief ? 1 : 1.0 / 8);
     max_error_rows(&s);
     close_studio(&s);

@@ -1,4 +1,4 @@
-/* The rows of the peers. One that crashes or never ends gets a row that says so. */
+/* Measures the peers. A peer that crashes or exceeds its time gets a row that states this. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@ typedef struct peer {
     const char *method, *setting;
     bench_vtk_mapper mapper;
     accuracy_opacity meaning;
-    int coarser; /* resample: how often the finest resolution is halved */
+    int coarser; /* resample: number of times that the finest resolution is halved */
 } peer;
 
 static const peer peers[] = {

@@ -1,4 +1,5 @@
-/* The lattices are those of bench_render; views, isovalues and ranges of the real grids come from their collection. */
+/* Makes the subjects. The lattices are those of bench_render. The views, isovalues and ranges of the real grids are
+ * taken from the collection in which these grids were published. */
 #include "accuracy_subject.h"
 
 #include <stdio.h>
@@ -137,7 +138,7 @@ static double tet_volume(const double *a, const double *b, const double *c, cons
            6;
 }
 
-/* The volume of a polyhedron, from the tets that join the triangles of its faces to its centre. */
+/* Returns the volume of a polyhedron as the sum of the tets between the triangles of its faces and its centre. */
 static double polyhedron_volume(const test_mesh *m, int64_t cell)
 {
     double centre[3] = {0, 0, 0}, sum = 0;
@@ -156,7 +157,7 @@ static double polyhedron_volume(const test_mesh *m, int64_t cell)
     return sum;
 }
 
-/* The volume of a cell, with warped faces as two triangles. */
+/* Returns the volume of a cell. Warped faces are divided into two triangles. */
 static double cell_volume(const test_mesh *m, int64_t cell)
 {
     static const signed char tet[][4] = {{0, 1, 2, 3}}, pyramid[][4] = {{0, 1, 2, 4}, {0, 2, 3, 4}},
@@ -185,7 +186,7 @@ static double mean_cell_size(const test_mesh *m)
     return sum / (double)m->cell_count;
 }
 
-/* The full angle in which the corners of the bounds are seen. */
+/* Returns the smallest full angle of view that contains all corners of the bounds. */
 static double fitting_degrees(const render_camera *camera, const double low[3], const double high[3])
 {
     double steepest = 0;

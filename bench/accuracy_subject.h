@@ -1,4 +1,5 @@
-/* The subject of bench_accuracy: a mesh with its field, and the picture of it that every method draws. */
+/* The subject of bench_accuracy: a mesh with a field, and the parameters of the picture that every method draws of
+ * it. */
 #ifndef ACCURACY_SUBJECT_H
 #define ACCURACY_SUBJECT_H
 
@@ -11,30 +12,32 @@ typedef struct accuracy_view {
     double eye[3], focal[3], up[3];
 } accuracy_view;
 
-/* Opacity and colour have the same knots, evenly spaced: VTK's integrators cut cells at the knots of both, and a long
- * colour table, which costs libinsitu nothing, would slow them down. */
+/* A subject. Its opacity and colour have the same evenly spaced knots: VTK's integrators divide cells at the knots of
+ * both, and a long colour table, which does not slow libinsitu, would slow VTK down. */
 typedef struct accuracy_subject {
     char name[64];
     test_mesh mesh;
-    test_view view; /* the mesh as a simulation would hold it: float32 coordinates and values, int32 indices */
+    test_view view; /* the mesh as simulations store it: float32 coordinates and values, int32 indices */
     mmbvh tree;
     accuracy_view look;
-    double degrees; /* the full angle of the square picture, in which the bounds just fit */
+    double degrees; /* full angle of view of the square picture, which the bounds just fill */
     double isovalue;
     double knots[ACCURACY_KNOTS];
     float opacities[ACCURACY_KNOTS], colours[3 * ACCURACY_KNOTS];
     double unit_distance;
-    double cell_size; /* unit of step_cells in a scene: the mean over all cells of the cube root of the volume */
+    double cell_size; /* the unit of step_cells in scenes: mean cube root of all cells' volumes */
     render_camera camera;
     render_space space;
 } accuracy_subject;
 
-/* name: a kind of lattice with its number of cubes a side ("tets:31"), or a file of INSITU_TEST_DATA without its ending
- * ("bluntfin_hex"). size: pixels a side. False where there is no such subject. */
+/* Makes the subject that `name` selects: a kind of lattice with its number of cubes along a side ("tets:31"), or a file
+ * of INSITU_TEST_DATA without its extension ("bluntfin_hex"). `size` is the picture's width and height in pixels.
+ * Returns false if there is no such subject. */
 bool accuracy_subject_create(const char *name, int size, accuracy_subject *out);
 void accuracy_subject_free(accuracy_subject *subject);
 
-/* A job of the subject, whose tree has been built, with all that it points to. It must not be moved. */
+/* A render job of the subject, whose tree must have been built, with all that the job points to. It must not be
+ * moved. */
 typedef struct accuracy_scene {
     render_job job;
     render_part part;
@@ -44,14 +47,15 @@ typedef struct accuracy_scene {
     render_volume_layer volume;
 } accuracy_scene;
 
-/* Sets the scene to the opaque isosurface, by robust roots, or to the volume, by samples a cell apart. */
+/* Sets the scene to the opaque isosurface, with robust roots, or to the volume, with samples at a distance of one
+ * cell. */
 void accuracy_scene_surface(accuracy_scene *scene, const accuracy_subject *subject);
 void accuracy_scene_volume(accuracy_scene *scene, const accuracy_subject *subject);
 
-/* The cube root of the volume of a cell's box. */
+/* Returns the cube root of the volume of a cell's bounding box. */
 double accuracy_box_size(const grid *cells, int64_t cell);
 
-/* Tells whether every cell is linear along a ray, or piecewise linear with pieces that the kernels know. */
+/* Returns whether every cell is linear along a ray, or piecewise linear with pieces that the kernels distinguish. */
 bool accuracy_is_linear(const accuracy_subject *subject);
 
 #endif

@@ -1,6 +1,6 @@
-/* The adaptive integral takes only opacities. Extinctions that are linear between the knots are given as a dense table
- * of opacities: between points 1/256 of a knot's interval apart, 1 - exp(-e) is off its chord by at most (ln 2 / 256)^2
- * / 8 = 9.2e-7 of opacity. */
+/* Computes the true values. The adaptive integral takes only opacities. Extinctions that are linear between the knots
+ * are given as a dense table of opacities: between points at a distance of 1/256 of a knot's interval, 1 - exp(-e)
+ * differs from its chord by at most (ln 2 / 256)^2 / 8 = 9.2e-7 of opacity. */
 #include "accuracy_truth.h"
 
 #include <stdlib.h>
@@ -9,18 +9,19 @@
 
 enum { DENSE = 256, DENSE_POINTS = (ACCURACY_KNOTS - 1) * DENSE + 1 };
 
-/* Error allowed to a cell's stretch: that of a hundred cells is less than float32's rounding of a channel. */
+/* Error allowed to the interval of a ray in one cell: the sum of a hundred intervals is less than float32's rounding of
+ * a channel. */
 static const double tolerance = 1e-10;
 
 struct accuracy_truth {
     const accuracy_subject *subject;
     bench_pixels *pixels;
     int count;
-    double *rgba[2]; /* for each accuracy_opacity: count × 4 */
+    double *rgba[2]; /* one array for each accuracy_opacity: count × 4 */
     accuracy_scene surface;
     render_part kept;
     reference_scene *reference;
-    reference_ray *rays; /* count */
+    reference_ray *rays; /* count elements */
 };
 
 static void *must(void *p)
@@ -127,8 +128,9 @@ accuracy_error accuracy_volume_error(const accuracy_truth *t, accuracy_opacity m
     return e;
 }
 
-/* In a polyhedron a quad's patch and the tets behind it may be on different sides of the isovalue; where the surface
- * lies between them is a matter of definition. In other cells, settings are compared on ambiguous rays too. */
+/* Returns whether the true hit is undefined. In a polyhedron, a quad's bilinear patch and the adjacent tets may be on
+ * different sides of the isovalue; whether the surface lies between them is a matter of definition. In other cells,
+ * hits are compared on ambiguous rays too. */
 static bool is_undefined(const accuracy_truth *t, const reference_ray *ray)
 {
     return ray->ambiguous && t->subject->mesh.face_count > 0;

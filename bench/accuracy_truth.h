@@ -1,36 +1,41 @@
-/* The true values of a subject's chosen pixels, in double: isosurface hits by the brute-force renderer, volumes by
- * adaptive integration through every cell; and the error of a picture against them. */
+/* Computes the true values of a subject's chosen pixels in double, and the error of a picture against them. The
+ * brute-force renderer finds the hits of isosurfaces; volumes are integrated adaptively through every cell. */
 #ifndef ACCURACY_TRUTH_H
 #define ACCURACY_TRUTH_H
 
 #include "accuracy_subject.h"
 #include "bench_error.h"
 
-/* The meaning of opacity a per unit distance. */
+/* Interpretations of an opacity a per unit distance. */
 typedef enum accuracy_opacity {
-    ACCURACY_OPACITY,   /* extinction -ln(1 - a), a linear between the knots: libinsitu, VTK's image mappers */
-    ACCURACY_EXTINCTION /* extinction linear between the knots: VTK's mappers of unstructured grids */
+    ACCURACY_OPACITY,   /* extinction -ln(1 - a), where a is linear between the knots: libinsitu, VTK's image mappers */
+    ACCURACY_EXTINCTION /* extinction that is linear between the knots: VTK's mappers of unstructured grids */
 } accuracy_opacity;
 
 typedef struct accuracy_truth accuracy_truth;
 
-/* One pixel is chosen in each block × block. The subject is borrowed; its tree has been built. */
+/* Chooses one pixel in each block of block × block pixels. The subject is borrowed, and its tree must have been
+ * built. */
 accuracy_truth *accuracy_truth_create(const accuracy_subject *subject, int block);
 void accuracy_truth_free(accuracy_truth *truth);
 
 const bench_pixels *accuracy_truth_pixels(const accuracy_truth *truth);
 
 typedef struct accuracy_error {
-    int pixels;      /* chosen pixels whose truth shows something, without polyhedra's rays that even the reference
-                        cannot decide (reference_ray's ambiguous) */
-    double rms, max; /* for volumes of linear premultiplied red, green, blue and opacity; for surfaces of depth, in
-                        sizes of the truth's cell, where both hit the same sheet */
-    int wrong;       /* surface: pixels where only one of the two hits, or where depths differ by more than a cell */
-    double residual; /* surface: the largest |field at the hit - isovalue| over the range of the cell's values; NaN for
-                        meshes with polyhedra */
+    /* Number of chosen pixels whose true value is not empty, except rays through polyhedra that even the reference
+     * cannot decide (`ambiguous` of reference_ray). */
+    int pixels;
+    /* Volumes: error of linear premultiplied red, green, blue and opacity. Surfaces: error of depth, relative to the
+     * size of the true hit's cell, if both hit the same sheet. */
+    double rms, max;
+    /* Surfaces: pixels in which only one of the two hits, or whose depths differ by more than a cell. */
+    int wrong;
+    /* Surfaces: largest |field at the hit - isovalue|, divided by the range of the cell's values; NaN for meshes with
+     * polyhedra. */
+    double residual;
 } accuracy_error;
 
-/* rgba: count × 4 */
+/* These compute the error of a picture from its values in the chosen pixels; rgba: count × 4. */
 accuracy_error accuracy_volume_error(const accuracy_truth *truth, accuracy_opacity meaning, const float *rgba);
 accuracy_error accuracy_surface_error(const accuracy_truth *truth, const double *depths);
 

@@ -1,5 +1,5 @@
-/* Measures speed against error: isosurfaces and volumes at every setting that trades one for the other, and VTK's
- * volume mappers on the same meshes, cameras and transfer functions. Prints CSV, a row for each setting. */
+/* Measures time against error of isosurfaces and volumes at every setting that trades one for the other, and of VTK's
+ * volume mappers on the same meshes, cameras and transfer functions. Prints CSV, with one row for each setting. */
 #include <stdio.h>
 
 #include <getopt.h>
@@ -18,7 +18,7 @@ void accuracy_print_head(void)
            "pixels,rms,max,wrong,residual\n");
 }
 
-/* Times in milliseconds. */
+/* Prints a row. Times are in milliseconds. */
 void accuracy_print(const accuracy_context *context, accuracy_row *row)
 {
     const accuracy_error *e = &row->error;
@@ -90,7 +90,7 @@ int main(int argc, char **argv)
         else if (found == NO_PEERS)
             with_peers = false;
         else
-            return usage(2); /* getopt_long() has said why */
+            return usage(2); /* getopt_long() has printed the reason */
     }
     if (optind == argc) return usage(2);
     if (with_head) accuracy_print_head();

@@ -5,7 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* In the child: draws and writes the result. */
+/* Draws in the child process and writes the result to the pipe `to`. */
 static void draw_and_send(const bench_vtk_request *request, float *rgba, size_t bytes, int seconds, int to)
 {
     bench_vtk_result result = {0};

@@ -1,5 +1,5 @@
-/* Measures uniform grids that are handed over as one lattice, as hexes, or as blocks of BLOCK^3 cells: the first step,
- * steps with new values and bytes per cell, in turns in one process. Prints CSV. */
+/* Measures uniform grids given as one lattice, as hexes, or as blocks of BLOCK^3 cells: the time of the first step and
+ * of steps with new values, and the bytes per cell. The forms are measured in turns in one process. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -16,14 +16,15 @@ typedef enum bench_form { AS_LATTICE, AS_HEXES, AS_BLOCKS, FORM_COUNT } bench_fo
 
 static const char *const form_names[FORM_COUNT] = {"lattice", "hexes", "blocks"};
 
-/* The grid in one form, with two states of its values. Forms are made when they are needed, and freed after it. */
+/* The grid in one form, with two states of its values. Each form is created when it is measured, and freed
+ * afterwards. */
 typedef struct bench_grid {
     const bench_scene *scene;
     bench_form form;
-    int cells; /* along each axis, of a block */
+    int cells; /* number of cells of a block along each axis */
     int64_t block_count, block_vertices, block_cells;
     float *values[PHASES]; /* blocks × vertices of a block */
-    float *coordinates[3]; /* of hexes */
+    float *coordinates[3]; /* coordinates of hexes */
     int32_t *connectivity;
 } bench_grid;
 
@@ -198,7 +199,7 @@ static void print(const bench_grid *g, const insitu_report *report, bench_times 
 
 static void measure(const bench_command *command, test_mesh_kind kind, int n)
 {
-    bench_scene scene; /* for its camera alone */
+    bench_scene scene; /* only its camera is used */
     (void)kind;
     bench_scene_create(&scene, "bench_blocks", TEST_HEXES, 1);
     bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);

@@ -1,5 +1,5 @@
-/* Measures how a frame's cost depends on the cells: their type, the layout of their arrays, and their size beside a
- * pixel. Only the renderer is timed; frames that are compared are drawn in turns. Prints CSV. */
+/* Measures how the time of a frame depends on the cells: on their type, on the layout of their arrays, and on the ratio
+ * of their size to a pixel. Only rendering is timed; frames that are compared are drawn in turns. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,26 +15,24 @@ static const float everything_opacities[2] = {0.05f, 0.3f};
 typedef struct picture {
     const char *name;
     bool is_surface, shows_everything;
-    bool from_afar;   /* is drawn by a rank of a thousand too */
-    double max_error; /* 0: samples */
-    double step;      /* of the bench's step, half a cube's side */
-    double unit;      /* of the opacity; 0: the bench's */
+    bool from_afar;   /* also drawn as by one of a thousand ranks */
+    double max_error; /* 0: integrates samples */
+    double step;      /* as a multiple of the benchmark's step, half of a cube's side */
+    double unit;      /* unit distance of the opacity; 0: the benchmark's */
 } picture;
 
-/* Dense: a ray has lost its light after a tenth of its way through the cube, at 25 to 180 optical depths a unit. */
+/* Unit distance of the dense volume: a ray has lost its light after a tenth of its path through the cube, at 25 to 180
+ * optical depths per unit of length. */
 static const double dense_unit = 0.002;
 
-static const picture pictures[PICTURES] = {{"isosurface", .is_surface = true, .from_afar = true},
-                                           {"volume", .from_afar = true, .step = 1},
-                                           {"volume everywhere", .shows_everything = true, .from_afar = true, .step = 1},
-                                           {"volume quarter step", .step = 0.5},
-                                           {"volume max_error 1e-2", .from_afar = true, .max_error = 1e-2, .step = 1},
-                                           {"volume dense", .shows_everything = true, .step = 1, .unit = dense_unit},
-                                           {"volume dense max_error 1e-2",
-                                            .shows_everything = true,
-                                            .max_error = 1e-2,
-                                            .step = 1,
-                                            .unit = dense_unit}};
+static const picture pictures[PICTURES] = {
+    {"isosurface", .is_surface = true, .from_afar = true},
+    {"volume", .from_afar = true, .step = 1},
+    {"volume everywhere", .shows_everything = true, .from_afar = true, .step = 1},
+    {"volume quarter step", .step = 0.5},
+    {"volume max_error 1e-2", .from_afar = true, .max_error = 1e-2, .step = 1},
+    {"volume dense", .shows_everything = true, .step = 1, .unit = dense_unit},
+    {"volume dense max_error 1e-2", .shows_everything = true, .max_error = 1e-2, .step = 1, .unit = dense_unit}};
 
 static const struct {
     const char *name;
@@ -65,7 +63,7 @@ static void show(bench_scene *s, const picture *p)
     s->transfer.opacities = everything_opacities;
 }
 
-/* Sets the transfer function back to what show() found. */
+/* Resets the transfer function to that of bench_scene_create(). */
 static void show_band(bench_scene *s)
 {
     s->transfer.unit_distance = bench_unit_distance;
@@ -82,10 +80,11 @@ static void time_frame(bench_scene *s, int number, bench_series *series)
     bench_end(began, number, series);
 }
 
-/* Samples between which all light is lost are far from the integral: they are compared with the same ones in double. */
+/* Prints the error of the dense volume. If all light is lost between two samples, their sum is far from the integral,
+ * so samples are compared with the same samples in double. */
 static void print_dense_error(bench_scene *s, const picture *p)
 {
-    free(s->integrals); /* those of the usual function */
+    free(s->integrals); /* integrals of the usual transfer function */
     s->integrals = NULL;
     if (p->max_error > 0)
         bench_scene_integral_error(s, p->name);
@@ -154,7 +153,7 @@ static void measure_layouts(bench_scene *first, const bench_command *command)
     for (int l = 0; l < LAYOUTS; l++) bench_scene_free(&scenes[l]);
 }
 
-/* Counts the cells whose values reach a range, which a picture shows. */
+/* Counts the cells whose values overlap a range, which a picture shows. */
 static double count_shown(const bench_scene *s, double low, double high)
 {
     const grid *g = &s->view.cells;
@@ -173,7 +172,7 @@ static double count_shown(const bench_scene *s, double low, double high)
     return (double)count;
 }
 
-/* Times a step's values to picture: the tree's ranges are found again before the frame. */
+/* Measures the time from a step's values to the picture, which includes refitting the tree's ranges. */
 static void time_new_values(bench_scene *s, int number, bench_series *series)
 {
     const double began = bench_begin();
@@ -192,7 +191,7 @@ static void print_cost(const bench_scene *s, const char *measure, bench_series *
     bench_print(&s->subject, name, "ns/shown cell", bench_stats_of(costs, series->count));
 }
 
-/* Measures the share of one rank among a thousand: all of the mesh within a width of AWAY_PIXELS pixels. */
+/* Measures the work of one of a thousand ranks: the whole mesh is so far away that it is AWAY_PIXELS pixels wide. */
 static void measure_thousand(bench_scene *s, const bench_command *command)
 {
     const double half = tan(bench_degrees * acos(-1) / 360), wide = sqrt(3);
@@ -208,8 +207,12 @@ static void measure_thousand(bench_scene *s, const bench_command *command)
         const picture *p = &pictures[i];
         if (!p->from_afar) continue;
         const bool is_surface = p->is_surface;
-        const double low = is_surface ? bench_isovalues[0] : p->shows_everything ? -9 : bench_knots[0],
-                     high = is_surface ? bench_isovalues[0] : p->shows_everything ? 9 : bench_knots[2];
+        const double low = is_surface            ? bench_isovalues[0]
+                           : p->shows_everything ? -9
+                                                 : bench_knots[0],
+                     high = is_surface            ? bench_isovalues[0]
+                            : p->shows_everything ? 9
+                                                  : bench_knots[2];
         const double shown = count_shown(s, low, high);
         bench_series series = {0}, new_values = {0};
         char name[96];

@@ -24,7 +24,7 @@ static bool usage(const char *program, const char *about, bench_command *command
     return false;
 }
 
-/* "tets:31" */
+/* Parses a mesh such as "tets:31", a kind of cells and a number of cubes along a side. */
 static bool add_mesh(const char *text, test_mesh_kind last, bench_command *command)
 {
     const char *colon = strchr(text, ':');
@@ -72,7 +72,7 @@ bool bench_command_parse(int argc, char **argv, const char *about, test_mesh_kin
         else if (found == DEPTHS)
             command->depths = optarg;
         else
-            is_good = false; /* getopt_long() has said why */
+            is_good = false; /* getopt_long() has printed the reason */
     }
     for (; is_good && optind < argc; optind++) {
         is_good = add_mesh(argv[optind], last, command);

@@ -1,5 +1,5 @@
-/* The command line that the benchmarks have in common: [--runs N] [--shrink N] [--no-head] [--depths FOLDER] MESH:N ...
- */
+/* Parses the command line that the benchmarks share: [--runs N] [--shrink N] [--no-head] [--depths FOLDER] MESH:N
+ * ... */
 #ifndef BENCH_COMMAND_H
 #define BENCH_COMMAND_H
 
@@ -10,24 +10,25 @@
 enum { BENCH_MAX_MESHES = 16 };
 
 typedef struct bench_command {
-    int runs;           /* of each measure; 5 by default */
-    int shrink;         /* pictures have 1/shrink of the pixels a side; 1 by default */
-    const char *depths; /* where pictures of depths are to be written; NULL: nowhere */
+    int runs;           /* number of runs of each measure; 5 by default */
+    int shrink;         /* divides the width and height of pictures; 1 by default */
+    const char *depths; /* folder for pictures of depths; NULL: none are written */
     int mesh_count;
     struct {
         test_mesh_kind kind;
         int n;
     } meshes[BENCH_MAX_MESHES];
-    int status; /* for main() to return where there is nothing to do */
+    int status; /* status for main() to return if nothing is to be measured */
 } bench_command;
 
-/* Reads the command line, and prints the CSV's head unless it says not to. about is what the program does, for --help;
- * last is the last kind of mesh that it knows. False with a status where help is asked for or the line is wrong. */
+/* Parses the command line, and prints the head of the CSV unless --no-head is given. `about` describes the program for
+ * --help; `last` is the last kind of mesh that the program supports. Returns false and sets the status if help is
+ * requested or the command line is invalid. */
 bool bench_command_parse(int argc, char **argv, const char *about, test_mesh_kind last, bench_command *command);
 
 typedef void bench_measure(const bench_command *command, test_mesh_kind kind, int n);
 
-/* Reads the command line as above, and measures each of its meshes. Returns the status for main() to return. */
+/* Parses the command line, and measures each of its meshes. Returns the status for main() to return. */
 int bench_measure_meshes(int argc, char **argv, const char *about, test_mesh_kind last, bench_measure *measure);
 
 #endif

@@ -1,9 +1,10 @@
-/* Measures compositing alone: the time of the slowest rank, bytes, messages and peak memory of each schedule, and of
+/* Measures only compositing: the time of the slowest rank, bytes, messages and peak memory of each schedule, and of
  * IceT's strategies on the same pictures, in turns. An MPI program; prints CSV.
  *
  *     mpirun -n 8 bench_composite [--runs N] [--size N] [--width W] [--height H] [--random]
  *
- * The mesh is that of the other benchmarks, cut into blocks of the cube, one a rank, or dealt out at random. */
+ * The mesh is that of the other benchmarks. It is divided into blocks of the cube, one per rank, or its cells are
+ * distributed at random. */
 #include <math.h>
 #include <mpi.h>
 #include <omp.h>
@@ -25,7 +26,7 @@ typedef struct options {
 static int own_rank, rank_count;
 static const float background[4] = {0, 0, 0, 0};
 
-/* Chooses the numbers of blocks along the axes, as equal as the number of ranks allows. */
+/* Computes the numbers of blocks along the axes, as equal as the number of ranks allows. */
 static void count_blocks(int blocks[3])
 {
     int left = rank_count;
@@ -134,11 +135,11 @@ static void make_picture(const fragment_list *list, bool is_surface, int width, 
 
 /* ---- measuring ----------------------------------------------------------------------------------------------- */
 
-/* The measures of one way of compositing. */
+/* The measurements of one compositing method. */
 typedef struct measure {
     char name[32];
-    bench_series series, cpu;     /* the slowest rank's time; the CPU time of all ranks, waiting included */
-    double bytes, messages, peak; /* bytes and messages of all ranks, peak of the largest */
+    bench_series series, cpu;     /* time of the slowest rank; CPU time of all ranks, including waiting */
+    double bytes, messages, peak; /* sums over all ranks of bytes and messages; the largest peak */
     bool can;
 } measure;
 
@@ -193,7 +194,8 @@ static void run_own(bench *b, comp_schedule schedule, int number, measure *m)
     base_error error = {0};
     if (have->count) memcpy(list.items, have->items, bytes);
     b->group.schedule = schedule;
-    /* All ranks are on one node, and the automatic choice knows that; fixed schedules take four ranks for a node. */
+    /* All ranks are on one node, which the automatic choice detects. Fixed schedules assume nodes of four ranks if the
+     * number of ranks is a multiple of four. */
     b->group.nodes = (comp_nodes){schedule != COMP_AUTOMATIC && rank_count % 4 == 0 ? 4 : 1, false};
     base_memory_reset_peak();
     const int64_t held = base_memory_held();

@@ -1,6 +1,6 @@
-/* VTK is set for speed: it merges no points and makes no normals and scalars, so its default flat shading takes the
- * triangles' own normals. The grid borrows the caller's arrays, the window and its context stay, and a new surface
- * replaces the last. */
+/* Configures VTK for speed: it merges no points and computes no normals and scalars, so its default flat shading uses
+ * the triangles' own normals. The grid borrows the caller's arrays, the window and its context are kept, and a new
+ * surface replaces the last one. */
 #include "bench_contour.h"
 
 #include <cmath>
@@ -34,7 +34,7 @@ struct bench_contour {
     vtkNew<vtkFloatArray> xyz, values;
     vtkNew<vtkUnstructuredGrid> grid;
     vtkNew<vtkContour3DLinearGrid> filter;
-    vtkNew<vtkPolyData> surface; /* the filter's last result */
+    vtkNew<vtkPolyData> surface; /* last result of the filter */
     vtkNew<vtkPolyDataMapper> mapper;
     vtkNew<vtkActor> actor;
     vtkNew<vtkRenderer> renderer;
@@ -108,7 +108,7 @@ void bench_contour_destroy(bench_contour *contour)
 
 bool bench_contour_can_draw(bench_contour *c)
 {
-    /* VTK aborts the process where there is no X server. */
+    /* VTK aborts the process if there is no X server. */
     if (!std::getenv("DISPLAY") || !c->window->SupportsOpenGL()) return false;
     c->window->Render();
     return true;

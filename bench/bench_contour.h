@@ -1,5 +1,5 @@
-/* VTK's way to an isosurface as a peer: vtkContour3DLinearGrid in parallel, then OpenGL, on Mesa where there is no GPU.
- */
+/* Isosurfaces of VTK as a peer: extraction by vtkContour3DLinearGrid in parallel, then rendering by OpenGL, with Mesa
+   if there is no GPU. */
 #ifndef BENCH_CONTOUR_H
 #define BENCH_CONTOUR_H
 
@@ -10,27 +10,27 @@
 extern "C" {
 #endif
 
-/* Borrowed, in the form that VTK takes without a copy. */
+/* The mesh, borrowed, in the layout that VTK reads without a copy. */
 typedef struct bench_contour_mesh {
     int64_t vertex_count, cell_count;
-    int cell_type;               /* all cells': VTK's id of a tet or a hex */
+    int cell_type;               /* type of all cells: VTK's id of a tet or a hex */
     const float *xyz;            /* vertex_count × 3 */
     const float *values;         /* vertex_count */
-    const int32_t *connectivity; /* cell_count × the type's number of vertices */
+    const int32_t *connectivity; /* cell_count × vertices per cell */
 } bench_contour_mesh;
 
 typedef struct bench_contour_view {
-    double eye[3], focal[3], up[3], degrees; /* perspective, degrees vertical */
+    double eye[3], focal[3], up[3], degrees; /* perspective; degrees is the vertical angle of view */
     int width, height;
 } bench_contour_view;
 
-/* Three vertices a triangle, not shared. */
+/* Triangles, each with three vertices of its own. */
 typedef struct bench_triangles {
     int64_t count;
-    const float *xyz; /* count × 9, and 4 readable bytes behind them; valid until the next extraction */
+    const float *xyz; /* count × 9, followed by 4 readable bytes; valid until the next extraction */
 } bench_triangles;
 
-/* Tells whether VTK is in this program; otherwise nothing else here may be called. */
+/* Returns whether this program was built with VTK; if not, no other function here may be called. */
 bool bench_contour_is_available(void);
 
 typedef struct bench_contour bench_contour;
@@ -38,7 +38,7 @@ typedef struct bench_contour bench_contour;
 bench_contour *bench_contour_create(const bench_contour_mesh *mesh, const bench_contour_view *view, int threads);
 void bench_contour_destroy(bench_contour *contour);
 
-/* Tells whether there is an X server's window to draw in. The context is made here, untimed. */
+/* Returns whether an X server provides a window to draw in. Creates the OpenGL context, which is not timed. */
 bool bench_contour_can_draw(bench_contour *contour);
 
 /* Sets new coordinates and values of the mesh. */
@@ -46,11 +46,12 @@ void bench_contour_set(bench_contour *contour, const float *xyz, const float *va
 
 bench_triangles bench_contour_extract(bench_contour *contour, const double *isovalues, int count);
 
-/* Draws the last extraction, and waits for the end of OpenGL's work; the first time includes what VTK prepares. Nothing
- * is read back. */
+/* Draws the last extraction and waits until OpenGL has finished. The first call includes VTK's preparations. Nothing is
+ * read back. */
 void bench_contour_draw(bench_contour *contour);
 
-/* Depth along the camera's axis in the last picture, row-major, top row first; infinity where nothing is. */
+/* Reads the depths of the last picture along the camera's axis, row-major with the top row first; infinity in empty
+ * pixels. */
 void bench_contour_read(bench_contour *contour, float *depths);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/* Replaces bench_contour.cpp where there is no VTK. */
+/* Replaces bench_contour.cpp in builds without VTK. */
 #include "bench_contour.h"
 
 #include <stdlib.h>

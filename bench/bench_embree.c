@@ -1,5 +1,5 @@
-/* Embree is used as its documentation says it is fastest: static scenes of one geometry, coherent packets of 16 rays,
- * the builder's nodes from its thread-local allocators. It gets as many threads as libinsitu. */
+/* Uses Embree in the way that its documentation recommends as fastest: static scenes of one geometry, coherent packets
+ * of 16 rays, and nodes from the builder's thread-local allocators. Embree gets as many threads as libinsitu. */
 #include "bench_embree.h"
 
 #include <math.h>
@@ -16,9 +16,9 @@ struct bench_embree {
     RTCDevice device;
     RTCScene scene;
     int threads;
-    uint32_t *iota; /* indices of triangles that share no vertex: 0, 1, 2, ... */
+    uint32_t *iota; /* indices of triangles that share no vertices: 0, 1, 2, ... */
     int64_t iota_count;
-    struct RTCBuildPrimitive *boxes, *sorted; /* cell_count each: as made, and a copy for the builder to work in */
+    struct RTCBuildPrimitive *boxes, *sorted; /* cell_count each: the cells' boxes, and a copy that the builder sorts */
     int64_t cell_count;
     RTCBVH bvh;
     void *root;
@@ -26,7 +26,7 @@ struct bench_embree {
 
 enum { WIDE = 8, PACKET = 4 };
 
-/* A node with child_count 0 is a leaf of cell_count cells, whose box is with its parent. */
+/* A node. If child_count is 0, the node is a leaf of cell_count cells, and its parent stores its box. */
 typedef struct tree_node {
     uint32_t child_count, cell_count;
 } tree_node;
@@ -115,8 +115,8 @@ void bench_embree_build(bench_embree *e, const float *xyz, int64_t triangle_coun
     rtcCommitScene(e->scene);
 }
 
-/* The camera's rays in float32: direction(x, y) = first + x right + y down, of length 1 along the camera's axis, so
- * that t is the depth. */
+/* The camera's rays in float32. The direction of a pixel is first + x right + y down; its length along the camera's
+ * axis is 1, so that t is the depth. */
 typedef struct pinhole {
     float eye[3], first[3], right[3], down[3];
     int width, height;
@@ -138,7 +138,8 @@ static pinhole pinhole_of(const render_camera *c)
     return p;
 }
 
-/* There is a clone for each instruction set, so that making rays costs little beside tracing them. */
+/* Makes the rays of 4 × 4 pixels. It is compiled for each instruction set, so that it takes little time compared with
+ * tracing the rays. */
 __attribute__((target_clones("avx512f", "avx2", "default"))) static void
 make_packet(const pinhole *p, int x0, int y0, struct RTCRayHit16 *packet, int *valid)
 {
@@ -228,7 +229,7 @@ void bench_embree_occlude(bench_embree *e, const bench_embree_ray *rays, int64_t
         occlude_packet(e, rays + first, (int)(count - first < 16 ? count - first : 16), blocked + first);
 }
 
-/* ---- the builder over cells ---- */
+/* ---- the builder for cells ---- */
 
 static struct RTCBuildPrimitive box_of(const grid *cells, int64_t cell)
 {
@@ -351,7 +352,8 @@ static struct RTCBounds united(const struct RTCBounds *a, const struct RTCBounds
                               .upper_z = fmaxf(a->upper_z, b->upper_z)};
 }
 
-/* The tests below a node of this half area, two boxes or the cells, each times its node's half area. */
+/* Returns the number of tests below a node, each weighted by the half area of its node. `area` is the half area of this
+ * node. An inner node tests two boxes, and a leaf tests its cells. */
 static double cost_below(const tree_node *node, double area)
 {
     if (!node->child_count) return area * node->cell_count;

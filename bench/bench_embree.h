@@ -1,10 +1,10 @@
-/* Embree as a peer: it traces rays in a triangle mesh, and builds trees over the boxes of cells. */
+/* Embree as a peer, which traces rays in a triangle mesh and builds trees over the bounding boxes of cells. */
 #ifndef BENCH_EMBREE_H
 #define BENCH_EMBREE_H
 
 #include "render.h"
 
-/* Tells whether Embree is in this program; otherwise nothing else here may be called. */
+/* Returns whether this program was built with Embree; if not, no other function here may be called. */
 bool bench_embree_is_available(void);
 
 typedef struct bench_embree bench_embree;
@@ -12,37 +12,37 @@ typedef struct bench_embree bench_embree;
 bench_embree *bench_embree_create(int threads);
 void bench_embree_destroy(bench_embree *embree);
 
-/* Builds the acceleration structure of triangles that share no vertices (xyz: triangle_count × 9, borrowed, with 4
- * readable bytes behind them); it replaces the last one. If is_fast, by Morton codes (RTC_BUILD_QUALITY_LOW), else by
- * binned SAH (MEDIUM). */
+/* Builds the acceleration structure of triangles that share no vertices, and replaces the last one. xyz: triangle_count
+ * × 9, borrowed, followed by 4 readable bytes. Uses Morton codes (RTC_BUILD_QUALITY_LOW) if is_fast, and binned SAH
+ * (MEDIUM) otherwise. */
 void bench_embree_build(bench_embree *embree, const float *xyz, int64_t triangle_count, bool is_fast);
 
-/* Traces a ray for each pixel, in packets of 16 = 4 × 4. depths gets the hit's depth along the camera's axis, or
- * infinity; normals the triangle's normal (pixels × 3, not of unit length, of either sign). */
+/* Traces a ray for each pixel, in packets of 16 = 4 × 4. `depths` gets the hit's depth along the camera's axis, or
+ * infinity; `normals` gets the triangle's normal (pixels × 3, of any length and either sign). */
 void bench_embree_trace(bench_embree *embree, const render_camera *camera, float *depths, float *normals);
 
-/* A ray of unit length's direction that ends after far. */
+/* A ray whose direction has length 1, and which ends at the distance `far`. */
 typedef struct bench_embree_ray {
     float origin[3], direction[3], far;
 } bench_embree_ray;
 
-/* Finds which of the rays meet a triangle, by packets of 16 in the order given. */
+/* Finds which rays hit a triangle. Traces packets of 16 rays in the given order. */
 void bench_embree_occlude(bench_embree *embree, const bench_embree_ray *rays, int64_t count, bool *blocked);
 
 typedef enum bench_embree_builder {
-    BENCH_EMBREE_LOW,        /* Morton codes, binary */
-    BENCH_EMBREE_MEDIUM,     /* binned SAH, binary, up to 7 cells a leaf: the tree that ours is compared with */
-    BENCH_EMBREE_MEDIUM_WIDE /* binned SAH, 8-wide, up to 8 cells a leaf: its fastest */
+    BENCH_EMBREE_LOW,    /* Morton codes, binary */
+    BENCH_EMBREE_MEDIUM, /* binned SAH, binary, up to 7 cells per leaf: the tree that libinsitu's is compared with */
+    BENCH_EMBREE_MEDIUM_WIDE /* binned SAH, 8-wide, up to 8 cells per leaf: Embree's fastest */
 } bench_embree_builder;
 
-/* Makes the boxes of all cells in Embree's form, once. */
+/* Stores the bounding boxes of all cells in Embree's format. */
 void bench_embree_set_cells(bench_embree *embree, const grid *cells);
 
-/* Runs rtcBuildBVH over a copy of the boxes, which it sorts in place, in the memory of the last such build. Returns the
- * seconds without the copy. */
+/* Runs rtcBuildBVH on a copy of the boxes, which it sorts in place. The memory of the last such build is reused.
+ * Returns the time in seconds without that of the copy. */
 double bench_embree_build_cells(bench_embree *embree, bench_embree_builder builder);
 
-/* SAH cost of the last tree, a binary one, counted as by mmbvh_cost(). */
+/* Returns the SAH cost of the last tree, which must be binary, by the definition of mmbvh_cost(). */
 double bench_embree_cost(const bench_embree *embree);
 
 #endif

@@ -1,4 +1,4 @@
-/* Replaces bench_embree.c where there is no Embree. */
+/* Replaces bench_embree.c in builds without Embree. */
 #include "bench_embree.h"
 
 #include <stdlib.h>

@@ -1,9 +1,9 @@
-/* The double reference on a few hundred pixels of a big mesh.
+/* Computes the reference in double for a few hundred pixels of a big mesh.
  *
  * Brute force over all cells is affordable because each cell is first projected. Every kind of cell lies within the
- * hull of its vertices, so the rectangle around its projected vertices holds its projection, and the cell is kept only
- * where that rectangle, a pixel wider all round, holds a chosen pixel. The reference then tries every chosen pixel's
- * ray against every cell that was kept for any of them. */
+ * convex hull of its vertices, so the rectangle around its projected vertices contains its projection. A cell is kept
+ * only if this rectangle, enlarged by one pixel on all sides, contains a chosen pixel. The reference then intersects
+ * the ray of every chosen pixel with every cell that was kept. */
 #include "bench_error.h"
 
 #include <stdlib.h>
@@ -22,7 +22,7 @@ struct bench_pixels {
     render_camera camera;
     int block, columns, rows;
     chosen_pixel *pixels; /* columns × rows */
-    grid kept;            /* the cells that matter, with the whole mesh's vertices; owns the three arrays below */
+    grid kept;            /* the cells near chosen pixels, with all vertices of the mesh; owns the three arrays below */
     int64_t *connectivity, *offsets;
     unsigned char *types;
 };
@@ -84,7 +84,7 @@ static bool is_wanted(const bench_pixels *all, const grid *cells, int64_t cell)
     return holds_chosen(all, low, high);
 }
 
-/* The cell's entries of connectivity: vertices, or a polyhedron's faces. */
+/* Returns the range of the cell's entries in connectivity: vertices, or faces of a polyhedron. */
 static void cell_entries(const grid *cells, int64_t cell, int64_t *first, int64_t *end)
 {
     const grid_walk walk = grid_walk_cell(cells, cell);
@@ -92,7 +92,7 @@ static void cell_entries(const grid *cells, int64_t cell, int64_t *first, int64_
     *end = walk.end;
 }
 
-/* Fills kept with the wanted cells in the mesh's order. */
+/* Fills `kept` with the wanted cells, in the order of the mesh. */
 static void keep_cells(bench_pixels *all, const grid *cells, const unsigned char *wanted)
 {
     int64_t count = 0, entries = 0, at = 0, first, end;
@@ -166,7 +166,7 @@ const grid *bench_pixels_cells(const bench_pixels *all)
     return &all->kept;
 }
 
-/* Traces the chosen pixels by the reference; the caller frees them. */
+/* Traces the chosen pixels by the reference. The caller frees the result. */
 static reference_ray *trace_chosen(const bench_pixels *all, const render_job *job)
 {
     const float nothing[4] = {0, 0, 0, 0};
@@ -182,7 +182,7 @@ static reference_ray *trace_chosen(const bench_pixels *all, const render_job *jo
     return rays;
 }
 
-/* The number of the chosen pixel that is this one, or -1. */
+/* Returns the index of this pixel among the chosen pixels, or -1. */
 static int chosen_index(const bench_pixels *all, uint32_t pixel)
 {
     const int x = (int)pixel % all->camera.width, y = (int)pixel / all->camera.width;
@@ -190,7 +190,8 @@ static int chosen_index(const bench_pixels *all, uint32_t pixel)
     return column < all->columns && row < all->rows && all->pixels[i].pixel == pixel ? i : -1;
 }
 
-/* The kernels return depths as the ray's parameter t. */
+/* Merges the fragments of the chosen pixels. The kernels' depths are the rays' parameters t, which are converted to
+ * depths along the camera's axis. */
 void bench_pixels_merge(const bench_pixels *all, const render_space *space, const fragment_list *fragments, float *rgba,
                         double *depths)
 {

@@ -1,5 +1,5 @@
-/* IceT's compositing (Debian's paraview-dev) of the same pictures: one RGBA image of floats a rank, with depths or in a
- * given order. */
+/* IceT's compositing (Debian's paraview-dev) of the same pictures, as a peer. Each rank has one RGBA image of floats,
+ * with depths or with a given order of the ranks. */
 #ifndef BENCH_ICET_H
 #define BENCH_ICET_H
 
@@ -10,23 +10,23 @@ enum { BENCH_ICET_STRATEGIES = 5 };
 
 typedef struct bench_icet bench_icet;
 
-/* One rank's picture: height × width × 4 premultiplied colours and, for surfaces, depths from 0 to 1, bottom row first.
- */
+/* The picture of one rank: height × width × 4 premultiplied colours and, for surfaces, depths from 0 to 1; the bottom
+   row is first. */
 typedef struct bench_icet_picture {
     int width, height;
-    const float *rgba, *depth; /* depth NULL: blended in order */
-    const int *order;          /* ranks from front to back */
-    int viewport[4];           /* x, y, width, height of the pixels that hold something */
+    const float *rgba, *depth; /* depth NULL: blended in `order` */
+    const int *order;          /* ranks, from front to back */
+    int viewport[4];           /* x, y, width, height of the rectangle of pixels that are not empty */
 } bench_icet_picture;
 
-/* NULL: this program was built without IceT. Collective, as all functions here. */
+/* Returns NULL if this program was built without IceT. All functions here are collective. */
 bench_icet *bench_icet_create(MPI_Comm comm);
 void bench_icet_free(bench_icet *icet);
 
 const char *bench_icet_strategy(int strategy);
 
-/* Composites to rank 0. Returns the bytes that this rank sent, or -1 where the strategy cannot do it. On rank 0 *rgba
- * is the picture, valid until the next call. */
+/* Composites to rank 0. Returns the number of bytes that this rank sent, or -1 if the strategy does not support the
+ * picture. On rank 0, *rgba becomes the picture, which is valid until the next call. */
 double bench_icet_composite(bench_icet *icet, int strategy, const bench_icet_picture *picture, const float **rgba);
 
 #endif

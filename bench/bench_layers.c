@@ -1,6 +1,6 @@
-/* Measures what slices, outer surfaces, clips, edges and antialiasing cost, or derived fields, contour lines, warps,
- * mirrors, planes and montages: whole steps with new values, and VTK's way to the same picture from the same values, in
- * turns in one process. Prints CSV. */
+/* Measures the cost of slices, outer surfaces, clips, edges and antialiasing, or of derived fields, contour lines,
+ * warps, mirrors, planes and montages. Whole steps with new values are measured in turns with VTK's pipeline to the
+ * same picture from the same values, in one process. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +11,7 @@
 #include "bench_layers_vtk.h"
 #include "bench_session.h"
 
-/* A picture, and VTK's; BENCH_LAYER_NONE: it has no peer. */
+/* A picture and VTK's equivalent layer, or BENCH_LAYER_NONE if it has no peer. */
 typedef struct bench_pair {
     bench_picture picture;
     bench_layer layer;
@@ -21,7 +21,7 @@ enum { MOST_PICTURES = 12 };
 
 typedef struct bench_group {
     const char *program;
-    bool is_by_part; /* set if the parts of a step are printed too, from the report, which has times of a clock */
+    bool is_by_part; /* also print the parts of a step, whose times in the report are wall-clock times */
     int count;
     bench_pair pairs[MOST_PICTURES];
 } bench_group;
@@ -38,7 +38,8 @@ static const bench_group layers = {"bench_layers",
                                     {BENCH_SMOOTH, BENCH_LAYER_NONE},
                                     {BENCH_DIFFERENCES, BENCH_LAYER_NONE}}};
 
-/* The slice, the surface and the isosurface are measured again beside those with contour lines. */
+/* The slice, the surface and the isosurface are measured once more in this group, in turns with their versions with
+ * contour lines. */
 static const bench_group flow = {"bench_layers flow",
                                  false,
                                  12,

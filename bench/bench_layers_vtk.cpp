@@ -51,8 +51,8 @@ struct bench_layers_vtk {
     vtkNew<vtkGeometryFilter> surface, clipped, warped, mirrored;
     vtkNew<vtkContour3DLinearGrid> isosurface, vortices;
     vtkNew<vtkContourFilter> slice_lines, surface_lines;
-    vtkNew<vtkRenderer> renderers[BENCH_LAYER_COUNT]; /* of all pictures but the montage */
-    vtkNew<vtkRenderer> views[VIEWS];                 /* of the montage */
+    vtkNew<vtkRenderer> renderers[BENCH_LAYER_COUNT]; /* for all pictures except the montage */
+    vtkNew<vtkRenderer> views[VIEWS];                 /* for the montage */
     vtkNew<vtkRenderWindow> window;
 };
 
@@ -89,7 +89,7 @@ void set_cutter(vtk3DLinearGridPlaneCutter *cutter, vtkUnstructuredGrid *grid, v
     cutter->ComputeNormalsOff();
 }
 
-/* Planes in the middle of layers of equal thickness, across the cube [-1, 1]^3. */
+/* Adds planes at the centres of layers of equal thickness across the cube [-1, 1]^3. */
 void set_planes(bench_layers_vtk &l)
 {
     const double *n = l.parameters.plane;
@@ -114,7 +114,7 @@ void set_isosurface(vtkContour3DLinearGrid *filter, double value)
     filter->SetValue(0, value);
 }
 
-/* Values that divide the range into parts of equal width, as in a scene. */
+/* Sets isovalues that divide the range into parts of equal width, as scenes do. */
 void set_lines(vtkContourFilter *filter, vtkAlgorithm *surface, const bench_layers_parameters &p)
 {
     filter->SetInputConnection(surface->GetOutputPort());
@@ -211,7 +211,7 @@ void set_window(bench_layers_vtk &l, const bench_contour_view &view)
         set_camera(l.views[i], view);
         l.views[i]->SetViewport(0.5 * (i % 2), 0.5 * (i / 2), 0.5 * (i % 2) + 0.5, 0.5 * (i / 2) + 0.5);
     }
-    vtkMapper::SetResolveCoincidentTopologyToPolygonOffset(); /* so that lines are in front of their surface */
+    vtkMapper::SetResolveCoincidentTopologyToPolygonOffset(); /* draws lines in front of their surface */
     l.window->SetOffScreenRendering(1);
     l.window->SetMultiSamples(0);
     l.window->SetSize(view.width, view.height);
@@ -221,7 +221,7 @@ void set_window(bench_layers_vtk &l, const bench_contour_view &view)
 
 bool bench_layers_vtk_is_available(void)
 {
-    return std::getenv("DISPLAY") != nullptr; /* without a server VTK aborts the process */
+    return std::getenv("DISPLAY") != nullptr; /* VTK aborts the process if there is no X server */
 }
 
 bench_layers_vtk *bench_layers_vtk_create(const bench_contour_mesh *mesh, const bench_contour_view *view,
@@ -255,7 +255,7 @@ void bench_layers_vtk_set(bench_layers_vtk *l, const float *values, const float 
     if (velocities)
         l->grid->GetPointData()->AddArray(l->velocities);
     else
-        l->grid->GetPointData()->RemoveArray("v"); /* so that no filter copies it */
+        l->grid->GetPointData()->RemoveArray("v"); /* prevents filters from copying it */
     l->grid->Modified();
 }
 

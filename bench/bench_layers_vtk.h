@@ -1,7 +1,7 @@
-/* VTK's ways to slices, outer surfaces and what is made of them as peers: vtk3DLinearGridPlaneCutter,
+/* VTK's pipelines to slices, outer surfaces and pictures derived from them, as peers: vtk3DLinearGridPlaneCutter,
  * vtkGeometryFilter, vtkGradientFilter, vtkContourFilter, vtkWarpVector and vtkReflectionFilter, on as many threads as
- * each can use, then OpenGL, on Mesa where there is no GPU. Pictures are those of bench_session.h: coloured by the
- * field, without light; isosurfaces with it. */
+ * each can use, then OpenGL, with Mesa if there is no GPU. The pictures are those of bench_session.h: coloured by the
+ * field without lighting, and isosurfaces with lighting. */
 #ifndef BENCH_LAYERS_VTK_H
 #define BENCH_LAYERS_VTK_H
 
@@ -15,7 +15,7 @@ typedef enum bench_layer {
     BENCH_LAYER_SLICE,
     BENCH_LAYER_SURFACE,
     BENCH_LAYER_CLIPPED,
-    BENCH_LAYER_Q_CRITERION, /* the values at all vertices, without a picture */
+    BENCH_LAYER_Q_CRITERION, /* computes the values at all vertices; draws no picture */
     BENCH_LAYER_VORTICES,
     BENCH_LAYER_LINED_SLICE,
     BENCH_LAYER_LINED_SURFACE,
@@ -27,15 +27,16 @@ typedef enum bench_layer {
     BENCH_LAYER_NONE = -1
 } bench_layer;
 
-/* Tells whether VTK is in this program, and an X server's window to draw in; otherwise nothing else here may be called.
- */
+/* Returns whether this program was built with VTK and an X server provides a window; if not, no other function here may
+   be called. */
 bool bench_layers_vtk_is_available(void);
 
 typedef struct bench_layers_vtk bench_layers_vtk;
 
-/* The parameters of bench_session.h. */
+/* The parameters of the pictures, which bench_session.h defines. */
 typedef struct bench_layers_parameters {
-    double plane[3]; /* normal of the plane through the origin that slices, or that cuts away the side it points to */
+    double
+        plane[3]; /* normal of the plane through the origin that slices, or that cuts off the side to which it points */
     double isovalue, range[2], vortex, warp, mirror;
     int line_count, plane_count;
 } bench_layers_parameters;
@@ -44,10 +45,10 @@ bench_layers_vtk *bench_layers_vtk_create(const bench_contour_mesh *mesh, const 
                                           const bench_layers_parameters *parameters, int threads);
 void bench_layers_vtk_destroy(bench_layers_vtk *layers);
 
-/* Sets new values of the mesh, and velocities, vertices × 3, or NULL. */
+/* Sets new values of the mesh, and new velocities (vertices × 3, or NULL). */
 void bench_layers_vtk_set(bench_layers_vtk *layers, const float *values, const float *velocities);
 
-/* Goes from the mesh to the picture, to the end of OpenGL's work; nothing is read back. */
+/* Computes the picture from the mesh and waits until OpenGL has finished; nothing is read back. */
 void bench_layers_vtk_draw(bench_layers_vtk *layers, bench_layer layer);
 
 #ifdef __cplusplus

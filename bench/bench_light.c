@@ -1,5 +1,6 @@
-/* Rays from the hits of an isosurface, towards a light and into the hemisphere, beside the frame that has the hits, and
- * beside Embree, which asks the triangles that VTK extracts for the same rays. In turns in one process. Prints CSV. */
+/* Measures rays from the hits of an isosurface, towards a light and into the hemisphere, in turns with the frame that
+ * finds the hits, and with Embree, which traces the same rays in the triangles that VTK extracts. All are measured in
+ * one process. Prints CSV. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,10 +13,10 @@
 
 enum { SAMPLES = 16 };
 
-/* The radius is a sixth of the mesh's side, about a tenth of its diagonal, as a scene has it by default. */
+/* The radius is a sixth of the mesh's side, about a tenth of its diagonal, which is a scene's default. */
 static const render_occlusion shadows = {1, 0, 1}, sky = {0, SAMPLES, 1.0 / 3};
 
-/* The rays of one kind. */
+/* The rays of one kind, shadow or occlusion rays. */
 typedef struct kind {
     const char *name;
     const render_occlusion *occlusion;
@@ -65,7 +66,7 @@ static int bits_of(const render_hit_rays *rays)
     return __builtin_popcountll(rays->samples) + __builtin_popcount(rays->lights);
 }
 
-/* The rays as Embree takes them, hit by hit. */
+/* Lists the rays in Embree's format, in the order of the hits. */
 static void list_rays(lit *l, kind *k)
 {
     const render_job *job = &l->scene.job;
@@ -137,7 +138,8 @@ static void print_rate(const lit *l, const kind *k, const char *what, bench_seri
     bench_print_number(&l->scene.subject, measure, "Mrays/s", 1e-3 * (double)k->rays / stats.median);
 }
 
-/* Rays of which Embree says something else: its surface is another where cells are not tets, and rounds otherwise. */
+/* Prints the share of rays for which Embree's result differs. Its surface is a different one if cells are not tets, and
+ * it rounds differently. */
 static void print_agreement(const lit *l, const kind *k)
 {
     int64_t theirs = 0;
@@ -176,7 +178,7 @@ static void measure(const bench_command *command, test_mesh_kind mesh, int n)
     bench_scene_resize(&l.scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
     bench_scene_show_surfaces(&l.scene, 1);
     bench_scene_build(&l.scene);
-    l.scene.surface.contact = 0.5F; /* as a session has it */
+    l.scene.surface.contact = 0.5F; /* the default of sessions */
     l.scene.job.paint = RENDER_UNLIT;
     l.scene.job.occlusion = &shadows;
     bench_routes_create(&l.routes, &l.scene);

@@ -1,4 +1,4 @@
-/* Measures tracing and building beside VTK and Embree, in turns in one process, on the same mesh, camera and image:
+/* Measures tracing and tree building in turns with VTK and Embree, in one process, on the same mesh, camera and image.
  * Embree traces the triangles that VTK extracts, and builds trees over the boxes of libinsitu's cells. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -6,7 +6,7 @@
 #include "bench_command.h"
 #include "bench_routes.h"
 
-/* The builders of trees; the tree of the first is traced. */
+/* The tree builders. Only the tree of the first one is traced. */
 static const struct {
     const char *name;
     mmbvh_options how;
@@ -40,7 +40,7 @@ static void run(bench_scene *scene, bench_routes *routes, peers_series *series, 
     }
 }
 
-/* Prints the cost of the trees of each of Embree's binary builders, built once more. */
+/* Builds a tree by each of Embree's binary builders and prints its cost. */
 static void print_costs(bench_scene *scene, bench_routes *routes)
 {
     for (int i = 0; routes->embree && i <= BENCH_EMBREE_MEDIUM; i++) {

@@ -1,6 +1,6 @@
-/* Measures speed and error of building, refitting and rendering, on a mesh that can have any size. A speed is the
- * median of several runs, with the least and the greatest; the error is against double precision on some of the pixels.
- * Prints CSV. */
+/* Measures speed and error of building, refitting and rendering on a mesh of any size. A speed is the median of several
+ * runs, with their minimum and maximum. The error is measured against double precision in some of the pixels. Prints
+ * CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -8,7 +8,7 @@
 #include "bench_scene.h"
 #include "memory.h"
 
-/* Speed of act() in units / seconds, over the runs; one more before them is not counted. */
+/* Measures the speed of act() in units per second over all runs. One run before them is not counted. */
 static bench_stats speed(bench_scene *scene, int runs, void (*act)(bench_scene *), double units)
 {
     double speeds[BENCH_MAX_RUNS];
@@ -49,7 +49,7 @@ static void measure_tree(bench_scene *s, int runs)
     bench_print(&s->subject, "refit bounds", "Mcells/s", speed(s, runs, refit_bounds, 1e-6 * cells));
 }
 
-/* Measures a frame. Its peak memory is without the tree. */
+/* Measures a frame. Its peak memory does not include the tree. */
 static void measure_frame(bench_scene *s, int runs, const char *layer)
 {
     char name[64];

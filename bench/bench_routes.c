@@ -140,7 +140,7 @@ void bench_routes_print(bench_routes *r, const char *name)
     print_series(r, name, "embree route medium", &r->embree_medium);
 }
 
-/* ---- do the pictures agree? ---- */
+/* ---- comparison of pictures ---- */
 
 static void compare_depths(bench_routes *r, const float *own, const float *theirs, const char *name, const char *peer)
 {
@@ -158,15 +158,13 @@ static void compare_depths(bench_routes *r, const float *own, const float *their
     snprintf(measure, sizeof measure, "%s %s coverage difference", name, peer);
     bench_print_number(r->subject, measure, "share", either ? (double)one / (double)either : 0);
     bench_stats depth = bench_stats_of(differences, both);
-    if (both)
-        depth.high = differences[(int64_t)both * 99 / 100]; /* beyond that, at silhouettes, different sheets are
-                                                               compared */
+    if (both) depth.high = differences[(int64_t)both * 99 / 100]; /* above it, at silhouettes, sheets differ */
     snprintf(measure, sizeof measure, "%s %s depth difference", name, peer);
     bench_print(r->subject, measure, "scene (max: of 99%)", depth);
     free(differences);
 }
 
-/* Writes depths as grey: black at 1.5 behind the scene's middle, white at 1.5 before it. */
+/* Writes depths as greys: black at 1.5 behind the scene's centre, white at 1.5 in front of it. */
 static void write_depths(const bench_routes *r, const float *depths, const char *folder, const char *name)
 {
     const int64_t count = (int64_t)r->camera->width * r->camera->height;

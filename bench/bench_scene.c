@@ -18,7 +18,8 @@ const double bench_eye[3] = {2.4, 1.6, 3.0}, bench_focal[3] = {0, 0, 0}, bench_u
 
 enum { ROWS = 18 /* rows of chosen pixels */, BIG_MESH = 13000000 };
 
-/* Error allowed to a cell's stretch of the integral: that of a thousand cells is less than float32's rounding. */
+/* Error allowed to the integral over the interval of a ray in one cell: the sum of a thousand intervals is less than
+ * float32's rounding. */
 static const double tolerance = 1e-11;
 
 static const double jitter = 0.2;
@@ -141,8 +142,8 @@ void bench_scene_frame(bench_scene *s)
     must(s, render_frame(&s->job, &s->fragments, NULL, &s->error));
 }
 
-/* Pixels are chosen when first asked for, as not every benchmark needs them. A big mesh gets fewer, because the
- * reference tries each pixel's ray against every cell near any of them. */
+/* Returns the chosen pixels, which are chosen by the first call, as not every benchmark needs them. A big mesh gets
+ * fewer pixels, because the reference intersects each pixel's ray with every cell near any of them. */
 const bench_pixels *bench_scene_pixels(bench_scene *s)
 {
     const int block = s->job.camera.height / (s->subject.cells < BIG_MESH ? ROWS : ROWS / 2);

@@ -1,5 +1,5 @@
-/* Computes schedules of compositing (comp_cost.h) for any number of ranks: messages, bytes and time of the rank that
- * has most to send, for a picture that a block partition cuts into P^(1/3) layers. Prints CSV; uses no MPI.
+/* Computes schedules of compositing (comp_cost.h) for any number of ranks: the messages, bytes and time of the rank
+ * that sends most, for a picture in which a block partition has P^(1/3) layers. Prints CSV; does not use MPI.
  *
  *     bench_schedules [RANKS_PER_NODE] */
 #include <math.h>
@@ -9,7 +9,8 @@
 #include "comp_cost.h"
 #include "comp_grid.h"
 
-/* The load of 1920 × 1080 pixels, of which the object covers half; the busiest rank has twice the mean. */
+/* Returns the load for 1920 × 1080 pixels, of which the object covers half. The busiest rank has twice the mean
+ * load. */
 static comp_load load_of(int ranks)
 {
     const double covered = 0.5 * 1920 * 1080, layers = cbrt(ranks);

@@ -7,8 +7,8 @@
 
 #include "session_image.h"
 
-/* Number of steps before those that count. A mesh at rest takes as many more as the session needs to decide for its
- * full tree. */
+/* Least and largest number of steps before the measured ones. Unless each step has a new mesh, steps are taken until
+ * the session no longer builds trees, as it builds the full tree only after some steps. */
 enum { WARM_UP = 8, MOST_WARM_UP = 60 };
 
 static const char *const part_names[BENCH_PARTS] = {"prepare", "build", "refit", "trace", "composite"};
@@ -16,7 +16,7 @@ static const char *const part_names[BENCH_PARTS] = {"prepare", "build", "refit",
 const double bench_plane[3] = {0.4, 0.6, 0.7};
 const double bench_range[2] = {-1.5, 1.5}, bench_vortex = 30, bench_warp = 0.02, bench_mirror = 1;
 
-/* The depths of the last picture, if it had any. */
+/* The depths of the last picture; NULL if it has none. */
 static float *caught_depths;
 
 bool session_writes_behind;
@@ -114,7 +114,7 @@ static bool has_velocities(bench_picture picture)
     return shows_q(picture) || picture == BENCH_LINED_ISOSURFACE || picture == BENCH_WARPED;
 }
 
-/* An ABC flow whose phase is shifted. */
+/* Returns an ABC flow with a shifted phase. */
 static float *make_velocities(const grid *g, double shift)
 {
     float *out = malloc(3 * (size_t)g->vertex_count * sizeof *out);
@@ -129,8 +129,8 @@ static float *make_velocities(const grid *g, double shift)
     return out;
 }
 
-/* Makes the second state: the field has moved a little, and the vertices by less than a cell, so that no cell turns
- * inside out. */
+/* Makes the second state. The field has moved a little, and the vertices by less than a cell, so that no cell is
+ * inverted. */
 static void make_states(bench_session *s)
 {
     const grid *g = &s->scene->view.cells;
@@ -207,7 +207,7 @@ static void write_lines(bench_picture picture, FILE *file)
         fprintf(file, ", lines: {field: v, component: x, count: %d}", BENCH_LINE_COUNT);
 }
 
-/* Writes slices and outer surfaces, coloured as VTK's are. */
+/* Writes layers of slices and outer surfaces, with the same colours as VTK's. */
 static void write_plane_or_faces(bench_picture picture, FILE *file)
 {
     char colours[96], plane[96];
@@ -262,8 +262,8 @@ void bench_write_camera(FILE *file)
             bench_up[1], bench_up[2], bench_degrees);
 }
 
-/* Writes an image with a layer of this picture. part: number of the image in a montage, whose pictures are a quarter as
- * large; -1: it is alone. */
+/* Writes an image with the layer of this picture. `part` is the number of the image in a montage, whose pictures have
+ * half the width and height, or -1 if the image is not in a montage. */
 static void write_image(const bench_session *s, bench_picture picture, int part, const char *ending, FILE *file)
 {
     const render_camera *camera = &s->scene->job.camera;
@@ -282,7 +282,7 @@ static void write_image(const bench_session *s, bench_picture picture, int part,
     fprintf(file, "    outputs: [{path: picture%s%s}]\n", ending, part < 0 ? "" : ", grid: [2, 2]");
 }
 
-/* A session's scene, and the ending of its pictures' names. */
+/* A session's scene file, and the extension of its pictures' names. */
 typedef struct scene_file {
     const bench_session *session;
     const char *ending;
@@ -321,7 +321,7 @@ insitu_session *bench_open_session(const bench_scene *scene, void (*write)(const
     return session;
 }
 
-/* Opens a session whose picture has this ending; .exr has depth. */
+/* Opens a session whose pictures have this extension; only .exr has depths. */
 static insitu_session *open_session(const bench_session *s, const char *ending)
 {
     const scene_file written = {s, ending};

@@ -1,6 +1,6 @@
-/* Measures steps of new values beside a process that spins: what a simulation pays for a step where one of its cores
- * has other work. In turns, on one thread and on all, alone and beside the process; a turn is the mean of some steps.
- * Prints CSV. */
+/* Measures steps with new values while another process uses a core: the cost of a step for a simulation if one of its
+ * cores has other work. Steps on one thread and on all threads, with and without the other process, are measured in
+ * turns; a turn's time is the mean of some steps. Prints CSV. */
 #define _GNU_SOURCE 1
 #include <signal.h>
 #include <stdio.h>
@@ -17,7 +17,7 @@ enum { STEPS = 10 };
 
 static pid_t spinner;
 
-/* A child that is stopped but where it is wanted, and ends with this process. */
+/* Starts a child process that spins. It is stopped except during measurements, and ends with this process. */
 static void start_spinner(void)
 {
     spinner = fork();
@@ -35,7 +35,7 @@ static void start_spinner(void)
 
 static const char *const places[2] = {"alone", "beside a spinning process"};
 
-/* The time of a turn goes into the series of its place. */
+/* Measures a turn and adds its time to series[place]. The spinning process runs if place is 1. */
 static void measure_once(bench_session *session, int place, int number, bench_series series[2])
 {
     double sum = 0;

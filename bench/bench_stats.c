@@ -1,4 +1,4 @@
-/* Benchmarks print long CSV, a measure a line, so that further programs and measures need no new columns. */
+/* Prints long CSV, one measure per line, so that further programs and measures need no new columns. */
 #include "bench_stats.h"
 
 #include <stdio.h>

@@ -1,5 +1,5 @@
-/* Measures the time to a picture: whole steps, and the routes that a user would take instead, in turns in one process.
- * The routes begin at the mesh, whether values, vertices or the whole mesh are new. Prints CSV. */
+/* Measures the time to a picture: whole steps in turns with the alternatives that a user has, in one process. The
+ * alternatives begin with the mesh, whether the values, the vertices or the whole mesh are new. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -14,7 +14,7 @@ static void measure_picture(const bench_scene *scene, bench_routes *routes, benc
     bench_session sessions[BENCH_CHANGE_COUNT];
     const int count = picture == BENCH_ISOSURFACES ? BENCH_ISOVALUES : 1;
     const char *name = bench_picture_name(picture);
-    const bench_session *last = &sessions[BENCH_NEW_MESH]; /* of this one everything is new */
+    const bench_session *last = &sessions[BENCH_NEW_MESH]; /* the session in which everything changes */
     for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++)
         bench_session_create(&sessions[change], scene, picture, change);
     for (int number = 0; number <= runs; number++) {

@@ -1,8 +1,8 @@
-/* Measures tables of the thesis's kind: 4.1 traversals, 4.2 sample groups, 4.3 groups against steps, 5.2 sizes. It is
- * started once for each instruction set and number of threads, to compare their speeds. A speed is the median of the
- * runs; the error stands beside it. Prints CSV.
+/* Measures tables like those of the thesis: 4.1 traversals, 4.2 sample groups, 4.3 groups against steps, 5.2 sizes. The
+ * program is started once for each instruction set and number of threads to compare their speeds. A speed is the median
+ * of the runs, and is printed together with the error. Prints CSV.
  *
- * Isosurfaces have BENCH_WIDTH × BENCH_HEIGHT pixels. Volumes are slower by far, so their pictures are smaller. */
+ * Isosurfaces have BENCH_WIDTH × BENCH_HEIGHT pixels. Volumes are much slower, so their pictures are smaller. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +16,8 @@ enum { VOLUME_WIDTH = 640, VOLUME_HEIGHT = 360, GROUPS = 6, STEPS = 6 };
 
 static const int groups[GROUPS] = {1, 4, 8, 16, 24, 32};
 
-/* Steps in sides of a cube. As in table 4.3, they go from a quarter to one and a half of the step of other tables. */
+/* Steps as multiples of a cube's side. As in table 4.3, they are from a quarter to one and a half of the other tables'
+ * step. */
 static const double steps[STEPS] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75};
 
 static const struct {
@@ -58,7 +59,8 @@ static void measure_volume(bench_scene *s, const char *name, const bench_command
     bench_scene_integral_error(s, name);
 }
 
-/* A tile's window has as many samples as a group, or fewer. */
+/* Measures traversal by tiles with the default sample group, and then with groups of each size. The sample window of a
+ * tile has at most as many samples as a group. */
 static void measure_groups(bench_scene *s, const char *prefix, const bench_command *command)
 {
     char name[64];

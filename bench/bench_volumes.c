@@ -1,9 +1,10 @@
-/* Measures volumes: whole steps and frames, and VTK's mappers of unstructured grids, which draw in processes of their
- * own, one after the other in the same run. Pictures are square, samples half a cube's side apart. Prints CSV.
+/* Measures volumes: whole steps and frames, and VTK's mappers of unstructured grids, which draw in separate processes,
+ * one after the other in the same run. Pictures are square, and samples are at a distance of half a cube's side. Prints
+ * CSV.
  *
- * Between the knots VTK's mappers interpolate the extinction linearly, libinsitu the opacity. They cut cells at the
- * knots of the colours too. So they get colours at the opacity's knots only, and are measured against the integral of
- * their own function. */
+ * Between the knots, VTK's mappers interpolate the extinction linearly, but libinsitu the opacity. VTK also divides
+ * cells at the knots of the colours, so it gets colours only at the knots of the opacity. Its error is measured against
+ * the integral of VTK's own function. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +15,7 @@
 #include "bench_command.h"
 #include "bench_session.h"
 
-/* DENSE opacities between knots stand for a linear extinction: they are off by at most (ln 2 / 256)^2 / 8 = 9.2e-7. */
+/* DENSE opacities between two knots approximate a linear extinction to (ln 2 / 256)^2 / 8 = 9.2e-7. */
 enum {
     SIZE = 1080,
     DENSE = 256,
@@ -133,7 +134,7 @@ static void measure_steps(bench_scene *scene, int runs)
     }
 }
 
-/* Measures the frame alone, and its error. max_error is 0 for none. */
+/* Measures only frames, and their error. If max_error is 0, no error is requested. */
 static void measure_frames(bench_scene *scene, const char *name, render_integration integration, double max_error,
                            int runs)
 {

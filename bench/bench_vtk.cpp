@@ -1,11 +1,11 @@
-/* VTK's volume mappers.
+/* Draws by VTK's volume mappers.
  *
- * Debian's VTK draws through X and OpenGL. Its ray casters work on the CPU and show their picture as a texture in the
- * end, so the server may be Xvfb. Whole renders are timed, after a first, empty one that makes the context.
+ * Debian's VTK draws through X and OpenGL. Its ray casters run on the CPU and finally show their picture as a texture,
+ * so the X server may be Xvfb. Whole renders are timed, after a first empty one that creates the context.
  *
- * The ray cast mapper keeps 8 bits a channel; so the same rays are cast once more, untimed, through the same function
- * and integrator for the float colour. Z-sweep keeps a float image, the fixed-point mapper 15 bits, projected
- * tetrahedra those of the frame buffer. */
+ * The ray cast mapper stores only 8 bits per channel. So the same rays are cast once more, untimed, by the same
+ * function and integrator, for colours in float. Z-sweep stores a float image, the fixed-point mapper 15 bits, and
+ * projected tetrahedra have the precision of the frame buffer. */
 #include "bench_vtk.h"
 #include "bench_vtk_mesh.h"
 
@@ -78,7 +78,7 @@ double seconds()
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/* Makes a grid of tets, as the ray caster and projected tetrahedra take no other cells. */
+/* Converts a grid to tets, as the ray caster and projected tetrahedra support no other cells. */
 vtkSmartPointer<vtkUnstructuredGrid> only_tets(vtkUnstructuredGrid *grid)
 {
     if (grid->IsHomogeneous() && grid->GetNumberOfCells() > 0 && grid->GetCellType(0) == VTK_TETRA) return grid;
@@ -123,7 +123,7 @@ void set_projected(peer &p, vtkUnstructuredGrid *grid)
     p.mapper = mapper;
 }
 
-/* Gives points outside the mesh the least knot, which has no opacity. */
+/* Sets points outside the mesh to the value of the lowest knot, which has no opacity. */
 void clear_outside(vtkImageData *image, const char *mask_name, double value)
 {
     vtkDataArray *values = image->GetPointData()->GetArray("f"), *mask = image->GetPointData()->GetArray(mask_name);
@@ -148,7 +148,7 @@ void set_resample(peer &p, vtkUnstructuredGrid *grid)
     vtkImageData *image = sampler->GetOutput();
     clear_outside(image, sampler->GetMaskArrayName(), p.request.knots[0]);
     auto mapper = vtkSmartPointer<vtkFixedPointVolumeRayCastMapper>::New();
-    image->GetPointData()->RemoveArray("vtkGhostType"); /* blanked points are drawn, transparent */
+    image->GetPointData()->RemoveArray("vtkGhostType"); /* draws blanked points, which are transparent */
     image->GetCellData()->Initialize();
     mapper->SetInputData(image);
     mapper->AutoAdjustSampleDistancesOff();
@@ -189,8 +189,8 @@ void set_property(peer &p)
     property->ShadeOff();
 }
 
-/* The ray caster's rays go through the lower left corners of pixels, everyone else's through their centres: its image
- * plane is shifted by half a pixel. */
+/* Sets the camera. The rays of the ray caster pass through the lower left corners of pixels, those of all other mappers
+ * through the centres, so the ray caster's image plane is shifted by half a pixel. */
 void set_view(peer &p)
 {
     vtkCamera *camera = p.renderer->GetActiveCamera();

@@ -1,4 +1,4 @@
-/* VTK's volume mappers as peers, and VTK's files, behind a C face. */
+/* VTK's volume mappers as peers, and a reader of VTK's files, with a C interface. */
 #ifndef BENCH_VTK_H
 #define BENCH_VTK_H
 
@@ -6,7 +6,7 @@
 
 #ifdef __cplusplus
 extern "C" {
-/* In C, members that are not named are zero. */
+/* C initializes members that are not named to 0. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 #endif
@@ -19,29 +19,29 @@ extern "C" {
 
 typedef enum bench_vtk_mapper {
     BENCH_VTK_RAY_PARTIAL, /* vtkUnstructuredGridVolumeRayCastMapper with partial pre-integration */
-    BENCH_VTK_RAY_LINEAR,  /* the same with the linear ray integrator */
-    BENCH_VTK_ZSWEEP,      /* vtkUnstructuredGridVolumeZSweepMapper, partial pre-integration */
-    BENCH_VTK_PROJECTED,   /* vtkProjectedTetrahedraMapper, on Mesa's rasterizer */
+    BENCH_VTK_RAY_LINEAR,  /* vtkUnstructuredGridVolumeRayCastMapper with the linear ray integrator */
+    BENCH_VTK_ZSWEEP,      /* vtkUnstructuredGridVolumeZSweepMapper with partial pre-integration */
+    BENCH_VTK_PROJECTED,   /* vtkProjectedTetrahedraMapper with Mesa's rasterizer */
     BENCH_VTK_RESAMPLE     /* vtkResampleToImage and vtkFixedPointVolumeRayCastMapper */
 } bench_vtk_mapper;
 
-/* One picture: perspective, square, over black, without shading. */
+/* One picture: square, in perspective, over black, without shading. */
 typedef struct bench_vtk_request {
     const test_mesh *mesh;
     bench_vtk_mapper mapper;
-    int resolution; /* of the sampled image: points along its longest axis */
+    int resolution; /* points along the longest axis of the sampled image */
     double eye[3], focal[3], up[3], degrees;
-    int size; /* pixels a side */
-    /* Opacity and colour by value, linear between the knots. Each mapper has its own meaning of opacity. */
+    int size; /* width and height in pixels */
+    /* Opacity and colour by value, linear between the knots. Each mapper interprets opacity in its own way. */
     int knot_count;
     const double *knots, *opacities;
     const float *colours; /* knot_count × 3 */
     double unit_distance;
-    double sample_distance; /* of the fixed-point mapper */
-    int runs;               /* frames to time after the first; fewer, but at least one, when seconds have passed */
+    double sample_distance; /* only for the fixed-point mapper */
+    int runs;               /* frames to time after the first; fewer, but at least one, once `seconds` have passed */
     double seconds;
     int pixel_count;
-    const int *pixels; /* pixel_count × 2: x and y, y = 0 at the top */
+    const int *pixels; /* pixel_count × 2: x and y; y = 0 at the top */
 } bench_vtk_request;
 
 enum { BENCH_VTK_MAX_RUNS = 16 };
@@ -49,18 +49,19 @@ enum { BENCH_VTK_MAX_RUNS = 16 };
 typedef struct bench_vtk_result {
     double first; /* seconds from the mesh to the first picture */
     int runs;
-    double frames[BENCH_VTK_MAX_RUNS]; /* seconds of each further one */
+    double frames[BENCH_VTK_MAX_RUNS]; /* seconds of each further picture */
 } bench_vtk_result;
 
-/* Draws. rgba gets pixel_count × 4, premultiplied, in the mapper's precision. False where VTK has no window to draw in
- * (no X server) or says that the mapper cannot run. VTK may also crash: call it in a process that may be lost. */
+/* Draws. rgba gets pixel_count × 4, premultiplied, in the mapper's precision. Returns false if there is no X server for
+ * a window, or if VTK reports that the mapper is not supported. VTK may also crash, so call this in a process of its
+ * own. */
 bool bench_vtk_draw(const bench_vtk_request *request, bench_vtk_result *result, float *rgba);
 
-/* A .vtu file of tets, hexes, wedges and pyramids with a scalar of its points. False where it cannot be read, or has
- * other cells. */
+/* Reads a .vtu file of tets, hexes, wedges and pyramids with a scalar point field. Returns false if the file cannot be
+ * read or has other cells. */
 bool bench_vtk_read(const char *path, const char *field, test_mesh *out);
 
-/* Tells whether VTK is in this program. */
+/* Returns whether this program was built with VTK. */
 bool bench_vtk_is_available(void);
 
 #ifdef __cplusplus

@@ -25,7 +25,7 @@ template <typename T> T *reserve(int64_t count)
     return static_cast<T *>(block);
 }
 
-/* Adds a polyhedron by VTK's face stream. */
+/* Adds a polyhedron as a face stream of VTK. */
 void add_polyhedron(const test_mesh &mesh, int64_t cell, vtkUnstructuredGrid &grid)
 {
     vtkNew<vtkIdList> stream;

@@ -1,4 +1,4 @@
-/* Converts the tests' meshes to VTK's. */
+/* Converts meshes of the tests to VTK's grids. */
 #ifndef BENCH_VTK_MESH_H
 #define BENCH_VTK_MESH_H
 
@@ -7,7 +7,7 @@
 
 #include "bench_vtk.h"
 
-/* The grid has float32 points, and float32 values as the point scalars "f". */
+/* Returns a grid with float32 points, and float32 values as the point scalars "f". */
 vtkSmartPointer<vtkUnstructuredGrid> bench_vtk_grid(const test_mesh &mesh);
 
 #endif

@@ -1,4 +1,4 @@
-/* Replaces bench_vtk.cpp where VTK is left out of the build. */
+/* Replaces bench_vtk.cpp in builds without VTK. */
 #include "bench_vtk.h"
 
 bool bench_vtk_draw(const bench_vtk_request *request, bench_vtk_result *result, float *rgba)

@@ -1,5 +1,5 @@
-/* Thousands of meshes, or of blocks of one mesh, over all ranks, of one hex each: what a step costs grows as their
- * number does. */
+/* Tests that the CPU time of a step grows linearly with the number of meshes, or with the number of blocks of one mesh.
+ * There are thousands of them over all ranks, and each consists of one hex. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +17,7 @@ static const char *scene_text = "images:\n"
                                 "      - surface: {colour: [1, 1, 1]}\n"
                                 "    outputs: [{path: \"many.png\"}]\n";
 
-/* Cubes in a row along x, and f = x / count. */
+/* Cubes in a row along x, with the field f = x / count. */
 typedef struct row_of_cubes {
     int count;
     double (*coordinates)[CORNERS][3], (*values)[CORNERS];
@@ -44,7 +44,8 @@ static void row_free(row_of_cubes *row)
     free(row->values);
 }
 
-/* Names of neighbours differ in their first digit, so that they do not come in the order of names. */
+/* Writes the cube's name. Names of neighbours differ in their first digit, so that sorting by name changes their
+ * order. */
 static void name_of(int i, char name[32])
 {
     snprintf(name, 32, "%d%03d rank %d", i % 10, i / 10, own_rank);
@@ -101,8 +102,8 @@ static double cpu_seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* CPU seconds of the first step with its set calls, and the least of later ones with new values. count: of all ranks.
- */
+/* Measures the CPU seconds of the first step, including its set calls, and the least CPU seconds of later steps with
+   new values. `count` is the number of cubes of all ranks together. */
 static void measure(bool are_blocks, int count, double *first, double *later)
 {
     row_of_cubes row;
@@ -123,7 +124,7 @@ static void measure(bool are_blocks, int count, double *first, double *later)
     row_free(&row);
 }
 
-/* Tells whether all ranks' times are within the bound. */
+/* Returns whether the times of all ranks are within the bound. */
 static bool is_linear(bool are_blocks)
 {
     const double most = 8 * sqrt(8);
@@ -135,9 +136,10 @@ static bool is_linear(bool are_blocks)
     return is_within;
 }
 
-/* Eight times the meshes take eight times as long, or a little more where caches no longer hold them; what grows as the
- * square would take 64 times as long. The bound is halfway between, by ratios. Ranks of MPICH compute while they wait,
- * so that their times have those in it that others do not run: then another try tells. */
+/* Checks that times grow linearly. Eight times the meshes take eight times as long, or a little more if they no longer
+ * fit into caches. Quadratic growth would take 64 times as long. The bound is the geometric mean of 8 and 64. MPICH's
+ * ranks spin while they wait for each other, so other programs on the machine can lengthen their CPU times: the
+ * measurement is repeated if it fails. */
 static void check_linear(bool are_blocks)
 {
     bool is_well = false;

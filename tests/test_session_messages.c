@@ -1,5 +1,5 @@
-/* Messages about input that is sound, but hardly meant: warnings, the same on all ranks, given once; and errors, where
- * nothing useful could be drawn in any time. */
+/* Tests messages about input that is valid but probably a mistake. A warning is given once and is the same on all
+ * ranks. An error is returned if no useful picture could be drawn in an acceptable time. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,7 +23,7 @@ enum { SIDE = 4 };
 
 static const char plain[] = IMAGE("[24, 16]", "", SURFACE, "");
 
-/* ---- what is done to meshes ---------------------------------------------------------------------------------- */
+/* ---- changes made to meshes ----------------------------------------------------------------------------------- */
 
 static void exchange(int64_t *a, int64_t *b)
 {
@@ -32,7 +32,7 @@ static void exchange(int64_t *a, int64_t *b)
     *b = held;
 }
 
-/* Numbers quads row by row: VTK's vertex 2 comes fourth, its vertex 6 last. */
+/* Numbers the vertices of quads row by row: VTK's vertex 2 becomes the fourth vertex, and VTK's vertex 6 the last. */
 static void number_by_rows(session_input *in)
 {
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) {
@@ -42,7 +42,7 @@ static void number_by_rows(session_input *in)
     }
 }
 
-/* Removes the jitter: then cells numbered by rows have exactly no volume. */
+/* Removes the jitter, so that the volumes of cells numbered by rows are exactly 0. */
 static void straighten(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
@@ -65,7 +65,7 @@ static void mirror(session_input *in)
     test_mesh_mirror(&in->part, false);
 }
 
-/* A third of the tets; and another third are ghosts. */
+/* Mirrors a third of the tets and marks another third as ghosts. */
 static void mirror_some(session_input *in)
 {
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) {
@@ -80,7 +80,7 @@ static void centre_on_cells(session_input *in)
 {
     for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] = cell_value;
     in->field.centring = INSITU_CELL;
-    in->field.count = in->part.cell_count; /* of hexes, which are fewer than their vertices */
+    in->field.count = in->part.cell_count; /* hexes, of which there are fewer than vertices */
 }
 
 static void make_negative(session_input *in)
@@ -98,7 +98,7 @@ static void make_nothing_there(session_input *in)
     if (own_rank == rank_count - 1 && in->part.cell_count) in->part.values[in->part.connectivity[0]] = NAN;
 }
 
-/* Keeps the first face of each hex, as a quad. */
+/* Keeps the first face of each hex as a quad, and removes the hex. */
 static void make_shells(session_input *in)
 {
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) {
@@ -110,7 +110,7 @@ static void make_shells(session_input *in)
     input_describe(in);
 }
 
-/* The values are x, and the hexes that have some above 0 become shells. */
+/* Sets the values to x, and replaces each hex that has a value of 0 or more by its first face. */
 static void make_some_shells(session_input *in)
 {
     int64_t at = 0;
@@ -130,13 +130,13 @@ static void make_some_shells(session_input *in)
     input_describe(in);
 }
 
-/* No value is below 0.1, which float32 has not. */
+/* Raises all values to at least 0.1, which float32 cannot represent exactly. */
 static void make_least(session_input *in)
 {
     for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = fmax(in->part.values[v], 0.1);
 }
 
-/* No value is above it. */
+/* Lowers all values to at most 0.1. */
 static void make_most(session_input *in)
 {
     for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = fmin(in->part.values[v], 0.1);
@@ -147,14 +147,14 @@ static void make_ghosts(session_input *in)
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) in->part.ghosts[cell] = 1;
 }
 
-/* Doubles tell places apart by 1e-4 there. */
+/* Moves the mesh to coordinates near 1e12, which doubles represent to 1e-4. */
 static void move_far(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
         in->part.coordinates[i] = 1e12 + 1e-2 * in->part.coordinates[i];
 }
 
-/* Half a cell is less than a millionth of the scene. */
+/* Scales x and y so that half a cell is less than a millionth of the scene's size. */
 static void make_needles(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)
@@ -167,7 +167,7 @@ static const struct warning_case {
     const char *name, *scene;
     test_mesh_kind kind;
     corrupt_function *corrupt;
-    const char *words[3]; /* none: no warning */
+    const char *words[3]; /* the first is NULL if no warning is expected */
 } warnings[] = {
     {"hexes by rows",
      plain,
@@ -416,7 +416,8 @@ static void likely_mistakes_are_reported_once(void **context)
     for (size_t i = 0; i < sizeof warnings / sizeof warnings[0]; i++) check_warning(&warnings[i]);
 }
 
-/* Told, not told again, cured, told anew; and anew with an edited scene. */
+/* Checks that a warning is given once, is not repeated in the next step, and is given again if its cause disappears and
+ * then returns, or if the scene is edited. */
 static void warnings_come_back_with_what_they_are_about(void **context)
 {
     (void)context;
@@ -450,7 +451,8 @@ static bool reads(insitu_session *session, const char *name, double expected)
     return insitu_parameter(session, name, &value) == INSITU_OK && fabs(value - expected) <= 0;
 }
 
-/* A name that the scene does not have leaves the value, and says which it has. */
+/* Checks that insitu_parameter() leaves the value unchanged for a name that the scene does not define, and that its
+ * error lists the names that the scene defines. */
 static bool lacks(insitu_session *session, const char *name, const char *words)
 {
     double value = -77;
@@ -468,7 +470,7 @@ static void parameters_change_with_the_scene_on_all_ranks(void **context)
         MPI_COMM_WORLD, write_scene(IMAGE("[24, 16]", "", SURFACE, "") "parameters: {inflow: 2.5, outflw: 1}\n"));
     session_input in;
     input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
-    everywhere(reads(session, "inflow", 2.5)); /* before any step */
+    everywhere(reads(session, "inflow", 2.5)); /* before the first step */
     everywhere(lacks(session, "outflow", "\"outflow\" is no parameter of ") &&
                lacks(session, "outflow", " (did you mean \"outflw\"?), expected one of inflow, outflw"));
     everywhere(insitu_parameter(session, NULL, &(double){0}) == INSITU_ERROR_ARGUMENT &&
@@ -477,13 +479,13 @@ static void parameters_change_with_the_scene_on_all_ranks(void **context)
     everywhere(insitu_parameter(NULL, "inflow", &(double){0}) == INSITU_ERROR_ARGUMENT);
     everywhere(submit(session, &in) == INSITU_OK);
     step_is_good(session, 0);
-    everywhere(is_warned(session, none)); /* the code may ask later */
+    everywhere(is_warned(session, none)); /* not yet, as the simulation may still read the parameter */
     step_is_good(session, 1);
     everywhere(is_warned(session, unread));
     for (int i = 0; i < 3; i++) {
         snprintf(text, sizeof text, "%sparameters: {outflow: 0, inflow: %d}\n", plain, 10 + i);
-        write_scene(i == 1 ? "images: 7\n" : text);         /* a broken edit changes none */
-        everywhere(reads(session, "inflow", i ? 10 : 2.5)); /* nothing but a step does */
+        write_scene(i == 1 ? "images: 7\n" : text);         /* an invalid edit changes no parameter */
+        everywhere(reads(session, "inflow", i ? 10 : 2.5)); /* parameters change only in a step */
         step_is_good(session, 2 + i);
         everywhere(reads(session, "inflow", i == 2 ? 12 : 10) && reads(session, "outflow", 0));
     }
@@ -494,7 +496,8 @@ static void parameters_change_with_the_scene_on_all_ranks(void **context)
     input_free(&in);
 }
 
-/* Two meshes of cell values: a layer of means at vertices is told of vertex ids, one of cells is not. */
+/* Two meshes have cell values. A warning about vertex ids is given for a layer drawn by means at vertices, but not for
+ * a layer drawn by cell values. */
 static void meshes_with_ids_among_others_are_reported(void **context)
 {
     (void)context;
@@ -524,7 +527,8 @@ static void meshes_with_ids_among_others_are_reported(void **context)
     }
 }
 
-/* In the step that draws the words first, though they are written after it; none hides another. */
+/* Checks that all errors in words are reported in the step that draws the words, although the words are written later,
+ * and that no error hides another. */
 static void faults_of_words_are_reported_at_once(void **context)
 {
     (void)context;
@@ -587,7 +591,8 @@ static void pictures_that_would_take_hours_are_refused(void **context)
     input_free(&in);
 }
 
-/* Names as they are given, with what could act on a terminal or make two lines of one made visible. */
+/* Checks that names are reported as they were given, except that control characters, which could act on a terminal or
+ * split a line in two, are escaped. */
 static void control_characters_are_escaped(void **context)
 {
     (void)context;

@@ -1,5 +1,5 @@
-/* Pictures side by side and over corners: each has the bits of the picture that a file of its own gets, on any ranks.
- */
+/* Tests montages, which put pictures side by side, and insets, which put pictures over corners. On any number of ranks,
+   each picture in a montage has the same bits as the picture in a file of its own. */
 #include <stdio.h>
 #include <string.h>
 
@@ -25,7 +25,7 @@ static const caught_picture *find(const char *path)
     return NULL;
 }
 
-/* Tells whether the cell has the picture's pixels; picture NULL: it is transparent. */
+/* Returns whether the cell has the picture's pixels; if picture is NULL, whether the cell is transparent. */
 static bool is_in_cell(const caught_picture *whole, int cell, const caught_picture *picture)
 {
     static const float nothing[4 * WIDTH];
@@ -38,7 +38,7 @@ static bool is_in_cell(const caught_picture *whole, int cell, const caught_pictu
     return is_in;
 }
 
-/* On rank 0, after a step: with_c tells whether the third image was due. */
+/* Checks the montage of a step on rank 0. `with_c` states whether the third image was due. */
 static bool is_montage(int cycle, bool with_c)
 {
     char path[32];
@@ -92,7 +92,7 @@ static void files_that_cannot_be_written_are_reported(void **state)
 
 /* ---- shared colour bars ------------------------------------------------------------------------------------------ */
 
-/* Two pictures with colour bars on a side, of ranges up to 1 and to `high`, in one row. */
+/* Writes a scene of two pictures in one row. Each has a colour bar at `side`; their ranges end at 1 and at `high`. */
 static void write_bars(char text[2048], const char *side, const char *high)
 {
     static const char image[] = "  - name: %s\n    size: [32, 24]\n    camera: {automatic: {direction: %s}}\n"
@@ -104,7 +104,7 @@ static void write_bars(char text[2048], const char *side, const char *high)
     snprintf(text + used, 2048 - (size_t)used, image, "b", "[1, 1, 1]", high, side);
 }
 
-/* The strip is 9 times as wide as words are high, rounded up. */
+/* Width of the strip with the shared colour bar: 9 times the height of letters, rounded up. */
 enum { STRIP = 22 };
 
 static bool are_placed(const char *side, bool is_shared)
@@ -143,7 +143,7 @@ static void alike_colour_bars_are_drawn_once(void **state)
             everywhere(own_rank != 0 || are_placed(sides[i % 2], is_shared));
             const char *told =
                 strstr(insitu_last_report(session)->warnings, "all.png: the pictures in it have different");
-            everywhere((told != NULL) == (!is_shared && cycle == 0)); /* once */
+            everywhere((told != NULL) == (!is_shared && cycle == 0)); /* the warning is given once */
         }
         insitu_destroy(&session);
     }
@@ -166,15 +166,16 @@ static const char inset_scene[] = "images:\n"
                                   "  - name: d\n    size: [6, 20]\n    every: 2\n    layers: [{surface: {}}]\n"
                                   "    outputs: [{path: d.png}, {path: whole.png, inset: bottom_left}]\n";
 
-/* Insets are two pixels from the edges, of which the nearer one to them is their frame. */
+/* Distance of insets from the montage's edges, in pixels, and width of the frame that is drawn around them within
+ * it. */
 enum { MARGIN = 2, FRAME = 1 };
 
 typedef struct inset_place {
-    const caught_picture *picture; /* NULL: there is none */
+    const caught_picture *picture; /* NULL if there is no inset */
     int x, y;
 } inset_place;
 
-/* Returns the pixel that an inset, or its frame, has at a place; NULL if the place is outside. */
+/* Returns the pixel that an inset or its frame has at a position; NULL if the position is outside of them. */
 static const float *inset_pixel(const inset_place *inset, int x, int y)
 {
     static const float grey[4] = {0.2140F, 0.2140F, 0.2140F, 1};
@@ -185,7 +186,7 @@ static const float *inset_pixel(const inset_place *inset, int x, int y)
     return is_in ? p->rgba + 4 * ((ptrdiff_t)row * p->width + column) : grey;
 }
 
-/* On rank 0, after a step: with_d tells whether the fourth image was due. */
+/* Checks the montage with insets on rank 0 after a step. `with_d` states whether the fourth image was due. */
 static bool has_insets(bool with_d)
 {
     const caught_picture *whole = find("whole.png"), *cells[2] = {find("a.png"), find("b.png")};
@@ -209,8 +210,8 @@ static bool is_covered(const placed_picture *panel, int x, int y, int width, int
     return panel->covered_count == 1 && r->x == x && r->y == y && r->width == width && r->height == height;
 }
 
-/* On rank 0: the decorations of the second panel keep clear of the inset over it and its frame, and those of the first,
- * which has none, are not asked to. */
+/* Checks the areas that decorations must avoid, on rank 0. For the second panel this is the rectangle of the inset and
+ * its frame; the first panel has no inset over it and thus no such area. */
 static bool keeps_clear(void)
 {
     return placed_count >= 2 && placed[0].covered_count == 0 &&
@@ -235,7 +236,7 @@ static void insets_cover_corners(void **state)
     discard_pictures();
 }
 
-/* Two panels that share a bar up to 1, and two insets with bars up to 1 and to 2. */
+/* Writes a scene of two panels that share a colour bar up to 1, and of two insets with colour bars up to 1 and to 2. */
 static void write_insets_beside_bars(char text[2048], const char *side)
 {
     static const char panel[] = "  - name: %s\n    size: [32, 24]\n    layers: [{slice: {field: f, range: [-1, 1]}}]\n"
@@ -251,8 +252,8 @@ static void write_insets_beside_bars(char text[2048], const char *side)
     snprintf(text + used, 2048 - (size_t)used, inset, "d", "2", side, "bottom_left");
 }
 
-/* On rank 0: insets lie over the panels, not over the strip, and after them. That with the bar of the strip has none of
- * its own. */
+/* Checks on rank 0 that insets are drawn after the panels and over them, but not over the strip with the shared colour
+ * bar. The inset whose colour bar is the strip's must have no colour bar of its own. */
 static bool are_beside_bars(const char *side)
 {
     const int left = strcmp(side, "left") == 0 ? STRIP : 0;

@@ -1,6 +1,7 @@
-/* Colours over narrow ranges far from 0. A field rises linearly from left to right, so that the colour of each pixel is
- * known in closed form, in double, from its place: by every kind of layer, on every scale, of float32 and float64
- * values. Legends of constant fields, warnings where values cannot be told apart, and statistics. */
+/* Tests colours over narrow ranges of values far from 0. A field rises linearly from left to right, so that the colour
+ * of each pixel is computed from its position by a closed form in double. Every kind of layer is drawn with every
+ * scale, of float32 and float64 values. Also tests the legends of constant fields, the warnings about values that
+ * cannot be distinguished, and statistics. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +16,8 @@ enum { SIDE = 4, SIZE = 16, MOST = 1 << 12 };
 
 /* ---- inputs ---------------------------------------------------------------------------------------------------- */
 
-/* The field "f" from low at x = -1 to high at x = 1, and "z", the third coordinate, by which isosurfaces are found. */
+/* The field "f", which rises from low at x = -1 to high at x = 1, and "z", the third coordinate, of which isosurfaces
+ * are drawn. */
 typedef struct ramp {
     session_input in;
     double *values, *heights;
@@ -63,7 +65,7 @@ static void ramp_submit(const ramp *r, insitu_session *session)
 
 #define LIT "material: {ambient: 1, diffuse: 0, specular: 0}"
 
-/* Layers in which every pixel has the colour of its place, with the keys of its map. */
+/* Layers in which the colour of every pixel is a function of its position. Each gets the keys of its colour map. */
 static const char *const layers[] = {
     "isosurface: {field: z, values: [0.1], colour_by: {field: f, %s}, " LIT "}",
     "slice: {field: f, planes: [{normal: [0, 0, 1]}], %s, " LIT "}",
@@ -96,8 +98,8 @@ static double linear_of(double srgb)
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-/* How much a picture is off, in sRGB or linear light from 0 to 1: expected are the colours of a scale's places. Colours
- * between two are even in sRGB. */
+/* Returns the largest error of a picture's colours, from 0 to 1, in sRGB or in linear light. The expected colours are
+ * the closed form's: the colour map interpolates linearly in sRGB. */
 static double colours_are_off(const caught_picture *picture, bool is_linear, double (*place)(double value), double low,
                               double high)
 {
@@ -151,8 +153,8 @@ static const narrow_case cases[] = {
     {1e8, 1e8 + 1, false, "scale: symlog, threshold: 1, ", by_log},
 };
 
-/* What a picture may be off: the rounding of values at vertices, of the map's table and of float32 between (2e-3 of the
- * map together: a darkest colour is steep in sRGB), and 2e-4 for scales that are taken as straight. */
+/* Returns the error allowed to a picture: the rounding of values at vertices; 2e-3 for the colour map's table and for
+ * float32 intermediates, as sRGB is steep at dark colours; and 2e-4 for scales that are approximated as linear. */
 static double allowed_of(const narrow_case *c)
 {
     const double larger = fmax(fabs(c->low), fabs(c->high));
@@ -174,7 +176,7 @@ static void check_case(const narrow_case *c, int layer, bool is_given)
     everywhere(insitu_step(session, 0, 0) == INSITU_OK);
     everywhere(!strstr(insitu_last_report(session)->warnings, "too near"));
     caught_picture picture = pop_caught_picture();
-    const bool is_volume = layer == 3; /* to max_error, in linear light */
+    const bool is_volume = layer == 3; /* integrated to max_error, in linear light */
     const double allowed = allowed_of(c) + (is_volume ? 0.01 : 0);
     const double off = colours_are_off(&picture, is_volume, c->place, c->low, c->high);
     if (!(off <= allowed)) fprintf(stderr, "layer %d, %s: off by %g\n", layer, keys, off);
@@ -200,7 +202,7 @@ static int compare_doubles(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* The middles of all cells' values over all ranks, sorted. */
+/* Returns the sorted middles of the value ranges of all cells of all ranks. */
 static double *sorted_middles(const narrow_case *c, int64_t *count)
 {
     ramp whole;
@@ -237,7 +239,7 @@ static caught_picture draw_range(const ramp *r, int layer, const char *scale, co
     return picture;
 }
 
-/* Checks that the percentiles are these values: pictures by both ranges are the same bits. */
+/* Checks that the percentiles are the values low and high: pictures with either range must have the same bits. */
 static void check_percentiles(const ramp *r, int layer, const char *scale, const int percents[2], double low,
                               double high)
 {
@@ -271,7 +273,7 @@ static void percentiles_are_those_of_doubles(void **state)
     }
 }
 
-/* 10,368 cells, of which two fifths and more have the one value, and as many the other. */
+/* The mesh has 10,368 cells. More than two fifths of them have the lower value, and as many the higher one. */
 static void percentiles_are_right_among_many_equal_values(void **state)
 {
     (void)state;
@@ -311,8 +313,8 @@ static void constant_fields_have_one_tick(void **state)
         }
 }
 
-/* Values that rounding alone tells apart are told of, once; a constant field is not. The steps are good all the same.
- */
+/* Checks that a warning is given once if values differ only by rounding, and none for a constant field. All steps must
+   succeed. */
 static void values_too_near_are_reported(void **state)
 {
     (void)state;
@@ -346,8 +348,8 @@ static void values_too_near_are_reported(void **state)
 
 /* ---- statistics ------------------------------------------------------------------------------------------------ */
 
-/* A linear field over a cube: its ends are at corners, its mean in the middle. The histogram's shares add up to 1, and
- * are alike on both sides of the middle as far as cells are. */
+/* Checks the statistics of a linear field over a cube: its extremes are at corners and its mean in the middle. The
+ * histogram's shares sum to 1, and each bin has at least a tenth. */
 static void statistics_distinguish_narrow_fields(void **state)
 {
     (void)state;
@@ -367,7 +369,8 @@ static void statistics_distinguish_narrow_fields(void **state)
         read_file("narrow.csv", MOST, text);
         const char *at = strchr(text, '\n');
         for (int i = 0; at && i < 14; i++, at = strchr(at + 1, ',')) n[i] = strtod(at + 1, NULL);
-        /* Cycle, time, cells, volume, minimum, maximum, mean, deviation, low, high, bins. Doubles are 1.5e-8 apart. */
+        /* Columns: cycle, time, cells, volume, minimum, maximum, mean, deviation, low, high, bins. Adjacent doubles
+         * differ by 1.5e-8 near 1e8. */
         const bool is_well = fabs(n[4] - low) <= 2e-8 && fabs(n[5] - high) <= 2e-8 &&
                              fabs(n[6] - 0.5 * (low + high)) <= 1e-6 && fabs(n[8] - low) <= 2e-8 &&
                              fabs(n[9] - high) <= 2e-8 && fabs(n[10] + n[11] + n[12] + n[13] - 1) < 1e-8 &&

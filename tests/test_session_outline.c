@@ -1,5 +1,5 @@
-/* Boxes of an outline: around all data, around each mesh over all ranks, and around what each rank holds. The ranks
- * hold shifted copies of one cube; of three and more, the second holds nothing. */
+/* Tests the boxes of an outline: around all data, around each mesh over all ranks, and around the cells of each rank.
+ * Each rank has two moved copies of one cube; of three or more ranks, the second has no cells. */
 #include <string.h>
 
 #include "session.h"
@@ -16,8 +16,8 @@ static bool is_empty(int rank)
     return rank_count >= 3 && rank == 1;
 }
 
-/* The cube is 2 wide: a rank's "far" one is moved by 10 along x and by 4 a rank along y, and its "near" one by 4 a rank
- * along z. */
+/* Sets a mesh of a cube of size 2. A rank's "far" cube is moved by 10 along x and by 4 × rank along y; its "near" cube
+ * is moved by 4 × rank along z. */
 static void give(insitu_session *session, const char *name, bool is_far, session_input *in)
 {
     input_create(in, TEST_HEXES, SIDE, TEST_BLOCK, 0, 1);

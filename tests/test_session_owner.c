@@ -1,6 +1,7 @@
-/* Meshes of finite volumes: faces with an owner and a neighbour, in all the forms that codes have them in, draw the
- * pictures of the same polyhedra given cell by cell, to the bit. Polyhedra that are hexes, wedges, pyramids or tets
- * draw the pictures of those. All ranks are told what is wrong on one. */
+/* Tests meshes of finite volumes, which are given by faces with an owner and a neighbour. Every form of this
+ * description draws, to the bit, the pictures of the same polyhedra given cell by cell. Polyhedra with the faces of
+ * hexes, wedges, pyramids or tets draw the pictures of these cell types. An error on one rank is reported on all
+ * ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -89,7 +90,7 @@ static int64_t sum_over_ranks(int64_t mine)
     return sum;
 }
 
-/* Cells of a kind as polyhedra, faces this way and that. */
+/* Creates the cells of a kind as polyhedra, whose faces have their vertices in either direction. */
 static void create_polyhedra(session_input *in, test_mesh_kind kind, double share)
 {
     input_create(in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
@@ -98,7 +99,8 @@ static void create_polyhedra(session_input *in, test_mesh_kind kind, double shar
     input_describe(in);
 }
 
-/* Exchanges the sides of some faces, as CGNS may have them: 0 stands for no cell on either side. */
+/* Exchanges owner and neighbour of some boundary faces, which CGNS permits: a 0 on either side means that there is no
+ * cell. */
 static void exchange_sides(owned *faces, int64_t count)
 {
     for (int64_t face = 0; face < count; face += 2) {
@@ -163,7 +165,7 @@ static void polyhedra_are_the_cells_that_they_are(void **state)
             drawing drawn = draw(scene, &in);
             everywhere(are_same(&expected, &drawn));
             everywhere(drawn.recognised == polyhedra && drawn.copied > expected.copied);
-            everywhere(drawn.inverted == 0 || half); /* those given as cells may be mirrored */
+            everywhere(drawn.inverted == 0 || half); /* cells that were not polyhedra may be left-handed */
             free_drawing(&drawn);
             in.mesh.keep_polyhedra = 1;
             drawn = draw(scene, &in);
@@ -177,7 +179,8 @@ static void polyhedra_are_the_cells_that_they_are(void **state)
     }
 }
 
-/* Every ninth face of hexes that are polyhedra is cut into two triangles: its cells stay polyhedra. */
+/* Cuts every ninth face of the hexes, which are given as polyhedra, into two triangles. The cells of these faces cannot
+ * be recognised as hexes. */
 static void cut_faces(const test_mesh *part, test_mesh *out, unsigned char *is_cut)
 {
     test_mesh_allocate(out, part->vertex_count, part->cell_count, 2 * part->connectivity_count);
@@ -203,7 +206,7 @@ static void cut_faces(const test_mesh *part, test_mesh *out, unsigned char *is_c
     free(halves);
 }
 
-/* Hexes as hexes beside those polyhedra. */
+/* Combines the hexes that have no cut face, as hexes, with the polyhedra that have one. */
 static void mix_cells(const test_mesh *hexes, const test_mesh *polyhedra, const unsigned char *is_cut, test_mesh *out)
 {
     test_mesh_allocate(out, hexes->vertex_count, hexes->cell_count, 12 * hexes->cell_count);
@@ -259,7 +262,8 @@ static void hexes_among_polyhedra_are_hexes(void **state)
     input_free(&mixed);
 }
 
-/* An orange of six segments: six quads and eight vertices as a hex has, but all quads from pole to pole. */
+/* Makes a polyhedron like an orange of six segments. It has six quads and eight vertices like a hex, but every quad
+ * extends from pole to pole. */
 static void make_orange(test_mesh *out)
 {
     test_mesh_allocate(out, 8, 1, 6);
@@ -274,7 +278,7 @@ static void make_orange(test_mesh *out)
     test_mesh_add_polyhedron(out, faces, 6);
 }
 
-/* Rank 0 has it. */
+/* Checks that a polyhedron of six quads that is not a hex stays a polyhedron. Only rank 0 has it. */
 static void six_quads_that_are_no_hex_stay(void **state)
 {
     (void)state;
@@ -283,7 +287,7 @@ static void six_quads_that_are_no_hex_stay(void **state)
     if (own_rank == 0)
         make_orange(&in.part);
     else
-        input_create(&in, TEST_HEXES, 1, TEST_BLOCK, 0, 2); /* no cell: the other one has it */
+        input_create(&in, TEST_HEXES, 1, TEST_BLOCK, 0, 2); /* the first of two parts, which has no cell */
     everywhere(in.part.cell_count == (own_rank == 0));
     input_describe(&in);
     drawing drawn = draw(scene, &in);
@@ -296,7 +300,7 @@ static void six_quads_that_are_no_hex_stay(void **state)
     input_free(&in);
 }
 
-/* Whichever face of a hex crosses itself, it is no hex, and not closed. The last rank has it. */
+/* Checks that a hex is refused as not closed if any one of its faces crosses itself. Only the last rank has it. */
 static void hexes_with_a_crossed_face_are_reported(void **state)
 {
     (void)state;
@@ -319,7 +323,8 @@ static void hexes_with_a_crossed_face_are_reported(void **state)
     input_free(&in);
 }
 
-/* Drawn, and drawn again with other coordinates; copied is what the second step holds beyond the first. */
+/* Draws the mesh twice, the second time with other coordinates. Returns the second drawing; its `copied` is the number
+ * of bytes by which the second step's copies exceed the first's. */
 static drawing draw_moved(const char *scene, session_input *in)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
@@ -339,7 +344,8 @@ static drawing draw_moved(const char *scene, session_input *in)
     return after;
 }
 
-/* A mesh that moves keeps what was made of its faces, and does not ask for them again: they are overwritten. */
+/* Checks that a mesh with new coordinates reuses the cells recognised in its faces without reading the faces again:
+ * they are overwritten before the second step. */
 static void moved_cells_are_the_same_cells(void **state)
 {
     (void)state;
@@ -356,7 +362,8 @@ static void moved_cells_are_the_same_cells(void **state)
     input_free(&in);
 }
 
-/* One allocation fails on the last rank, the next, the next: an error to all or the picture, and then the picture. */
+/* Lets the n-th allocation fail on the last rank, for each n. The step must return an error on all ranks or draw the
+ * picture, and the next step must draw the picture. */
 static void memory_that_runs_out_is_reported(void **state)
 {
     (void)state;
@@ -382,7 +389,7 @@ static void memory_that_runs_out_is_reported(void **state)
         insitu_destroy(&s);
         everywhere(base_memory_held() == held);
     }
-    everywhere(reported >= 6); /* two arrays of the lists, two of owner and neighbour, types, two of the cells */
+    everywhere(reported >= 6); /* arrays: 2 of the lists, 2 of owner and neighbour, 1 of types, 2 of cells */
     free_drawing(&expected);
     free_owned(&faces);
     input_free(&in);

@@ -1,11 +1,12 @@
-/* A user's errors in owners, neighbours and lists of faces, on one rank alone: every rank gets the same message, with
- * the rank, the mesh, the face and the value; nothing is drawn; and once it is put right the next step draws. */
+/* Tests errors of users in owners, neighbours and lists of faces, each on one rank only. Every rank must get the same
+ * message, which names the rank, the mesh, the face and the value; nothing is drawn; and the next step draws once the
+ * input is corrected. */
 #include "test_owned_faces.h"
 #include "test_session_fixture.h"
 
 static owned corrupted;
 
-/* The description of these is spoilt, or their arrays, on one rank. */
+/* Describes the mesh by owners in `corrupted`. One rank then corrupts this description or its arrays. */
 static void by_owner(session_input *in, form which, int base)
 {
     free_owned(&corrupted);
@@ -26,7 +27,7 @@ static void owner_negative(session_input *in)
 static void owner_before_one(session_input *in)
 {
     by_owner(in, FORM_PAIRS, 1);
-    corrupted.pairs[2 * 4] = corrupted.pairs[2 * 4 + 1] = 0; /* 0 beside a cell is CGNS's way of a boundary */
+    corrupted.pairs[2 * 4] = corrupted.pairs[2 * 4 + 1] = 0; /* one 0 alone would mark a boundary face, as in CGNS */
 }
 static void neighbour_large(session_input *in)
 {
@@ -43,7 +44,7 @@ static void owner_is_neighbour(session_input *in)
     by_owner(in, FORM_WIDE, 0);
     corrupted.owner[1] = corrupted.neighbour[1] = 2;
 }
-/* The faces of cell 0 go to another. */
+/* Assigns the faces of cell 0 to other cells. */
 static void cell_without_faces(session_input *in)
 {
     by_owner(in, FORM_WIDE, 0);

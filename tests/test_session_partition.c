@@ -1,10 +1,10 @@
-/* A volume for which the scene gives no sampling, range, unit distance or camera. These are derived from all ranks'
- * data, so the picture is the one that rank 0 draws of the whole mesh alone. Each rank lists its cells in its own way:
- * other vertices and cells first, faces from another vertex on and in the other direction, a polyhedron's faces in
- * another order. Warped faces make a cell's volume depend on how a face is cut into triangles, which must not depend on
- * the listing.
+/* Tests a volume for which the scene gives no sampling, range, unit distance or camera. They are derived from the data
+ * of all ranks, so the picture must be the one that rank 0 draws of the whole mesh alone. Each rank lists its cells in
+ * its own order: vertices and cells are permuted, the vertices of a face begin at another vertex and run in the
+ * opposite direction, and a polyhedron's faces are permuted. The volume of a cell with warped faces depends on how each
+ * face is divided into triangles, and this division must not depend on the listing.
  *
- * The bound is that of compositing, 1e-6, as fragments blend in other groups. */
+ * The bound is compositing's, 1e-6, as fragments are blended in other groups. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -39,7 +39,7 @@ static const scene_case scenes[] = {
     {"segments", IMAGE(VOLUME, "    sampling: {method: segments}\n")},
     {"two volumes", IMAGE(VOLUME DENSE, "")},
 };
-enum { FIRST_SAMPLED = 4, SCENES = sizeof scenes / sizeof *scenes }; /* from that one on by the default step */
+enum { FIRST_SAMPLED = 4, SCENES = sizeof scenes / sizeof *scenes }; /* scenes from this one on use the default step */
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
@@ -48,8 +48,8 @@ typedef enum mesh_kind { HONEYCOMB, WARPED_POLYHEDRA, WARPED_MIXED, HEXES, FLAT_
 static const char *const mesh_names[MESHES] = {"honeycomb", "warped polyhedra", "polyhedra among others", "hexes",
                                                "flat cells among hexes"};
 
-/* Adds as many hexes again, each with its eight vertices in one oblique plane: the rounding of their volumes depends on
- * which vertex is listed first. */
+/* Doubles the number of hexes. The eight vertices of each added hex lie in one oblique plane, so the rounding of its
+ * volume depends on which vertex is listed first. */
 static void add_flat_hexes(test_mesh *mesh)
 {
     test_mesh old = *mesh;
@@ -81,7 +81,7 @@ static void make_mesh(mesh_kind kind, test_mesh *out)
     if (kind == FLAT_AMONG_HEXES) add_flat_hexes(out);
 }
 
-/* Dealt at random, and listed in the rank's own way. */
+/* Makes this rank's part of a random partition, and lists its vertices, faces and cells in this rank's own order. */
 static void extract_rank_cells(const test_mesh *whole, session_input *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
@@ -95,7 +95,7 @@ static void extract_rank_cells(const test_mesh *whole, session_input *out)
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
-/* On rank 0 *out is the picture, to be freed. */
+/* Draws the scene and returns the size of cells. On rank 0, *out becomes the picture, which the caller frees. */
 static double draw(MPI_Comm comm, const char *scene, const session_input *in, caught_picture *out)
 {
     insitu_session *session = open_session(comm, scene);
@@ -142,9 +142,9 @@ static void verify(mesh_kind kind)
     input_free(&whole);
 }
 
-/* ---- to a hundredth ------------------------------------------------------------------------------------------ */
+/* ---- error of the default ------------------------------------------------------------------------------------ */
 
-/* The picture by default is off by no more than 0.01; the one that it is compared with, by 1e-4. */
+/* Returns whether the default picture, whose error is at most 0.01, agrees with one whose error is at most 1e-4. */
 static bool is_near(const char *layers, const session_input *in)
 {
     char text[1024];
@@ -202,7 +202,7 @@ static void default_volumes_of_hexes_give_one_picture(void **context)
     verify(HEXES);
 }
 
-/* When drawn to an error, flat cells overlap others, and such pixels agree to max_error. */
+/* Tests only scenes with samples: to max_error, pixels in which flat cells overlap others agree only to max_error. */
 static void flat_cells_do_not_change_the_default_step(void **context)
 {
     (void)context;

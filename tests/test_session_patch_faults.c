@@ -1,6 +1,6 @@
-/* A user's errors in the patches of a field, on one rank alone: every rank gets the same message, with the rank, the
- * mesh, the field, the patch, the face and what is wrong with it; nothing is drawn; and once it is put right the next
- * step draws. */
+/* Tests errors of users in the patches of a field, each on one rank only. Every rank must get the same message, which
+ * names the rank, the mesh, the field, the patch, the face and the error; nothing is drawn; and the next step draws
+ * once the input is corrected. */
 #include <stdio.h>
 #include <string.h>
 
@@ -16,13 +16,13 @@ enum { SIDE = 3, MOST = 64 };
 static session_input input;
 static owned faces;
 static double cell_values[SIDE * SIDE * SIDE], values[2 * MOST];
-static int64_t inner, outer; /* a face of either kind, counted from index_base */
+static int64_t inner, outer; /* an interior and a boundary face, counted from index_base */
 static int64_t inner_quad[4], outer_quad[4], no_quad[4] = {0, 2, 5, 7}, twice[8], numbers[MOST];
 static insitu_patch patches[2];
 
 /* ---- meshes ------------------------------------------------------------------------------------------------------ */
 
-/* One face of the hexes and one between two of them, by their vertices. */
+/* Finds the vertices of one boundary face and of one interior face of the hexes. */
 static void find_quads(void)
 {
     const test_mesh *part = &input.part;
@@ -36,7 +36,8 @@ static void find_quads(void)
     memcpy(twice + 4, outer_quad, sizeof outer_quad);
 }
 
-/* All cells on each rank, so that each has both kinds of faces: beside one another. */
+/* Creates a whole mesh on each rank, so that each rank has interior and boundary faces. The ranks' meshes lie side by
+ * side. */
 static void create(void)
 {
     input_create(&input, TEST_HEXES, SIDE, TEST_BLOCK, 0, 1);
@@ -51,7 +52,7 @@ static void create(void)
     for (int i = 0; i < SIDE * SIDE * SIDE; i++) cell_values[i] = i % 2;
 }
 
-/* A patch by its first face, on a mesh of owners that counts from 1. */
+/* Describes a mesh by owners, with index_base 1, and a patch by the number of its first face. */
 static void describe(void)
 {
     input_describe(&input);
@@ -74,7 +75,8 @@ static void by_numbers(int64_t second)
     patches[0].faces = (insitu_array){numbers, INSITU_INT64, 0};
 }
 
-/* Sets a patch by vertices on a mesh without owners, whose cells have faces or are hexes; both count from 0. */
+/* Sets a patch by vertices on a mesh without owners, whose cells are polyhedra or hexes. Mesh and patch have index_base
+ * 0. */
 static void by_vertices(const int64_t *vertices, int64_t count)
 {
     input_describe(&input);
@@ -216,7 +218,7 @@ static void with_fill(void)
 typedef struct fault {
     void (*corrupt)(void);
     insitu_status status;
-    bool at_once; /* the set call fails too */
+    bool at_once; /* insitu_set_field() fails too, before the step */
     const char *words[2];
 } fault;
 
@@ -283,7 +285,7 @@ static void wrong_input_is_reported_on_all_ranks(void **state)
     free_owned(&faces);
 }
 
-/* Numbers of faces, on a mesh that has none. */
+/* Checks that a patch given by the numbers of faces is refused for hexes, whose faces have no numbers. */
 static void hexes_want_vertices(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Values on the boundary: a vertex of a face that has one gets, bit for bit, the mean over such faces that a search
- * over the whole mesh gives, for any dealing of the cells and any way of naming the faces; linear fields are exact
- * where the header says so. */
+/* Tests values on boundary faces. A vertex of faces that have values gets, bit for bit, the mean over these faces that
+ * a brute-force search over the whole mesh finds, for any partition of the cells and any way of listing the faces.
+ * Linear fields are exact at the vertices for which the header guarantees it. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,9 +25,9 @@ static const char corner_scene[] = "images:\n  - name: a\n    size: [40, 30]\n  
 static test_mesh whole;
 static int *owners;
 
-/* ---- what is to come out --------------------------------------------------------------------------------------- */
+/* ---- expected means --------------------------------------------------------------------------------------------- */
 
-/* A number of any of many magnitudes, so that the order of a sum matters. */
+/* Returns a pseudorandom number. Numbers differ by many orders of magnitude, so that the order of a sum matters. */
 static double scattered(double at, uint64_t seed)
 {
     uint64_t bits;
@@ -42,10 +42,11 @@ static double cell_value(int64_t cell)
 
 typedef struct boundary_face {
     double centre[3];
-    int patch; /* the axis of its wall; that of z = 1 and -1 has no values */
+    int patch; /* axis of the face's wall; walls at z = 1 and z = -1 have no values */
 } boundary_face;
 
-/* Walls are at 1 and -1, where vertices are not moved: sums of their coordinates are exact. */
+/* Returns whether a face lies on a wall. Walls are at 1 and -1, and their vertices are not moved, so sums of their
+ * coordinates are exact. */
 static bool is_on_wall(const double (*points)[3], int64_t count, boundary_face *out)
 {
     int wall = -1;
@@ -67,7 +68,7 @@ static double face_value(const boundary_face *face)
 {
     const double value = scattered(face->centre[0] + 8 * face->centre[1] + 64 * face->centre[2], 9);
     if (value < 0.002) return NAN;
-    return face->patch == 1 ? (double)(float)value : value; /* which are given as float32 */
+    return face->patch == 1 ? (double)(float)value : value; /* patch 1 is given as float32 */
 }
 
 static int read_loop(const grid *g, const session_face_loop *loop, double points[8][3])
@@ -83,8 +84,8 @@ static bool is_among(const double (*points)[3], int count, const double position
     return false;
 }
 
-/* The mean over all cells of the whole mesh, in which each cell has its own faces, so that those between two cells are
- * there twice. */
+/* Returns the mean of the values on boundary faces around a vertex or, without any, of the values of the cells around
+ * it. Each cell of the whole mesh has its own faces, so an interior face is visited twice. */
 static double expected_at(const grid *all, const double position[3])
 {
     double cells[256], faces[256];
@@ -107,9 +108,10 @@ static double expected_at(const grid *all, const double position[3])
     return face_count ? mean_of(faces, face_count) : mean_of(cells, cell_count);
 }
 
-/* ---- what is handed over --------------------------------------------------------------------------------------- */
+/* ---- input ----------------------------------------------------------------------------------------------------- */
 
-/* BY_NUMBERS and BY_RANGES are for meshes with faces; FORM_* of test_owned_faces.h, else cells' faces. */
+/* How a patch lists its faces. BY_NUMBERS and BY_RANGES need faces with numbers: those of owners (FORM_* of
+ * test_owned_faces.h) or of polyhedra. */
 typedef enum telling { BY_VERTICES, BY_NUMBERS, BY_RANGES } telling;
 
 enum { MOST_FACES = 8 * 6 * SIDE * SIDE, RUBBISH = 1000000 };
@@ -119,9 +121,9 @@ typedef struct part_input {
     owned faces;
     insitu_mesh mesh;
     insitu_field field;
-    double *values; /* cells */
+    double *values; /* of cells */
     insitu_patch patches[MOST_FACES];
-    double wide[PATCHES][2 * MOST_FACES]; /* every second one */
+    double wide[PATCHES][2 * MOST_FACES]; /* only every second element is used */
     float narrow[PATCHES][MOST_FACES];
     int64_t vertices[PATCHES][8 * MOST_FACES], offsets[PATCHES][MOST_FACES + 1], numbers[PATCHES][MOST_FACES];
     int64_t counts[PATCHES];
@@ -137,7 +139,7 @@ static void add_value(part_input *in, int patch, double value)
     in->narrow[patch][at] = (float)value;
 }
 
-/* Those of ghost cells have rubbish. */
+/* Lists the boundary faces of all cells. Faces of ghost cells get wrong values. */
 static void list_by_cells(part_input *in, const grid *g)
 {
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
@@ -159,7 +161,7 @@ static void list_by_cells(part_input *in, const grid *g)
     }
 }
 
-/* The faces of make_owned() have numbers of their own. */
+/* Lists the boundary faces of make_owned(), which numbers faces in its own order. */
 static void list_by_owned(part_input *in)
 {
     for (int64_t f = in->faces.inner; f < in->part.face_count; f++) {
@@ -217,7 +219,8 @@ static void describe(part_input *in)
     in->field.values = (insitu_array){in->values, INSITU_FLOAT64, 0};
 }
 
-/* The part of rank, or the whole with the others' cells as ghosts that hold rubbish. */
+/* Creates the part of a rank or, with_ghosts, the whole mesh, in which cells of other ranks are ghosts with wrong
+ * values. */
 static void part_create(part_input *in, int rank, bool with_ghosts)
 {
     int *all = test_calloc((size_t)whole.cell_count, sizeof *all);
@@ -240,7 +243,8 @@ static void part_free(part_input *in)
     if (in->faces.owner) free_owned(&in->faces);
 }
 
-/* ---- and what does ----------------------------------------------------------------------------------------------- */
+/* ---- checks --------------------------------------------------------------------------------------------------------
+ */
 
 static const session_scalar *means_of(const session_mesh *mesh)
 {
@@ -298,7 +302,7 @@ static void part_lists(part_input *in)
     test_view_free(&view);
 }
 
-/* polyhedra: all cells are made such. */
+/* Makes the whole mesh. If `polyhedra`, all cells become polyhedra. */
 static void make_whole(test_mesh_kind kind, bool polyhedra)
 {
     test_mesh_lattice(kind, SIDE, 0.2, test_wave, &whole);
@@ -402,7 +406,8 @@ static insitu_status fill(void *data, insitu_field *field)
     return INSITU_OK;
 }
 
-/* Set first with other values on the boundary alone; and then given by a fill. */
+/* Checks that means are computed again if only the values on the boundary change, and if a fill function gives the
+ * field. */
 static void means_follow_values_on_the_boundary(void **state)
 {
     (void)state;
@@ -439,9 +444,9 @@ static void means_follow_values_on_the_boundary(void **state)
 
 /* ---- a linear field ---------------------------------------------------------------------------------------------- */
 
-/* The mean of a linear function is that of the mean place of its faces' centres: the vertex itself amid a wall; at an
- * edge h / 4 from both walls, at a corner h / 3 from all three. Four values of size 2 and their sum are off by a few
- * roundings of 2.2e-16 of that. */
+/* The mean of a linear function over faces is its value at the mean of the faces' centres. For a vertex within a wall
+ * this is the vertex itself; at an edge it is moved by h / 4 away from both walls, and at a corner by h / 3 from all
+ * three walls. Four values of size 2 and their sum are off by a few roundings of 2.2e-16 × 2. */
 static void linear_fields_are_exact_amid_walls(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Plane runs: triangles, quads and polygons in the plane of x and y, handed over without z. Their pictures are the
- * colour map of the field, pixel by pixel in closed form, with no camera and no material in the scene, and the same to
- * the bit on any ranks. Statistics, conditions and percentiles weigh cells by their area. */
+/* Tests plane runs: triangles, quads and polygons in the plane of x and y, given without z. If the scene has no camera
+ * and no material, each pixel has the colour map's colour of the field, which a closed form computes, and the pictures
+ * are the same to the bit on any number of ranks. Statistics, conditions and percentiles weight cells by area. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,7 +23,7 @@ static const double right = 3, top = 2; /* the plate is [0, 3] x [0, 2] */
 
 typedef enum plate_kind { QUADS, TRIANGLES, POLYGONS, PLATE_KINDS } plate_kind;
 
-/* This rank's cells of a plate, with all of its vertices. */
+/* This rank's cells of a plate, with all of the plate's vertices. */
 typedef struct plate {
     plate_kind kind;
     int cell_count, entry_count;
@@ -36,7 +36,7 @@ static double linear(double x, double y)
     return 2 * x - y;
 }
 
-/* A value for the lattice's square, and for both of its triangles. */
+/* Returns the cell value of a square of the lattice; both of its triangles have this value. */
 static double value_of_square(int i, int j)
 {
     return (3 * i + 5 * j) % 7 - 1;
@@ -62,7 +62,7 @@ static void add_square(plate *p, int i, int j)
     }
 }
 
-/* The squares that the rank has among so many ranks. */
+/* Makes the squares of the plate that `rank` has among `ranks` ranks. */
 static void make_plate(plate_kind kind, int rank, int ranks, plate *out)
 {
     *out = (plate){.kind = kind};
@@ -135,8 +135,8 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const plate *p, boo
 
 /* ---- pictures ------------------------------------------------------------------------------------------------- */
 
-/* The place in the plate of a pixel's middle: the plate is as wide as 0.95 of the frame or as high, whichever is less.
- */
+/* Computes the plate's position at the centre of a pixel. The plate is as large as fits into 0.95 of the frame's width
+   and of its height. */
 static void place_of(int pixel, double *x, double *y)
 {
     const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
@@ -150,16 +150,16 @@ static bool is_near_edge(double at, double size, int cells)
     return fabs(place - round(place)) < 1e-4;
 }
 
-/* sRGB's code of linear light, as a PNG has it before it is rounded. */
+/* Converts linear light to the sRGB code of a PNG, before it is rounded. */
 static double srgb_code(float light)
 {
     const double c = (double)light;
     return 255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1 / 2.4) - 0.055);
 }
 
-/* Tells whether each channel of each pixel, in the 8 bits of a PNG, is that of the grey map at the field's value, or
- * one off: a half of it is the code's own rounding, and the map's table, straight in linear light between 1024 grey
- * codes, and values in float are off by far less than the other. */
+/* Returns whether each 8-bit channel of each pixel differs by at most 1 from the grey map at the field's value. The
+ * rounding of codes takes half of this tolerance. The colour map's table, which is linear between 1024 greys, and
+ * float32 values cause errors far below the other half. */
 static bool is_map(const caught_picture *picture, bool is_of_cells)
 {
     int hits = 0;
@@ -187,7 +187,7 @@ static bool are_same(const caught_picture *a, const caught_picture *b)
            memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
 }
 
-/* Without z and with zeros, on all ranks and on one. */
+/* Draws the plate without z and with z = 0, on all ranks and on one rank. */
 static void pictures_are_the_colour_map_of_the_field(void **state)
 {
     (void)state;
@@ -210,7 +210,8 @@ static void pictures_are_the_colour_map_of_the_field(void **state)
         }
 }
 
-/* A direction from behind, an explicit camera, a light and a material each make another picture. */
+/* Checks that what the scene specifies overrides the defaults of plane runs: a direction from behind, an explicit
+ * camera, a light and a material each change the picture. */
 static void what_the_scene_says_comes_first(void **state)
 {
     (void)state;
@@ -251,16 +252,17 @@ static void layers_that_show_nothing_are_reported(void **state)
 
 #define LINES "{isosurface: {field: f, values: [3, 1], colours: [[1, 0, 0], [0, 1, 0]]}}"
 
-/* The share of a pixel that the line of a value covers, 1.5 pixels wide, in the middle of a field whose slope is that
- * of linear(): so much of the box of a pixel as lies along the line. */
+/* Returns the share of a pixel that the contour line of a level covers. The line is 1.5 pixels wide and lies within a
+ * field with the slope of linear(). The coverage is that of a box of one pixel across the line. */
 static double line_share(double value, double level)
 {
     const double half = fmax(top / 2, right / 2 * HEIGHT / WIDTH) / 0.95, size = 2 * half / HEIGHT;
     return fmin(fmax(1.25 - fabs(value - level) / (sqrt(5) * size), 0), 1);
 }
 
-/* Tells whether the picture has the two lines, the red one at 3 and the green one at 1, and on_grey: the map under
- * them. Values in float are off by 1e-6 of 8, which is 4e-6 of a pixel of 0.094; light goes with the share. */
+/* Returns whether the picture has the two contour lines, red at 3 and green at 1, over the grey map if on_grey. Float32
+ * values up to 8 are off by 1e-6, which is 4e-6 of a pixel of 0.094; the light of a pixel is proportional to the share
+ * covered by the line. */
 static bool are_lines(const caught_picture *picture, bool on_grey)
 {
     int hits = 0;
@@ -286,7 +288,8 @@ static bool are_lines(const caught_picture *picture, bool on_grey)
     return hits > 100;
 }
 
-/* Alone, over the plate itself, and where shadows have hits lit later. The same on all ranks and on one. */
+/* Draws the contour lines alone, over the surface of the plate, and with shadows, for which hits are lit later.
+ * Pictures are the same on all ranks and on one rank. */
 static void isosurfaces_are_contour_lines(void **state)
 {
     (void)state;
@@ -310,8 +313,8 @@ static void isosurfaces_are_contour_lines(void **state)
         }
 }
 
-/* The share of the pixel that the strip about the hyperbola x y = level covers, from points of the pixel: each is moved
- * to the curve along the field's slope. */
+/* Returns the share of the pixel that the strip about the hyperbola x y = level covers. It samples points of the pixel
+ * and estimates each point's distance from the curve along the field's gradient. */
 static double hyperbola_share(int pixel, double level)
 {
     enum { POINTS = 16 };
@@ -333,8 +336,9 @@ static double hyperbola_share(int pixel, double level)
     return (double)inside / (POINTS * POINTS);
 }
 
-/* Quads have the field x y exactly. A ramp of one pixel for lines of all directions is asked to be within 0.02 of the
- * covered share, as the root of the mean square, and the sum to be within a hundredth of the width times the length. */
+/* Quads represent the field x y exactly. The drawn lines have a ramp of one pixel in all directions. Their root mean
+ * square error must be within 0.02 of the covered share, and their total light within a hundredth of width times
+ * length. */
 static void curved_lines_cover_what_strips_do(void **state)
 {
     (void)state;
@@ -346,7 +350,7 @@ static void curved_lines_cover_what_strips_do(void **state)
     double squares = 0, drawn = 0, exact = 0;
     int count = 0;
     for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) {
-        const double border = 0.1; /* more than two pixels */
+        const double border = 0.1; /* more than two pixels wide */
         double x, y;
         place_of(pixel, &x, &y);
         if (x < border || x > right - border || y < border || y > top - border) continue;
@@ -386,7 +390,7 @@ static void solids_need_z(void **state)
     make_plate(QUADS, own_rank, rank_count, &part);
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(IMAGE("", MAP_OF("f"))));
     insitu_mesh mesh = describe(&part, false);
-    mesh.cell_type = INSITU_TET; /* as many vertices as a quad */
+    mesh.cell_type = INSITU_TET; /* tets have as many vertices as quads */
     assert_int_equal(insitu_set_mesh(session, "plate", &mesh), INSITU_ERROR_MESH);
     everywhere(strstr(insitu_error(session), "z coordinates are not given") != NULL);
     mesh = describe(&part, false);
@@ -430,7 +434,7 @@ static void bars_say_what_they_show(void **state)
 
 enum { MOST = 1 << 12 };
 
-/* A number of the file's second line. */
+/* Returns a number of the file's second line. */
 static double number_at(const char *text, int column)
 {
     const char *at = strchr(text, '\n');
@@ -440,12 +444,12 @@ static double number_at(const char *text, int column)
 
 static bool is_near(double a, double b)
 {
-    if (fabs(a - b) <= 1e-8 * fmax(1, fabs(b))) return true; /* nine digits are written */
+    if (fabs(a - b) <= 1e-8 * fmax(1, fabs(b))) return true; /* numbers are written with nine digits */
     fprintf(stderr, "%.9g, expected %.9g\n", a, b);
     return false;
 }
 
-/* A linear field's mean over the plate is its value in the middle, and its ends are at corners. */
+/* Checks a linear field's statistics: its mean is the value at the plate's centre, and its extremes are at corners. */
 static bool are_of_plate(const char *text, plate_kind kind)
 {
     enum { CELLS = 2, AREA, LEAST, GREATEST, MEAN };
@@ -478,13 +482,13 @@ static void statistics_weigh_shells_by_area(void **state)
     }
 }
 
-/* Width of a column of quads when the last one is made seven times as wide as the others. */
+/* Returns the width of a column of quads. The last column is seven times as wide as each of the others. */
 static double column_width(int i)
 {
     return i == NX - 1 ? 1.75 : 0.25;
 }
 
-/* Makes the plate's last column wider; its bounds stay the same. */
+/* Makes the plate's last column wider; the plate's bounds stay the same. */
 static void widen_column(plate *p)
 {
     for (int n = 0; n < MAX_VERTICES; n++) {
@@ -494,7 +498,7 @@ static void widen_column(plate *p)
     }
 }
 
-/* The mean by area is 2; by cells it is not, as one column is wider. */
+/* The mean weighted by area is 2. A mean over cells would differ, as one column is wider. */
 static void conditions_weigh_shells_by_area(void **state)
 {
     (void)state;
@@ -514,7 +518,7 @@ static void conditions_weigh_shells_by_area(void **state)
     }
 }
 
-/* The least value of squares that a percentage of the area does not exceed. */
+/* Returns the least value such that squares with at most this value cover the given percentage of the area. */
 static int percentile_by_area(double percent)
 {
     enum { LEAST = -1, GREATEST = 5 };
@@ -527,7 +531,7 @@ static int percentile_by_area(double percent)
     return GREATEST;
 }
 
-/* No percentage is that of whole squares, so that rounding does not matter. */
+/* No percentage falls exactly between whole squares, so rounding does not change the result. */
 static void percentiles_weigh_shells_by_area(void **state)
 {
     (void)state;
@@ -551,7 +555,7 @@ static void percentiles_weigh_shells_by_area(void **state)
         }
 }
 
-/* A tet with the values 0 to 3, and a triangle beside it with larger ones, on the last rank. */
+/* Sets a tet with the values 0 to 3 and an adjacent triangle with larger values, on the last rank. */
 static void set_tet_and_triangle(insitu_session *session)
 {
     static const double places[3][5] = {{0, 1, 0, 0, 3}, {0, 0, 1, 0, 3}, {0, 0, 0, 1, 0}};
@@ -572,7 +576,8 @@ static void set_tet_and_triangle(insitu_session *session)
     set_field(session, "f", INSITU_VERTEX, mesh.vertex_count, 1, values);
 }
 
-/* Beside a cell with a volume shells do not count: the numbers are those of the tet alone. */
+/* Checks that shells are ignored in meshes that also have cells with a volume: the statistics are those of the tet
+ * alone. */
 static void shells_beside_solids_do_not_count(void **state)
 {
     (void)state;
@@ -599,7 +604,7 @@ static void shells_beside_solids_do_not_count(void **state)
     free_caught(&picture);
 }
 
-/* ---- the whole ------------------------------------------------------------------------------------------------ */
+/* ---- main ------------------------------------------------------------------------------------------------------ */
 
 static int begin_tests(void **state)
 {

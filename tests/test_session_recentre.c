@@ -1,5 +1,6 @@
-/* Cell values at vertices: for any dealing of the cells, by coordinates or by ids, bit for bit the mean that a search
- * over the whole mesh gives; and the picture of a dealt mesh is that of the whole one. */
+/* Tests the averaging of cell values at vertices. For any partition of the cells, with vertices matched by coordinates
+ * or by ids, the mean is bit for bit that of a search over the whole mesh, and the picture of the partitioned mesh is
+ * that of the whole mesh. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,7 +34,7 @@ static const char mixed_scene[] = "images:\n"
                                   "    outputs:\n"
                                   "      - path: a.exr\n";
 
-/* The scene of mixed_scene without the isosurface's own field, drawn by c or by v. */
+/* The scene of mixed_scene, except that the isosurface is coloured by `field`, which is c or v. */
 #define SMOOTH(field, how, method)                                                                                     \
     "images:\n  - name: a\n    size: [40, 30]\n    layers:\n"                                                          \
     "      - isosurface: {field: c, values: [8], colour_by: {field: " field how "}, opacity: 0.5}\n"                   \
@@ -44,14 +45,15 @@ static const char mixed_scene[] = "images:\n"
 static test_mesh whole;
 static int *owners;
 
-/* A value of the whole mesh's cell: of many magnitudes, so that the order of a sum shows. */
+/* Returns the value of a cell of the whole mesh. Values differ by many orders of magnitude, so that the order of a sum
+ * matters. */
 static double cell_value(int64_t cell)
 {
     const double u = test_uniform((uint64_t)cell, 5);
     return cell % 17 == 3 ? NAN : u * pow(10, floor(6 * test_uniform((uint64_t)cell, 6)) - 3);
 }
 
-/* The mean over all cells that have a vertex at this place. */
+/* Returns the mean over all cells that have a vertex at this position. */
 static double expected_at(const double position[3])
 {
     double values[256];
@@ -69,8 +71,8 @@ static double expected_at(const double position[3])
 
 typedef struct part_input {
     test_mesh part;
-    double *values; /* cells */
-    int64_t *ids;   /* vertices */
+    double *values; /* of cells */
+    int64_t *ids;   /* of vertices */
     insitu_mesh mesh;
     insitu_field field;
 } part_input;
@@ -92,7 +94,8 @@ static void describe(part_input *in)
     in->field.values = (insitu_array){in->values, INSITU_FLOAT64, 0};
 }
 
-/* The part of rank, or the whole with the others' cells as ghosts that hold rubbish. */
+/* Creates the part of a rank or, with_ghosts, the whole mesh, in which cells of other ranks are ghosts with wrong
+ * values. */
 static void part_create(part_input *in, int rank, bool with_ghosts)
 {
     int *all = test_calloc((size_t)whole.cell_count, sizeof *all);
@@ -149,7 +152,8 @@ static insitu_status draw(insitu_session *session, const part_input *in, int cyc
     return status ? status : stepped;
 }
 
-/* ids of mixed widths and signs; with a ghost layer; or plain. */
+/* How vertices are matched: by coordinates, by ids of various widths and signs, or by coordinates with a layer of
+ * ghosts. */
 typedef enum variant { BY_COORDINATES, BY_IDS, WITH_GHOSTS, VARIANT_COUNT } variant;
 
 static void means_equal_a_search_over_all_cells(void **context)
@@ -174,7 +178,7 @@ static void means_equal_a_search_over_all_cells(void **context)
     insitu_destroy(&session);
 }
 
-/* Vertices doubled within a rank are one, as they would be on two. */
+/* Checks that duplicate vertices within a rank are treated as one vertex, like duplicates on two ranks. */
 static void doubled_vertices_are_one(void **context)
 {
     (void)context;
@@ -186,7 +190,7 @@ static void doubled_vertices_are_one(void **context)
     double *coordinates = calloc((size_t)count * 3 + 1, sizeof *coordinates);
     for (int64_t i = 0; i < count; i++) {
         memcpy(coordinates + 3 * i, in.part.coordinates + 3 * in.part.connectivity[i], 3 * sizeof *coordinates);
-        for (int axis = 0; axis < 3; axis++) /* 0 and -0 are the same place */
+        for (int axis = 0; axis < 3; axis++) /* 0 and -0 are equal coordinates */
             if (coordinates[3 * i + axis] == 0 && i % 2) coordinates[3 * i + axis] = -0.0;
         in.part.connectivity[i] = i;
     }
@@ -200,7 +204,8 @@ static void doubled_vertices_are_one(void **context)
     part_free(&in);
 }
 
-/* Two hexes side by side that share no vertex. When the second moves away, groups of equal vertices are made anew. */
+/* Two adjacent hexes have equal vertices but share none. When the second hex moves away, the groups of equal vertices
+ * must be found again. */
 static void means_follow_cells_that_part(void **context)
 {
     (void)context;
@@ -267,8 +272,9 @@ static void means_follow_values_that_changed_on_one_rank(void **context)
     test_free(right);
 }
 
-/* Compares rank 0's own picture of the whole with that of all ranks. Surfaces alone have the same bits; with a volume
- * behind transparent surfaces, pictures agree within the rounding of "over" (1e-6, as everywhere). */
+/* Compares the picture of the whole mesh, which rank 0 draws alone, with the picture of all ranks. Surfaces alone have
+ * the same bits. If a volume lies behind transparent surfaces, pictures agree within the rounding of the over operator
+ * (1e-6, as in all tests). */
 static void compare_with_alone(const char *scene, double bound)
 {
     for (int distributed = 0; distributed < TEST_PARTITION_COUNT; distributed++) {
@@ -327,7 +333,8 @@ static void smooth_volumes_of_distributed_cells_are_those_of_one_rank(void **con
     compare_with_alone(SMOOTH("c", AT_VERTICES, "segments"), 1e-6);
 }
 
-/* On rank 0, draws a scene with the cells' values as c and the means of a search over all cells as v. */
+/* Draws a scene on rank 0 with the cells' values as field c, and with the means of a search over all cells as field
+ * v. */
 static caught_picture draw_smooth(const char *scene, const part_input *in, const double *means)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
@@ -345,8 +352,8 @@ static caught_picture draw_smooth(const char *scene, const part_input *in, const
     return picture;
 }
 
-/* With interpolate: vertex a cell field is drawn by the means at the vertices, by default as it is. Cells without a
- * finite value of their own, which a field at vertices does not know of, are ghosts. */
+/* Checks that `interpolate: vertex` draws a cell field by the means at its vertices, and that the default draws cell
+ * values. The vertex field v cannot mark cells without a finite value of their own, so these cells are ghosts. */
 static void smooth_layers_are_those_of_the_means(void **context)
 {
     (void)context;

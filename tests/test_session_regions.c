@@ -1,5 +1,6 @@
-/* Regions: several meshes in one picture, each with fields of its own. Tests on which meshes a layer is drawn, by its
- * field or by name, what is grey, and what is refused, on any number of ranks, some without a part of a region. */
+/* Tests regions: several meshes in one picture, each with its own fields. Checks on which meshes a layer is drawn, by
+ * its field or by a mesh's name, which surfaces are grey, and what is refused, on any number of ranks, some of which
+ * have no cells of a region. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,8 +15,8 @@ enum { WIDTH = 40, HEIGHT = 30, SIDE = 4 };
     "images:\n  - name: a\n    size: [40, 30]\n    background: [0, 0, 0, 0]\n    layers:\n" layers                     \
     "    outputs: [{path: a.exr}]\n"
 
-/* Two cubes of hexes beside each other, "air" and "sea/0", dealt to all ranks but for the last, which has none of the
- * sea; both have the field f, the air has t too, and the sea has s. */
+/* Two cubes of hexes side by side, the meshes "air" and "sea/0". Both are partitioned over all ranks, except that the
+ * last of several ranks has no cells of the sea. Both have the field f; the air also has t, and the sea also has s. */
 static session_input air, sea;
 
 static void regions_create(void)
@@ -56,7 +57,7 @@ static insitu_session *open_regions(const char *scene)
     return session;
 }
 
-/* The picture of a scene, on rank 0. */
+/* Draws a scene and checks its warnings. Returns the picture on rank 0. */
 static caught_picture draw(const char *scene, const char *warning)
 {
     insitu_session *session = open_regions(scene);
@@ -74,7 +75,7 @@ static bool has_colour(const caught_picture *picture, int p)
     return picture->rgba[4 * p + 3] > 0;
 }
 
-/* Rank 0: covered pixels of the left half, where the air alone is, and of the right half. */
+/* Counts on rank 0 the covered pixels of the left half, which shows only the air, and of the right half. */
 static void count_covered(const caught_picture *picture, int counts[2])
 {
     counts[0] = counts[1] = 0;
@@ -100,13 +101,14 @@ static void assert_same(const char *scene, const char *warning, const char *othe
     "images:\n  - name: a\n    size: [40, 30]\n    background: [0, 0, 0, 0]\n" FRONT "    layers:\n" layers            \
     "    outputs: [{path: a.exr}]\n"
 
-/* A layer without a mesh is on those that have its field, and a named one on what its name stands for. */
+/* Checks that a layer that names no mesh is drawn on all meshes that have its field, and that a layer that names a mesh
+ * or a pattern is drawn on the meshes that match. */
 static void layers_are_on_the_meshes_that_have_the_field(void **context)
 {
     (void)context;
     static const struct {
         const char *scene;
-        bool is_on[2]; /* air, sea */
+        bool is_on[2]; /* on air, on sea */
     } cases[] = {
         {FRONT_IMAGE("      - isosurface: {field: f, values: [0.1]}\n"), {true, true}},
         {FRONT_IMAGE("      - isosurface: {field: t, values: [0.1]}\n"), {true, false}},
@@ -131,7 +133,7 @@ static void layers_are_on_the_meshes_that_have_the_field(void **context)
     }
 }
 
-/* Two layers, one a region, are one layer on both. */
+/* Checks that two layers, one on each region, draw the same picture as one layer on both regions. */
 static void regions_apart_are_regions_together(void **context)
 {
     (void)context;
@@ -140,7 +142,8 @@ static void regions_apart_are_regions_together(void **context)
                       "      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: sea}\n"));
 }
 
-/* The range of the colours is of the meshes that are drawn; the others are grey, as by colours: [grey]. */
+/* Checks that meshes without the colour field are drawn grey, as with `colours: [grey]`, and that the range of the
+ * colours is taken from the meshes that have the field. */
 static void surfaces_without_the_colour_field_are_grey(void **context)
 {
     (void)context;
@@ -157,7 +160,7 @@ static void surfaces_without_the_colour_field_are_grey(void **context)
                 IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: sea}\n"));
 }
 
-/* Colours that are not numbers are grey, one by one: here all of them, of one region. */
+/* Checks that each point whose colour value is not a number is drawn grey. Here all values of one region are NaN. */
 static void colours_that_are_not_numbers_are_grey(void **context)
 {
     (void)context;

@@ -1,6 +1,7 @@
-/* Shells: triangles, quads and polygons, alone and beside cells of three dimensions. A sheet of them is a plane, by
- * closed form, and for any dealing the same to the bit as on one rank; a shell on a cell's face is drawn instead of the
- * face; isosurfaces, slices and volumes are those of the mesh without them. */
+/* Tests shells: triangles, quads and polygons, alone and together with cells of three dimensions. A sheet of shells is
+ * compared with the closed form of its plane, and is the same to the bit for any partition as on one rank. A shell on a
+ * cell's face is drawn instead of the face. Isosurfaces, slices and volumes are those of the mesh without its
+ * shells. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -47,7 +48,7 @@ static void add_cell(shell_mesh *m, unsigned char type, double value, int count,
     m->offsets[++m->cell_count] = m->entry_count;
 }
 
-/* The cells of a block of two squares of a sheet. */
+/* Kinds of cells that make up a block of two squares of a sheet. */
 typedef enum sheet_kind { QUADS, TRIANGLES, POLYGONS, MIXED, SHEET_KINDS } sheet_kind;
 
 static void add_block(shell_mesh *m, sheet_kind kind, const int at[6])
@@ -68,7 +69,7 @@ static void add_block(shell_mesh *m, sheet_kind kind, const int at[6])
     }
 }
 
-/* 6 x 6 squares over x and y from -1 to 1, on the plane 0.3 x + 0.2 y. */
+/* Makes 6 × 6 squares over x and y from -1 to 1, on the plane z = 0.3 x + 0.2 y. */
 static void make_sheet(sheet_kind kind, shell_mesh *out)
 {
     enum { SIDE = 6 };
@@ -86,8 +87,8 @@ static void make_sheet(sheet_kind kind, shell_mesh *out)
         }
 }
 
-/* 2 x 2 x 2 hexes between -1 and 1 of the value 0; shells of the value 1 on their outer faces at z = 1, on inner
- * ones at z = 0, and through them at z = 0.5. */
+/* Makes 2 × 2 × 2 hexes of the value 0 between -1 and 1, and shells of the value 1: on the hexes' outer faces at z = 1,
+ * on interior faces at z = 0, and through the hexes at z = 0.5. */
 static void make_block(bool with_shells, shell_mesh *out)
 {
     *out = (shell_mesh){0};
@@ -109,7 +110,8 @@ static void make_block(bool with_shells, shell_mesh *out)
                          (const int[]){at[k][j][i], at[k][j + 1][i], at[k][j + 1][i + 1], at[k][j][i + 1]});
 }
 
-/* The rank's cells: every so many one, or all of them with the others' as ghosts. */
+/* Extracts this rank's cells, which are every rank_count-th cell or, with_ghosts, all cells, of which those of other
+ * ranks are ghosts. */
 static void extract_rank_cells(const shell_mesh *whole, bool with_ghosts, shell_mesh *out)
 {
     *out = *whole;
@@ -178,9 +180,9 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const shell_mesh *m
     return picture;
 }
 
-/* ---- what is to be seen -------------------------------------------------------------------------------------- */
+/* ---- pictures ------------------------------------------------------------------------------------------------ */
 
-/* Finds where the pixel's ray meets the plane 0.3 x + 0.2 y = z. */
+/* Finds where the pixel's ray intersects the plane 0.3 x + 0.2 y = z. */
 static double intersect_sheet(int pixel, double place[3])
 {
     static const double normal[3] = {0.3, 0.2, -1};
@@ -194,7 +196,8 @@ static double intersect_sheet(int pixel, double place[3])
     return left / along;
 }
 
-/* Depths and colours to what test_session_surfaces.c derives. */
+/* Compares depths and colours with the sheet's, within the tolerances that is_cube() in test_session_surfaces.c
+ * derives. */
 static bool is_sheet(const caught_picture *picture)
 {
     int hits = 0;
@@ -238,7 +241,7 @@ static void sheets_are_planes_on_any_ranks(void **state)
         }
 }
 
-/* 4 of the block's 24 outer faces are replaced by shells, of which there are 12. */
+/* Of the 12 shells, 4 replace outer faces of the block, which has 24. */
 static void shells_take_the_place_of_faces(void **state)
 {
     (void)state;
@@ -288,7 +291,7 @@ static void other_layers_pass_shells_over(void **state)
     }
 }
 
-/* ---- what is wrong ------------------------------------------------------------------------------------------- */
+/* ---- errors -------------------------------------------------------------------------------------------------- */
 
 static void is_reported(const shell_mesh *m, const char *const words[2])
 {
@@ -305,7 +308,7 @@ static void bad_shells_are_reported(void **state)
 {
     (void)state;
     shell_mesh m;
-    const bool is_last = own_rank == rank_count - 1; /* it alone gets things wrong */
+    const bool is_last = own_rank == rank_count - 1; /* only the last rank has wrong input */
     make_sheet(MIXED, &m);
     if (is_last) m.connectivity[1] = 999;
     is_reported(&m, (const char *const[]){"cell 0 (quad)", "vertex index 999 is outside 0..48"});

@@ -1,6 +1,7 @@
-/* Slices of a session: a plane is where its closed form is and has the colours of a linear field there, on cells of
- * every type, dealt in any way and with ghosts, the same to the bit as on one rank. A plane in faces of cells is drawn
- * once and has no hole; one on the border of the data is drawn whichever way its normal points. */
+/* Tests slices of a session. A plane is at the position of its closed form and has the colours of a linear field there,
+ * on cells of every type, for any partition and with ghosts, and is the same to the bit as on one rank. A plane that
+ * coincides with faces of cells is drawn once and has no holes. A plane on the boundary of the data is drawn for either
+ * direction of its normal. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,7 +23,7 @@ typedef struct plane {
     double normal[3], distance;
 } plane;
 
-/* The depth at which the ray meets the plane; at: where. */
+/* Returns the depth at which the ray intersects the plane, and stores the position in at. */
 static double meet(const ray *r, const plane *p, double at[3])
 {
     double along = 0, from = p->distance;
@@ -63,9 +64,10 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     return picture;
 }
 
-/* Compares with the scene's planes, whose nearest hit within the cube counts. Rays near the cube's border may hit or
- * miss. Depths are off by roundings of single precision of numbers near 5, times the inverse cosine, at most 10 here;
- * colours by as much of the field, of slope 1 in 3.2, times the table's slope of at most 12. */
+/* Compares the picture with the scene's planes: the nearest hit within the cube is visible. Rays near the cube's border
+ * may hit or miss. Depths near 5 are off by roundings of single precision times the inverse cosine of the angle of
+ * incidence, at most 10 here. Colours are off by the depth error times the field's slope, 1 in 3.2, and the colour
+ * table's slope, at most 12. */
 static bool is_truth(const caught_picture *picture, const plane *planes, int count)
 {
     const double depth_error = 10 * 5 * 3e-7, colour_error = depth_error / 3.2 * 12;
@@ -111,7 +113,7 @@ static void make_whole(test_mesh_kind kind, double jitter, session_input *out)
     input_describe(out);
 }
 
-/* The rank's cells; with ghosts: all cells, of which the others' are ghosts. */
+/* Extracts this rank's cells or, with_ghosts, all cells, of which those of other ranks are ghosts. */
 static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts,
                                session_input *out)
 {
@@ -125,7 +127,8 @@ static const char three_planes[] =
               SLICE("", "{normal: [0, 3, 0], point: [0, -0.6, 0]}"));
 static const plane three[3] = {{{1. / 3, 2. / 3, -2. / 3}, -0.4}, {{1, 1, 4}, 0.1 + 0.3 + 2.4}, {{0, 1, 0}, -0.6}};
 
-/* Planes of a number are spread over the cube: along its diagonal this goes from -sqrt(3) to sqrt(3). */
+/* Planes given by `count` are spread evenly over the cube's extent along the normal, which is from -sqrt(3) to sqrt(3)
+ * along the diagonal. */
 static void planes_in_numbers_are_true(void **state)
 {
     (void)state;
@@ -136,7 +139,7 @@ static void planes_in_numbers_are_true(void **state)
                              {{1, 1, 1}, 0},
                              {{1, 1, 1}, 2},
                              {{0, -1, 0}, -0.75},
-                             {{0, -1, 0}, 0.25}}; /* 2 = 2/3 sqrt(3) / n */
+                             {{0, -1, 0}, 0.25}}; /* the distance of 2/3 sqrt(3), divided by n */
     session_input whole = {0};
     bool is_well = true;
     assert_true(fabs(2 * n - 2. / 3 * sqrt(3)) < 1e-15);
@@ -185,7 +188,7 @@ static void planes_are_true_and_the_same_on_any_ranks(void **state)
 
 enum { MANY_VALUES = 40, MANY_PLANES = 24 };
 
-/* Descending: a layer's isovalues come in any order. */
+/* Returns the isovalues in descending order, as those of a layer need not be sorted. */
 static double many_value(int i)
 {
     return 1.2207 - 0.0613 * i;
@@ -196,7 +199,7 @@ static double many_distance(int i)
     return -0.93 + 0.0817 * i;
 }
 
-/* As many isovalues and planes as an image may have, each of opacity 0.05. */
+/* Writes a scene with the maximum number of isovalues and planes of an image, each of opacity 0.05. */
 static const char *write_many(void)
 {
     char text[8192];
@@ -211,8 +214,9 @@ static const char *write_many(void)
     return write_scene(text);
 }
 
-/* Each surface is crossed by some ray, and each crossing leaves 0.95 of what is behind it. The surfaces of a linear
- * field are planes, too. Each of at most 64 products is rounded to single precision: 64 x 2^-23 < 1e-5. */
+/* Checks that each surface is crossed by some ray, and that each crossing leaves 0.95 of the light behind it. The
+ * isosurfaces of a linear field are planes. Each of at most 64 products is rounded to single precision: 64 × 2^-23 <
+ * 1e-5. */
 static bool has_many(const caught_picture *picture)
 {
     bool is_crossed[MANY_VALUES + MANY_PLANES] = {false};
@@ -261,7 +265,8 @@ static void many_isovalues_and_planes_are_all_drawn(void **state)
 
 /* ---- planes in faces ----------------------------------------------------------------------------------------- */
 
-/* Every ray that meets the plane in the cube has the slice once: 0.5 of opacity. */
+/* Checks that every ray that intersects the plane within the cube crosses the slice exactly once: the opacity is
+ * 0.5. */
 static bool is_once(const caught_picture *picture, const plane *p)
 {
     int hits = 0;
@@ -328,7 +333,7 @@ static void planes_beside_the_data_are_warned_of(void **state)
 
 /* ---- values -------------------------------------------------------------------------------------------------- */
 
-/* Hexes of one value each: the colour at a point is that of its cell; where it is NaN it is grey. */
+/* Each hex has one value. Checks that a point has the colour of its cell, and is grey if the cell's value is NaN. */
 static bool has_colours_of_cells(const caught_picture *picture)
 {
     int hits = 0;
@@ -380,7 +385,7 @@ static void cells_have_their_values_and_no_number_is_grey(void **state)
     input_free(&whole);
 }
 
-/* ---- what is computed again ---------------------------------------------------------------------------------- */
+/* ---- recomputation ------------------------------------------------------------------------------------------- */
 
 static session_scalar *distances_of(const insitu_session *session)
 {
@@ -390,8 +395,8 @@ static session_scalar *distances_of(const insitu_session *session)
     return NULL;
 }
 
-/* Two images of one plane share its distances. New values leave them alone; new coordinates do not, and a plane through
- * the middle of the data goes with them. */
+/* Checks that two images of one plane share the distances of vertices, that new values do not cause them to be
+ * recomputed but new coordinates do, and that a plane through the centre of the data moves with the data. */
 static void distances_go_with_the_geometry(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
-/* Normals by gradients at vertices are compared with gradients solved for at every vertex in double, drawn as three
- * fields that colour the surface, and with the gradient itself where the field is linear; they are the same to the bit
- * on any partition. */
+/* Tests normals from gradients at vertices. They are compared with gradients that this file computes at every vertex in
+ * double, drawn as three fields that colour the surface, and with the exact gradient if the field is linear. They are
+ * the same to the bit for any partition. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,11 +30,11 @@ static void *zeros(int64_t count, size_t size)
 }
 
 typedef struct gradients {
-    double (*sum)[4]; /* of the weighted gradients, and of the weights */
+    double (*sum)[4]; /* sum of the weighted gradients, and of the weights */
     double *component[3];
 } gradients;
 
-/* x: 3 × 4, the right side last. False where it is singular. */
+/* Solves the 3 × 3 system in x, whose last column is the right-hand side. Returns false if the system is singular. */
 static bool eliminate(double x[3][4], double *determinant)
 {
     *determinant = 1;
@@ -56,7 +56,8 @@ static bool eliminate(double x[3][4], double *determinant)
     return true;
 }
 
-/* One corner: a place and a value, and three others. */
+/* Adds the gradient in one corner of a cell. The corner and the other ends of its three edges each have a position and
+ * a value. */
 static void add_corner(gradients *g, int64_t vertex, const double corner[4], const double ends[3][4])
 {
     double x[3][4], determinant, squares = 0;
@@ -88,7 +89,7 @@ static void add_ends(gradients *g, const test_mesh *mesh, const int64_t *cell, i
 
 static void add_plain_cell(gradients *g, const test_mesh *mesh, int type, const int64_t *cell)
 {
-    static const int around[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* a hex's corners as bits, and back */
+    static const int around[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* maps a hex's vertices to three bits, and back */
     for (int i = 0; i < 8 && type == INSITU_HEX; i++)
         add_ends(g, mesh, cell, i, around[around[i] ^ 1], around[around[i] ^ 2], around[around[i] ^ 4]);
     for (int i = 0; i < 4 && type == INSITU_TET; i++) add_ends(g, mesh, cell, i, (i + 1) % 4, (i + 2) % 4, (i + 3) % 4);
@@ -100,7 +101,7 @@ static void add_plain_cell(gradients *g, const test_mesh *mesh, int type, const 
     }
 }
 
-/* The centre is the mean of the vertices, each once. */
+/* Adds the gradients of a polyhedron. Its centre is the mean of its vertices, each counted once. */
 static void add_polyhedron(gradients *g, const test_mesh *mesh, const int64_t *faces, int64_t face_count)
 {
     int64_t known[MAX_ENDS];
@@ -154,7 +155,7 @@ static void gradients_free(gradients *g)
 
 /* ---- pictures -------------------------------------------------------------------------------------------------- */
 
-/* g: NULL, or fields "gx", "gy" and "gz" of the whole mesh. */
+/* Draws the scene. If g is not NULL, the whole mesh also gets the fields "gx", "gy" and "gz". */
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, const gradients *g)
 {
     static const char *const names[] = {"gx", "gy", "gz"};
@@ -185,11 +186,11 @@ static double swirl(const double p[3])
     return sin(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) + 0.4 * p[2] * p[2] - 0.3 * p[0] * p[2] + 0.2 * p[1];
 }
 
-/* Every kind, and polyhedra of the hexes and of a half of the mixture. */
+/* A mesh of every kind, and lattices of hexes and of mixed cells of which a share is converted to polyhedra. */
 typedef struct mesh_case {
     const char *name;
     test_mesh_kind kind;
-    double as_polyhedra; /* the share of cells */
+    double as_polyhedra; /* share of the cells */
 } mesh_case;
 
 static const mesh_case cases[] = {
@@ -200,7 +201,7 @@ static const mesh_case cases[] = {
     {"mixed", TEST_MIXED, 0},
     {"hexes as polyhedra", TEST_HEXES, 1},
     {"mixed, half of them polyhedra", TEST_MIXED, 0.5},
-    {"polyhedra", TEST_POLYHEDRA, 0}, /* concave: last, see below */
+    {"polyhedra", TEST_POLYHEDRA, 0}, /* concave; must be last, as its bound is another */
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
@@ -218,10 +219,11 @@ static void whole_create(const mesh_case *c, test_function *f, session_input *wh
     describe(whole);
 }
 
-/* ---- what normals are ------------------------------------------------------------------------------------------ */
+/* ---- normals --------------------------------------------------------------------------------------------------- */
 
-/* The largest sine of the angle between the drawn and the expected normal, over pixels with a surface. The expected one
- * is gradient, or the values of the three pictures. far gets the number of pixels where it is more than 3e-4. */
+/* Returns the largest sine of the angle between the drawn and the expected normal over all pixels with a surface. The
+ * expected normal is `gradient` or, if it is NULL, the values of the three pictures. far gets the number of pixels in
+ * which the sine exceeds 3e-4. */
 static double worst_angle(const caught_picture *picture, const caught_picture *expected, const double *gradient,
                           int *pixels, int *far)
 {
@@ -246,11 +248,12 @@ static double worst_angle(const caught_picture *picture, const caught_picture *e
     return worst;
 }
 
-/* Components are between -3 and 3, and gradients 0.3 long or more on these surfaces. Each component, drawn as a field,
- * is off by some units of 6e-8 of 3, and by the place's 1.5e-5 (test_session_surfaces.c) times its own slope, 6 at
- * most: 9e-5 in all, and a normal by 3e-4 of its length. Polyhedra draw fields differently near quads, which have
- * bilinear values as in a neighbouring hex, and where tets overlap, since a field is their sum but the normal is one
- * tet's. So of polyhedra with triangles only, some of them concave, nine pixels of ten must be right. */
+/* Components of gradients are between -3 and 3, and gradients are 0.3 long or more on these surfaces. Each component,
+ * drawn as a field, is off by some units of 6e-8 × 3, and by the position's error of 1.5e-5 (test_session_surfaces.c)
+ * times the component's own slope, at most 6: together 9e-5, so a normal is off by 3e-4 of its length. Polyhedra
+ * interpolate fields differently near quads, whose values are bilinear as in an adjacent hex, and if their tets
+ * overlap: a field is then the sum of the overlapping tets, but the normal is that of one tet. So only nine pixels of
+ * ten must be right for polyhedra whose faces are triangles and of which some are concave. */
 static void normals_are_the_interpolated_gradients(void **state)
 {
     static const char *const scenes[] = {SCENE(COLOURED("gx")), SCENE(COLOURED("gy")), SCENE(COLOURED("gz"))};
@@ -276,8 +279,8 @@ static void normals_are_the_interpolated_gradients(void **state)
     }
 }
 
-/* The lattice's corners are doubles, so each gradient is good to some units of 1e-16 over a corner's determinant; the
- * error is the rounding of gradients, coordinates and normals to float32, some units of 6e-8. */
+/* The lattice's coordinates are doubles, so each gradient is accurate to some units of 1e-16 divided by a corner's
+ * determinant. The error is that of rounding gradients, coordinates and normals to float32, some units of 6e-8. */
 static void a_linear_field_has_its_gradient(void **state)
 {
     static const double gradient[3] = {0.3, -0.7, 0.5};
@@ -295,7 +298,7 @@ static void a_linear_field_has_its_gradient(void **state)
     }
 }
 
-/* ---- how near the truth ---------------------------------------------------------------------------------------- */
+/* ---- convergence ----------------------------------------------------------------------------------------------- */
 
 static void swirl_gradient(const double p[3], double out[3])
 {
@@ -304,7 +307,7 @@ static void swirl_gradient(const double p[3], double out[3])
     out[2] = 0.8 * p[2] - 0.3 * p[0];
 }
 
-/* The mean angle between normals and the gradient of the function itself, in degrees. */
+/* Returns the mean angle in degrees between the drawn normals and the gradient of the function itself. */
 static double mean_angle(test_mesh_kind kind, int side, const char *scene)
 {
     render_camera camera;
@@ -334,8 +337,9 @@ static double mean_angle(test_mesh_kind kind, int side, const char *scene)
     return sum / count;
 }
 
-/* The error of gradients in cells is of first order in the cells' size. At vertices errors of first order cancel,
- * except at the boundary and by the jitter: errors are smaller, and less than half on cells of half the size. */
+/* The error of gradients in cells is of first order in the cells' size. At vertices the errors of first order cancel,
+ * except at the boundary and because of the jitter. So errors at vertices must be smaller, and halving the cells' size
+ * must more than halve them. */
 static void normals_come_nearer_to_the_truth(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_POLYHEDRA};
@@ -355,7 +359,8 @@ static void normals_come_nearer_to_the_truth(void **state)
 
 /* ---- on any partition ------------------------------------------------------------------------------------------ */
 
-/* Makes this rank's part, with its cells listed in its own way; with_ghosts: all cells, those of others flagged. */
+/* Makes this rank's part, with its cells listed in this rank's own order. with_ghosts: all cells, of which those of
+ * other ranks are ghosts. */
 static void part_create(const test_mesh *whole, test_partition_kind distributed, bool with_ghosts, session_input *out)
 {
     int *owners = zeros(whole->cell_count, sizeof *owners);
@@ -371,7 +376,7 @@ static void part_create(const test_mesh *whole, test_partition_kind distributed,
     describe(out);
 }
 
-/* whole: of rank 0. */
+/* Checks that all ranks draw the picture that rank 0 draws alone. Only rank 0's whole is used. */
 static void same_as_alone(const char *name, const char *scene, const session_input *whole, const session_input *part)
 {
     caught_picture ours = draw(MPI_COMM_WORLD, scene, part, NULL), alone = {0};
@@ -404,7 +409,7 @@ static void any_partition_has_the_same_bits(void **state)
         }
 }
 
-/* Tets of both, whose vertices stay apart. */
+/* Joins the tets of both halves without merging their equal vertices. */
 static void join(const test_mesh halves[2], test_mesh *out)
 {
     *out = (test_mesh){.vertex_count = halves[0].vertex_count + halves[1].vertex_count,
@@ -428,7 +433,7 @@ static void join(const test_mesh halves[2], test_mesh *out)
     for (int64_t cell = 0; cell <= out->cell_count; cell++) out->offsets[cell] = 4 * cell;
 }
 
-/* A crack, on one rank: the cells on the two sides of a plane have vertices of their own there. */
+/* Draws a mesh with a crack on one rank: the cells on the two sides of a plane have separate, equal vertices there. */
 static void doubled_vertices_are_one(void **state)
 {
     session_input whole, cracked = {0};
@@ -452,7 +457,8 @@ static void doubled_vertices_are_one(void **state)
     input_free(&whole);
 }
 
-/* Cells with values that are not finite are not drawn, and do not count at vertices that they share. */
+/* Checks that cells with values that are not finite are not drawn and do not contribute to the gradients at their
+ * vertices. */
 static void rubbish_gives_nothing(void **state)
 {
     (void)state;

@@ -1,8 +1,8 @@
-/* A step takes less stack, of the calling thread's and of a worker's, than it checks for (session_threads.h). The
- * stacks are painted before a step, and inspected after it.
+/* Tests that the calling thread and the worker threads use less stack in a step than the sizes that the step requires
+ * (session_threads.h). The stacks are filled with a pattern before a step, and searched for it afterwards.
  *
- * With SMALL_STACKS in the environment OpenMP's are too small, and the step says so, and what suffices; with
- * TOLD_STACKS they are what it says. */
+ * If SMALL_STACKS is set in the environment, OpenMP's stacks are too small: the step must fail and state a sufficient
+ * size. If TOLD_STACKS is set, the stacks have this size. */
 #define _GNU_SOURCE
 #include <omp.h>
 #include <pthread.h>
@@ -15,10 +15,10 @@
 #include "session_threads.h"
 #include "test_session_fixture.h"
 
-enum { MOST_TOLD = 280 }; /* kB that the error of workers' stacks may ask for */
-enum { PAINT = 0xa5, PAINTED = 1 << 20, NEAR = 1024 /* frames of the painter itself */ };
+enum { MOST_TOLD = 280 }; /* largest size in kB that the error about workers' stacks may suggest */
+enum { PAINT = 0xa5, PAINTED = 1 << 20, NEAR = 1024 /* NEAR: stack of the painting function itself */ };
 
-/* Two threads wherever the test runs. */
+/* Replaces OpenMP's function, so that two threads are used on any machine. */
 __attribute__((visibility("default"))) int omp_get_num_procs(void)
 {
     return 2;
@@ -31,7 +31,7 @@ static __attribute__((noinline)) void paint_stack(volatile unsigned char **top)
     for (int i = NEAR; i < PAINTED; i++) here[-i] = PAINT;
 }
 
-/* Returns how far below top the paint is gone. */
+/* Returns the largest distance below top at which the pattern was overwritten. */
 static __attribute__((noinline)) int taken_stack(volatile unsigned char *top)
 {
     int taken = PAINTED - 1;
@@ -103,13 +103,13 @@ static void steps_take_less_than_they_are_checked_for(void **context)
         for (int layer = 0; layer < LAYERS; layer++) measure(&in, layers[layer], most);
         input_free(&in);
     }
-    session_input in; /* enough cells for a build by branches */
+    session_input in; /* enough cells to build the tree in parallel branches */
     input_create(&in, TEST_TETS, 15, TEST_BLOCK, 0, 1);
     measure(&in, layers[0], most);
     input_free(&in);
     printf("%s: of %d kB the calling thread takes %d, of %d kB a worker %d\n", render_isa(), SESSION_CALLER_STACK >> 10,
            most[0] >> 10, SESSION_WORKER_STACK >> 10, most[1] >> 10);
-    assert_true(most[0] > 4 * NEAR && most[1] > 4 * NEAR); /* they were measured */
+    assert_true(most[0] > 4 * NEAR && most[1] > 4 * NEAR); /* checks that both stacks were measured */
     assert_true(4 * most[0] <= 3 * SESSION_CALLER_STACK);
     assert_true(4 * most[1] <= 3 * SESSION_WORKER_STACK);
 }
@@ -133,7 +133,7 @@ static void small_stacks_are_reported(void **context)
     input_free(&in);
 }
 
-/* With OMP_STACKSIZE=MOST_TOLD in the environment. */
+/* Runs with OMP_STACKSIZE=MOST_TOLD in the environment. */
 static void suggested_stacks_suffice(void **context)
 {
     (void)context;

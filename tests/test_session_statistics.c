@@ -1,5 +1,5 @@
-/* Statistics of fields: closed forms and sums by hand; files that are the same to the byte on any ranks, and that
- * restarted runs continue; images that wait for a condition, or are drawn once. */
+/* Tests statistics of fields: comparisons with closed forms and with sums computed here; files that are the same to the
+ * byte on any number of ranks and that restarted runs continue; images that are drawn on a condition or only once. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,7 +19,8 @@ enum { SIDE = 4, MOST = 1 << 16 };
 
 /* ---- inputs and files ------------------------------------------------------------------------------------------ */
 
-/* Cell-centred: a value for each cell that is random, but the cell's own wherever it is. */
+/* Makes this rank's part. If is_cell_centred, each cell gets a random value that does not depend on the rank that has
+ * the cell. */
 static void make_part(test_mesh_kind kind, double jitter, bool is_cell_centred, session_input *out)
 {
     test_mesh whole;
@@ -44,7 +45,7 @@ static void make_part(test_mesh_kind kind, double jitter, bool is_cell_centred, 
     test_mesh_free(&whole);
 }
 
-/* A field of the last line. */
+/* Returns a column of the file's last line as a number. */
 static double number_at(const char *text, int column)
 {
     const char *line = text, *end;
@@ -72,14 +73,14 @@ static void run_steps(const char *scene, const session_input *in, int first, int
 
 static bool is_near(double a, double b)
 {
-    if (fabs(a - b) <= 1e-8 * fmax(1, fabs(b))) return true; /* nine digits are written */
+    if (fabs(a - b) <= 1e-8 * fmax(1, fabs(b))) return true; /* numbers are written with nine digits */
     fprintf(stderr, "%.9g, expected %.9g\n", a, b);
     return false;
 }
 
-/* A linear field over the cube from -1 to 1: its mean is the middle's value, its ends are at corners. Polyhedra are
- * cubes here, whose vertices' means are their middles. In mixed lattices pyramids are not in pairs, whose vertices'
- * means are not their middles. */
+/* Checks a linear field over the cube from -1 to 1: its mean is the value at the centre, and its extremes are at
+ * corners. The polyhedra are cubes here, so the mean of their vertices is their centre. Mixed lattices are exempt from
+ * the exact mean: their pyramids are not in pairs, so the means of the vertices are not the centres. */
 static void numbers_of_linear_fields_are_closed_forms(void **state)
 {
     (void)state;
@@ -99,8 +100,8 @@ static void numbers_of_linear_fields_are_closed_forms(void **state)
     }
 }
 
-/* Cells with bent faces, and concave ones, leave no gap and do not overlap: together they are the cube. Bent hexes and
- * wedges also as polyhedra with bilinear faces. */
+/* Checks that cells with warped faces and concave cells leave no gap and do not overlap: their volumes sum to the
+ * cube's. Warped hexes and wedges are also tested as polyhedra with bilinear faces. */
 static void bent_and_concave_cells_fill_their_cube(void **state)
 {
     (void)state;
@@ -108,7 +109,7 @@ static void bent_and_concave_cells_fill_their_cube(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (int way = 0; way < 2; way++) {
             session_input in = {0};
-            make_part(kind, 0.15, false, &in); /* no tet is turned inside out */
+            make_part(kind, 0.15, false, &in); /* no tet is inverted */
             if (way == 1 && kind == TEST_POLYHEDRA) test_mesh_reorder_vertices(&in.part, 9);
             if (way == 1 && kind != TEST_POLYHEDRA) test_mesh_to_polyhedra(&in.part, 0.5);
             input_describe(&in);
@@ -121,7 +122,8 @@ static void bent_and_concave_cells_fill_their_cube(void **state)
         }
 }
 
-/* Cubes of one size, whose values are known: sums by hand. Bins from -2 to 6, so that some cells are in none. */
+/* Compares the statistics of equal cubes of known values with sums computed here. Bins range from -2 to 6, so that some
+ * cells are in no bin. */
 static void numbers_of_cells_are_sums(void **state)
 {
     (void)state;
@@ -151,7 +153,7 @@ static void numbers_of_cells_are_sums(void **state)
     input_free(&in);
 }
 
-/* The same bytes by all ranks and by one, of cells whose volumes all differ. */
+/* Checks that all ranks together and one rank alone write the same bytes for cells of different volumes. */
 static void files_do_not_depend_on_the_partition(void **state)
 {
     (void)state;
@@ -198,7 +200,7 @@ static void runs_that_begin_again_go_on_with_the_file(void **state)
     run_steps(scene, &in, 3, 7);
     read_file("runs.csv", MOST, text);
     everywhere(own_rank != 0 || strcmp(first, text) == 0);
-    if (own_rank == 0) first[strlen(first) - 20] = '\0'; /* the last line is torn */
+    if (own_rank == 0) first[strlen(first) - 20] = '\0'; /* the last line is incomplete */
     put_file("runs.csv", first);
     run_steps(scene, &in, 6, 7);
     read_file("runs.csv", MOST, first);
@@ -206,7 +208,7 @@ static void runs_that_begin_again_go_on_with_the_file(void **state)
     input_free(&in);
 }
 
-/* The error is told on all ranks, and the picture is drawn. */
+/* Checks that the error is returned on all ranks, and that the picture is still drawn. */
 static void files_that_cannot_be_written_are_reported(void **state)
 {
     (void)state;
@@ -232,7 +234,7 @@ static void files_that_cannot_be_written_are_reported(void **state)
     input_free(&in);
 }
 
-/* Statistics and conditions of a field that is missing keep no others from being found. */
+/* Checks that statistics and conditions of a missing field do not prevent those of other fields from being found. */
 static void others_of_a_missing_field_are_found(void **state)
 {
     (void)state;
@@ -261,7 +263,7 @@ static void others_of_a_missing_field_are_found(void **state)
 
 /* ---- conditions ------------------------------------------------------------------------------------------------ */
 
-/* The field's greatest value is the cycle's; pictures drawn at cycles 0 to 9, as bits. */
+/* Sets a field whose maximum is the cycle, and returns the cycles from 0 to 9 at which a picture was drawn, as bits. */
 static unsigned cycles_drawn(const char *scene)
 {
     unsigned drawn = 0;

@@ -1,6 +1,6 @@
-/* Strides of every array of every form of mesh, of its fields, patches and components: those by which the elements
- * could not lie in memory are refused at once with the array, its count and its stride, on all ranks alike; arrays that
- * are read backwards draw the same pictures as arrays that are read forwards. */
+/* Tests the strides of every array of every form of mesh, of its fields, patches and components. A stride by which the
+ * elements could not lie in memory is refused at once, with the array, its count and its stride, and the same error is
+ * returned on all ranks. Arrays that are read backwards draw the same pictures as arrays that are read forwards. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,12 +9,12 @@
 
 enum { SIDE = 3, MOST = 40 };
 
-/* A stride of a description, with the words for its array and how many elements that has. */
+/* A stride of a description, with the name of its array in messages and the number of its elements. */
 typedef struct strided {
     const char *name;
     int64_t *stride;
     int64_t count;
-    insitu_array *array; /* NULL: the stride is that of components */
+    insitu_array *array; /* NULL if the stride is that of components */
 } strided;
 
 static int add(strided *list, int at, const char *name, insitu_array *array, int64_t count)
@@ -59,7 +59,7 @@ static int list_of_fields(formed_mesh *m, strided *out, int at)
     return at;
 }
 
-/* The patch's faces by their vertices, with offsets, or by a list of their numbers. */
+/* Describes the patch's faces by their vertices and offsets, or by a list of their numbers. */
 static int list_of_patch(formed_mesh *m, strided *out)
 {
     static int64_t offsets[2], number[1];
@@ -85,7 +85,7 @@ static int list_of_patch(formed_mesh *m, strided *out)
 static const int64_t wild[] = {(int64_t)1 << 60,    (int64_t)1 << 62, (int64_t)1 << 49,   INT64_MIN,
                                -((int64_t)1 << 60), INT64_MAX - 7,    -((int64_t)1 << 49)};
 
-/* Spoils it on the last rank; is_empty: this rank has nothing of the kind. */
+/* Sets invalid strides on the last rank, and checks that all ranks get the error. */
 static void refuse(insitu_session *session, formed_mesh *m, const strided *s, bool is_last)
 {
     for (size_t i = 0; i < sizeof wild / sizeof wild[0]; i++) {
@@ -110,7 +110,7 @@ static void refuse(insitu_session *session, formed_mesh *m, const strided *s, bo
     }
 }
 
-/* All ranks have as many arrays, or none: those without a list wait. */
+/* Refuses each array of the list. All ranks must have equally long lists, since the checks are collective. */
 static void refuse_all(insitu_session *session, formed_mesh *m, const strided *list, int count)
 {
     int most = count;
@@ -182,7 +182,8 @@ static int64_t size_of(const strided *s)
                                                             : 8;
 }
 
-/* Copies the elements, of so many bytes each, in reverse order; the array then begins at the last one. */
+/* Copies the elements, each of `bytes` bytes, in reverse order. The array then begins at the copy's last element and
+ * has a negative stride. */
 static void *reverse(const strided *s, int64_t bytes)
 {
     const int64_t from_stride = *s->stride ? *s->stride : bytes;

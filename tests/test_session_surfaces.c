@@ -1,6 +1,6 @@
-/* Outer surfaces of a session: the faces that one cell alone has, none missing and none inside, counted by their area;
- * their pictures by closed form, for any dealing the same to the bit as on one rank; warped faces as the bilinear
- * patches that they are. */
+/* Tests the outer surfaces of a session. They consist of the faces that only one cell has; their area shows that no
+ * face is missing and that no interior face is included. Their pictures agree with a closed form and are the same to
+ * the bit for any partition as on one rank. Warped faces are drawn as bilinear patches. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,7 +24,8 @@ static void make_whole(test_mesh_kind kind, session_input *out)
     input_describe(out);
 }
 
-/* The rank's cells, listed its own way; with ghosts: all cells, of which the others' are ghosts. */
+/* Extracts this rank's cells in this rank's own order or, with_ghosts, all cells, of which those of other ranks are
+ * ghosts. */
 static void extract_rank_cells(const session_input *whole, test_partition_kind distributed, bool with_ghosts,
                                session_input *out)
 {
@@ -50,7 +51,7 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     return picture;
 }
 
-/* ---- which faces --------------------------------------------------------------------------------------------- */
+/* ---- faces --------------------------------------------------------------------------------------------------- */
 
 static double area_of(const double *a, const double *b, const double *c)
 {
@@ -63,7 +64,7 @@ static double area_of(const double *a, const double *b, const double *c)
     return 0.5 * sqrt(sum);
 }
 
-/* The area of this rank's outer faces; NaN where one is not on the border of the cube. */
+/* Returns the area of this rank's outer faces; NaN if one of them is not on the boundary of the cube. */
 static double outer_area(const insitu_session *session)
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
@@ -95,7 +96,7 @@ static double whole_area(const session_input *in)
     return area;
 }
 
-/* Six squares of 4. Sums of some hundred areas round by less than 1e-12. */
+/* The cube has six squares of area 4. A sum of some hundred areas is off by less than 1e-12. */
 static void outer_faces_are_the_cube_s(void **state)
 {
     (void)state;
@@ -105,7 +106,7 @@ static void outer_faces_are_the_cube_s(void **state)
             make_whole(kind, &whole);
             extract_rank_cells(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
             if (way == 3 && kind != TEST_POLYHEDRA)
-                test_mesh_to_polyhedra(&part.part, 0.5); /* some of them, beside the others */
+                test_mesh_to_polyhedra(&part.part, 0.5); /* half of the cells, mixed with the others */
             input_describe(&part);
             const double area = whole_area(&part);
             if (!(fabs(area - 24) < 1e-12))
@@ -126,7 +127,8 @@ static int64_t *make_ids(const session_input *whole, const session_input *part, 
     return ids;
 }
 
-/* With ids that are the same on all ranks nothing changes; with ids of each rank's own its whole border is outer. */
+/* Checks that vertex ids that are the same on all ranks do not change the outer faces, and that with ids of each rank's
+ * own each rank's whole boundary is outer. */
 static void faces_are_one_by_ids(void **state)
 {
     (void)state;
@@ -147,8 +149,8 @@ static void faces_are_one_by_ids(void **state)
 
 /* ---- pictures of the cube ------------------------------------------------------------------------------------ */
 
-/* The depths between which the ray is in the cube; false where it misses it. *margin: how near it is to an edge or a
- * miss. */
+/* Computes the depths at which the ray enters and leaves the cube; returns false if it misses the cube. *margin is the
+ * distance from an edge or from a change between hit and miss. */
 static bool cross_cube(const ray *r, double depths[2], double *margin)
 {
     double in[3], out[3];
@@ -165,9 +167,9 @@ static bool cross_cube(const ray *r, double depths[2], double *margin)
     return depths[0] < depths[1];
 }
 
-/* A hit's depth is off by roundings of numbers near 5 in single precision, and by as much of position across the ray
- * over the slant, at most 10 here; the grey of a place by its rounded position, of slope 1 in 4 and the table's of 3.
- */
+/* A hit's depth is off by roundings of numbers near 5 in single precision, and by equal errors of its position across
+ * the ray, divided by the sine of the angle between ray and face, at least 1/10 here. Its grey is off by the rounded
+ * position times the field's slope of 1 in 4 and the colour table's slope of 3. */
 static bool is_cube(const caught_picture *picture, float opacity)
 {
     int hits = 0;
@@ -210,7 +212,7 @@ static bool are_same(const caught_picture *a, const caught_picture *b)
            memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
 }
 
-/* Half-clear surfaces are crossed twice by every ray: opacity 3/4. */
+/* Surfaces of opacity 1/2 are crossed twice by every ray, so their opacity is 3/4. */
 static void cube_is_one_picture_of(test_mesh_kind kind)
 {
     session_input whole = {0};
@@ -246,8 +248,8 @@ static void cubes_are_true_and_the_same_on_any_ranks(void **state)
 
 /* ---- warped faces -------------------------------------------------------------------------------------------- */
 
-/* Each bilinear patch is first met by so many squares along a side, of two triangles; Newton's method then finds where
- * the ray meets the patch itself. */
+/* The oracle first intersects each bilinear patch as FINE × FINE squares of two triangles each. Newton's method then
+ * finds the intersection of the ray and the patch itself in STEPS steps. */
 enum { FINE = 16, STEPS = 6 };
 
 static void cross(const double a[3], const double b[3], double out[3])
@@ -317,8 +319,9 @@ static void intersect_patch(const ray *r, const double *const p[4], patch_hit *n
         }
 }
 
-/* Rays beside the silhouette are left out: those whose neighbours are not hit. Depths are off by roundings of numbers
- * near 7 in single precision and of places across the ray, over the slant. */
+/* Rays at the silhouette, whose neighbours do not hit the hex, are left out. Depths are off by roundings of numbers
+ * near 7 in single precision, and by errors of the position across the ray divided by the sine of the angle between ray
+ * and patch. */
 static bool is_hex(const caught_picture *picture, const double *places)
 {
     static const int faces[6][4] = {{0, 4, 7, 3}, {1, 2, 6, 5}, {0, 1, 5, 4}, {3, 7, 6, 2}, {0, 3, 2, 1}, {4, 5, 6, 7}};
@@ -379,7 +382,7 @@ static void warped_faces_are_bilinear_patches(void **state)
     remove(scene);
 }
 
-/* ---- what is found again ------------------------------------------------------------------------------------- */
+/* ---- recomputation ------------------------------------------------------------------------------------------- */
 
 static void faces_are_found_once_for_the_cells(void **state)
 {
@@ -413,8 +416,8 @@ static void faces_are_found_once_for_the_cells(void **state)
 
 /* ---- polygons -------------------------------------------------------------------------------------------------- */
 
-/* A cube whose face towards the eye has a vertex amid one edge, as hanging nodes make them. Rays go exactly along the
- * line between two of the face's triangles, y = z: they hit it all the same. */
+/* Draws a cube whose face towards the eye has an additional vertex in the middle of an edge, like a hanging node. Rays
+ * that meet the face exactly on the line between two of its triangles, y = z, must hit it. */
 static void rays_along_the_diagonals_of_polygons_hit(void **state)
 {
     (void)state;
@@ -447,7 +450,7 @@ static void rays_along_the_diagonals_of_polygons_hit(void **state)
     for (int i = 0; is_right && own_rank == 0 && i < 64 * 64; i++) {
         const int column = i % 64, row = i / 64;
         const bool is_inside = column >= 16 && column < 48 && row >= 16 && row < 48;
-        /* The camera's depth is a float of size 4. */
+        /* The camera's depth is a float of about 4. */
         is_right = is_inside ? fabs((double)caught[0].depth[i] - 4) < 1e-6 : isinf(caught[0].depth[i]);
         if (!is_right) fprintf(stderr, "pixel %d, %d: depth %g\n", column, row, (double)caught[0].depth[i]);
     }

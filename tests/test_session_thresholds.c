@@ -1,5 +1,6 @@
-/* Surfaces of thresholds: the faces between cells within the bounds and all others, by brute force over all pairs of
- * faces; found anew when the values change; one picture on any ranks. */
+/* Tests the surfaces of thresholds: the faces between cells within the bounds and all others. They are compared with a
+ * brute-force search over all pairs of faces, are found again when the values change, and give the same picture on any
+ * number of ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +22,8 @@ enum { SIDE = 3, PIXELS = 48 * 36 };
 
 /* ---- faces ---------------------------------------------------------------------------------------------------- */
 
-/* Hashes corners in any order: a sum of hashes of their places. */
+/* Mixes the bits of a hash. A face's hash is the sum of the mixed hashes of its corners' positions, so it does not
+ * depend on their order. */
 static uint64_t mix(uint64_t h)
 {
     h = (h ^ h >> 30) * 0xbf58476d1ce4e5b9u;
@@ -40,7 +42,7 @@ static uint64_t hash_place(const double place[3])
     return out;
 }
 
-/* Faces as sets of corners: how many, and a sum over them that tells one set of faces from another. */
+/* A set of faces: the number of faces, and a sum of hashes that differs between different sets. */
 typedef struct face_set {
     uint64_t count, sum;
 } face_set;
@@ -61,7 +63,7 @@ static bool is_within(const test_mesh *mesh, const grid *g, int64_t cell, bool i
     return true;
 }
 
-/* Those that one of the cells within alone has: each face is held against each other. */
+/* Finds the faces that exactly one of the cells within the bounds has, by comparing each face with each other face. */
 static face_set find_truth(const test_mesh *mesh, const grid *g, bool is_cell_centred)
 {
     face_set out = {0};
@@ -89,7 +91,8 @@ static face_set find_truth(const test_mesh *mesh, const grid *g, bool is_cell_ce
     return out;
 }
 
-/* The faces of the pyramids and tets on this rank's faces, whose last vertex is the apex, summed over all ranks. */
+/* Finds the faces that this rank draws, and sums them over all ranks. Faces are stored as pyramids and tets, whose last
+ * vertex is the apex. */
 static face_set find_drawn(const insitu_session *session)
 {
     face_set out = {0};
@@ -107,7 +110,8 @@ static face_set find_drawn(const insitu_session *session)
 
 /* ---- sessions ------------------------------------------------------------------------------------------------- */
 
-/* A wave that wanders by the step; of cells at their first vertices. */
+/* Sets the values to a wave that moves from step to step. Cell values are the wave's values at the cells' first
+ * vertices. */
 static void set_values(session_input *in, bool is_cell_centred, double step)
 {
     test_mesh *part = &in->part;
@@ -116,7 +120,7 @@ static void set_values(session_input *in, bool is_cell_centred, double step)
     part->values = calloc((size_t)count + 1, sizeof *part->values);
     assert_non_null(part->values);
     for (int64_t i = 0; i < count; i++) {
-        /* A polyhedron's entries are faces. */
+        /* The connectivity of a polyhedron lists faces, not vertices. */
         int64_t vertex = is_cell_centred ? part->connectivity[part->offsets[i]] : i;
         if (is_cell_centred && part->types[i] == 42)
             vertex = part->face_connectivity[part->face_offsets[part->connectivity[part->offsets[i]]]];
@@ -154,7 +158,7 @@ static void keep(caught_picture *out)
     caught_count = 0;
 }
 
-/* Two steps, each of values of its own. */
+/* Checks the faces and pictures of two steps with different values. */
 static void check(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
 {
     session_input whole = {0}, part = {0};
@@ -195,7 +199,7 @@ static void faces_are_those_around_the_cells_within(void **state)
         for (int way = 0; way < 3; way++) check(kind, way == 1, way == 2);
 }
 
-/* Tests bounds that hold everything or nothing, and a mesh without the field. */
+/* Checks thresholds that all cells or no cells are within, and a mesh without the field. */
 static void bounds_may_show_all_or_nothing(void **state)
 {
     (void)state;

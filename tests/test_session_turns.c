@@ -1,5 +1,6 @@
-/* Volumes that fill one space make fragments in every cell on a ray. They are drawn in turns, so that no rank holds all
- * of its fragments at once, and in few, because in each all ranks wait for each other. */
+/* Tests volumes that fill the same space, which make a fragment in every cell on a ray. They are drawn in several
+ * turns, so that no rank holds all of its fragments at once. The number of turns must be small, because all ranks wait
+ * for each other in each turn. */
 #include <stdio.h>
 
 #include "test_effort.h"
@@ -11,7 +12,7 @@
 #define THIN "      - volume: {field: f, opacity: [[0, 0.1], [1, 0.3]], unit_distance: 1}\n"
 #define DENSE "      - volume: {field: f, opacity: [[0, 0.4], [0.5, 0.1], [1, 0.3]], unit_distance: 1}\n"
 
-static insitu_report totals; /* fragments are those of all ranks, bytes_peak is the greatest */
+static insitu_report totals; /* fragments: sum over all ranks; bytes_peak: maximum over all ranks */
 
 static void draw(const char *text, int side)
 {
@@ -37,7 +38,7 @@ static void one_volume_needs_no_further_pass(void **context)
     everywhere(totals.turns == 0);
 }
 
-/* A few fragments a ray: all at once. */
+/* A picture of a few fragments per ray is drawn in one turn. */
 static void two_volumes_take_a_further_pass(void **context)
 {
     (void)context;
@@ -45,8 +46,8 @@ static void two_volumes_take_a_further_pass(void **context)
     everywhere(totals.turns == 1);
 }
 
-/* A picture that took 124 turns when they were of 4 million fragments of all ranks, by an estimate. A rank may hold
- * 2 million fragments at once, 64 MiB, and as much again packed and unpacked. */
+/* Checks a picture that took 124 turns when a turn was limited to an estimated 4 million fragments of all ranks
+ * together. A rank may hold 2 million fragments at once (64 MiB), and as many again packed and unpacked. */
 static void many_fragments_take_few_passes(void **context)
 {
     (void)context;

@@ -1,6 +1,6 @@
-/* Arrays of any type, at any address and of any stride draw the picture of the same numbers as float64 and int64: the
- * arrays of cells and faces, their flags and coordinates, and values whose components are interleaved or apart. Those
- * that are read in place add nothing to what is copied. */
+/* Tests that arrays of any type, address and stride draw the same picture as the same numbers in float64 and int64.
+ * This applies to arrays of cells and faces, to flags and coordinates, and to values whose components are interleaved
+ * or separate. Arrays that are read in place must not increase the number of copied bytes. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,10 +10,10 @@
 
 enum { SIDE = 2, MOST_ROOMS = 64 };
 
-/* How an array is laid out. */
+/* The memory layout of an array. */
 typedef struct layout {
     insitu_type type;
-    int shift; /* of its first element from an aligned place, bytes */
+    int shift; /* offset of the first element from an aligned address, in bytes */
     int gap;   /* bytes between elements */
     bool is_in_place;
 } layout;
@@ -69,7 +69,7 @@ static double number_at(const insitu_array *a, int64_t i)
         return (double)number == value;                                                                                \
     }
 
-/* Stores a number; false where the type cannot hold it. */
+/* Stores a number as the given type; returns false if the type cannot represent it. */
 static bool put(char *out, insitu_type type, double value)
 {
     switch (type) {
@@ -103,12 +103,13 @@ static int64_t size_of(insitu_type type)
     return sizes[type];
 }
 
-/* The same numbers, float64, int64 or uint8 until now, in another layout; false where it cannot hold them. */
+/* Stores an array of float64, int64 or uint8 in another layout; returns false if the layout's type cannot represent the
+ * numbers. */
 static bool lay_out(insitu_array *a, int64_t count, const layout *as)
 {
     const int64_t stride = size_of(as->type) + as->gap;
     if (!a->data) return true;
-    char *room = malloc((size_t)(count * stride + as->shift + 16)); /* is aligned to 16 bytes */
+    char *room = malloc((size_t)(count * stride + as->shift + 16)); /* malloc aligns this to 16 bytes */
     assert_true(room && room_count < MOST_ROOMS);
     rooms[room_count++] = room;
     bool fits = true;
@@ -124,7 +125,7 @@ static bool agree(bool here)
     return all;
 }
 
-/* Whole numbers as coordinates and values, so that each type can say them. */
+/* Creates an input whose coordinates and values are integers, so that every type can represent them. */
 static void create(session_input *in, test_mesh_kind kind)
 {
     input_create(in, kind, SIDE, TEST_BLOCK, own_rank, rank_count);
@@ -135,7 +136,7 @@ static void create(session_input *in, test_mesh_kind kind)
     input_describe(in);
 }
 
-/* What the step copied, and its picture. */
+/* Draws the input. Returns its picture and the number of bytes that the step copied. */
 static caught_picture draw(const char *path, const session_input *in, int64_t *copied)
 {
     discard_pictures();
@@ -146,7 +147,8 @@ static caught_picture draw(const char *path, const session_input *in, int64_t *c
     return pop_caught_picture();
 }
 
-/* Draws the input and compares; is_in_place: no more is copied than of the truth. */
+/* Draws the input and compares the picture with the true one. If is_in_place, no more bytes may be copied than for the
+ * true picture. */
 static void same(const char *path, const session_input *in, const caught_picture *truth, int64_t copied,
                  bool is_in_place)
 {
@@ -193,7 +195,7 @@ static void cells_of_any_type_are_the_same(void **state)
     everywhere(drawn > 60);
 }
 
-/* Types as VTK has them, and by numbers of the code's own; flags whose lowest byte is 0. */
+/* Gives cell types by VTK's numbers and by other numbers with a map, and flags whose lowest byte is 0. */
 static void types_and_flags_of_any_type_are_the_same(void **state)
 {
     (void)state;
@@ -212,7 +214,8 @@ static void types_and_flags_of_any_type_are_the_same(void **state)
         for (int64_t c = 0; c < in.mesh.cell_count; c++) {
             char *to = (char *)(uintptr_t)in.mesh.ghosts.data + c * (size_of(as->type) + as->gap);
             put(to, as->type, in.part.ghosts[c] ? flag : 0);
-            if (i % 2) in.part.types[c] = (unsigned char)((in.part.types[c] + 35) % 60); /* map's inverse */
+            /* Applies the inverse of the map, which adds 25 modulo 60. */
+            if (i % 2) in.part.types[c] = (unsigned char)((in.part.types[c] + 35) % 60);
         }
         if (i % 2) in.mesh.cell_type_map = map;
         if (i % 2) in.mesh.cell_type_map_count = 60;
@@ -254,7 +257,7 @@ static void coordinates_of_any_type_are_the_same(void **state)
     input_free(&in);
 }
 
-/* Values are read where they are, whatever their type. */
+/* Checks that values of any type are read in place. */
 static void values_of_any_type_are_the_same(void **state)
 {
     (void)state;
@@ -290,7 +293,7 @@ static const char vector_scene[] = "images:\n"
 
 enum { COMPONENTS = 3 };
 
-/* How the vector field is given beside the truth's packed tuples. */
+/* Layouts of the vector field; the true picture is drawn from packed tuples. */
 typedef enum vector_form { TUPLES, APART, APART_BY_INDEX, UNALIGNED_TUPLES, TUPLES_BY_INDEX, VECTOR_FORMS } vector_form;
 
 static insitu_array components[COMPONENTS];
@@ -351,7 +354,8 @@ static void components_apart_are_the_same(void **state)
     }
 }
 
-/* A field that is set again as it was, or without need, is read by the tables of the last time or by new ones. */
+/* Checks that a field that is set again, unchanged or without need, is read correctly, whether its tables of components
+ * are reused or created again. */
 static void components_may_be_set_again(void **state)
 {
     (void)state;
@@ -386,7 +390,8 @@ static void components_may_be_set_again(void **state)
     input_free(&in);
 }
 
-/* A session goes from one form to another, and to new coordinates, as another does that has float64 all the time. */
+/* Checks that a session whose arrays change between layouts, and then get new coordinates, draws the same pictures as a
+ * session that always has float64. */
 static void forms_may_change_from_step_to_step(void **state)
 {
     (void)state;
@@ -414,7 +419,7 @@ static void forms_may_change_from_step_to_step(void **state)
         const bool is_same = own_rank || same_pictures(&pictures[0], &pictures[1]);
         everywhere(is_same);
         for (int k = 0; k < 2; k++) free_caught(&pictures[k]);
-        if (room_count > MOST_ROOMS - 8) free_rooms(); /* the next step's arrays replace them before it */
+        if (room_count > MOST_ROOMS - 8) free_rooms(); /* a session reads arrays until its next step */
     }
     insitu_destroy(&session);
     insitu_destroy(&plain);

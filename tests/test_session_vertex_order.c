@@ -1,6 +1,6 @@
-/* Meshes whose vertices stand in one order and are said to stand in another: the warning names the order in which they
- * stand, whatever signs the volumes of their corners sum to. Mirrored and distorted cells are in no wrong order, and
- * cells that no order mends are told as such. */
+/* Tests meshes whose cells list their vertices in an order other than the declared one. The warning must name the
+ * actual order, whatever signs the sums of corner volumes have. Mirrored and distorted cells must not cause this
+ * warning, and cells that are wrong in every order get a warning that states this. */
 #include <stdio.h>
 #include <string.h>
 
@@ -13,7 +13,7 @@ static const char scene[] = "images:\n  - name: a\n    size: [12, 8]\n    layers
 
 static const char *const names[ORDERS] = {"INSITU_ORDER_VTK", "INSITU_ORDER_LEXICOGRAPHIC", "INSITU_ORDER_DMPLEX"};
 
-/* The place of VTK's n-th vertex in another order, as docs/finite_elements.md has it. */
+/* Returns the position of VTK's n-th vertex in another order, as docs/finite_elements.md defines it. */
 static int place_in(insitu_vertex_order order, int type, int n)
 {
     static const int lexicographic[] = {0, 1, 3, 2, 4, 5, 7, 6}, hex[] = {0, 3, 2, 1, 4, 5, 6, 7};
@@ -34,7 +34,7 @@ static void bring_into(test_mesh *part, insitu_vertex_order order)
     }
 }
 
-/* Tells whether the two orders differ for the kind's cells. */
+/* Returns whether the two orders differ for the cells of this kind. */
 static bool differ(test_mesh_kind kind, int a, int b)
 {
     if (a == b || kind == TEST_MIXED) return a != b;
@@ -43,7 +43,8 @@ static bool differ(test_mesh_kind kind, int a, int b)
     return a == own || b == own;
 }
 
-/* Warns of the order (NULL: does not), and of hands at most. */
+/* Checks that one warning with these words is given. If words is NULL, checks that no warning about the vertex order is
+ * given; a warning about left-handed cells is then allowed. */
 static void expect(insitu_session *session, const session_input *in, const char *words, const char *what)
 {
     everywhere(submit(session, in) == INSITU_OK);
@@ -85,13 +86,13 @@ static void order_that_fits_is_named(void **state)
             for (int said = 0; said < ORDERS; said++)
                 for (int j = 0; j < 3; j++)
                     for (int mirrored = 0; mirrored < 2; mirrored++)
-                        /* Where an order is VTK's for the kind, VTK's is named. */
+                        /* If the actual order equals VTK's for this kind, the warning names VTK's. */
                         if (stand == INSITU_ORDER_VTK || differ(kinds[k], INSITU_ORDER_VTK, stand))
                             check(kinds[k], (insitu_vertex_order)stand, (insitu_vertex_order)said, jitters[j],
                                   mirrored);
 }
 
-/* Two opposite vertices of each hex change places: cells that no order mends. */
+/* Exchanges two opposite vertices of each hex, so that the cells are wrong in every order. */
 static void twisted_cells_are_reported(void **state)
 {
     (void)state;
@@ -109,7 +110,7 @@ static void twisted_cells_are_reported(void **state)
     input_free(&in);
 }
 
-/* A few cells in another order are no majority. */
+/* Checks that no warning is given if only a minority of the cells has another order. */
 static void few_cells_are_not_reported(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* A small image and its camera, for session tests that know by closed form what each pixel shows. */
+/* Defines a small image and its camera, for tests of sessions that compute each pixel by a closed form. */
 #ifndef TEST_SESSION_VIEW_H
 #define TEST_SESSION_VIEW_H
 
@@ -8,7 +8,7 @@ enum { WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 
 #define EYE "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
 
-/* The image begins with these keys; its layers and outputs follow. more: further keys of the image. */
+/* Begins the image with these keys, followed by `more`, further keys of the image. The layers and IMAGE_END follow. */
 #define IMAGE_BEGIN(more)                                                                                              \
     "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE more "    layers:\n"
 #define IMAGE_END "    outputs: [{path: a.exr}]\n"
@@ -19,7 +19,7 @@ typedef struct ray {
     double base[3], direction[3];
 } ray;
 
-/* The ray through the middle of the pixel. */
+/* Returns the ray through the pixel's centre. */
 static inline ray ray_of(int pixel)
 {
     render_camera camera;

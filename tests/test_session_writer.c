@@ -1,6 +1,6 @@
-/* Pictures that rank 0's thread writes while the simulation goes on: they are the same, in the same order, as those
- * written in the step; errors are returned later, on all ranks; waiting pictures are bounded, and outlive their scene.
- */
+/* Tests the pictures that a thread of rank 0 writes while the simulation continues. They must be the same, and in the
+ * same order, as if they were written in the step. Errors are returned by a later step on all ranks, the number of
+ * pending pictures is limited, and they can outlive their scene. */
 #include <pthread.h>
 #include <stdio.h>
 #include <string.h>
@@ -17,7 +17,7 @@ enum { SIDE = 4, MIB = 1 << 20 };
          "}]\n    decorations: {title: '{cycle}'}\n    outputs: [{path: 'a{cycle}.png'}, {path: 'a{cycle}.exr'}]\n"    \
          "  - name: b\n    size: [8, 12]\n    layers: [{volume: {field: f}}]\n    outputs: [{path: 'b{cycle}.exr'}]\n"
 
-/* Pictures wait at the gate until it is opened. */
+/* While is_closed, rank 0's writer thread waits at this gate before it writes a picture. */
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
 static pthread_cond_t has_changed = PTHREAD_COND_INITIALIZER;
 static bool is_closed;
@@ -72,7 +72,7 @@ static bool are_same(const caught_picture *a, const caught_picture *b)
            (!a->depth || memcmp(a->depth, b->depth, pixels * sizeof(float)) == 0);
 }
 
-/* The first half of what was caught is the second. */
+/* Returns whether 2 × count pictures were caught, of which the first half equals the second half. */
 static bool are_halves_same(int count)
 {
     bool is_same = caught_count == 2 * count;
@@ -98,7 +98,8 @@ static void pictures_are_those_written_in_the_step(void **state)
     input_free(&in);
 }
 
-/* Steps end while nothing is written; the report counts what waits, and the end tells all that could not be written. */
+/* Checks that steps end while no picture is written. The report counts the pending pictures, and insitu_destroy()
+ * reports all pictures that could not be written. */
 static void simulation_goes_on_while_pictures_wait(void **state)
 {
     (void)state;
@@ -109,7 +110,7 @@ static void simulation_goes_on_while_pictures_wait(void **state)
     for (int cycle = 0; cycle < 4; cycle++) {
         everywhere(insitu_step(session, cycle, 0.5) == INSITU_OK);
         const insitu_report *report = insitu_last_report(session);
-        const int waiting = cycle + 1 + cycle / 2 + 1; /* a of every other, b of each */
+        const int waiting = cycle + 1 + cycle / 2 + 1; /* image a at every other cycle, b at each cycle */
         everywhere(report->pictures_waiting == (own_rank ? 0 : waiting) && report->background_ms == 0);
     }
     everywhere(caught_count == 0);
@@ -128,7 +129,7 @@ static void *open_gate_later(void *unused)
     return unused;
 }
 
-/* Four pictures of 32 MiB wait; the fifth is not drawn before the gate is open. */
+/* Checks that four pictures of 32 MiB may be pending, and that the fifth is not drawn before the gate is open. */
 static void pending_pictures_are_bounded(void **state)
 {
     (void)state;
@@ -160,7 +161,7 @@ static void pending_pictures_are_bounded(void **state)
     input_free(&in);
 }
 
-/* Rank 0's thread has come past the gate this often. */
+/* Waits until rank 0's writer thread has passed the gate `count` times. */
 static void wait_for_passed(int count)
 {
     pthread_mutex_lock(&mutex);
@@ -178,7 +179,8 @@ static void failure_is_reported_by_a_later_step_or_the_end(void **state)
     insitu_session *session = open_behind(write_scene(SCENE("", "[16, 12]")), &in, wait_at_gate);
     everywhere(insitu_step(session, 2, 0.5) == INSITU_OK);
     wait_for_passed(3);
-    /* The thread decides which step returns the error: the last picture is past the gate, but may not be done yet. */
+    /* The writer thread's progress determines which step returns the error: the last picture has passed the gate, but
+     * may not be written yet. */
     insitu_status status = INSITU_OK;
     for (int cycle = 3; cycle < 1000 && !status; cycle += 2) {
         status = insitu_step(session, cycle, 0.5);
@@ -186,7 +188,7 @@ static void failure_is_reported_by_a_later_step_or_the_end(void **state)
         discard_pictures();
     }
     reported_everywhere(session, status, INSITU_ERROR_IO, "cycle 2: image \"a\": a2.png: cannot be written");
-    everywhere(insitu_last_report(session)->images == 1); /* what is due is drawn all the same */
+    everywhere(insitu_last_report(session)->images == 1); /* the picture that is due is still drawn */
     everywhere(insitu_step(session, 1001, 0.5) == INSITU_OK);
     everywhere(insitu_step(session, 1002, 0.5) == INSITU_OK);
     status = insitu_destroy(&session);
@@ -195,7 +197,8 @@ static void failure_is_reported_by_a_later_step_or_the_end(void **state)
     input_free(&in);
 }
 
-/* An error of the step goes first, and the picture's is not lost. */
+/* Checks that an error of the step is returned first, and that the error of a picture is returned later and not
+ * lost. */
 static void failure_waits_for_an_error_of_the_step(void **state)
 {
     (void)state;
@@ -218,7 +221,7 @@ static void failure_waits_for_an_error_of_the_step(void **state)
     input_free(&in);
 }
 
-/* Names, colours and places of pictures that wait are the old scene's. */
+/* Checks that pending pictures keep the names, colours and positions of the scene that drew them. */
 static void scene_is_kept_until_its_pictures_are_written(void **state)
 {
     (void)state;
@@ -269,8 +272,9 @@ static void tables_follow_their_pictures(void **state)
     input_free(&in);
 }
 
-/* In insitu_create(), by the thread that calls it: beside a step it would hold the loader's lock, for which the start
- * of OpenMP's threads waits. The next report has its time. */
+/* Checks that the calling thread loads the image library in insitu_create(). Loading it in parallel with a step would
+ * hold the loader's lock, for which the start of OpenMP's threads waits. The next report includes the time for
+ * loading. */
 static void image_library_is_loaded_before_the_first_step(void **state)
 {
     (void)state;

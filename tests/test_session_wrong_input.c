@@ -1,9 +1,10 @@
-/* Meshes and fields with random mistakes, of every form: counts, strides, NULLs, types, alignment, indices, offsets,
- * coordinates, values, choices, and ranks without anything; on one rank or on all. Each step is an error, the same on
- * all ranks, or draws its pictures; and once the input is right, the next step draws what it drew at first.
+/* Tests meshes of every form and fields with random errors: in counts, strides, NULL pointers, types, alignment,
+ * indices, offsets, coordinates, values and options, and missing arrays; on one rank or on all ranks. Each step must
+ * return an error, the same on all ranks, or draw its pictures. Once the input is correct, the next step must draw what
+ * the first step drew.
  *
- * A mistake must be one that the library can find, so none makes an array longer than its memory: counts and elements
- * are made smaller, or so large that nothing of the size can exist. */
+ * The library must be able to detect each error, so no error makes an array longer than its memory: counts and elements
+ * are made smaller, or so large that no array of this size can exist. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +16,7 @@
 
 enum { SIDE = 2, CASES = 120, ALL_CASES = 3000, FAULTS = 3, MOST_PIXELS = 12 * 9 };
 
-/* Random numbers of a case. */
+/* The random number generator of a case. */
 typedef struct dice {
     uint64_t seed, next;
 } dice;
@@ -29,17 +30,17 @@ static int64_t roll(dice *d, int64_t sides)
 
 /* ---- arrays ---------------------------------------------------------------------------------------------------- */
 
-/* An array of the input: its description, which may be spoilt, and what it is in truth. */
+/* An array of the input: its description, which may be corrupted, and its correct description. */
 typedef struct input_array {
     insitu_array *array;
     insitu_array truth;
-    int64_t count;              /* elements in truth */
-    bool are_indices, is_table; /* of pointers, or their sizes */
+    int64_t count;              /* correct number of elements */
+    bool are_indices, is_table; /* is_table: has pointers, or the sizes of their lists */
 } input_array;
 
 enum { ARRAYS = 22 };
 
-/* right: the input before it was spoilt. */
+/* Lists the arrays of the input. `right` is the input before it was corrupted. */
 static int list_arrays(formed_mesh *m, const formed_mesh *right, input_array *out)
 {
     insitu_mesh *a = &m->mesh;
@@ -96,7 +97,7 @@ static void put_number(const input_array *a, int64_t i, double value)
     memcpy(p, size == 8 ? (const void *)&value : &narrow, (size_t)size);
 }
 
-/* Other contents of one to three elements. */
+/* Replaces the contents of one to three elements. */
 static void corrupt_elements(const input_array *a, dice *d)
 {
     const int64_t indices[] = {-1, 0, 1, -7, INT32_MIN, INT32_MAX, INT64_MIN, INT64_MAX, (int64_t)1 << 40, a->count};
@@ -116,10 +117,10 @@ static void corrupt_stride(const input_array *a, dice *d)
     static const int64_t wild[] = {
         (int64_t)1 << 60, (int64_t)1 << 62, INT64_MIN, INT64_MAX, -((int64_t)1 << 50), 1, 3, 0};
     const int64_t stride = PICK(d, wild), size = size_of(a->truth.type);
-    a->array->stride_bytes = stride == 3 && size < stride ? size : stride; /* no array gets longer than its memory */
+    a->array->stride_bytes = stride == 3 && size < stride ? size : stride; /* stays within the array's memory */
 }
 
-/* Types of no more bytes, right ones and wrong ones, and numbers that are no type. */
+/* Sets another type of at most as many bytes, valid or invalid for this array, or a number that is not a type. */
 static void corrupt_type(const input_array *a, dice *d)
 {
     static const int types[] = {INSITU_FLOAT32, INSITU_FLOAT64, INSITU_INT32, INSITU_INT64, INSITU_UINT8, 0, -1, 77};
@@ -205,7 +206,7 @@ static void corrupt_choice(formed_mesh *m, dice *d)
     }
 }
 
-/* A rank without cells, or a field, or names. */
+/* Removes this rank's cells, a field, or names. */
 static void leave_out(formed_mesh *m, dice *d)
 {
     insitu_field *field = &m->fields[roll(d, FORMED_FIELDS)];
@@ -222,7 +223,7 @@ static void leave_out(formed_mesh *m, dice *d)
     }
 }
 
-/* The fault's own numbers do not depend on what the rank has. */
+/* Corrupts the input in one random way if is_mine. The random numbers of a fault do not depend on the rank's input. */
 static void corrupt(formed_mesh *m, const formed_mesh *right, uint64_t number, int fault, bool is_mine)
 {
     dice d = {number, 1000 * (uint64_t)(fault + 1)};
@@ -244,7 +245,8 @@ typedef struct bench {
     float truth[FORMED_PICTURES][MOST_PIXELS * 4];
 } bench;
 
-/* Counts the pixels that differ from those of the first step. The origin of a refused mesh may move roundings. */
+/* Counts the pixels that differ from the first step's by more than 0.02. Rounding may differ, since a refused mesh may
+ * change the origin. */
 static int count_differing(const bench *b)
 {
     int count = 0;
@@ -287,7 +289,7 @@ static void close_bench(bench *b)
     formed_free(&b->mesh);
 }
 
-/* Returns whether the step failed. */
+/* Draws a corrupted input. Returns whether the step failed. */
 static bool draw_wrong(bench *b, int number)
 {
     dice d = {(uint64_t)number, 0};
@@ -308,7 +310,8 @@ static bool draw_wrong(bench *b, int number)
     return status != INSITU_OK;
 }
 
-/* INSITU_TEST_CASE: the number of the only case to do. Returns how many steps failed. */
+/* Runs the cases first to end - 1, or only the case whose number is in the environment variable INSITU_TEST_CASE.
+ * Returns how many steps failed. */
 static int run_cases(mesh_form form, bool has_corner_fields, int first, int end)
 {
     const char *only = getenv("INSITU_TEST_CASE");
@@ -333,7 +336,8 @@ static void any_mistake_is_an_error_or_a_picture(void **state)
     for (int i = 0; i < 2 * MESH_FORM_COUNT; i++)
         failed += run_cases((mesh_form)(i / 2), i % 2, i * each, (i + 1) * each);
     if (own_rank == 0) fprintf(stderr, "%d cases, %d errors\n", all, failed);
-    everywhere(getenv("INSITU_TEST_CASE") || (failed > all / 4 && failed < all)); /* neither few nor all are fatal */
+    everywhere(getenv("INSITU_TEST_CASE") ||
+               (failed > all / 4 && failed < all)); /* more than a quarter fail, but not all */
 }
 
 int main(int argc, char **argv)

@@ -1,6 +1,6 @@
-/* Each count of a mesh is 0 or not by itself, in each form of mesh, for all layers, on the last rank or on all, and its
- * arrays are given or not: an error on all ranks or a picture, and never the end of the run. A mesh without cells is
- * right, whatever else it has. */
+/* Tests all combinations of counts of a mesh that are 0 or not, in each form of mesh, for all layers, on the last rank
+ * or on all, with and without the arrays of these counts. The step must return an error on all ranks or draw a picture,
+ * and must never abort. A mesh without cells is valid, whatever other counts it has. */
 #include <stdio.h>
 #include <string.h>
 
@@ -20,7 +20,7 @@ static void counts_of(insitu_mesh *mesh, int64_t *counts[COUNTS])
     memcpy(counts, all, sizeof all);
 }
 
-/* Takes away the arrays that have as many elements as the counts of the mask, or one more. */
+/* Removes the arrays that have as many elements as a count of the mask, or one more. */
 static void drop_arrays(insitu_mesh *mesh, unsigned mask)
 {
     insitu_array *const of_counts[COUNTS][5] = {
@@ -34,7 +34,7 @@ static void drop_arrays(insitu_mesh *mesh, unsigned mask)
         for (int i = 0; i < 5 && of_counts[c][i] && mask >> c & 1; i++) of_counts[c][i]->data = NULL;
 }
 
-/* Tells whether the mesh is right because it has no cells and nothing contradicts that. */
+/* Returns whether the mesh is valid because it has no cells and no contradictory arrays. */
 static bool is_empty_and_right(const insitu_mesh *mesh)
 {
     return mesh->cell_count == 0 && mesh->neighbour_count <= mesh->face_count &&

@@ -1,5 +1,5 @@
-/* A slice is the isosurface 0 of the vertices' distances from a plane. Brute force in double on warped cells of every
- * type shows that it has the right place and colours; a closed form shows that it is a plane. */
+/* Tests slices, which are the isosurface 0 of the vertices' distances from a plane. A brute-force intersection in
+ * double on warped cells of every type checks positions and colours; a closed form checks that the slice is a plane. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -22,8 +22,9 @@ static double distance(const double position[3])
     return normal[0] * position[0] + normal[1] * position[1] + normal[2] * position[2] - 0.1;
 }
 
-/* Cells are 1/4 of the cube's half side. The fixture's own bound on depths, 2e-6 cells or 5e-7 × conditioning, is then
- * below 1e-5 of the scene for rays that meet the plane at more than a few degrees. */
+/* Checks that hits lie on the plane. Cells have 1/4 of the cube's half side. The fixture's bound on depths, 2e-6 cells
+ * or 5e-7 × conditioning, is then below 1e-5 of the scene for rays that meet the plane at an angle of more than a few
+ * degrees. */
 static void assert_on_plane(const render_fixture *f, const drawn_frame *drawn, const char *what)
 {
     int64_t hits = 0;
@@ -49,7 +50,7 @@ static void check_kind(test_mesh_kind kind)
     test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
     fixture_create_lattice(&f, kind, SIDE, JITTER, distance);
     fixture_set_camera(&f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
-    fixture_set_volume(&f, 0.3); /* its colours serve the surface */
+    fixture_set_volume(&f, 0.3); /* the volume's colour map also colours the surface */
     f.job.volume_count = 0;
     fixture_add_surface(&f, &through, 1, 1);
     f.surfaces[0].colour_field = (render_field){&colours.field, f.ranges};

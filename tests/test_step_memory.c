@@ -1,7 +1,7 @@
-/* Every allocation of a session's life fails in turn, on one rank or on all: as it is created, as meshes and fields are
- * set and drawn, as its scene is edited. The result is an error on all ranks or the picture, to the bit; and the next
- * step draws the picture, whatever failed before. The heap that fails is the process's own, which libyaml and the C
- * library use too. */
+/* Tests that a session handles the failure of any allocation: each one fails in turn, on one rank or on all ranks,
+ * while the session is created, meshes and fields are set and drawn, and the scene is edited. The result must be an
+ * error on all ranks or, to the bit, the picture; and the next step must draw the picture, whatever failed before. The
+ * failing heap is that of the whole process, which libyaml and the C library also use. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,12 +11,13 @@
 #include "test_session_fixture.h"
 #include "text_file.h"
 
-/* Distance between the allocations that are tried, as the command line gives it; 0: the default. */
+/* Distance between the allocations that are tried, given on the command line; 0 selects the default. */
 static int given_stride;
-/* The one that fails, or did last. */
+/* Number of the allocation that fails, or that failed last. */
 static int64_t allocation;
 
-/* Each case begins at an allocation of its own. Steps on several ranks take longer. */
+/* Returns the distance between the allocations that are tried. Each case begins at a different allocation. The distance
+ * is larger on several ranks, as their steps take longer. */
 static int stride(void)
 {
     return given_stride ? given_stride : rank_count > 1 ? 193 : 97;
@@ -33,8 +34,8 @@ static int stride(void)
     "          lines: {field: c, count: 3}}\n"
 #define VOLUME(field) "      - volume: {field: " field ", opacity: [[0, 0], [0.3, 0.4], [1, 0.9]]}\n"
 
-/* Surfaces alone and in front of a volume, by samples and by segments, values at vertices and in cells, several
- * volumes, frames that are summed. */
+/* The scene has surfaces alone and in front of a volume, volumes by samples and by segments, values at vertices and in
+ * cells, several volumes, and frames that are averaged. */
 #define DECORATIONS                                                                                                    \
     "    decorations: {title: t, text: [{text: a}], colour_bar: {labels: x}, outline: ranks, axes: true}\n"
 
@@ -70,7 +71,7 @@ static const char edited_scene[] =
 typedef struct memory_case {
     const char *name;
     test_mesh_kind kinds[2];
-    int mesh_count; /* two fill the same space */
+    int mesh_count; /* two meshes fill the same space */
 } memory_case;
 
 static const memory_case cases[] = {{"tets", {TEST_TETS}, 1},
@@ -106,7 +107,7 @@ static void scenery_free(scenery *s)
     }
 }
 
-/* The first status that is not OK; the rest is handed over all the same. */
+/* Sets the meshes and fields. Continues after an error, and returns the first status that is not INSITU_OK. */
 static insitu_status submit_scenery(insitu_session *session, const scenery *s)
 {
     insitu_status first = INSITU_OK;
@@ -135,7 +136,7 @@ typedef struct picture_set {
     caught_picture pictures[MAX_CAUGHT];
 } picture_set;
 
-/* Rank 0's pictures, which are forgotten. */
+/* Moves the caught pictures out of the list of caught pictures. Only rank 0 has any. */
 static picture_set pop_pictures(void)
 {
     picture_set set = {.count = caught_count};
@@ -149,7 +150,7 @@ static void free_pictures(picture_set *set)
     for (int i = 0; i < set->count; i++) free_caught(&set->pictures[i]);
 }
 
-/* Every picture that was caught is one of the set; rank 0 has them. */
+/* Returns whether each caught picture is in the set. Only rank 0 has pictures. */
 static bool are_of(const picture_set *set)
 {
     bool are_all = true;
@@ -163,7 +164,7 @@ static bool are_of(const picture_set *set)
     return are_all;
 }
 
-/* As everywhere(), naming the allocation that failed. */
+/* Checks the condition on all ranks; if it is false, prints the number of the allocation that failed. */
 #define at_allocation(condition) everywhere(name_allocation((condition)))
 static bool name_allocation(bool is_well)
 {
@@ -194,7 +195,7 @@ static insitu_session *open_and_draw(const char *scene, const scenery *s, pictur
 
 typedef struct failure {
     int64_t n;
-    bool is_armed; /* on this rank */
+    bool is_armed; /* whether the allocation fails on this rank */
 } failure;
 
 static void start_failing(const failure *f)
@@ -202,7 +203,7 @@ static void start_failing(const failure *f)
     if (f->is_armed) heap_start_failing(f->n, false);
 }
 
-/* Tells whether the allocation was beyond the last one on every rank. */
+/* Stops failing. Returns whether every rank made fewer allocations than the number of the one to fail. */
 static bool stop_failing(const failure *f)
 {
     int is_over = !f->is_armed || heap_stop_failing() < f->n;
@@ -210,7 +211,8 @@ static bool stop_failing(const failure *f)
     return is_over;
 }
 
-/* An error is one of memory, or of the field that a refused mesh could not be given, and the same for all. */
+/* Checks that the status is the same on all ranks, and that an error is about memory or about the field of a mesh that
+ * was refused. */
 static void check_reported(const insitu_session *session, insitu_status status)
 {
     if (status == INSITU_OK || status == INSITU_ERROR_FIELD) {
@@ -238,7 +240,7 @@ typedef struct step_state {
     picture_set expected;
 } step_state;
 
-/* Returns whether there are no more to fail. */
+/* Returns whether there are no further allocations to fail. */
 static bool set_and_step_fail_cleanly(const scenery *s, const failure *f, void *state)
 {
     step_state *t = state;
@@ -252,7 +254,7 @@ static bool set_and_step_fail_cleanly(const scenery *s, const failure *f, void *
     at_allocation(own_rank != 0 || status != INSITU_OK || caught_count == t->expected.count);
     int is_set = set == INSITU_OK;
     MPI_Allreduce(MPI_IN_PLACE, &is_set, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
-    if (is_set) step_draws(t->session, &t->expected); /* what was taken is not lost */
+    if (is_set) step_draws(t->session, &t->expected); /* input that was set successfully must not be lost */
     everywhere(submit_scenery(t->session, s) == INSITU_OK);
     step_draws(t->session, &t->expected);
     return is_over;
@@ -343,8 +345,9 @@ typedef struct edit_state {
     picture_set before, after;
 } edit_state;
 
-/* report.json is written after all ranks have agreed on the status of a step. So the next step, which draws all the
- * same, returns the error of an earlier one that could not write it, and the one after that is well. */
+/* Checks that the next step draws. report.json is written after all ranks have agreed on the status of a step. So the
+ * next step draws, but returns the error of an earlier step that could not write report.json, and the step after the
+ * next returns no error. */
 static void next_step_draws(insitu_session *session, const picture_set *expected)
 {
     discard_pictures();
@@ -355,7 +358,7 @@ static void next_step_draws(insitu_session *session, const picture_set *expected
     if (status) step_draws(session, expected);
 }
 
-/* A step in which the edit is not taken says so, and the next one takes it. */
+/* Checks that a step that fails to apply an edited scene returns an error, and that the next step applies the edit. */
 static bool edit_fails_cleanly(const scenery *s, const failure *f, void *state)
 {
     edit_state *t = state;
@@ -405,7 +408,7 @@ static void write_many_lines(text_output *out, const void *what)
     }
 }
 
-/* Tells whether the file, and nothing but it, has all lines. */
+/* Returns whether the file consists of exactly the expected lines. */
 static bool has_many_lines(const char *path)
 {
     static char expected[TEXT_BYTES + 1], text[TEXT_BYTES + 2];
@@ -414,7 +417,8 @@ static bool has_many_lines(const char *path)
     return strcmp(text, expected) == 0;
 }
 
-/* A file is either the whole text, or what it was before, and then the failure is one of memory. */
+/* Checks that a file has either the whole new text or its previous contents; in the latter case the error must be about
+ * memory. */
 static void failing_texts_are_whole_or_not_written(void **context)
 {
     (void)context;

@@ -1,5 +1,5 @@
-/* Steps of the opacity in scenes of many cells: in lattices of cells with curved fields, where max_error holds for all
- * of a ray's cells together; and in a scene of several volumes, which are mixed. */
+/* Tests steps of the opacity in scenes of many cells: in lattices of cells with curved fields, in which max_error
+ * bounds the error of all of a ray's cells together; and in a scene of several volumes, which are mixed. */
 #include "test_effort.h"
 #include "test_step_fixture.h"
 
@@ -15,7 +15,8 @@
 
 enum { POINTS = 6, CELLS = 4, LATTICE_SIDE = 15, MIXED_SIDE = 7 };
 
-/* Dense as it is at 0.02, rays end in the first cells whose field is beyond a step; at 0.3 they come through. */
+/* Verifies pictures of a lattice. With a unit distance of 0.02 the volume is so dense that rays end in the first cells
+ * whose field is beyond a step; with 0.3 rays reach the cells behind them. */
 static void verify_lattice(test_mesh_kind kind, fixture_camera camera, double unit)
 {
     static const double values[POINTS] = {-0.7, -0.15, -0.15, 0.3, 0.3, 0.7};
@@ -38,7 +39,7 @@ static void verify_lattice(test_mesh_kind kind, fixture_camera camera, double un
     test_mesh_free(&mesh);
 }
 
-/* Usually each kind of cell from one of the cameras. */
+/* Usually draws each kind of cell with only one of the cameras, since all combinations take long. */
 static void lattices_of_curved_cells(void **state)
 {
     static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
@@ -51,10 +52,10 @@ static void lattices_of_curved_cells(void **state)
 
 /* ---- volumes that are mixed ---- */
 
-/* Two volumes over one field, by steps of a cell: the first one's opacity is constant except for a step, the second
- * one's constant. A field off its chord matters only at the step, whose stretches are halved: its error is a share of
- * the mixing's 0.4 RENDER_MIXING_ERROR by length and another by absorption (kernel_cell_segments.h), beside the error
- * of mixing itself. */
+/* Draws two volumes of one field, with the step size of a cell. The opacity of the first volume is constant except for
+ * a step; that of the second is constant. A curved field causes errors only at the step, whose intervals are halved.
+ * The error is a share of the mixing's 0.4 RENDER_MIXING_ERROR by length and another share by absorption
+ * (kernel_cell_segments.h), in addition to the error of mixing itself. */
 static double verify_mixed(const test_mesh *mesh, fixture_camera camera, double unit)
 {
     static const float colours[12] = {0.9f, 0.2f, 0.1f, 0.9f, 0.2f, 0.1f, 0.1f, 0.4f, 0.9f, 0.1f, 0.4f, 0.9f};
@@ -104,7 +105,7 @@ static void mixed_volumes_by_step(void **state)
     }
 }
 
-/* An argument: the tests to run, as cmocka matches names. */
+/* An optional argument selects the tests to run, by a pattern of cmocka. */
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {

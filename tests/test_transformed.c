@@ -36,7 +36,7 @@ insitu_status give_values(void *filled, insitu_field *field)
 {
     filled_values *f = filled;
     int one = 1, ranks = 0;
-    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD); /* ends only where all ranks call it */
+    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD); /* returns only if all ranks call this function */
     f->calls += ranks == rank_count;
     field->count = f->count;
     field->values = f->values;
@@ -63,10 +63,9 @@ insitu_session *open_text(MPI_Comm comm, const char *before, const char *scene)
     return session;
 }
 
-const char all_layers[] =
-    "threads: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1]}}]")
-        LAYERS("b", "[{volume: {field: f}}]") LAYERS("c", "[{slice: {field: f, planes: [{normal: [1, 2, 3]}]}}]")
-            LAYERS("d", "[{surface: {colour_by: {field: f}, edges: {}, threshold: {field: f, from: -0.8}}}]");
+const char all_layers[] = "threads: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1]}}]")
+    LAYERS("b", "[{volume: {field: f}}]") LAYERS("c", "[{slice: {field: f, planes: [{normal: [1, 2, 3]}]}}]")
+        LAYERS("d", "[{surface: {colour_by: {field: f}, edges: {}, threshold: {field: f, from: -0.8}}}]");
 const char surface_layers[] =
     "threads: 1\nimages:\n" LAYERS("a", "[{isosurface: {field: f, values: [0.1], normals: vertex}}]")
         LAYERS("d", "[{surface: {colour_by: {field: f}, edges: {}}}]\n    shadows: true");

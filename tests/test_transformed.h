@@ -1,14 +1,16 @@
-/* Meshes that the scene warps or mirrors: their pictures, beside those of meshes that are handed over as they are to be
- * drawn. Planes, lattices and blocks to do that with. */
+/* Draws meshes that the scene warps or mirrors, and compares their pictures with those of meshes that are given in
+ * their final form. Also makes planes, lattices and blocks for these tests. */
 #ifndef TEST_TRANSFORMED_H
 #define TEST_TRANSFORMED_H
 
 #include "test_mesh_forms.h"
 
-/* The place of a vertex by the description: by vertex, or along the axes of a lattice with packed strides. */
+/* Computes the position of a vertex from the mesh's description: from coordinates by vertex, or along the axes of a
+ * lattice with packed strides. */
 void place_of(const insitu_mesh *mesh, int64_t vertex, double out[3]);
 
-/* The data of give_values(), a fill function, which all ranks must call. calls: how often all did. */
+/* The data of give_values(), a fill function that all ranks must call. `calls` counts the calls that all ranks made
+ * together. */
 typedef struct filled_values {
     insitu_array values;
     int64_t count;
@@ -17,26 +19,26 @@ typedef struct filled_values {
 
 insitu_status give_values(void *filled, insitu_field *field);
 
-/* Compares, frees both, and tells where pictures of nothing were compared. */
+/* Compares both drawings and frees them. Also fails if the compared pictures are empty. */
 void expect_same(drawn *a, drawn *b, const char *what);
 
-/* A session of the text `before` and the scene. */
+/* Opens a session with the text `before` followed by the scene. */
 insitu_session *open_text(MPI_Comm comm, const char *before, const char *scene);
 
 #define LAYERS(name, layers)                                                                                           \
     "  - name: " name "\n    size: [24, 18]\n    layers: " layers "\n    outputs: [{path: " name ".exr}]\n"
 
-/* Scenes of all layers of "f", and of surfaces alone, which are the same to the bit on any ranks. */
+/* Scenes with all layers of "f", and with surfaces alone, which are the same to the bit on any number of ranks. */
 extern const char all_layers[], surface_layers[];
 
-/* Draws "f" on one mesh in one step, and destroys the session. u: NULL, or a further field. */
+/* Draws "f" on one mesh in one step, and destroys the session. `u` is a further field, or NULL. */
 drawn draw_mesh(insitu_session *session, const insitu_mesh *mesh, const insitu_field *f, const insitu_field *u);
 
-/* As above, of a formed mesh with another description. */
+/* Draws a formed mesh with another description in one step, and destroys the session. */
 drawn draw_formed(insitu_session *session, const formed_mesh *m, const insitu_mesh *mesh, bool with_corners,
                   const insitu_field *u);
 
-/* This rank's rows of quads, of 3 x 3 each, in the plane z = 0, of floats or doubles. */
+/* This rank's rows of quads in the plane z = 0, 3 × 3 quads per rank, with float or double coordinates. */
 typedef struct plane {
     double wide[16][2], values[16];
     float narrow[16][2];
@@ -61,7 +63,8 @@ typedef struct block {
     insitu_field field;
 } block;
 
-/* The block of this number among all ranks', along z; of quads along y. Curvilinear ones have padding along x. */
+/* Makes the block with this number. The blocks of all ranks are stacked along z, and blocks of quads along y.
+ * Curvilinear blocks have padding along x. */
 void make_block(lattice_form form, int number, block *out);
 
 #endif

@@ -1,6 +1,6 @@
-/* The VTK adaptor hands over VTK's own pointers where it may, and right conversions where it must. The session is a
- * stub that records. Volumes of split and reordered cells are compared with those computed here from the corner
- * positions; everything else is compared element by element with VTK's arrays. */
+/* Tests that the VTK adaptor passes VTK's own pointers to the session if it can, and correct conversions otherwise. The
+ * session is a stub that records its input. Volumes of cells that are split or reordered are compared with volumes
+ * computed here from the positions of corners; everything else is compared element by element with VTK's arrays. */
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -34,7 +34,7 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -51,7 +51,7 @@ namespace
 
 using point = std::array<double, 3>;
 
-/* A grid of single cells, each with its own points: a regular prism or what the points say. */
+/* Adds a cell with these points, which it shares with no other cell, to the grid. */
 void add_cell(vtkUnstructuredGrid *grid, int type, const std::vector<point> &points)
 {
     if (!grid->GetPoints()) {
@@ -110,8 +110,9 @@ double tet_volume(const point &a, const point &b, const point &c, const point &d
            6;
 }
 
-/* The signed volume of cell i of a mesh, by tets; exact up to rounding where faces are flat. VTK's order: a hex has its
- * lower quad counterclockwise seen from above; wedges come in both windings, so their magnitude is taken. */
+/* Returns the signed volume of cell i, as a sum of tets; it is exact except for rounding if faces are flat. Vertices
+ * are in VTK's order: a hex's lower quad is counterclockwise if seen from above. Wedges occur in both orientations, so
+ * the magnitude of their volume is used. */
 double cell_volume(const insitu_mesh &m, int64_t i)
 {
     const int64_t begin = m.offsets.data ? integer_at(m.offsets, i) : 0;
@@ -129,7 +130,7 @@ double cell_volume(const insitu_mesh &m, int64_t i)
     }
 }
 
-/* Volumes here are sums of a few products of numbers of size 1. */
+/* Bound on the error of volumes, which are sums of a few products of numbers of size 1. */
 constexpr double rounding = 1e-14;
 
 void plain_grid_is_borrowed(void **)
@@ -323,7 +324,7 @@ void voxel_becomes_a_right_handed_hexahedron(void **)
     assert_non_null(strstr(f.report.copied_why, "voxels and pixels reordered"));
 }
 
-/* The set of points of a face, rising. */
+/* Returns the sorted points of a face. */
 std::vector<int64_t> face_points(const insitu_mesh &m, int64_t face)
 {
     std::vector<int64_t> points;
@@ -390,8 +391,8 @@ void bezier_cells_are_their_corners_with_a_warning(void **)
     assert_non_null(strstr(f.report.cells_why, "1 higher-order cells"));
 }
 
-/* One type of one order needs neither types nor offsets; those whose last points libinsitu does not know are copied
- * without them. */
+/* Checks cells of higher order. If all cells have one type and one order, neither types nor offsets are passed. Cells
+ * whose last points libinsitu does not support are copied without these points. */
 void cells_of_higher_order_are_submitted(void **)
 {
     const struct {
@@ -430,7 +431,7 @@ void other_cells_of_higher_order_are_their_corners(void **)
     for (const auto &c : cases) {
         const auto &[corners, volume] = shapes.at(c.linear);
         std::vector<point> points = *corners;
-        points.resize(static_cast<size_t>(c.points), point{9, 9, 9}); // no corner
+        points.resize(static_cast<size_t>(c.points), point{9, 9, 9}); // not at a corner
         vtkNew<vtkUnstructuredGrid> grid;
         add_cell(grid, c.type, points);
         fixture f;
@@ -463,8 +464,8 @@ void lines_are_left_out_and_fields_follow(void **)
     assert_non_null(strstr(f.report.cells_why, "2 points and lines"));
 }
 
-/* Triangles, quads and polygons are borrowed as they are, pixels turned; quadratic ones beside polygons are drawn by
- * their corners. */
+/* Checks that triangles, quads and polygons are passed in place, and that the vertices of pixels are reordered.
+ * Quadratic shells in a grid with polygons are reduced to their corners. */
 void shells_are_submitted(void **)
 {
     const std::vector<std::array<double, 3>> square = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
@@ -508,7 +509,7 @@ void add_polyhedron(vtkUnstructuredGrid *grid)
     grid->InsertNextCell(VTK_POLYHEDRON, 4, ids, 4, faces);
 }
 
-/* Two tets on a common triangle as polyhedra: 7 faces, one of them in both. */
+/* Two tets with a common triangle, given as polyhedra, have 7 faces. One of the faces belongs to both. */
 void polyhedra_share_their_faces(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
@@ -537,7 +538,7 @@ void polyhedra_without_faces_are_warned_about(void **)
     vtkNew<vtkUnstructuredGrid> grid;
     add_polyhedron(grid);
     add_cell(grid, VTK_TETRA, corner);
-    grid->GetFaces()->SetValue(0, 5); /* one face more than there is */
+    grid->GetFaces()->SetValue(0, 5); /* one face more than the cell has */
     fixture f;
     assert_int_equal(f.set(grid), INSITU_OK);
     assert_int_equal(f.report.cells, 1);
@@ -569,7 +570,7 @@ void ghost_flags_that_hide_are_submitted(void **)
     assert_null(f.mesh().mesh.ghosts.data);
 }
 
-/* vtkGhostType of 32 bits, VisIt's array alone, and both. */
+/* Checks a vtkGhostType array of 32 bits, VisIt's array of ghost zones alone, and both together. */
 void ghost_flags_of_other_types_and_names_hide_cells_too(void **)
 {
     const int own[4] = {0, vtkDataSetAttributes::DUPLICATECELL, 0, vtkDataSetAttributes::HIDDENCELL};
@@ -614,7 +615,8 @@ void ghost_flags_follow_cells_left_out(void **)
     for (int i = 0; i < 2; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i), expected[i]);
 }
 
-/* A lattice's coordinate along an axis of vertex n along it, if coordinates are not given by vertex. */
+/* Returns a lattice's coordinate along an axis at the n-th vertex along that axis, if coordinates are not given by
+ * vertex. */
 double place_along(const insitu_lattice &l, int axis, int64_t n)
 {
     const insitu_array &a = l.axes[axis];
@@ -623,11 +625,11 @@ double place_along(const insitu_lattice &l, int axis, int64_t n)
                                     : static_cast<const double *>(a.data)[n];
 }
 
-/* 3 x 4 x 5 points. */
+/* Each grid has 3 × 4 × 5 points. */
 void structured_grids_are_hexahedra(void **)
 {
     vtkNew<vtkImageData> image;
-    image->SetExtent(2, 4, -1, 2, 3, 7); // a piece of a whole
+    image->SetExtent(2, 4, -1, 2, 3, 7); // an extent that is a piece of a larger grid
     image->SetOrigin(1, 2, 3);
     image->SetSpacing(0.5, 1, 2);
     vtkNew<vtkRectilinearGrid> rectilinear;
@@ -667,7 +669,7 @@ void structured_grids_are_hexahedra(void **)
             const int64_t index[3] = {i % 3, i / 3 % 4, i / 12};
             data->GetPoint(i, at);
             for (int a = 0; a < 3 && data != curvilinear.Get(); a++)
-                assert_true(place_along(*lattice, a, index[a]) == at[a]); // to the bit
+                assert_true(place_along(*lattice, a, index[a]) == at[a]); // equal to the bit
         }
         assert_ptr_equal(f.mesh().fields.at("f").values.data, values->GetPointer(0));
         assert_int_equal(f.report.bytes_copied, 0);
@@ -675,7 +677,8 @@ void structured_grids_are_hexahedra(void **)
     }
 }
 
-/* Flat along any axis, hidden by a point, and turned: the points of a turned image alone are listed. */
+/* Checks images that are flat along an axis, images with a hidden point, and rotated images. Only for a rotated image
+ * are points listed. */
 void flat_hidden_and_turned_images_are_lattices(void **)
 {
     for (int flat = 0; flat < 3; flat++) {
@@ -696,7 +699,7 @@ void flat_hidden_and_turned_images_are_lattices(void **)
     flags->SetName(vtkDataSetAttributes::GhostArrayName());
     flags->SetNumberOfValues(27);
     for (vtkIdType i = 0; i < 27; i++) flags->SetValue(i, i == 14 ? vtkDataSetAttributes::HIDDENPOINT : 0);
-    image->GetPointData()->AddArray(flags); // point 2, 1, 1: of the four cells beyond i = 1
+    image->GetPointData()->AddArray(flags); // point (2, 1, 1): hides the four cells around it with i = 1
     fixture f;
     assert_int_equal(f.set(image), INSITU_OK);
     for (int i = 0; i < 8; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i) != 0, i % 2);
@@ -733,7 +736,7 @@ void polygons_are_shells(void **)
     for (int i = 0; i < 3; i++) assert_int_equal(integer_at(mesh.cell_types, i), types[i]);
     assert_int_equal(f.report.cells_flat, 1);
 
-    data->SetLines(nullptr); // then the list is taken as it is, all but the types of its cells
+    data->SetLines(nullptr); // then connectivity is passed in place, and only cell types are copied
     assert_int_equal(f.set(data), INSITU_OK);
     assert_int_equal(f.mesh().mesh.cell_count, 3);
     for (int i = 0; i < 3; i++) assert_int_equal(integer_at(f.mesh().mesh.cell_types, i), types[i]);
@@ -775,7 +778,7 @@ void leaves_of_composites_are_meshes_and_go_when_they_are_gone(void **)
     collection->SetPartitionedDataSet(0, partitions);
     assert_int_equal(f.set(collection), INSITU_OK);
     assert_int_equal(f.session.meshes.size(), 2);
-    partitions->SetPartition(0, nullptr); // as on a rank that has none of it: the other keeps its number
+    partitions->SetPartition(0, nullptr); // this rank has no piece of it; the other keeps its number
     vtkNew<vtkPartitionedDataSet> images;
     vtkNew<vtkImageData> image;
     image->SetDimensions(2, 2, 2);

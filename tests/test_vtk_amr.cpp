@@ -1,5 +1,5 @@
-/* AMR by the VTK adaptor: grids become blocks of levels of one mesh, which lie where the boxes say. That the session
- * then draws each place of the domain by the finest cell there is tested by session_levels and vtk_structured. */
+/* Tests AMR data in the VTK adaptor: grids become blocks of the levels of one mesh, at the positions of their AMR
+ * boxes. session_levels and vtk_structured test that the session draws each position by the finest cell there. */
 #include <array>
 #include <cmath>
 #include <string>
@@ -17,7 +17,7 @@
 #include <vtkUniformGrid.h>
 #include <vtkUnsignedCharArray.h>
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -32,16 +32,17 @@ extern "C" {
 namespace
 {
 
-/* A grid of an AMR: its level, its first cell in that level's counting, and how many cells it has. */
+/* A grid of an AMR: its level, the indices of its first cell within that level, and its number of cells. */
 struct block {
     unsigned level;
     std::array<int, 3> low, cells;
-    int ratio; // of level 0's cells to those of its level
+    int ratio; // number of this level's cells per cell of level 0, along an axis
 };
 
-const std::array<double, 3> origin = {-3, 1, 0.5}, spacing = {1, 0.5, 0.25}; // of level 0
+const std::array<double, 3> origin = {-3, 1, 0.5}, spacing = {1, 0.5, 0.25}; // origin and spacing of level 0
 
-/* Three levels of ratios 2 and 4; blocks that touch, one across two coarser ones, and one at negative places. */
+/* Three levels with refinement ratios of 2 and 4. Some blocks touch, one lies across two coarser ones, and one has
+ * negative indices. */
 const std::vector<block> blocks = {{0, {0, 0, 0}, {4, 6, 4}, 1},   {0, {4, 0, 0}, {3, 6, 4}, 1},
                                    {0, {-2, 0, 0}, {2, 6, 4}, 1},  {1, {4, 2, 2}, {6, 4, 4}, 2},
                                    {1, {-4, 4, 0}, {2, 6, 4}, 2},  {1, {-2, 4, 0}, {4, 2, 2}, 2},
@@ -65,7 +66,7 @@ vtkSmartPointer<vtkUniformGrid> grid_of(const block &b, bool is_flat = false)
 
 enum class given { spacings, ratios };
 
-enum class held { all, some }; // held by a rank; where some, the grids of level 1 and the first one are another rank's
+enum class held { all, some }; // grids that a rank has; some: not the first and level 1
 
 vtkSmartPointer<vtkOverlappingAMR> make_amr(given what, bool is_flat = false, held grids = held::all)
 {
@@ -90,7 +91,7 @@ vtkSmartPointer<vtkOverlappingAMR> make_amr(given what, bool is_flat = false, he
     return amr;
 }
 
-/* Tells whether a finer block covers the middle of the cell of block b. */
+/* Returns whether a block of the next finer level covers the centre of a cell of block b. */
 bool is_covered(const block &b, const std::array<int, 3> &cell, bool is_flat)
 {
     for (const block &finer : blocks) {
@@ -111,7 +112,7 @@ std::string name_of(size_t n)
     return "m[" + std::to_string(n) + "]";
 }
 
-/* Compares the lattice of each block with its place in the level. */
+/* Compares the lattice of each block with the block's position in its level. */
 void check(const fixture &f, bool is_flat = false)
 {
     for (size_t n = 0; n < blocks.size(); n++) {
@@ -146,7 +147,7 @@ void grids_are_blocks_of_levels_by_spacings_or_ratios(void **)
         check(f);
         for (const auto &[name, mesh] : f.session.meshes) assert_null(mesh.mesh.ghosts.data);
         assert_int_equal(f.report.bytes_copied, 0);
-        for (unsigned i = 0; i < 3; i++) assert_null(amr->GetDataSet(0, i)->GetCellGhostArray()); // left as it is
+        for (unsigned i = 0; i < 3; i++) assert_null(amr->GetDataSet(0, i)->GetCellGhostArray()); // input is unchanged
     }
 }
 
@@ -226,7 +227,7 @@ void boxes_that_do_not_fit_are_reported(void **)
     assert_true(!is_on_level(f, 0) && is_on_level(f, 1));
 }
 
-/* A box of level 1 that begins within a cell of level 0, and one whose grid is elsewhere. */
+/* Checks a box of level 1 that begins within a cell of level 0, and a grid whose position differs from its box. */
 void boxes_within_cells_make_no_levels(void **)
 {
     auto amr = make_amr(given::spacings);

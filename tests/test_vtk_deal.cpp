@@ -1,5 +1,5 @@
-/* Dealing cells out to ranks: by any partition every cell is on exactly one rank, with the same points, bit for bit,
- * and its values. */
+/* Tests the distribution of cells to ranks. For any partition each cell must be on exactly one rank, with bitwise equal
+ * points and with its values. */
 #include <cstdint>
 #include <map>
 #include <string>
@@ -18,7 +18,7 @@
 
 #include "cell_deal.h"
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -34,7 +34,8 @@ using render_tool::partition;
 namespace
 {
 
-/* n × n × n hexahedra of thirds, so that no coordinate is a float; cell data "id" from first on, point data "x". */
+/* Returns n × n × n hexahedra, whose coordinates are multiples of 1/3, so that float cannot represent them. Cell data
+ * "id" counts from `first`; point data is "x". */
 vtkSmartPointer<vtkUnstructuredGrid> lattice(int n, int first, double shift)
 {
     auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
@@ -62,7 +63,7 @@ vtkSmartPointer<vtkUnstructuredGrid> lattice(int n, int first, double shift)
     return grid;
 }
 
-using corners = std::vector<double>; // x y z of each vertex of a cell
+using corners = std::vector<double>; // coordinates x, y, z of each vertex of a cell
 
 void collect(vtkUnstructuredGrid *grid, std::map<int, corners> &found)
 {
@@ -134,8 +135,8 @@ void more_ranks_than_cells_leaves_some_without(void **)
     assert_int_equal(with, 1);
 }
 
-/* A block's size differs from the mean by less than one cell; a hash of 4096 cells over 4 ranks by less than 5 standard
- * deviations: sqrt(4096 · 1/4 · 3/4) · 5 = 139. */
+/* The size of a block differs from the mean by less than one cell. The size of a part of 4096 cells that are hashed to
+ * 4 ranks differs by less than 5 standard deviations: sqrt(4096 · 1/4 · 3/4) · 5 = 139. */
 void parts_are_balanced(void **)
 {
     const auto grid = lattice(16, 0, 0);

@@ -1,4 +1,4 @@
-/* The pictures that insitu-render makes without a scene: what they show of a file, looked at by their pixels.
+/* Tests the pictures that insitu-render draws without a scene, by their pixels.
  *
  *     test_vtk_default <insitu-render> <mpiexec> */
 #include <array>
@@ -18,7 +18,7 @@
 
 #include "test_vtk_run.h"
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -31,7 +31,7 @@ extern "C" {
 namespace
 {
 
-constexpr int width = 240, height = 160, bar = 180; // the colour bar stands right of this
+constexpr int width = 240, height = 160, bar = 180; // bar: the colour bar is to the right of this column
 
 std::string tool, mpiexec, folder;
 
@@ -69,7 +69,8 @@ picture draw(const std::string &arguments, const std::string &name, int ranks = 
     return read_picture(name);
 }
 
-/* Eight bits of a colour may be off by one for the map's table, by one for rounding. */
+/* Compares colours of eight bits. They may differ by 1 because of the colour map's table and by 1 because of
+ * rounding. */
 bool is_near(const colour &a, const colour &b)
 {
     bool is = true;
@@ -87,7 +88,8 @@ int count_near(const picture &p, const colour &c)
 
 using field = double (*)(const std::array<double, 3> &at);
 
-/* Cells of a lattice over [-1, 1] along the axes that are not `without`; hexahedra if that is none of them. */
+/* Writes the cells of a lattice over [-1, 1] along all axes except `without`; if `without` is not an axis, the cells
+ * are hexahedra. */
 void write_lattice(const std::string &name, int without, field f)
 {
     constexpr int cells = 12, side = cells + 1;
@@ -125,7 +127,7 @@ void write_lattice(const std::string &name, int without, field f)
     assert_int_equal(writer->Write(), 1);
 }
 
-/* The field is 0 on the whole outside, and up to 1 in the middle, whose colour only a cut shows. */
+/* The field is 0 on the whole surface and up to 1 at the centre. Only a cut shows the colour of the centre. */
 void a_solid_with_a_dark_outside_is_cut_open(void **)
 {
     write_lattice("hot.vtu", -1, [](auto &at) {
@@ -135,7 +137,7 @@ void a_solid_with_a_dark_outside_is_cut_open(void **)
     assert_int_equal(count_near(draw("--whole hot.vtu", "hot_0000.png"), viridis_high), 0);
 }
 
-/* The edge of the cube that is nearest to the eye goes down from the middle of the picture; a cut takes it away. */
+/* The cube's edge that is nearest to the eye extends downwards from the picture's centre; a cut would remove it. */
 void a_solid_whose_outside_shows_the_field_is_drawn_whole(void **)
 {
     write_lattice("shown.vtu", -1, [](auto &at) { return at[0] + 2 * at[2]; });
@@ -144,8 +146,8 @@ void a_solid_whose_outside_shows_the_field_is_drawn_whole(void **)
     for (int y = 80; y < 140; y++) assert_false(is_near(p.at(112, y), background));
 }
 
-/* Seen from the front a field that rises along the first axis has one colour a column, rising to the right;
- * lit or in perspective it has not. */
+/* A field that rises along the first axis is seen from the front. Each column must have one colour, and colours must
+ * rise to the right; lighting or perspective would make colours vary within a column. */
 void flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map(void **)
 {
     write_lattice("x.vtu", 0, [](auto &at) { return at[1]; });
@@ -159,11 +161,12 @@ void flat_meshes_are_seen_from_the_front_in_the_colours_of_the_map(void **)
         const int at = middles[middles.size() / 2];
         for (int y = height / 2 - 30; y <= height / 2 + 30; y++)
             for (const int x : {at - 20, at, at + 20}) assert_true(p.at(x, y) == p.at(x, height / 2));
-        assert_true(p.at(at + 20, height / 2)[0] > p.at(at, height / 2)[0]); /* the high end has more red */
+        assert_true(p.at(at + 20, height / 2)[0] > p.at(at, height / 2)[0]); /* the map's high end has more red */
     }
 }
 
-/* The only step of a run tells what is wrong with its words, and a missing letter does not hide a lack of room. */
+/* Checks that the only step of a run reports the errors in its words, and that the warning about a missing glyph does
+ * not hide the one about missing space. */
 void faults_of_words_are_reported_in_a_run_of_one_step(void **)
 {
     write_lattice("words.vtu", 2, [](auto &at) { return at[0]; });

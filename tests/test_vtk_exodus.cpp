@@ -1,8 +1,9 @@
-/* Element blocks of Exodus files, of every type with every number of nodes that codes write: each comes out as the
- * cells between its corners, or is refused by name. The test writes the files by the Exodus library.
+/* Tests element blocks of Exodus files, of every type and with every number of nodes that codes write. Each element
+ * must be read as the cell between its corners or be refused by the name of its type. The test writes the files by the
+ * Exodus library.
  *
- * The body is a cube of volume 1 with f = x + 2 z, whose mean is 1.5. Both are summed over the tets of each cell, in
- * double; a face's diagonals do not matter, since all faces are flat. */
+ * The body is a cube of volume 1 with the field f = x + 2 z, whose mean is 1.5. Volume and integral are summed in
+ * double over the tets of each cell. All faces are flat, so the choice of their diagonals does not matter. */
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -26,7 +27,7 @@
 #include "test_vtk_run.h"
 #include "vtk_messages.h"
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -48,10 +49,11 @@ using node_list = std::vector<int>;
 
 struct body {
     std::vector<place> nodes;
-    std::vector<node_list> cells; // nodes from 0
+    std::vector<node_list> cells; // indices of nodes, from 0
 };
 
-/* How a box of corners 0..7 (VTK's order of a hexahedron) and its centre, 8, is divided. */
+/* A division of a box into cells. Nodes 0 to 7 are the box's corners in VTK's order of a hexahedron; node 8 is its
+ * centre. */
 struct division {
     const char *type;
     std::vector<node_list> cells;
@@ -65,7 +67,8 @@ const division tets = {"TETRA", {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6}, {0, 7
 const division quads = {"SHELL", {{0, 1, 2, 3}}};
 const division triangles = {"TRI", {{0, 1, 2}, {0, 2, 3}}};
 
-/* The cube as two boxes side by side. Each cell has nodes of its own behind its corners, all at its centre. */
+/* Returns the cube as two adjacent boxes. The nodes of each cell beyond its corners are separate nodes, all at the
+ * cell's centre. */
 body divide(const division &how, int nodes_per_cell, double first_x)
 {
     body b;
@@ -102,8 +105,8 @@ void put(int status)
     if (status < 0) throw std::runtime_error("the Exodus library cannot write");
 }
 
-/* Two steps; at the second f is twice as large. The field of the cells is the cell's number in its block. A second
- * field of the nodes, of zeros, has the names of a displacement's components if it is moved. */
+/* Writes two steps; f is twice as large in the second step. The cell field is the cell's number in its block. If
+ * is_moved, a second point field, of zeros, has the names of a displacement's components. */
 void write_exodus(const std::string &path, const std::vector<block> &blocks, bool is_moved = false)
 {
     int word = 8, io_word = 8;
@@ -156,7 +159,7 @@ void write_exodus(const std::string &path, const std::vector<block> &blocks, boo
     put(ex_close(file));
 }
 
-/* The size of what is drawn, its volume or for flat cells its area, and the integral of f over it. */
+/* The size of the cells (volume, or area of flat cells), and the integral of f over them. */
 struct sums {
     double size = 0, integral = 0;
     vtkIdType cells = 0, points = 0;
@@ -177,7 +180,7 @@ double dot(const place &a, const place &b)
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* A tet or a triangle of a cell. */
+/* Adds a tet or a triangle of a cell. */
 void add_simplex(vtkUnstructuredGrid *grid, const std::vector<vtkIdType> &nodes, sums &all)
 {
     vtkDataArray *f = grid->GetPointData()->GetArray("f");
@@ -193,7 +196,7 @@ void add_simplex(vtkUnstructuredGrid *grid, const std::vector<vtkIdType> &nodes,
     all.integral += size * mean;
 }
 
-/* By the corners alone, which come first in every type of VTK's. */
+/* Adds a cell by its corners, which are the first points in each of VTK's cell types. */
 void add_cell(vtkUnstructuredGrid *grid, vtkIdType cell, sums &all)
 {
     std::vector<node_list> simplices;
@@ -252,13 +255,13 @@ sums sums_of(const std::string &path, size_t step, int piece = 0, int pieces = 1
     return all;
 }
 
-/* Sums of a few terms of size 1 in double: 1e-12. */
+/* The numbers are sums of a few terms of size 1 in double, so they agree to 1e-12. */
 bool is_near(double a, double b)
 {
     return std::fabs(a - b) < 1e-12;
 }
 
-/* Returns the number of wrong files. */
+/* Writes and reads elements of one type and number of nodes. Returns the number of wrong files. */
 int check_kind(const division &how, const std::string &type, int nodes, double mean)
 {
     const std::string name = type + " of " + std::to_string(nodes) + " nodes";
@@ -293,7 +296,7 @@ void every_kind_of_element_has_its_corners(void **)
     assert_int_equal(wrong, 0);
 }
 
-/* At z = 0 f = x, whose mean is 0.5. */
+/* Surface elements are at z = 0, where f = x has the mean 0.5. */
 void elements_of_surfaces_have_their_corners(void **)
 {
     int wrong = 0;
@@ -314,7 +317,8 @@ void names_of_types_are_taken_as_codes_write_them(void **)
     assert_int_equal(wrong, 0);
 }
 
-/* Blocks side by side keep their own cells and values, whichever of them VTK reads right. */
+/* Checks that adjacent blocks of several types keep their own cells and values, even if VTK alone would read only some
+ * of them correctly. */
 void blocks_of_many_kinds_stand_side_by_side(void **)
 {
     const std::string path = folder + "/many.e";
@@ -362,7 +366,8 @@ std::string why_refused(const std::string &path)
     return "";
 }
 
-/* Any of the files of a parallel run stands for all, each of which is a piece. The second step has 2 f. */
+/* Any one file of a parallel run stands for all of the run's files, each of which is a piece. In the second step the
+ * field is 2 f. */
 void files_of_a_parallel_run_are_pieces(void **)
 {
     const std::string start = folder + "/run.e-s002.12.";
@@ -370,7 +375,7 @@ void files_of_a_parallel_run_are_pieces(void **)
         write_exodus(start + (p < 10 ? "0" : "") + std::to_string(p), {{"HEX8", divide(hexes, 8, p)}});
     const sums all = sums_of(start + "07", 1);
     assert_true(is_near(all.size, 12));
-    assert_true(std::fabs(all.integral - 2 * (12 * 1.5 + 66)) < 1e-10); /* sums of some hundred */
+    assert_true(std::fabs(all.integral - 2 * (12 * 1.5 + 66)) < 1e-10); /* a sum of some hundred terms */
     assert_int_equal(open_data_file(start + "00")->pieces(0), 12);
     for (int piece = 0; piece < 3; piece++) assert_true(is_near(sums_of(start + "00", 0, piece, 3).size, 4));
     assert_int_equal(std::remove((start + "03").c_str()), 0);

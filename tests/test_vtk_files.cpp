@@ -1,5 +1,5 @@
-/* insitu-render's readers get from files of every format the cells and values that are in them; from files that are cut
- * short they get an error or the same cells and values, never others.
+/* Tests that insitu-render's readers return the cells and values that files of every format contain. For truncated
+ * files they must return an error or the same cells and values.
  *
  *     test_vtk_files [random cuts of each file] */
 #include <algorithm>
@@ -35,7 +35,7 @@
 #include "test_vtk_samples.h"
 #include "vtk_messages.h"
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -52,7 +52,7 @@ namespace
 
 std::string folder;
 std::vector<sample> samples;
-int random_cuts = 40; // of each file, besides those that are chosen
+int random_cuts = 40; // number of random truncations of each file, in addition to chosen ones
 
 int write_all(void **)
 {
@@ -62,7 +62,7 @@ int write_all(void **)
     return 0;
 }
 
-/* The only grid with cells in data. */
+/* Returns the only grid with cells in data. */
 vtkSmartPointer<vtkUnstructuredGrid> only_grid(vtkDataObject *data)
 {
     if (auto *grid = vtkUnstructuredGrid::SafeDownCast(data)) return grid;
@@ -85,7 +85,7 @@ vtkSmartPointer<vtkUnstructuredGrid> read_grid(const std::string &name)
     return only_grid(grids_of(open_data_file(path)->read(0, 0, 1), path));
 }
 
-/* "" or where the two differ. */
+/* Returns what differs between the cells of two grids, or "". */
 std::string differing_cells(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b)
 {
     if (a->GetNumberOfPoints() != b->GetNumberOfPoints()) return "number of points";
@@ -112,7 +112,8 @@ std::string differing_cells(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b)
     return "";
 }
 
-/* An array that is not there can be drawn by no picture. */
+/* Returns what differs between two arrays of one name, or "". If an array is missing, no picture can draw wrong values
+ * of it. */
 std::string differing_values(vtkDataSetAttributes *a, vtkDataSetAttributes *b, const std::string &name, bool must_exist)
 {
     vtkDataArray *x = a->GetArray(name.c_str()), *y = b->GetArray(name.c_str());
@@ -147,7 +148,8 @@ void every_format_gives_its_cells_and_values(void **)
     }
 }
 
-/* "" or the wrong contents that were read from a cut file. */
+/* Returns what is wrong in the contents that were read from a truncated file; "" if they are right or the file was
+ * refused. */
 std::string taken_for(const sample &s)
 {
     try {
@@ -169,13 +171,13 @@ std::vector<size_t> cuts_of(size_t size, int random_count)
     return cuts;
 }
 
-/* Counts the cuts of one file of the sample that are taken for something else. */
+/* Counts the truncations of one file of the sample that are read with wrong contents. */
 int count_wrong_cuts(const sample &s, const std::string &file)
 {
     int wrong = 0;
     const std::string whole = read_file(folder + "/" + file);
     for (const size_t cut : cuts_of(whole.size(), random_cuts)) {
-        std::filesystem::remove(folder + "/" + file); /* HDF5 takes a file that is written again for the one it was */
+        std::filesystem::remove(folder + "/" + file); /* else HDF5 would use its old contents */
         write_file(folder + "/" + file, whole.substr(0, cut));
         const std::string where = taken_for(s);
         if (where.empty()) continue;
@@ -209,7 +211,7 @@ void hidden_points_hide_their_cells(void **)
     for (int i = 0; i < 60; i++) assert_int_equal(ghosts_of(grid)->GetValue(i) != 0, i == 0 || i == 59);
 }
 
-/* A coarse lattice of 4 × 4 × 4 cells, of which 2 × 2 × 2 have finer ones. */
+/* A coarse lattice has 4 × 4 × 4 cells; finer cells cover 2 × 2 × 2 of them. */
 void finer_levels_hide_coarser_cells(void **)
 {
     const double origin[3] = {0, 0, 0}, steps[2][3] = {{1, 1, 1}, {0.5, 0.5, 0.5}}, inner[3] = {1, 1, 1};
@@ -280,7 +282,7 @@ void cut_foam_files_are_errors_or_the_same(void **)
     assert_int_equal(wrong, 0);
 }
 
-/* The message of what cannot be opened or read, or "". */
+/* Returns the message of the error when the file is opened or read, or "" if there is none. */
 std::string why_refused(const std::string &name)
 {
     try {
@@ -308,7 +310,7 @@ vtkIdType count_cells(vtkDataObject *data)
     return count;
 }
 
-/* The second processor has no step 0.5 at first. */
+/* The second processor does not have step 0.5 at first. */
 void foam_cases_of_parallel_runs_are_read_by_processors(void **)
 {
     namespace fs = std::filesystem;
@@ -332,7 +334,7 @@ void foam_cases_of_parallel_runs_are_read_by_processors(void **)
     assert_true(piece->GetBounds()[0] == 2);
     assert_true(piece->GetCellData()->GetArray("p")->GetComponent(2, 0) == 6);
 
-    write_foam(parallel); /* a case whose last step is as late */
+    write_foam(parallel); /* a case of a serial run with the same last time */
     assert_int_equal(open_data_file(parallel + "/dec.foam")->pieces(0), 1);
     fs::remove_all(parallel + "/0.5");
     file = open_data_file(parallel + "/dec.foam");
@@ -354,7 +356,7 @@ void foam_cases_that_lack_folders_are_refused_by_their_names(void **)
     expect_reported(why_refused("lacking/dec.foam"), "processors4/ is of OpenFOAM's collated format");
 }
 
-/* A cell's value is the one of its place among the hexes, wherever the quads are numbered. */
+/* Checks that a cell's value is that of its hex's position, for any numbering of the boundary's quads. */
 void cgns_cells_are_read_wherever_the_boundary_is_numbered(void **)
 {
     const auto expected = hexes(lattice::curved);
@@ -394,7 +396,7 @@ void cgns_zones_with_wrong_numbers_are_refused(void **)
     expect_reported(why_refused("wrong.cgns"), "sections that mix cells and boundary are not read");
 }
 
-/* The .vtm of a run that writes a table of its residuals beside the grid. */
+/* Reads the .vtm of a run that writes a table of residuals in addition to the grid. */
 void tables_beside_grids_are_left_out(void **)
 {
     write_file(folder + "/residuals.vtt",
@@ -406,7 +408,7 @@ void tables_beside_grids_are_left_out(void **)
     assert_int_equal(read_grid("table.vtm")->GetNumberOfCells(), 60);
 }
 
-/* Entries of one time are parts of one step, and steps come in the order of their times. */
+/* Checks that entries with one time become parts of one step, and that steps are sorted by their times. */
 void series_have_the_times_of_their_entries(void **)
 {
     auto entry = [](const char *time, const char *file) {
@@ -417,7 +419,7 @@ void series_have_the_times_of_their_entries(void **)
     const auto file = open_data_file(folder + "/s.pvd");
     assert_int_equal(file->times().size(), 2);
     assert_true(file->times()[0] == 0.25 && file->times()[1] == 2);
-    assert_int_equal(file->pieces(0), 60); // the cells of a structured grid
+    assert_int_equal(file->pieces(0), 60); // as many cells as the structured grid
     assert_int_equal(file->pieces(1), 2);
     assert_string_equal(file->step_path(0).c_str(), (folder + "/g.vts").c_str());
     const auto both = grids_of(file->read(1, 0, 1), "");
@@ -458,7 +460,7 @@ void wrong_series_are_refused_by_what_is_wrong(void **)
                    "none.vtu: No such file");
 }
 
-/* Files of grids without cells, as VTK's own writer and others write them. */
+/* Reads files of grids without cells, as written by VTK and by other programs. */
 void grids_without_cells_are_no_errors(void **)
 {
     const std::string head = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>",
@@ -474,7 +476,7 @@ void grids_without_cells_are_no_errors(void **)
     assert_string_equal(difference(read_grid("with_none.pvtu"), hexes(lattice::curved), true).c_str(), "");
 }
 
-/* Each file of text has a number written as Fortran does in the place of the last one that is a value. */
+/* In each text file the last value is replaced by a number in Fortran's notation without the exponent's letter. */
 void numbers_without_the_letter_of_their_exponent_are_refused(void **)
 {
     const std::string vtu = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>\n"
@@ -541,7 +543,8 @@ template <typename Number> std::string bytes_of(const std::vector<Number> &value
     return {reinterpret_cast<const char *>(values.data()), values.size() * sizeof(Number)};
 }
 
-/* All steps in one file, those of the variable too, which begins with "C Binary". The second has `more` tets more. */
+/* Writes all steps into one file for the geometry and one for the variable, each of which begins with "C Binary". The
+ * second step has `more` more tets. */
 void write_ensight_set(int more)
 {
     using floats = std::vector<float>;
@@ -597,7 +600,7 @@ void ensight_file_sets_are_read_step_by_step(void **)
     assert_true(why_set_is_refused().find("set.f: has steps of different sizes") != std::string::npos);
 }
 
-/* A cube, with values in `section` of a binary file: what stands before the values, and the values. */
+/* Writes a cube as a binary file whose values are in `section`, which is what precedes the values. */
 void write_ensight_cube(const std::string &section, const std::string &values)
 {
     using floats = std::vector<float>;

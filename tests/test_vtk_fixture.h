@@ -1,4 +1,4 @@
-/* An adaptor on a session that only records its input. To be included after cmocka.h. */
+/* Sets up an adaptor on a session that only records its input. Include this after cmocka.h. */
 #ifndef TEST_VTK_FIXTURE_H
 #define TEST_VTK_FIXTURE_H
 

@@ -1,11 +1,12 @@
-/* insitu-render on files of every format: the pictures are those of the same cells in a .vtu, bit for bit, on one rank
- * and on two; a file that is cut short ends the program with an error or changes nothing. Pictures are plain numbers
- * (plain_image.c).
+/* Tests insitu-render on files of every format. Pictures must be, bit for bit, those of the same cells in a .vtu, on
+ * one rank and on two ranks. A truncated file must cause an error or not change the picture. Pictures are written as
+ * plain numbers (plain_image.c).
  *
  *     test_vtk_formats <insitu-render> <mpiexec> [percent...]
  *
- * Each file is cut at these percents, on one rank and on two. By default it is cut at 95, and one of thirteen runs
- * is done: programs start slowly, and test_vtk_files cuts each file within one. */
+ * Each file is truncated to each of these percentages of its size, on one rank and on two ranks. By default files are
+ * truncated to 95 percent and only one of thirteen runs is made, as programs start slowly. test_vtk_files truncates
+ * each file within one program. */
 #include <algorithm>
 #include <cstdlib>
 #include <string>
@@ -22,7 +23,7 @@
 #include "test_vtk_run.h"
 #include "test_vtk_samples.h"
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -86,7 +87,7 @@ std::string picture(size_t step)
     return read_file(folder + "/a_" + (step < 10 ? "0" : "") + number + ".exr");
 }
 
-/* Files are steps of one run: the first is the .vtu, the others must look the same. */
+/* Draws the files as steps of one run. The first file is the .vtu; the others must have the same picture. */
 void expect_same_pictures(int ranks, const std::vector<std::string> &files)
 {
     std::string names;
@@ -94,7 +95,8 @@ void expect_same_pictures(int ranks, const std::vector<std::string> &files)
     const std::string count = std::to_string(files.size());
     expect(run_tool(ranks, "scene.yaml" + names), 0, count + " steps, " + count + " pictures");
     const std::string first = picture(0), pixels = first.substr(0, size_t{64} * 48 * 4 * sizeof(float));
-    assert_true(pixels.substr(4 * sizeof(float)) != pixels.substr(0, pixels.size() - 4 * sizeof(float))); // not empty
+    // Not all pixels have the same colour, so the picture is not empty.
+    assert_true(pixels.substr(4 * sizeof(float)) != pixels.substr(0, pixels.size() - 4 * sizeof(float)));
     for (size_t i = 1; i < files.size(); i++) {
         if (picture(i) == first) continue;
         print_error("%s on %d ranks: another picture than %s\n", files[i].c_str(), ranks, files[0].c_str());
@@ -131,7 +133,7 @@ void polyhedra_beside_other_cells_are_drawn_on_any_ranks(void **)
     assert_true(picture(0) == random);
 }
 
-/* The file that VTK writes for a grid without cells. */
+/* none.vtu is the file that VTK writes for a grid without cells. */
 void pieces_without_cells_change_nothing(void **)
 {
     write_vtu(folder + "/none.vtu", vtkNew<vtkUnstructuredGrid>());
@@ -152,7 +154,7 @@ void foam_cases_are_drawn_step_by_step(void **)
     assert_true(picture(0) != picture(1));
 }
 
-/* A rank reads one processor's folder, or several ranks share one. */
+/* A rank reads the folder of one processor, or several ranks share one folder. */
 void foam_cases_of_parallel_runs_look_the_same_on_any_ranks(void **)
 {
     for (const int p : {0, 1}) write_foam(folder + "/parallel/processor" + std::to_string(p), 2 * p);
@@ -178,7 +180,7 @@ void steps_of_series_are_chosen_by_number(void **)
     expect(run_tool(1, "--info run.pvd"), 0, "times  3: 3 .. 9");
 }
 
-/* --info leaves out hidden cells, and points that no other cell has. */
+/* Checks that --info ignores hidden cells, and points that belong only to hidden cells. */
 void info_leaves_hidden_cells_out(void **)
 {
     const auto data = structured(lattice::curved);
@@ -200,7 +202,8 @@ void info_leaves_hidden_cells_out(void **)
     expect(run_tool(2, "scene.yaml blanked.vts"), 0, "  59 cells");
 }
 
-/* The picture of the whole is drawn only if the tool draws the file that is cut. */
+/* Draws a truncated file. The picture of the whole file is drawn for comparison only if the tool does not refuse the
+ * truncated file. */
 void expect_error_or_same(const sample &s, const std::string &file, size_t percent, int ranks)
 {
     const std::string whole = read_file(folder + "/" + file);

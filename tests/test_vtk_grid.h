@@ -1,4 +1,4 @@
-/* A VTK grid of hexes or tets, for tests that compare with VTK's filters. */
+/* Makes a VTK grid of hexes or tets, for tests that compare with VTK's filters. */
 #ifndef TEST_VTK_GRID_H
 #define TEST_VTK_GRID_H
 
@@ -11,7 +11,8 @@
 #include <vtkSmartPointer.h>
 #include <vtkUnstructuredGrid.h>
 
-/* type: VTK_TETRA or VTK_HEXAHEDRON; coordinates: vertex_count × 3, kept in double precision. */
+/* Returns a grid of cells of one type, VTK_TETRA or VTK_HEXAHEDRON. coordinates: vertex_count × 3; the grid stores them
+ * in double precision. */
 inline vtkSmartPointer<vtkUnstructuredGrid> test_vtk_grid(int64_t vertex_count, const double *coordinates,
                                                           int64_t cell_count, int type, const int64_t *connectivity)
 {

@@ -1,5 +1,6 @@
-/* VTK's HDF files: steps of unstructured grids come out as they were written, one by one; what is not read is refused
- * by its type. The test writes the files by the HDF5 library. Each part is a row of unit cubes along x. */
+/* Tests VTK's HDF files: the steps of unstructured grids must be read as they were written, one at a time, and
+ * unsupported types must be refused by name. The test writes the files by the HDF5 library. Each part is a row of unit
+ * cubes along x. */
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -20,7 +21,7 @@
 #include "test_vtk_run.h"
 #include "vtk_messages.h"
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -39,14 +40,15 @@ std::string folder;
 
 using numbers = std::vector<long long>;
 
-/* All parts' arrays, one after the other. */
+/* The concatenated arrays of all parts. */
 struct lists {
     numbers point_counts, cell_counts, id_counts, ids, offsets, types;
-    std::vector<double> points, f; // f at the points
-    std::vector<double> c;         // in the cells
+    std::vector<double> points, f; // f: at points
+    std::vector<double> c;         // of cells
 };
 
-/* Cubes first .. first + count - 1 of a row, at height z. f = x + 100 step, c = cube + 100 step. */
+/* Adds a part of the cubes first to first + count - 1 of a row at height z. The fields are f = x + 100 step and c =
+ * cube + 100 step. */
 void add_part(lists &all, int first, int count, double z, int step)
 {
     const double corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
@@ -173,7 +175,7 @@ void expect_refusal(const std::string &name, const std::string &why)
     assert_true(false);
 }
 
-/* Two parts, the second of which has no cells, and then one of three. */
+/* Writes three parts with 2, 0 and 3 cells; the reader must return the cells of all of them. */
 void parts_of_one_step_are_all_read(void **)
 {
     {
@@ -192,7 +194,8 @@ void parts_of_one_step_are_all_read(void **)
     assert_true(found.find("3 cells x 2..5 z 0..1 f 2..5 c 2..4; ") != std::string::npos);
 }
 
-/* Everything changes from step to step, the number of parts too; the second step begins with a part without cells. */
+/* Everything changes from step to step, including the number of parts. The second step begins with a part without
+ * cells. */
 void steps_of_a_mesh_that_changes_are_read_one_by_one(void **)
 {
     {
@@ -221,7 +224,7 @@ void steps_of_a_mesh_that_changes_are_read_one_by_one(void **)
     expect("changing.vtkhdf", 2, "1 cells x 7..8 z 2..3 f 207..208 c 207..207; ");
 }
 
-/* One mesh for all steps, of which only the values change, each of the fields in a place of its own. */
+/* All steps share one mesh. Only the values change, and each field has its own offsets. */
 void steps_of_values_share_their_mesh(void **)
 {
     {
@@ -244,7 +247,8 @@ void steps_of_values_share_their_mesh(void **)
     expect("values.vtkhdf", 1, "3 cells x 0..3 z 0..1 f 100..103 c 0..2; ");
 }
 
-/* The points move; the cells are those of the first step, though each step has a part of its own. */
+/* The points move from step to step. The cells are those of the first step, although each step has a part of its
+ * own. */
 void points_that_move_keep_their_cells(void **)
 {
     {

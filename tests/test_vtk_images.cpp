@@ -1,13 +1,13 @@
-/* insitu-render on real files: alone and on ranks it must draw the same pictures. An isosurface's pixels (depth and
- * colour) are bitwise the same on any partition; a volume's differ by the rounding of "over" in another order. Their
- * bound of 1e-6 in linear light is the library's promise: a pixel's few tens of merges, each with a float rounding
- * (6e-8) of values up to 1, leave no room for errors of another kind.
+/* Tests insitu-render on real files: one rank and several ranks must draw the same pictures. The pixels of isosurfaces
+ * (depth and colour) are bitwise the same for any partition. The pixels of volumes differ by the rounding of the over
+ * operator in another order. Their bound of 1e-6 in linear light is what the library guarantees: the few tens of merges
+ * of a pixel, each with a float rounding (6e-8) of values up to 1, leave no room for other errors.
  *
- * Usually the files are dealt to ranks at random, one of them by blocks too; in the whole test all are.
+ * Usually the files' cells are distributed to ranks at random, and one file's also in blocks; the whole test does both
+ * for all files.
  *
  *     test_vtk_images <insitu-render that writes plain numbers (plain_image.c)> <mpiexec>, with the data's folder in
- *     INSITU_TEST_DATA; 77 if that is not set
- */
+ *     INSITU_TEST_DATA; the exit status is 77 if that is not set */
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
@@ -19,7 +19,7 @@
 #include "test_effort.h"
 #include "test_vtk_run.h"
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -36,18 +36,18 @@ constexpr int width = 96, height = 72;
 constexpr double volume_tolerance = 1e-6;
 
 std::string tool, mpiexec, data_folder;
-run_result last_run; // of draw()
+run_result last_run; // last_run: the last run of draw()
 
 struct subject {
     std::string name;
     std::vector<std::string> files;
     std::string field;
     double value, low, high;
-    int shown_in;                                  // step in which there is something to see
-    std::vector<std::string> volumes = {"volume"}; // pictures of the volume: names of volume_pictures
+    int shown_in;                                  // a step whose pictures are not empty
+    std::vector<std::string> volumes = {"volume"}; // pictures of the volume to draw, by name in volume_pictures
 };
 
-/* A picture of the volume by each way to integrate it, one of them with a second volume. */
+/* Pictures of the volume by each integration method, one of them with a second volume. */
 const struct volume_picture {
     std::string name, sampling, second;
 } volume_pictures[] = {{"volume", "{}", ""},
@@ -56,7 +56,7 @@ const struct volume_picture {
                        {"both", "{max_error: 1e-2}", "f_cell"}};
 
 struct picture {
-    std::vector<float> rgba, depth; // depth: empty where the picture has none
+    std::vector<float> rgba, depth; // depth is empty if the picture has none
 };
 
 picture read_picture(const std::string &path)
@@ -107,7 +107,7 @@ std::string scene_of(const subject &s)
     return text;
 }
 
-/* Draw into a folder of its own, with no rank launcher where ranks is 0. */
+/* Draws into a folder of its own and returns it. If ranks is 0, the program is run without mpiexec. */
 std::string draw(const subject &s, int ranks, const std::string &partition)
 {
     const std::string folder = fresh_folder("vtk_images/" + s.name + "_" + std::to_string(ranks) + "_" + partition);
@@ -158,7 +158,7 @@ void expect_same_pictures(const subject &s, const std::string &alone, const std:
     }
 }
 
-/* The smallest surface here is that of the notch's stress, with some 20 pixels. */
+/* The smallest surface here, that of the notch's stress, covers some 20 pixels. */
 void expect_something_to_see(const subject &s, const std::string &folder)
 {
     const auto step = static_cast<size_t>(s.shown_in);
@@ -179,7 +179,7 @@ void draws_alone(const subject &s)
     expect_something_to_see(s, draw(s, 0, "block"));
 }
 
-/* Quadratic cells are drawn by all of their nodes. */
+/* Checks that quadratic cells are drawn with all of their nodes. */
 void draws_whole(const subject &s)
 {
     draws_alone(s);
@@ -198,7 +198,7 @@ void post_is_the_same_on_ranks(void **)
     draws_the_same_on_ranks({"post_tet", {"post_tet.vtu"}, "VelocityMagnitude", 0.8, 0, 1.4, 0});
 }
 
-/* Each of 8,000 cells on any of seven ranks. */
+/* The 8,000 cells are distributed at random to seven ranks. */
 void polyhedra_are_the_same_on_seven_ranks(void **)
 {
     const subject s = {
@@ -250,7 +250,7 @@ void info_counts_the_mixed_lattice(void **)
         assert_true(r.says(text));
 }
 
-/* NetCDF reads zeros where the end of a file is missing. */
+/* NetCDF would read zeros if the end of a file is missing. */
 void exodus_cut_short_is_refused(void **)
 {
     const std::string folder = fresh_folder("vtk_cut");

@@ -1,4 +1,3 @@
-/* See the header. */
 #include "test_vtk_run.h"
 
 #include <cstdlib>

@@ -6,19 +6,19 @@
 #include <vector>
 
 struct run_result {
-    int status; // of exit; -1: ended by a signal
+    int status; // exit status; -1 if a signal ended the program
     std::string out;
     std::string err;
 
     bool says(const std::string &text) const { return (out + err).find(text) != std::string::npos; }
 };
 
-/* Run a shell command in folder; on a failure of the expectation that follows, out and err are there to be printed. */
+/* Runs a shell command in folder. Returns its exit status and what it wrote to stdout and stderr. */
 run_result run_in(const std::string &folder, const std::string &command);
 
 std::string shell_word(const std::string &word);
 
-/* An empty folder below the working directory, made anew. */
+/* Returns an empty folder below the working directory; removes its former contents. */
 std::string fresh_folder(const std::string &name);
 
 void write_file(const std::string &path, const std::string &text);

@@ -1,4 +1,3 @@
-/* See the header. */
 #include "test_vtk_samples.h"
 
 #include <algorithm>
@@ -47,7 +46,8 @@ struct place {
     double x, y, z;
 };
 
-/* All are sixteenths, so that neither an image's way to add up its steps nor six decimal digits round them. */
+/* Returns the position of a point. All coordinates are multiples of 1/16, so neither the sum of an image's steps nor
+ * six decimal digits round them. */
 place place_of(lattice kind, int i, int j, int k)
 {
     switch (kind) {
@@ -206,7 +206,7 @@ void write_text_pieces(const std::string &path, const std::string &list, const s
                          points + pieces + "</" + list + "></VTKFile>\n");
 }
 
-/* One piece each; the readers of several pieces are VTK's. */
+/* Each file has one piece, as VTK itself reads files of several pieces. */
 void write_parallel_lattices(const std::string &folder)
 {
     const std::string whole = "WholeExtent=\"0 5 0 4 0 3\"", piece = "<Piece Extent=\"0 5 0 4 0 3\" Source=\"g.",
@@ -219,8 +219,8 @@ void write_parallel_lattices(const std::string &folder)
                       "<PPoints><PDataArray type=\"Float32\" NumberOfComponents=\"3\"/></PPoints>", piece + "vts\"/>");
 }
 
-/* Writes C binary files. VTK's writer needs numbers of blocks; it writes a .case too, but closes it only when the
- * program ends. */
+/* Writes C binary files. VTK's writer needs the numbers of blocks. VTK also writes a .case, but does not close it
+ * before the program ends. */
 void write_ensight(const std::string &folder, vtkUnstructuredGrid *grid)
 {
     vtkNew<vtkUnstructuredGrid> numbered;
@@ -385,7 +385,7 @@ void write_cgns_fields(int file, int base, int zone, vtkUnstructuredGrid *grid)
                    grid->GetCellData()->GetArray("c")->GetVoidPointer(0), &number);
 }
 
-/* A structured zone. */
+/* Writes a structured zone. */
 void write_cgns(const std::string &path, vtkUnstructuredGrid *grid)
 {
     int file = 0, base = 0, zone = 0;
@@ -404,7 +404,7 @@ struct section_writer {
     vtkUnstructuredGrid *grid;
     cgsize_t quads = (size[0] - 1) * (size[1] - 1);
 
-    /* Adds the vertices of a hex, from 1, and its first one until there are count. */
+    /* Adds the vertices of a hex, counted from 1, and then repeats its first vertex until there are `count` nodes. */
     void add_hex(vtkIdType cell, int count, std::vector<cgsize_t> &nodes) const
     {
         vtkIdType corners = 0;
@@ -420,7 +420,7 @@ struct section_writer {
         for (int k = 3; k >= 0; k--) nodes.push_back(points[k] + 1);
     }
 
-    /* These return the number behind the last element's. */
+    /* put_hexes() and put_wall() return the number after that of the last element. */
     cgsize_t put_hexes(const char *name, cgsize_t number, cgsize_t begin, cgsize_t end, int nodes_each = 8) const
     {
         std::vector<cgsize_t> nodes;
@@ -516,7 +516,7 @@ void write_foam(const std::string &folder, int first)
     for (int x = first; x < first + 3; x++)
         for (const char *yz : {" 0 0)\n", " 1 0)\n", " 1 1)\n", " 0 1)\n"}) points += "(" + std::to_string(x) + yz;
     write_file(mesh + "points", foam_file("vectorField", "points", points + ")\n"));
-    /* Inner faces first: the two triangles, then the quad between the wedges. */
+    /* Interior faces are first: the two triangles, then the quad between the wedges. */
     write_file(mesh + "faces", foam_file("faceList", "faces",
                                          "14\n(\n3(4 5 6)\n3(4 6 7)\n4(4 8 10 6)\n4(0 3 2 1)\n4(0 1 5 4)\n4(1 2 6 5)\n"
                                          "4(2 3 7 6)\n4(3 0 4 7)\n4(4 5 9 8)\n4(5 6 10 9)\n3(8 9 10)\n4(6 7 11 10)\n"

@@ -1,4 +1,5 @@
-/* Small files of every format that insitu-render reads, and the grids that they hold, built apart from them. */
+/* Writes small files of every format that insitu-render reads, and makes the grids that they contain without reading
+ * the files. */
 #ifndef TEST_VTK_SAMPLES_H
 #define TEST_VTK_SAMPLES_H
 
@@ -10,50 +11,51 @@
 class vtkDataSet;
 class vtkUnstructuredGrid;
 
-/* A lattice of 6 × 5 × 4 points as VTK has it: coordinates by axes, by one array an axis, by a list of points. */
+/* A lattice of 6 × 5 × 4 points in VTK's three forms: coordinates by origin and spacing, by one array per axis, and by
+ * a list of points. */
 enum class lattice { image, rectilinear, curved };
 
-/* A grid with the point field "x", and the cell field "c", which counts cells. */
+/* Returns a grid with the point field "x" and the cell field "c", which counts cells. */
 vtkSmartPointer<vtkDataSet> structured(lattice kind);
 
-/* As above, but a list of hexahedra made from the lattice's indices alone. */
+/* Returns the grid of structured() as a list of hexahedra, made only from the lattice's indices. */
 vtkSmartPointer<vtkUnstructuredGrid> hexes(lattice kind);
 
-/* A row of unit cubes along x from `first` on, every second a polyhedron if is_mixed, else all hexahedra. */
+/* Returns a row of unit cubes along x, beginning at `first`. If is_mixed, every second cube is a polyhedron, otherwise
+ * all cubes are hexahedra. */
 vtkSmartPointer<vtkUnstructuredGrid> cubes(int count, int first, bool is_mixed);
 
 struct sample {
-    std::string name;               // of the file to open, within the folder
-    std::vector<std::string> files; // that may be cut: it and those it names
+    std::string name;               // name of the file to open, within the folder
+    std::vector<std::string> files; // files that may be truncated: that file and those that it names
     vtkSmartPointer<vtkUnstructuredGrid> expected;
 };
 
-/* Write the files of all formats that this VTK can write into folder. */
+/* Writes into folder the files of all formats that this version of VTK can write. */
 std::vector<sample> write_samples(const std::string &folder);
 
 void write_vtu(const std::string &path, vtkUnstructuredGrid *grid);
 
-/* How the elements of a CGNS zone are numbered. */
+/* The numbering of the elements of a CGNS zone. */
 enum class cgns_order {
     cells_first,  // the hexes, then the quads at the bottom
     wall_first,   // the quads, then the hexes
-    wall_between, // 20 hexes, the quads, the other hexes
-    wall_long,    // the quads four times, more than there are hexes, then the hexes
-    wall_stored,  // as cells_first, but the quads' section is the file's first
-    mixed,        // one section of both: a quad before each of the first hexes
-    curved,       // as wall_first, with HEXA_27 whose nodes beyond the corners are the first corner
-    gap           // as wall_first, but the hexes' numbers begin one too late
+    wall_between, // 20 hexes, then the quads, then the other hexes
+    wall_long,    // four times the quads, which are more than the hexes, then the hexes
+    wall_stored,  // like cells_first, but the section of the quads is stored first
+    mixed,        // one section of both types: a quad before each of the first hexes
+    curved,       // like wall_first, with HEXA_27 whose nodes beyond the corners repeat the first corner
+    gap           // like wall_first, but the hexes' numbers begin one too high
 };
 
-/* Writes hexes() as each of the unstructured zones of a CGNS file. claimed: the number of cells that a zone says it
- * has. */
+/* Writes hexes() as each of the unstructured zones of a CGNS file. `claimed` is the number of cells that each zone
+ * states. */
 void write_cgns_elements(const std::string &path, vtkUnstructuredGrid *grid, cgns_order order, int claimed = 60,
                          const std::vector<std::string> &zones = {"Zone"});
 
 /* Writes an OpenFOAM case to folder: a cube that begins at x = first and, beside it, two wedges whose triangles
- * together are the cube's face, so that the cube has seven faces. The field p is the cell's number at time 0, twice
- * that at 0.5.
- */
+ * together are the cube's face, so that the cube has seven faces. The field p is the cell's number at time 0, and twice
+ * this number at time 0.5. */
 void write_foam(const std::string &folder, int first = 0);
 
 #endif

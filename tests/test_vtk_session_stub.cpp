@@ -1,4 +1,4 @@
-/* See the header. The defaults are what the public header says they are. */
+/* The defaults are those that the public header documents. */
 #include "test_vtk_session_stub.h"
 
 #include <iterator>

@@ -1,6 +1,6 @@
-/* insitu-render on structured files: each rank reads a part of the extent, and the picture is the same on any ranks,
- * bit for bit; blocks of a .vtm have no seam; an AMR file of VTK's own writer shows a sphere without slits, against the
- * closed form. Pictures are plain numbers (plain_image.c).
+/* Tests insitu-render on structured files. Each rank reads a part of the extent, and the picture is bitwise the same on
+ * any number of ranks. Blocks of a .vtm must have no seam. An AMR file that VTK wrote must show a sphere without slits,
+ * compared with the closed form. Pictures are written as plain numbers (plain_image.c).
  *
  *     test_vtk_structured <insitu-render> <mpiexec> */
 #include <algorithm>
@@ -35,7 +35,7 @@
 #include "test_effort.h"
 #include "test_vtk_run.h"
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -76,7 +76,7 @@ void expect_same(const std::string &a, const std::string &b, const std::string &
     assert_true(a == b && a.size() > size_t{pixels} * 16);
 }
 
-/* Layers that are the same to the bit on any ranks, looked at along z from z = 5. */
+/* Returns a scene, seen along z from z = 5, whose layers are the same to the bit on any number of ranks. */
 std::string scene(const std::string &field)
 {
     return "images:\n  - name: a\n    size: [200, 200]\n    background: [0, 0, 0, 0]\n    camera: {position: [0, 0, "
@@ -98,7 +98,7 @@ int write_scenes(void **)
     return 0;
 }
 
-/* Adds the signed distance from a sphere at points and in cells. */
+/* Adds the signed distance from a sphere as point data and as cell data. */
 void add_distances(vtkDataSet *data)
 {
     vtkNew<vtkDoubleArray> at_points, in_cells;
@@ -121,7 +121,7 @@ void add_distances(vtkDataSet *data)
 
 using sizes = std::array<int, 3>;
 
-/* A grid of [-1, 1]^3 whose indices do not begin at 0. */
+/* Returns a grid of [-1, 1]^3 whose indices do not begin at 0. */
 vtkSmartPointer<vtkDataSet> image_of(const sizes &cells)
 {
     auto image = vtkSmartPointer<vtkImageData>::New();
@@ -193,7 +193,7 @@ void grids_are_the_same_on_any_ranks(void **)
         expect_same(draw(3, std::string("--partition ") + how + " cells.yaml g.vti"), draw(1, "cells.yaml g.vti"), how);
 }
 
-/* The cells that the ranks read are each cell once, and each rank's share is near to the mean. */
+/* Checks that the ranks together read each cell once, and that each rank's number of cells is near the mean. */
 void ranks_read_parts_of_the_extent(void **)
 {
     for (const sizes &cells : {sizes{13, 10, 17}, sizes{2, 2, 2}, sizes{40, 1, 1}}) {
@@ -224,7 +224,7 @@ void ranks_read_parts_of_the_extent(void **)
 
 /* ---- blocks ------------------------------------------------------------------------------------------------------ */
 
-/* The grid of an image in four blocks, of which two meet the others at different indices. */
+/* Writes the grid of an image as four blocks. Two of the blocks meet the others at different indices. */
 void write_blocks(const sizes &cells)
 {
     const auto whole = image_of(cells);
@@ -275,20 +275,20 @@ void blocks_have_no_seam(void **)
 
 /* ---- AMR --------------------------------------------------------------------------------------------------------- */
 
-/* A grid of a level, in cells of level 0, of which [-1, 1]^3 has 8^3. */
+/* A grid of a level. Its position and size are in cells of level 0, of which [-1, 1]^3 has 8^3. */
 struct box {
     unsigned level;
     sizes low, cells;
 };
 
-/* Level 2 lies across both grids of level 1, which lie beside level 0 and at the border. */
+/* The grid of level 2 lies across both grids of level 1, which touch level 0 and the border of the domain. */
 const std::vector<box> boxes = {{0, {0, 0, 0}, {4, 8, 8}},
                                 {0, {4, 0, 0}, {4, 8, 8}},
                                 {1, {0, 2, 4}, {3, 5, 4}},
                                 {1, {3, 2, 4}, {2, 5, 4}},
                                 {2, {1, 3, 5}, {3, 3, 3}}};
 
-/* ratios: of level 1 to level 0, and of level 2 to level 1. */
+/* Writes the AMR. `ratios` are the refinement ratios of level 1 to level 0 and of level 2 to level 1. */
 void write_amr(const std::array<int, 2> &ratios)
 {
     const double origin[3] = {-1, -1, -1};
@@ -321,8 +321,9 @@ void write_amr(const std::array<int, 2> &ratios)
     write<vtkXMLUniformGridAMRWriter>("levels.vthb", amr);
 }
 
-/* Counts pixels at which the front of the sphere is not seen. The surface in a cell is off the sphere by at most half
- * the largest cell's diagonal, 0.217; inside of 0.6 the front and the back are 0.8 apart. */
+/* Counts the pixels in which the sphere's front is not visible. The surface in a cell differs from the sphere by at
+ * most half of the largest cell's diagonal, 0.217. Within a radius of 0.6 the front and the back are at least 0.8
+ * apart. */
 int count_slits(const std::string &picture)
 {
     int slits = 0;

@@ -1,5 +1,5 @@
-/* Tests insitu-render from outside: its output for good and bad files, alone and on ranks. The test writes the files,
- * so it knows their contents.
+/* Tests insitu-render as a program: its output for valid and invalid files, on one rank and on several. The test writes
+ * the files, so it knows their contents.
  *
  *     test_vtk_tool <insitu-render> <a copy that writes pictures as plain numbers (plain_image.c)> <mpiexec> */
 #include <filesystem>
@@ -24,7 +24,7 @@
 
 #include "test_vtk_run.h"
 
-// cmocka defines fail as a macro, so it comes after all C++ headers.
+// cmocka.h is included after all C++ headers, as it defines fail as a macro.
 extern "C" {
 #include <setjmp.h>
 #include <stdarg.h>
@@ -49,8 +49,8 @@ const char *const scene = "images:\n"
                           "    outputs:\n"
                           "      - path: a_{cycle:02}.exr\n";
 
-/* Tets along x from `first` on, each with its own points; point field "x" is the x of the point, cell field "number"
- * counts. */
+/* Returns tets along x, beginning at `first`, each with its own points. The point field "x" is the point's x; the cell
+ * field "number" counts the tets. */
 vtkSmartPointer<vtkUnstructuredGrid> row_of_tets(int count, int first = 0)
 {
     auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
@@ -87,7 +87,7 @@ void write_vtu(const std::string &name, vtkUnstructuredGrid *grid)
     assert_int_equal(writer->Write(), 1);
 }
 
-/* 4 x 4 quads and a triangle, of surface meshes' own format. */
+/* Writes 4 × 4 quads and a triangle in VTK's format of surface meshes (.vtp). */
 void write_sheet()
 {
     vtkNew<vtkPoints> points;
@@ -198,7 +198,7 @@ void info_lists_what_is_in_a_file(void **)
     assert_true(r.says("0 .. 39\n"));
 }
 
-/* VTK 9.1 has other names for these. */
+/* VTK 9.1 has other names for these cell types. */
 void info_names_cells_of_higher_order(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
@@ -272,7 +272,8 @@ void wrong_options_are_named(void **)
     expect(run_tool("row.vtu scene.yaml"), 0, "1 step, 1 picture");
 }
 
-/* One rank alone gets a file that is not there, so it alone fails before and where others go on to collective calls. */
+/* Only one rank is given a file that does not exist, so it alone fails while the others continue to collective
+ * calls. */
 void one_rank_failing_ends_all(void **)
 {
     const std::string start =
@@ -299,8 +300,9 @@ void surface_meshes_are_drawn(void **)
     }
 }
 
-/* Pictures without a scene: files of one name in several folders, or with several endings, and long names that begin
- * alike. Drawn again, a file has the same names. */
+/* Checks the names of pictures drawn without a scene, for files of one name in several folders or with several
+ * extensions, and for long names with a common prefix. If a file is drawn again, its pictures must have the same
+ * names. */
 void default_pictures_of_two_files_are_two(void **)
 {
     namespace fs = std::filesystem;
@@ -375,7 +377,7 @@ void a_field_that_begins_later_leaves_out_the_first_steps(void **)
     expect(run_tool("scene.yaml late_0.vtu late_0.vtu"), 1, "insitu-render: scene.yaml:6: no mesh has the field");
 }
 
-/* Without a scene the field is one that the first and the last step have, or else the last step's. */
+/* Checks that the default field is one that the first and the last step have, or otherwise one of the last step. */
 void default_field_is_one_that_the_last_step_has(void **)
 {
     auto with_y = row_without_x(3);
@@ -390,8 +392,9 @@ void default_field_is_one_that_the_last_step_has(void **)
     expect(run_tool("with_x.vtu without.vtu with_x.vtu"), 0, "; other steps have it, and --field takes another");
 }
 
-/* Without a scene a small step is drawn otherwise where a step of more and larger values follows, by the scale and the
- * camera of both; on any ranks alike. Steps have one time, which the pictures show. */
+/* Checks that, without a scene, all steps of a series share the scale of values and the camera: a small step is drawn
+ * differently if a larger step with larger values follows. Pictures are the same on any number of ranks. All steps have
+ * the same time, which the pictures show. */
 void a_series_has_one_scale_and_one_camera(void **)
 {
     for (const auto &[name, count] : {std::pair{"grow_0.vtu", 2}, {"grow_1.vtu", 9}, {"grow_2.vtu", 2}}) {
@@ -414,7 +417,8 @@ void a_series_has_one_scale_and_one_camera(void **)
     assert_true(grown == first_picture("grow_1.vtu grow_2.vtu", 2));
 }
 
-/* One piece has doubles, one no field, one a field that is not declared: the same picture and warnings on any ranks. */
+/* One piece has doubles, one has no field, and one has a field that is not declared. Picture and warnings must be the
+ * same on any number of ranks. */
 void pieces_that_differ_are_drawn_the_same_on_any_ranks(void **)
 {
     auto wide = row_of_tets(4), more = row_of_tets(2, 10);
@@ -448,7 +452,7 @@ void pieces_that_differ_are_drawn_the_same_on_any_ranks(void **)
     }
 }
 
-/* All cells are there, however they are read and dealt out. */
+/* Checks that all cells are present for each way of reading and distributing them. */
 void every_way_of_reading_gives_all_cells(void **)
 {
     for (const int ranks : {2, 4}) {

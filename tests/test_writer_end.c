@@ -1,5 +1,6 @@
-/* Runs that end with pictures on their way: at once after the last step, in every way that a process may end. Each run
- * is a process of its own. Pictures that a killed run had not written may be missing, but no file is half a picture. */
+/* Tests runs that end while pictures are still pending, immediately after the last step, in every way in which a
+ * process may end. Each run is a process of its own. A killed run may lack pictures that were pending, but must not
+ * leave an incomplete file. */
 #include <dirent.h>
 #include <signal.h>
 #include <stdio.h>
@@ -45,10 +46,10 @@ static insitu_status draw(const char *folder, insitu_session **session)
     return status;
 }
 
-/* The run: its end is named. */
+/* Runs a simulation, and then ends in the way that `end` names. */
 static int run(const char *end, const char *folder)
 {
-    static insitu_session *session; /* still held where a run ends without insitu_destroy(), and so no leak */
+    static insitu_session *session; /* static, so that a run that ends without insitu_destroy() has no leak */
     MPI_Init(NULL, NULL);
     if (draw(folder, &session) != INSITU_OK) {
         fprintf(stderr, "%s: %s\n", end, insitu_error(session));
@@ -58,11 +59,11 @@ static int run(const char *end, const char *folder)
     if (strcmp(end, "exit") == 0) exit(0);
     if (strcmp(end, "destroy") == 0 && insitu_destroy(&session) != INSITU_OK) return 1;
     MPI_Finalize();
-    if (strcmp(end, "finalize") == 0) _exit(0); /* all is written by now */
+    if (strcmp(end, "finalize") == 0) _exit(0); /* all pictures are written by now */
     return 0;
 }
 
-/* Tells whether a PNG is whole, from its first bytes to its last chunk. */
+/* Returns whether a PNG is complete, from its first bytes to its last chunk. */
 static int is_whole_png(const char *path)
 {
     static const unsigned char begin[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'}, end[4] = {'I', 'E', 'N', 'D'};
@@ -74,7 +75,7 @@ static int is_whole_png(const char *path)
     return is_whole;
 }
 
-/* Whole pictures, -1 where a file of a picture's name is none; they go. */
+/* Counts complete pictures and removes them; returns -1 if a file with a picture's name is not a complete PNG. */
 static int count_pictures(const char *folder)
 {
     int count = 0;
@@ -114,7 +115,7 @@ int main(int argc, char **argv)
         const int is_killed = strcmp(ends[i], "killed") == 0;
         const int status = status_of(argv[0], ends[i], folder), count = count_pictures(folder);
         const int is_well = is_killed ? WIFSIGNALED(status) && count >= 0 : status == 0 && count == PICTURES;
-        /* Open MPI's own handler turns exit() without MPI_Finalize() into a status of its own. */
+        /* Open MPI's own handler replaces the status of an exit() without MPI_Finalize(). */
         const int is_exit_well = strcmp(ends[i], "exit") == 0 && WIFEXITED(status) && count == PICTURES;
         printf("%s: status %d, %d of %d pictures\n", ends[i], status, count, PICTURES);
         if (!is_well && !is_exit_well) failed = 1;
