@@ -26,6 +26,7 @@
 #include "session_shape.h"
 
 enum {
+    LANES = 4,                /* points whose sums are computed together */
     BLOCK = 32,               /* most points of a block */
     MOST_FUNCTIONS = 1 << 20, /* most numbers of a factor's functions that are stored */
     MOST_TET_POINTS = 17,     /* most points along an axis of bent tets, unless straight ones need more */
@@ -135,7 +136,8 @@ static bool make_factor(int dimensions, int order, bool is_lobatto, int points, 
     out->node_count = dimensions > 1 ? session_complete_nodes(types[dimensions], order).count : order + 1;
     out->is_lobatto = is_lobatto;
     if (!session_make_quadrature(dimensions, points, &out->rule)) return false;
-    out->width = out->rule.count < BLOCK ? out->rule.count : BLOCK;
+    const int whole = (out->rule.count + LANES - 1) / LANES * LANES;
+    out->width = whole < BLOCK ? whole : BLOCK;
     const size_t blocks = (size_t)((out->rule.count - 1) / out->width + 1);
     if (dimensions > 1 && blocks * count_block(out) > MOST_FUNCTIONS) return true;
     out->functions = base_calloc(blocks * count_block(out), sizeof *out->functions);
@@ -243,12 +245,30 @@ size_t session_cell_rules_work_size(const session_cell_rules *rules)
     return size;
 }
 
-/* Adds the products of a matrix of node_count x width with the values at nodes to the first `width` numbers of out. */
-static void add_products(const double *restrict matrix, int node_count, int width, const double *restrict values,
-                         double *restrict out)
+/* Multiplies a matrix of node_count x width with the values of one component, or of three components that follow each
+ * other, at the nodes. Sums of LANES points stay in registers. */
+static inline __attribute__((always_inline)) void multiply(const double *restrict matrix, int node_count, int width,
+                                                           const double *restrict values, const int components,
+                                                           double (*restrict out)[BLOCK])
 {
-    for (int n = 0; n < node_count; n++)
-        for (int i = 0; i < width; i++) out[i] += matrix[n * width + i] * values[n];
+    for (int first = 0; first < width; first += LANES) {
+        double sums[3][LANES] = {{0}};
+        for (int n = 0; n < node_count; n++)
+            for (int c = 0; c < components; c++)
+                for (int i = 0; i < LANES; i++)
+                    sums[c][i] += matrix[n * width + first + i] * values[c * node_count + n];
+        for (int c = 0; c < components; c++) memcpy(out[c] + first, sums[c], sizeof sums[c]);
+    }
+}
+
+static void multiply_one(const double *matrix, int node_count, int width, const double *values, double (*out)[BLOCK])
+{
+    multiply(matrix, node_count, width, values, 1, out);
+}
+
+static void multiply_three(const double *matrix, int node_count, int width, const double *values, double (*out)[BLOCK])
+{
+    multiply(matrix, node_count, width, values, 3, out);
 }
 
 static double find_measure(double (*slopes)[AXES][BLOCK], int axes, int point)
@@ -269,20 +289,17 @@ static void visit_block(const cell_visit *v, int first, const double *functions,
     const int nodes = factor->node_count, width = factor->width, dimensions = factor->rule.dimensions;
     const int lines = v->rules->line_count, rest = factor->rule.count - first;
     const double *in = v->lattices[0];
-    double slopes[AXES][AXES][BLOCK] = {{{0}}}, values[BLOCK] = {0}, measures[BLOCK];
+    double slopes[AXES][AXES][BLOCK], values[1][BLOCK], measures[BLOCK];
     for (int axis = 0; axis < dimensions; axis++)
-        for (int x = 0; x < 3; x++)
-            add_products(functions + (1 + axis) * nodes * width, nodes, width, in + x * nodes, slopes[axis][x]);
-    add_products(functions, nodes, width, in + 3 * nodes, values);
+        multiply_three(functions + (1 + axis) * nodes * width, nodes, width, in, slopes[axis]);
+    multiply_one(functions, nodes, width, in + 3 * nodes, values);
     /* the slopes along the last line are the first ones that were added to the components */
     for (int line = 0; line < lines; line++)
-        for (int x = 0; x < 3; x++)
-            add_products(functions, nodes, width, in + (SIZE + 3 * line + x) * nodes,
-                         slopes[dimensions + lines - 1 - line][x]);
+        multiply_three(functions, nodes, width, in + (SIZE + 3 * line) * nodes, slopes[dimensions + lines - 1 - line]);
     const int count = rest < width ? rest : width;
     for (int i = 0; i < count; i++)
         measures[i] = weight * factor->rule.weights[first + i] * find_measure(slopes, dimensions + lines, i);
-    v->visit(v->of, count, measures, values);
+    v->visit(v->of, count, measures, values[0]);
 }
 
 static void visit_first(const cell_visit *v, double weight)
