@@ -263,6 +263,30 @@ static void cells_between_lobatto_points_are_exact(void **state)
     }
 }
 
+/* Bent tets of order 7 are the last ones whose rule is exact. Six of them fill the cube. */
+static void bent_tets_of_order_7_are_exact(void **state)
+{
+    (void)state;
+    enum { ORDER = 7, NODES = 120 };
+    static const signed char cells[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7},
+                                            {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
+    static double places[6 * NODES][3];
+    const session_nodes nodes = session_complete_nodes(GRID_TET, ORDER);
+    int count = 0;
+    for (int cell = 0; cell < 6; cell++)
+        for (int k = 0; k <= ORDER; k++)
+            for (int j = 0; j <= ORDER - k; j++)
+                for (int i = 0; i <= ORDER - k - j; i++, count++) {
+                    const int weights[4] = {ORDER - i - j - k, i, j, k};
+                    for (int a = 0; a < 3; a++) {
+                        places[count][a] = -1;
+                        for (int c = 0; c < 4; c++)
+                            places[count][a] += 2. / ORDER * weights[c] * (cells[cell][c] >> a & 1);
+                    }
+                }
+    check_kind("tet 7", &nodes, INSITU_ORDER_LEXICOGRAPHIC, false, places[0], 6);
+}
+
 /* Straight tets of any order are exact: those of order 12 have more functions than are stored. Equispaced nodes of
  * order 12 multiply the rounding errors of their values by some 100. */
 static void high_orders_have_their_volumes(void **state)
@@ -299,6 +323,7 @@ int main(void)
         cmocka_unit_test(rules_are_exact_for_their_degree),
         cmocka_unit_test(cells_have_the_integrals_of_their_polynomials),
         cmocka_unit_test(cells_between_lobatto_points_are_exact),
+        cmocka_unit_test(bent_tets_of_order_7_are_exact),
         cmocka_unit_test(high_orders_have_their_volumes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
