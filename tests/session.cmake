@@ -128,6 +128,10 @@ add_executable(test_order_interpolation test_order_interpolation.c test_mesh_ord
 target_link_libraries(test_order_interpolation PRIVATE insitu_quick_flags insitu_internal PkgConfig::CMOCKA)
 add_test(NAME order_interpolation COMMAND test_order_interpolation)
 set_tests_properties(order_interpolation PROPERTIES TIMEOUT 60)
+add_executable(test_order_integrals test_order_integrals.c test_mesh_order.c)
+target_link_libraries(test_order_integrals PRIVATE insitu_quick_flags insitu_internal PkgConfig::CMOCKA)
+add_test(NAME order_integrals COMMAND test_order_integrals)
+set_tests_properties(order_integrals PROPERTIES TIMEOUT 60)
 add_executable(test_order_bound test_order_bound.c test_mesh_order.c)
 target_link_libraries(test_order_bound PRIVATE insitu_quick_flags insitu_internal PkgConfig::CMOCKA)
 insitu_add_split_test(order_bound $<TARGET_FILE:test_order_bound>)
@@ -136,6 +140,10 @@ foreach(name order order_cells order_normals order_faults order_finer order_erro
   target_sources(test_session_${name} PRIVATE test_mesh_order.c)
   insitu_add_mpi_test(session_${name} test_session_${name} 2 WHOLE 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()
+insitu_session_program(test_session_order_statistics)
+target_sources(test_session_order_statistics PRIVATE test_mesh_order.c)
+insitu_add_mpi_test(session_order_statistics test_session_order_statistics 2 WHOLE 1 3 5 TIMEOUT 120
+  ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
 insitu_session_program(test_session_order_partition)
 target_sources(test_session_order_partition PRIVATE test_mesh_order.c)

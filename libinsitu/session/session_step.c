@@ -67,8 +67,7 @@ static void reload_scene(insitu_session *s, session_changes *changes)
     const scene *now = &s->scene_file.scene;
     const bool are_same_pieces = now->finer_pieces == old.finer_pieces && now->finer_memory == old.finer_memory &&
                                  now->is_surface_error_given == old.is_surface_error_given;
-    /* statistics need all cells to be refined (views/session_error_requests.c) */
-    if (are_same_pieces && now->statistics_count == old.statistics_count) return;
+    if (are_same_pieces) return;
     session_end_finer(&s->meshes);
     s->meshes.are_cells_changed = s->meshes.are_names_changed = true;
     changes->are_cells_changed = changes->are_names_changed = true;
@@ -168,14 +167,6 @@ static insitu_status transform_meshes(insitu_session *s, bool *are_cells_changed
     return status;
 }
 
-/* Returns whether some mesh has cells of higher order on any rank. */
-static bool has_higher_order(const session_catalogue *catalogue)
-{
-    bool is_any = false;
-    for (int m = 0; m < catalogue->mesh_count; m++) is_any = is_any || catalogue->meshes[m].has_higher_order;
-    return is_any;
-}
-
 /* Reads cells of higher order as finer ones, unless the scene says otherwise. Which cells are refined follows from the
  * images that are due, and so does the number of pieces by surface_error. *are_cells_changed is set if cells are split
  * otherwise on any rank. Collective. */
@@ -185,7 +176,7 @@ static insitu_status refine_cells(insitu_session *s, const session_moment *momen
     const scene *scene = &s->scene_file.scene;
     const session_pieces_basis basis = {scene, moment, &s->catalogue, &s->team, &s->meshes};
     bool are_changed = false;
-    if (scene->finer_pieces == 1 || !has_higher_order(&s->catalogue)) return INSITU_OK;
+    if (scene->finer_pieces == 1 || !session_catalogue_has_higher_order(&s->catalogue)) return INSITU_OK;
     if (!*are_cells_changed && session_count_due(scene, moment) == 0) return INSITU_OK;
     session_finer_choice *choices = base_calloc((size_t)s->catalogue.mesh_count + 1, sizeof *choices);
     if (!choices) session_fail_for_memory(error, s->catalogue.mesh_count * (int64_t)sizeof *choices, "finer pieces");

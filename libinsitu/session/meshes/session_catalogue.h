@@ -145,6 +145,14 @@ insitu_status session_update_homes(session_catalogue *catalogue, const session_m
  * session_update_homes() then finds out which meshes have changed. Local. */
 void session_forget_homes(session_catalogue *catalogue);
 
+/* Returns whether some mesh has cells of higher order on any rank. */
+static inline bool session_catalogue_has_higher_order(const session_catalogue *catalogue)
+{
+    bool is_any = false;
+    for (int m = 0; m < catalogue->mesh_count; m++) is_any = is_any || catalogue->meshes[m].has_higher_order;
+    return is_any;
+}
+
 /* Returns the name of the mesh group over which values on this mesh are averaged: the group of the mesh alone if it has
  * vertex ids, and otherwise mesh_group_name, the name stored in the layer's field. */
 static inline uint64_t session_mesh_group_name(const session_catalogue_mesh *mesh, uint64_t mesh_group_name)

@@ -101,16 +101,20 @@ static void find_positions(const session_nodes *of, insitu_vertex_order order, s
     }
 }
 
+bool session_make_completion(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
+{
+    *out = (session_interpolation){.of = *of, .complete = session_complete_nodes(of->type, of->order)};
+    out->positions = base_alloc((size_t)out->complete.count * sizeof *out->positions);
+    if (out->positions) find_positions(of, order, out);
+    return out->positions;
+}
+
 bool session_make_interpolation(const session_nodes *of, insitu_vertex_order order, int parts, bool is_lobatto,
                                 session_interpolation *out)
 {
-    *out = (session_interpolation){.of = *of,
-                                   .complete = session_complete_nodes(of->type, of->order),
-                                   .fine = session_complete_nodes(of->type, parts * of->order)};
-    out->positions = base_alloc((size_t)out->complete.count * sizeof *out->positions);
-    if (!out->positions || !make_weights(of, parts, is_lobatto, out)) return false;
-    find_positions(of, order, out);
-    return true;
+    if (!session_make_completion(of, order, out)) return false;
+    out->fine = session_complete_nodes(of->type, parts * of->order);
+    return make_weights(of, parts, is_lobatto, out);
 }
 
 void session_drop_interpolation(session_interpolation *interpolation)

@@ -26,6 +26,9 @@ bool session_make_interpolation(const session_nodes *of, insitu_vertex_order ord
                                 session_interpolation *out);
 void session_drop_interpolation(session_interpolation *interpolation);
 
+/* Finds only what session_complete_tuples() needs; there are no fine nodes and no weights. */
+bool session_make_completion(const session_nodes *of, insitu_vertex_order order, session_interpolation *out);
+
 /* Puts tuples at the cell's nodes, in the order of its row, into the order of `complete`, and adds those at nodes that
  * a serendipity cell lacks. */
 void session_complete_tuples(const session_interpolation *of, int components, const double *tuples, double *out);

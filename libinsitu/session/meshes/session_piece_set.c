@@ -74,7 +74,8 @@ static insitu_status fail_for_memory(const session_mesh *mesh, base_error *error
 
 /* ---- pieces at nodes --------------------------------------------------------------------------------------------- */
 
-/* Finds a piece at each of the cell's own nodes. is_own: buffer of one flag per node of the finer lattice. */
+/* Finds a piece at each of the cell's own nodes, whatever their order in the row. is_own: buffer of one flag per node
+ * of the finer lattice. */
 static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own, uint64_t *out)
 {
     const session_nodes *fine = &kind->nodes.fine;
@@ -84,7 +85,7 @@ static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own
         for (int j = 0; j <= p; j++)
             for (int i = 0; i <= p; i++)
                 if (session_is_node(&kind->nodes.of, i, j, k) &&
-                    session_node_index(&kind->nodes.of, INSITU_ORDER_LEXICOGRAPHIC, i, j, k) < kind->nodes.of.count)
+                    session_node_index(&kind->nodes.of, INSITU_ORDER_VTK, i, j, k) < kind->nodes.of.count)
                     is_own[session_node_index(fine, INSITU_ORDER_LEXICOGRAPHIC, parts * i, parts * j, parts * k)] =
                         true;
     for (int i = 0; i < kind->pieces.piece_size; i++) {

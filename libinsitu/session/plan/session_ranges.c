@@ -6,15 +6,19 @@
  *
  * Each cell with a volume has the weight 1. If all cells are shells, their weights are their areas. Weights are
  * integers, so that their sums are the same in any order: an area is a fraction of the largest one, times 2^28 and
- * rounded, so that 2^35 cells can be added and the error of each cell is at most 2^-29 of the largest one. */
+ * rounded, so that 2^35 cells can be added and the error of each cell is at most 2^-29 of the largest one.
+ *
+ * A cell of higher order counts once, by the values at its own nodes, whatever the pieces into which it is divided. */
 #include "session_ranges.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "mmbvh_fetch.h"
+#include "memory.h"
 #include "session_agree.h"
 #include "session_distances.h"
+#include "session_order_values.h"
 #include "session_region.h"
 #include "session_scalars.h"
 #include "session_volume.h"
@@ -96,7 +100,9 @@ typedef struct digit_count {
     bool is_positive;       /* set if only positive values count */
     bool is_of_shells;      /* set if only shells count; otherwise only cells with a volume do */
     double largest_area;    /* area of the largest shell that counts */
-    bool is_kept;           /* set if the stored values are read instead of cells */
+    /* for each mesh, the values of the caller's cells if some are of higher order; NULL for others */
+    session_cell_value **order_values;
+    bool is_kept; /* set if the stored values are read instead of cells */
     kept_values kept;
 } digit_count;
 
@@ -125,35 +131,67 @@ static bool count_value(const digit_count *of, const weighted_value *value, int6
     return is_counted;
 }
 
+/* The caller's cells of one mesh, with the values of a scalar. */
+typedef struct counted_cells {
+    int64_t count;
+    const grid *g;
+    grid_field field;
+    const session_cell_value *values; /* if some cells are of higher order; otherwise NULL */
+} counted_cells;
+
+/* Returns false if the mesh does not have the scalar. */
+static bool find_cells(const session_meshes *meshes, int index, const scene_field *field, const digit_count *of,
+                       counted_cells *out)
+{
+    const session_mesh *mesh = meshes->items[index];
+    const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
+    if (!scalar) return false;
+    *out = (counted_cells){session_whole_count(mesh), &mesh->cells, session_scalar_field(mesh, scalar),
+                           of->order_values[index]};
+    return true;
+}
+
+static bool is_shell(const counted_cells *cells, int64_t cell)
+{
+    return cells->values ? cells->values[cell].is_shell : grid_is_shell(cells->g, cell);
+}
+
+static double find_area(const counted_cells *cells, int64_t cell)
+{
+    return cells->values ? cells->values[cell].volume : session_shell_area(cells->g, cell);
+}
+
 /* Computes the mean of a cell's minimum and maximum. Returns false if the cell is not seen or its values do not
  * count. */
-static bool find_middle(const digit_count *of, const grid *g, const grid_field *field, int64_t cell, double *middle)
+static bool find_middle(const digit_count *of, const counted_cells *cells, int64_t cell, double *middle)
 {
-    if (!grid_is_seen(g, cell)) return false;
-    const fetch_range range = fetch_any_cell_range(g, field, cell);
+    if (cells->values) {
+        const session_cell_value *value = &cells->values[cell];
+        *middle = 0.5 * value->minimum + 0.5 * value->maximum;
+        return value->is_counted && (!of->is_positive || *middle > 0);
+    }
+    if (!grid_is_seen(cells->g, cell)) return false;
+    const fetch_range range = fetch_any_cell_range(cells->g, &cells->field, cell);
     *middle = 0.5 * range.low + 0.5 * range.high;
     return range.is_finite && (!of->is_positive || *middle > 0);
 }
 
-static int64_t find_weight(const digit_count *of, const grid *g, int64_t cell)
+static int64_t find_weight(const digit_count *of, const counted_cells *cells, int64_t cell)
 {
     if (!of->is_of_shells) return 1;
-    return of->largest_area > 0 ? llrint(session_shell_area(g, cell) / of->largest_area * 0x1p28) : 0;
+    return of->largest_area > 0 ? llrint(find_area(cells, cell) / of->largest_area * 0x1p28) : 0;
 }
 
-static void count_cells(const session_mesh *mesh, const session_scalar *scalar, int threads, digit_count *of,
-                        int64_t counts[2 * DIGITS])
+static void count_cells(const counted_cells *cells, int threads, digit_count *of, int64_t counts[2 * DIGITS])
 {
-    const grid *g = &mesh->cells;
-    const grid_field field = session_scalar_field(mesh, scalar);
-#pragma omp parallel num_threads(session_region_threads(threads, g->cell_count))
+#pragma omp parallel num_threads(session_region_threads(threads, cells->count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(+ : counts[:2 * DIGITS]) nowait
-        for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        for (int64_t cell = 0; cell < cells->count; cell++) {
             double middle;
-            if (grid_is_shell(g, cell) != of->is_of_shells || !find_middle(of, g, &field, cell, &middle)) continue;
-            const weighted_value value = {order_from_value(middle), find_weight(of, g, cell)};
+            if (is_shell(cells, cell) != of->is_of_shells || !find_middle(of, cells, cell, &middle)) continue;
+            const weighted_value value = {order_from_value(middle), find_weight(of, cells, cell)};
             if (count_value(of, &value, counts) && of->pass >= FIRST_KEPT) keep_value(&value, &of->kept);
         }
         region_leave();
@@ -167,9 +205,8 @@ static void count_own_digits(const session_meshes *meshes, const session_team *t
     if (of->is_kept) return;
     of->kept.count = 0;
     for (int i = 0; i < meshes->count; i++) {
-        const session_mesh *mesh = meshes->items[i];
-        const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
-        if (scalar) count_cells(mesh, scalar, team->threads, of, counts);
+        counted_cells cells;
+        if (find_cells(meshes, i, field, of, &cells)) count_cells(&cells, team->threads, of, counts);
     }
     of->is_kept = of->pass >= FIRST_KEPT && of->kept.count <= MOST_KEPT;
 }
@@ -185,23 +222,20 @@ static insitu_status count_digits(const session_meshes *meshes, const session_te
 
 /* Entries of the reduction by minimum that determines which cells count. SOLID: -1 if a cell with a volume counts,
  * otherwise 0. AREA: the negated area of the largest shell; it is not computed any more after a cell with a volume has
- * been found. */
-enum { SOLID, AREA, KINDS };
+ * been found. LACKING: -1 if memory ran out on a rank, otherwise 0. */
+enum { SOLID, AREA, LACKING, KINDS };
 
-static void find_own_kind(const session_mesh *mesh, const session_scalar *scalar, int threads, const digit_count *of,
-                          double least[KINDS])
+static void find_own_kind(const counted_cells *cells, int threads, const digit_count *of, double least[KINDS])
 {
-    const grid *g = &mesh->cells;
-    const grid_field field = session_scalar_field(mesh, scalar);
-#pragma omp parallel num_threads(session_region_threads(threads, g->cell_count))
+#pragma omp parallel num_threads(session_region_threads(threads, cells->count))
     {
         region_enter();
 #pragma omp for schedule(static) reduction(min : least[:KINDS]) nowait
-        for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        for (int64_t cell = 0; cell < cells->count; cell++) {
             double middle;
-            if (least[SOLID] < 0 || !find_middle(of, g, &field, cell, &middle)) continue;
-            if (grid_is_shell(g, cell))
-                least[AREA] = fmin(least[AREA], -session_shell_area(g, cell));
+            if (least[SOLID] < 0 || !find_middle(of, cells, cell, &middle)) continue;
+            if (is_shell(cells, cell))
+                least[AREA] = fmin(least[AREA], -find_area(cells, cell));
             else
                 least[SOLID] = -1;
         }
@@ -209,21 +243,48 @@ static void find_own_kind(const session_mesh *mesh, const session_scalar *scalar
     }
 }
 
+/* Computes the values of the caller's cells of meshes with cells of higher order. The nodes of quads are taken as
+ * equispaced, since areas hardly depend on it. Returns false if memory runs out. */
+static bool find_order_values(const session_meshes *meshes, int threads, const scene_field *field, digit_count *of,
+                              base_error *error)
+{
+    of->order_values = base_calloc((size_t)meshes->count + 1, sizeof(session_cell_value *));
+    if (!of->order_values) session_fail_for_memory(error, meshes->count, "percentiles");
+    for (int i = 0; i < meshes->count && !error->status; i++) {
+        const session_mesh *mesh = meshes->items[i];
+        const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
+        if (!scalar || !mesh->topology.is_split) continue;
+        const bool is_own = !scalar->is_recentred && !session_is_distance(scalar);
+        const session_order_field own = {.mesh = mesh,
+                                         .values = session_scalar_field(mesh, scalar),
+                                         .given = is_own ? session_find_given_nodes(mesh, scalar->field) : -1,
+                                         .threads = threads};
+        session_find_order_values(&own, &of->order_values[i], error);
+    }
+    return !error->status;
+}
+
+static void free_order_values(const session_meshes *meshes, digit_count *of)
+{
+    for (int i = 0; i < meshes->count && of->order_values; i++) base_free(of->order_values[i]);
+    base_free(of->order_values);
+}
+
 /* Determines whether cells with a volume count, or only shells. */
 static insitu_status find_kind(const session_meshes *meshes, const session_team *team, const scene_field *field,
                                digit_count *of, base_error *error)
 {
-    double least[KINDS] = {0, 0};
-    for (int i = 0; i < meshes->count; i++) {
-        const session_mesh *mesh = meshes->items[i];
-        const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
-        if (scalar) find_own_kind(mesh, scalar, team->threads, of, least);
+    double least[KINDS] = {0};
+    if (!find_order_values(meshes, team->threads, field, of, error)) least[LACKING] = -1;
+    for (int i = 0; i < meshes->count && least[LACKING] == 0; i++) {
+        counted_cells cells;
+        if (find_cells(meshes, i, field, of, &cells)) find_own_kind(&cells, team->threads, of, least);
     }
     const insitu_status status = session_check_mpi(
         error, MPI_Allreduce(MPI_IN_PLACE, least, KINDS, MPI_DOUBLE, MPI_MIN, team->comm), "MPI_Allreduce");
     of->is_of_shells = least[SOLID] == 0;
     of->largest_area = -least[AREA];
-    return status;
+    return status || least[LACKING] == 0 ? status : session_agree(team->comm, error);
 }
 
 /* Returns the digit of the value with the given rank (a sum of weights, counted from 0). *rank becomes its rank among
@@ -259,6 +320,7 @@ static insitu_status find_percentiles(const session_meshes *meshes, const sessio
             of.known_bits[end] |= (uint64_t)digit << pass_shift(of.pass);
         }
     }
+    free_order_values(meshes, &of);
     *low = total ? value_from_order(of.known_bits[0]) : INFINITY;
     *high = total ? value_from_order(of.known_bits[1]) : -INFINITY;
     return status;

@@ -204,6 +204,16 @@ static insitu_status update_copy(session_mesh *mesh, int index, int threads, bas
     return status;
 }
 
+/* Updates the copy of a field that statistics or derived fields need. Statistics of higher order read the caller's
+ * values, so that they need no copy at the nodes of finer lattices. */
+static insitu_status update_requested(session_mesh *mesh, int index, int threads, base_error *error)
+{
+    session_field *field = &mesh->fields[index];
+    if (field->is_source || !session_is_interpolated(mesh, field)) return update_copy(mesh, index, threads, error);
+    const indexed_values v = make_indexed_values(mesh, field);
+    return check_index(mesh, field, &v, error);
+}
+
 insitu_status session_copy_requested(const session_meshes *meshes, int threads, base_error *error)
 {
     insitu_status status = INSITU_OK;
@@ -211,7 +221,7 @@ insitu_status session_copy_requested(const session_meshes *meshes, int threads, 
         session_mesh *mesh = meshes->items[m];
         for (int f = 0; f < mesh->field_count; f++) {
             const bool is_needed = mesh->fields[f].is_in_statistics || mesh->fields[f].is_source;
-            if (is_needed && !status) status = update_copy(mesh, f, threads, error);
+            if (is_needed && !status) status = update_requested(mesh, f, threads, error);
             mesh->fields[f].is_in_statistics = false;
         }
     }

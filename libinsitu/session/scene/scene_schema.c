@@ -286,7 +286,8 @@ DEFINE_MAPPING(histogram, "histogram", HISTOGRAM_KEYS);
     X(CYAML_FIELD_INT_PTR("every", OPTIONAL, scene_file_statistics, every),                                            \
       .help = "Write at the cycles that are multiples of this.", .default_text = "`1`", .low = 1, .high = 1000000000)  \
     X(CYAML_FIELD_MAPPING_PTR("histogram", OPTIONAL, scene_file_statistics, histogram, histogram_fields),              \
-      .help = "The share of the volume that has values in each bin. Each cell counts with its value.",                 \
+      .help = "The share of the volume that has values in each bin. Each cell counts with its value, cells of higher " \
+              "order with those at their quadrature points.",                                                          \
       .default_text = "none", .child = &histogram_mapping)
 DEFINE_MAPPING(statistics, "statistics", STATISTICS_KEYS);
 
@@ -514,13 +515,15 @@ static const scene_form parameter_form = {{CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT,
               "while the step is drawn.",                                                                              \
       .child = &image_mapping)                                                                                         \
     X(CYAML_FIELD_SEQUENCE("statistics", POINTER, scene_file, statistics, &statistics, 0, 64),                         \
-      .help = "Statistics of fields. Each entry writes one file with one line per step. A line has the cycle, the "    \
-              "time, the number of cells, their volume, the least and the greatest value, the mean and the standard "  \
-              "deviation, and then the histogram. Mean and standard deviation are those of the cells' values (their "  \
-              "own, or the mean of their vertices' values), weighted by volume. Ghost cells, cells without volume "    \
-              "and cells with values that are not finite do not count. If the field is only on triangles, quads and "  \
-              "polygons, their area is used instead of the volume. If it is also on cells with a volume, only those "  \
-              "cells count. The numbers are the same on any partition. No line is written if there are no cells.",     \
+      .help =                                                                                                          \
+          "Statistics of fields. Each entry writes one file with one line per step. A line has the cycle, the "        \
+          "time, the number of cells, their volume, the least and the greatest value, the mean and the standard "      \
+          "deviation, and then the histogram. Mean and standard deviation are those of the cells' values (their "      \
+          "own, or the mean of their vertices' values), weighted by volume. In cells of higher order they are "        \
+          "integrals of polynomials: see [Statistics](high_order.md#statistics). Ghost cells, cells without volume "   \
+          "and cells with values that are not finite do not count. If the field is only on triangles, quads and "      \
+          "polygons, their area is used instead of the volume. If it is also on cells with a volume, only those "      \
+          "cells count. The numbers are the same on any partition. No line is written if there are no cells.",         \
       .default_text = "none", .child = &statistics_mapping)                                                            \
     X(CYAML_FIELD_SEQUENCE("fields", POINTER, scene_file, fields, &derived, 1, SCENE_MAX_DERIVED),                     \
       .help = "Fields that are computed from the simulation's fields, or from each other. This is a mapping from "     \

@@ -103,7 +103,8 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
     if (!status) session_fill_fields(meshes, catalogue, false, error);
     if (!error->status) session_copy_requested(meshes, team->threads, error);
     status = session_agree(team->comm, error);
-    if (!status) status = session_find_statistics(meshes, team, work.requests, work.count, work.results, error);
+    if (!status)
+        status = session_find_statistics(meshes, catalogue, team, work.requests, work.count, work.results, error);
     if (!status) {
         store_conditions(events, scene, &work);
         if (team->rank == 0) write_due_statistics(events, scene, &work, now, error);

@@ -1,7 +1,9 @@
 /* Computes statistics with integer sums, which are the same for any order of summation. A term is the cell's volume as
  * a fraction (0 to 1) of the volume of the largest cell, times 2^52. If there are shells and no cell has a volume,
- * areas are used instead of volumes. A sum consists of two words, the multiples of 2^28 and the remainder, so that the
- * terms of 2^34 cells can be added. The error of a term is at most 2^-53 of the volume of the largest cell. */
+ * areas are used instead of volumes (session_fixed_sums.h). The error of a term is at most 2^-53 of the volume of the
+ * largest cell.
+ *
+ * The values of the caller's cells of higher order are computed once, in the first pass (session_order_values.h). */
 #include "session_statistics.h"
 
 #include <math.h>
@@ -10,52 +12,16 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_cell_value.h"
+#include "session_finer.h"
+#include "session_fixed_sums.h"
+#include "session_order_values.h"
 #include "session_region.h"
 #include "session_scalars.h"
-#include "session_volume.h"
-
-/* ---- one cell ------------------------------------------------------------------------------------------------ */
-
-typedef struct cell_value {
-    /* is_counted: the cell is drawn and all its values are finite; is_shell: it is a shell */
-    bool is_counted, is_shell;
-    double minimum, maximum, mean; /* of the cell's value, or of the values at its vertices */
-    double volume;                 /* volume, or area of a shell */
-} cell_value;
-
-static cell_value read_cell_value(const grid *g, const grid_field *field, int64_t cell, volume_buffer *buffer)
-{
-    cell_value out = {grid_is_seen(g, cell), grid_is_shell(g, cell), INFINITY, -INFINITY, 0, 0};
-    if (!out.is_counted) return out;
-    out.volume = session_cell_volume(g, cell, buffer);
-    const int count = field->is_cell_centred ? 1 : buffer->vertex_count;
-    for (int i = 0; i < count; i++) {
-        const double value = grid_field_value(field, field->is_cell_centred ? cell : buffer->vertices[i]);
-        out.is_counted = out.is_counted && isfinite(value);
-        out.minimum = fmin(out.minimum, value);
-        out.maximum = fmax(out.maximum, value);
-        out.mean += value;
-    }
-    out.mean /= count;
-    out.is_counted = out.is_counted && count > 0 && isfinite(out.mean) && isfinite(out.volume);
-    return out;
-}
 
 /* ---- sums ---------------------------------------------------------------------------------------------------- */
 
-enum { LOW_BITS = 28, VOLUME = 1, MOMENT = 3, BINS = 5, MAX_SUMS = BINS + 2 * SESSION_MAX_BINS };
-
-static void add_fixed_point(int64_t sum[2], double share)
-{
-    const int64_t whole = llrint(share * 0x1p52);
-    sum[0] += whole >> LOW_BITS;
-    sum[1] += whole & ((1 << LOW_BITS) - 1);
-}
-
-static double sum_from_fixed_point(const int64_t sum[2])
-{
-    return ((double)sum[0] * (1 << LOW_BITS) + (double)sum[1]) * 0x1p-52;
-}
+enum { VOLUME = 1, MOMENT = 3, BINS = 5, MAX_SUMS = BINS + 2 * SESSION_MAX_BINS };
 
 /* Results of earlier passes over the cells, which a pass uses. */
 typedef struct sum_basis {
@@ -66,31 +32,36 @@ typedef struct sum_basis {
     bool is_of_shells; /* set if only shells are counted; otherwise only cells with a volume are */
 } sum_basis;
 
-/* Returns a value's position in the range as a fraction, 0 at low and 1 at high. It does not overflow. */
-static double share_of_range(double value, double low, double high)
+/* Returns the position of a cell's mean in the range of the values. The mean of a polynomial may be outside, but not by
+ * so much that sums would overflow. */
+static double position_of_mean(const session_statistics *s, const session_cell_value *cell)
 {
-    const double share = high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0;
-    return fmin(fmax(share, 0), 1);
+    static const double most = 1024;
+    if (!cell->is_integral) return share_of_range(cell->mean, s->minimum, s->maximum);
+    return fmin(fmax(position_in_range(cell->mean, s->minimum, s->maximum), -most), most);
 }
 
-static int find_bin(const session_statistics *s, double value)
+static session_bins bins_of(const session_statistics *s)
 {
-    if (value < s->low || value > s->high) return -1;
-    return (int)fmin(share_of_range(value, s->low, s->high) * s->bin_count, s->bin_count - 1);
+    return (session_bins){s->bin_count, s->low, s->high};
 }
 
-static void add_cell(const sum_basis *b, const cell_value *cell, int64_t *sums)
+static void add_cell(const sum_basis *b, const session_cell_value *cell, int64_t *sums)
 {
     const session_statistics *s = b->first_pass;
     const double volume = b->largest > 0 ? cell->volume / b->largest : 0;
-    const double place = share_of_range(cell->mean, s->minimum, s->maximum) - b->approximate_mean;
+    const double place = position_of_mean(s, cell) - b->approximate_mean;
     if (b->is_second) {
+        const double half_range = 0.5 * s->maximum - 0.5 * s->minimum;
+        const double deviation = half_range > 0 ? fmin(cell->half_deviation / half_range, 1024) : 0;
         add_fixed_point(sums, volume * place * place);
+        if (cell->is_integral) add_fixed_point(sums, volume * deviation * deviation);
         return;
     }
     add_fixed_point(sums + VOLUME, volume);
     add_fixed_point(sums + MOMENT, volume * place);
-    const int bin = s->bin_count ? find_bin(s, cell->mean) : -1;
+    const session_bins bins = bins_of(s);
+    const int bin = bins.count && !cell->is_integral ? find_bin(&bins, cell->mean) : -1;
     if (bin >= 0) add_fixed_point(sums + BINS + 2 * bin, volume);
 }
 
@@ -99,22 +70,23 @@ typedef struct statistics_pass {
     const session_mesh *mesh;
     const grid *g; /* the mesh's cells */
     grid_field field;
+    const session_cell_value *cells; /* values of the caller's cells, if they are of higher order; otherwise NULL */
     const session_team *team;
     volume_buffer *buffers; /* one per thread, for computing the volumes of cells */
 } statistics_pass;
 
-/* Adds one of the caller's cells, all of whose pieces together count as one cell. */
-static void add_whole_cell(const statistics_pass *p, const sum_basis *b, int64_t cell, int64_t *sums)
+static session_cell_value find_cell_value(const statistics_pass *p, int64_t cell)
 {
-    const int64_t end = session_first_piece(p->mesh, cell + 1);
-    bool is_counted = false;
-    for (int64_t piece = session_first_piece(p->mesh, cell); piece < end; piece++) {
-        const cell_value value = read_cell_value(p->g, &p->field, piece, &p->buffers[omp_get_thread_num()]);
-        if (!value.is_counted || value.is_shell != b->is_of_shells) continue;
-        add_cell(b, &value, sums);
-        is_counted = true;
-    }
-    if (!b->is_second) sums[0] += is_counted;
+    if (p->cells) return p->cells[cell];
+    return session_read_cell_value(p->g, &p->field, cell, &p->buffers[omp_get_thread_num()]);
+}
+
+static void add_counted_cell(const statistics_pass *p, const sum_basis *b, int64_t cell, int64_t *sums)
+{
+    const session_cell_value value = find_cell_value(p, cell);
+    if (!value.is_counted || value.is_shell != b->is_of_shells) return;
+    add_cell(b, &value, sums);
+    if (!b->is_second) sums[0]++;
 }
 
 static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sums, int count)
@@ -124,7 +96,7 @@ static void add_cells(const statistics_pass *p, const sum_basis *b, int64_t *sum
     {
         region_enter();
 #pragma omp for schedule(static) reduction(+ : sums[:count]) nowait
-        for (int64_t cell = 0; cell < cells; cell++) add_whole_cell(p, b, cell, sums);
+        for (int64_t cell = 0; cell < cells; cell++) add_counted_cell(p, b, cell, sums);
         region_leave();
     }
 }
@@ -135,15 +107,12 @@ enum { ENDS = 3, KINDS = 2 };
 
 static void find_cell_extremes(const statistics_pass *p, int64_t cell, double ends[KINDS * ENDS])
 {
-    const int64_t end = session_first_piece(p->mesh, cell + 1);
-    for (int64_t piece = session_first_piece(p->mesh, cell); piece < end; piece++) {
-        const cell_value value = read_cell_value(p->g, &p->field, piece, &p->buffers[omp_get_thread_num()]);
-        if (!value.is_counted) continue;
-        double *of = ends + (value.is_shell ? ENDS : 0);
-        of[0] = fmin(of[0], value.minimum);
-        of[1] = fmin(of[1], -value.maximum);
-        of[2] = fmin(of[2], -value.volume);
-    }
+    const session_cell_value value = find_cell_value(p, cell);
+    if (!value.is_counted) return;
+    double *of = ends + (value.is_shell ? ENDS : 0);
+    of[0] = fmin(of[0], value.minimum);
+    of[1] = fmin(of[1], -value.maximum);
+    of[2] = fmin(of[2], -value.volume);
 }
 
 static void find_extremes(const statistics_pass *p, double ends[KINDS * ENDS])
@@ -165,25 +134,70 @@ typedef struct statistics_work {
     const session_team *team;
     const session_statistics_request *requests;
     int count;
+    bool *are_lobatto; /* for each mesh, whether nodes of its cells of higher order are Gauss-Lobatto points */
+    /* for each request and mesh, the values of the cells of a mesh with cells of higher order; NULL for others */
+    session_cell_value **order_values;
     /* KINDS * ENDS entries per request, then one entry that is -1 if memory ran out on a rank, and otherwise 0 */
     double *extremes;
-    int64_t *sums; /* MAX_SUMS entries per request */
+    int64_t *sums; /* MAX_SUMS entries per request, then the number of ranks on which memory ran out */
     /* one buffer per thread; they are large enough after the first pass, since each thread always processes the same
      * cells */
     volume_buffer *buffers;
 } statistics_work;
+
+static session_cell_value **find_order_values(const statistics_work *w, int request, int mesh)
+{
+    return &w->order_values[request * w->meshes->count + mesh];
+}
 
 /* Sets up a pass over the field of the request on a mesh of this rank. Returns false if the mesh does not have the
  * field. */
 static bool set_up_pass(const statistics_work *w, int request, int mesh, statistics_pass *pass)
 {
     const session_mesh *of = w->meshes->items[mesh];
-    *pass = (statistics_pass){.mesh = of, .g = &of->cells, .team = w->team, .buffers = w->buffers};
+    *pass = (statistics_pass){.mesh = of,
+                              .g = &of->cells,
+                              .cells = *find_order_values(w, request, mesh),
+                              .team = w->team,
+                              .buffers = w->buffers};
     return of->is_given && !of->source && session_find_values(of, w->requests[request].field, &pass->field);
 }
 
-/* Stores an error if a thread's buffer could not be allocated on any rank. */
-static insitu_status check_buffers(const statistics_work *w, base_error *error)
+static session_order_field order_field(const statistics_work *w, int request, int mesh)
+{
+    const session_mesh *of = w->meshes->items[mesh];
+    const scene_field *field = w->requests[request].field;
+    session_order_field out = {.mesh = of, .is_lobatto = w->are_lobatto[mesh], .threads = w->team->threads};
+    session_find_values(of, field, &out.values);
+    out.given = session_find_given_nodes(of, session_find_field(of, field->name));
+    return out;
+}
+
+/* Computes the values of the caller's cells if the mesh has cells of higher order. */
+static void make_order_values(const statistics_work *w, int request, int mesh, statistics_pass *pass, base_error *error)
+{
+    session_cell_value **values = find_order_values(w, request, mesh);
+    const session_order_field of = order_field(w, request, mesh);
+    if (of.mesh->topology.is_split && !error->status) session_find_order_values(&of, values, error);
+    pass->cells = *values;
+}
+
+/* Adds the volumes of cells of higher order to the bins of the histogram. */
+static void add_order_bins(const statistics_work *w, int request, int mesh, const sum_basis *basis, base_error *error)
+{
+    const session_statistics_request *of = &w->requests[request];
+    const session_order_field field = order_field(w, request, mesh);
+    const session_binned_volumes binned = {.bins = bins_of(basis->first_pass),
+                                           .is_whole = of->low > of->high,
+                                           .is_of_shells = basis->is_of_shells,
+                                           .largest = basis->largest,
+                                           .sums = w->sums + (ptrdiff_t)MAX_SUMS * request + BINS};
+    const session_cell_value *values = *find_order_values(w, request, mesh);
+    if (values && binned.bins.count && !error->status) session_bin_order_values(&field, values, &binned, error);
+}
+
+/* Stores an error if memory ran out on any rank. */
+static insitu_status check_memory(const statistics_work *w, base_error *error)
 {
     if (w->extremes[KINDS * ENDS * w->count] == 0) return INSITU_OK;
     for (int thread = 0; thread < w->team->threads; thread++)
@@ -212,35 +226,40 @@ static insitu_status reduce_ends(const statistics_work *w, base_error *error)
         for (int k = 0; k < KINDS * ENDS; k++) ends[k] = k % ENDS == 2 ? 0 : INFINITY;
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
-            if (set_up_pass(w, i, m, &pass)) find_extremes(&pass, ends);
+            if (!set_up_pass(w, i, m, &pass)) continue;
+            make_order_values(w, i, m, &pass, error);
+            if (!error->status) find_extremes(&pass, ends);
         }
     }
-    w->extremes[size] = 0;
+    w->extremes[size] = error->status ? -1 : 0;
     for (int thread = 0; thread < w->team->threads; thread++)
         if (w->buffers[thread].is_out_of_memory) w->extremes[size] = -1;
     const insitu_status status = session_check_mpi(
         error, MPI_Allreduce(MPI_IN_PLACE, w->extremes, size + 1, MPI_DOUBLE, MPI_MIN, w->team->comm), "MPI_Allreduce");
-    return status ? status : check_buffers(w, error);
+    return status ? status : check_memory(w, error);
 }
 
 static insitu_status reduce_sums(const statistics_work *w, const session_statistics *known, bool is_second,
                                  base_error *error)
 {
-    const int size = is_second ? 2 : MAX_SUMS;
-    memset(w->sums, 0, (size_t)(size * w->count) * sizeof *w->sums);
+    const int size = is_second ? 2 : MAX_SUMS, all = size * w->count;
+    memset(w->sums, 0, ((size_t)all + 1) * sizeof *w->sums);
     for (int i = 0; i < w->count; i++) {
         const double range = known[i].maximum - known[i].minimum;
         const double about =
-            is_second && range > 0 ? share_of_range(known[i].mean, known[i].minimum, known[i].maximum) : 0;
+            is_second && range > 0 ? position_in_range(known[i].mean, known[i].minimum, known[i].maximum) : 0;
         const sum_basis basis = {&known[i], -find_request_extremes(w, i)[2], about, is_second, known[i].is_of_shells};
         for (int m = 0; m < w->meshes->count; m++) {
             statistics_pass pass;
-            if (set_up_pass(w, i, m, &pass)) add_cells(&pass, &basis, w->sums + size * i, size);
+            if (!set_up_pass(w, i, m, &pass)) continue;
+            add_cells(&pass, &basis, w->sums + size * i, size);
+            if (!is_second) add_order_bins(w, i, m, &basis, error);
         }
     }
-    return session_check_mpi(error,
-                             MPI_Allreduce(MPI_IN_PLACE, w->sums, size * w->count, MPI_INT64_T, MPI_SUM, w->team->comm),
-                             "MPI_Allreduce");
+    w->sums[all] = error->status != INSITU_OK;
+    const insitu_status status = session_check_mpi(
+        error, MPI_Allreduce(MPI_IN_PLACE, w->sums, all + 1, MPI_INT64_T, MPI_SUM, w->team->comm), "MPI_Allreduce");
+    return status || !w->sums[all] ? status : session_agree(w->team->comm, error);
 }
 
 static void begin_statistics(const statistics_work *w, int request, session_statistics *out)
@@ -280,22 +299,50 @@ static insitu_status find_all_statistics(const statistics_work *w, session_stati
     return status;
 }
 
-insitu_status session_find_statistics(const session_meshes *meshes, const session_team *team,
-                                      const session_statistics_request *requests, int count, session_statistics *out,
-                                      base_error *error)
+/* Finds which nodes of cells of higher order are Gauss-Lobatto points, as for finer pieces. Collective. */
+static insitu_status find_spacings(session_meshes *meshes, const session_catalogue *catalogue, MPI_Comm comm,
+                                   bool *are_lobatto, base_error *error)
+{
+    if (!session_catalogue_has_higher_order(catalogue)) return INSITU_OK;
+    session_finer_choice *choices = base_calloc((size_t)catalogue->mesh_count, sizeof *choices);
+    if (!choices) session_fail_for_memory(error, catalogue->mesh_count * (int64_t)sizeof *choices, "statistics");
+    insitu_status status = session_agree(comm, error);
+    if (!status) status = session_count_finer(meshes, catalogue, comm, choices, error);
+    for (int m = 0; m < catalogue->mesh_count && !status; m++)
+        for (int i = 0; i < meshes->count; i++)
+            if (strcmp(meshes->items[i]->name, catalogue->meshes[m].name) == 0) are_lobatto[i] = choices[m].is_lobatto;
+    base_free(choices);
+    return status;
+}
+
+static void free_work(statistics_work *w)
+{
+    for (int thread = 0; w->buffers && thread < w->team->threads; thread++) session_volume_free(&w->buffers[thread]);
+    for (int i = 0; w->order_values && i < w->count * w->meshes->count; i++) base_free(w->order_values[i]);
+    base_free(w->extremes);
+    base_free(w->sums);
+    base_free(w->buffers);
+    base_free(w->are_lobatto);
+    base_free(w->order_values);
+}
+
+insitu_status session_find_statistics(session_meshes *meshes, const session_catalogue *catalogue,
+                                      const session_team *team, const session_statistics_request *requests, int count,
+                                      session_statistics *out, base_error *error)
 {
     statistics_work work = {.meshes = meshes, .team = team, .requests = requests, .count = count};
+    const size_t most = (size_t)count, mesh_count = (size_t)meshes->count;
     if (count == 0) return INSITU_OK;
-    work.extremes = base_alloc(((size_t)count * KINDS * ENDS + 1) * sizeof *work.extremes);
-    work.sums = base_alloc((size_t)count * MAX_SUMS * sizeof *work.sums);
+    work.extremes = base_alloc((most * KINDS * ENDS + 1) * sizeof *work.extremes);
+    work.sums = base_alloc((most * MAX_SUMS + 1) * sizeof *work.sums);
     work.buffers = base_calloc((size_t)team->threads, sizeof *work.buffers);
-    if (!work.extremes || !work.sums || !work.buffers)
+    work.are_lobatto = base_calloc(mesh_count + 1, sizeof *work.are_lobatto);
+    work.order_values = base_calloc(most * mesh_count + 1, sizeof(session_cell_value *));
+    if (!work.extremes || !work.sums || !work.buffers || !work.are_lobatto || !work.order_values)
         session_fail_for_memory(error, count * MAX_SUMS * (int64_t)sizeof *work.sums, "statistics of fields");
     insitu_status status = session_agree(team->comm, error);
+    if (!status) status = find_spacings(meshes, catalogue, team->comm, work.are_lobatto, error);
     if (!status) status = find_all_statistics(&work, out, error);
-    for (int thread = 0; work.buffers && thread < team->threads; thread++) session_volume_free(&work.buffers[thread]);
-    base_free(work.extremes);
-    base_free(work.sums);
-    base_free(work.buffers);
+    free_work(&work);
     return status;
 }

@@ -4,10 +4,9 @@
 #define SESSION_STATISTICS_H
 
 #include "scene.h"
-#include "session_mesh.h"
+#include "session_catalogue.h"
+#include "session_fixed_sums.h"
 #include "session_team.h"
-
-enum { SESSION_MAX_BINS = 256 };
 
 typedef struct session_statistics_request {
     const scene_field *field;
@@ -15,26 +14,27 @@ typedef struct session_statistics_request {
     double low, high; /* range of values that the bins cover; low > high: the range of all values */
 } session_statistics_request;
 
-/* Statistics of a field. The value of a cell is its own, or the mean of the values at its vertices. Cells whose values
- * are not all finite are not counted. If no cell with a volume is counted, shells are counted instead, and their areas
- * replace volumes. */
+/* Statistics of a field. The value of a cell is its own, or the mean of the values at its vertices. In a cell of higher
+ * order, values at nodes are those of its polynomial, which is integrated. Cells whose values are not all finite are
+ * not counted. If no cell with a volume is counted, shells are counted instead, and their areas replace volumes. */
 typedef struct session_statistics {
     int64_t cell_count; /* number of counted cells */
     bool is_of_shells;  /* set if shells are counted, so that areas replace volumes */
     double volume;      /* total volume of the cells */
-    /* range of the values; for a vertex field that of the values at vertices. minimum > maximum: there are no values */
+    /* range of the values; for a vertex field that of the values at vertices, which include all nodes. minimum >
+     * maximum: there are no values */
     double minimum, maximum;
-    double mean, deviation; /* mean and standard deviation of the cells' values, weighted by volume */
+    double mean, deviation; /* mean and standard deviation of the cells' values, or polynomials, weighted by volume */
     int bin_count;
     double low, high; /* lower bound of the first bin and upper bound of the last one */
-    /* fraction of the volume in each bin, by the cells' values */
+    /* fraction of the volume in each bin, by the cells' values, or by the polynomials' values at quadrature points */
     double bin_fractions[SESSION_MAX_BINS];
 } session_statistics;
 
 /* Computes the statistics of fields over those meshes on which each field is shown and that have it, by three
- * reductions. Collective. */
-insitu_status session_find_statistics(const session_meshes *meshes, const session_team *team,
-                                      const session_statistics_request *requests, int count, session_statistics *out,
-                                      base_error *error);
+ * reductions, and one more if there are cells of higher order. Collective. */
+insitu_status session_find_statistics(session_meshes *meshes, const session_catalogue *catalogue,
+                                      const session_team *team, const session_statistics_request *requests, int count,
+                                      session_statistics *out, base_error *error);
 
 #endif

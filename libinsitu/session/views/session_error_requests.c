@@ -4,8 +4,8 @@
  * divided into pieces. So only cells that may be crossed need finer pieces.
  *
  * All cells need them if faces of pieces are drawn or compared with those of neighbours (outer surfaces, contours of
- * shells), if rays pass from cell to cell (volumes), if values at vertices are means or derivatives over neighbours, if
- * pieces are counted (percentiles), or if sums over pieces are written (statistics). */
+ * shells), if rays pass from cell to cell (volumes), or if values at vertices are means or derivatives over neighbours.
+ */
 #include "session_error_requests.h"
 
 #include <math.h>
@@ -177,11 +177,6 @@ static bool is_polynomial(const session_catalogue_mesh *mesh, const session_cata
            session_resolve_component(shown, field->component_count) >= 0;
 }
 
-static bool counts_cells(const scene_colour_map *map)
-{
-    return !map->range.is_fixed && map->range.source == SCENE_RANGE_PERCENTILES;
-}
-
 static void add_isosurface(session_error_requests *requests, const session_due_views *views,
                            const session_catalogue_mesh *mesh, const scene_image *image, int index, int layer,
                            session_report *report)
@@ -197,8 +192,7 @@ static void add_isosurface(session_error_requests *requests, const session_due_v
     for (int i = 0; i < shown->value_count && request->field && image->variant.view == 0; i++)
         add_value(requests, request, shown->values[i]);
     /* central differences also sample neighbours of crossed cells */
-    requests->needs_all = requests->needs_all || !is_bounded || shown->normals == SCENE_DIFFERENCES ||
-                          (shown->has_colour_by && counts_cells(&shown->colour_map));
+    requests->needs_all = requests->needs_all || !is_bounded || shown->normals == SCENE_DIFFERENCES;
     if (!report) return;
     session_warn(report, &(session_warning){WARNING_PIECES, image->name, mesh->name, layer}, !is_bounded,
                  "image \"%s\": surface_error does not hold for the isosurface of \"%s\" on mesh \"%s\": only "
@@ -218,7 +212,6 @@ static void add_slice(session_error_requests *requests, const session_due_views 
         session_find_plane_point(&shown->planes[i], &views->extent, like.plane.point);
         show_request(requests, views, &like, index);
     }
-    requests->needs_all = requests->needs_all || counts_cells(&shown->colour_map);
 }
 
 static void add_volume(session_error_requests *requests, const session_due_views *views,
@@ -260,12 +253,10 @@ void session_list_error_requests(const scene *scene, const session_due_views *vi
 {
     const session_error_request positions = {.field = NULL};
     bool are_any_due = false;
-    *out = (session_error_requests){
-        .is_complete = true, .is_counted = scene->statistics_count > 0, .needs_all = has_shells};
+    *out = (session_error_requests){.is_complete = true, .needs_all = has_shells};
     find_request(out, views, &positions);
     for (int i = 0; i < views->count; i++) {
         const scene_image *image = &scene->images[i];
-        out->is_counted = out->is_counted || image->condition.is_given;
         are_any_due = are_any_due || views->are_due[i];
         if (!views->are_due[i]) continue;
         if (has_whole_layers(mesh, image)) {
@@ -278,5 +269,5 @@ void session_list_error_requests(const scene *scene, const session_due_views *vi
         for (int layer = 0; layer < image->volume_count; layer++) add_volume(out, views, mesh, image, i, layer);
         for (int layer = 0; layer < image->slice_count; layer++) add_slice(out, views, mesh, image, i, layer);
     }
-    out->needs_all = out->needs_all || out->is_counted || !are_any_due;
+    out->needs_all = out->needs_all || !are_any_due;
 }

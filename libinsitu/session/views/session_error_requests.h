@@ -44,7 +44,6 @@ typedef struct session_error_requests {
     int count;
     bool is_complete; /* set as long as memory has not run out */
     bool is_shown;    /* set if some due image shows the mesh */
-    bool is_counted;  /* set if statistics or conditions of images are sums over pieces */
     bool needs_all;   /* set if all cells are refined, not only those that isosurfaces and slices may cross */
     session_error_request items[SESSION_MOST_ERROR_REQUESTS];
 } session_error_requests;

@@ -28,9 +28,9 @@ static const double bytes_per_mib = 1048576;
 
 /* The errors of one mesh, and what follows from them. */
 typedef struct piece_error {
-    bool is_counted, needs_all; /* those of the requests; the same on every rank */
-    bool is_shown; /* set if some due image shows the mesh, or a fixed number is that of all cells; the same on every
-                      rank */
+    bool needs_all; /* that of the requests; the same on every rank */
+    bool is_shown;  /* set if some due image shows the mesh, or a fixed number is that of all cells; the same on every
+                       rank */
     session_deviation all;                           /* counts are those of isosurfaces */
     session_finer_bytes bytes[FINER_MOST_PARTS + 1]; /* that finer lattices take on all ranks */
     double light_error;  /* largest estimate of the error of a pixel in a volume, if cells have one piece */
@@ -141,7 +141,6 @@ static void use_mesh(const session_pieces_basis *basis, const session_due_views 
         w->out = out;
         session_list_error_requests(scene, views, &basis->catalogue->meshes[mesh], choice->shell_count > 0,
                                     &w->requests, scene->is_surface_error_given ? report : NULL);
-        out->is_counted = w->requests.is_counted;
         out->needs_all = w->requests.needs_all;
         out->is_shown = w->requests.is_shown || (w->marks_only && w->requests.needs_all);
         if (w->requests.is_complete) use_parts(w, basis->catalogue->meshes[mesh].name, error);
@@ -269,12 +268,6 @@ static insitu_status list_pieces(const session_pieces_basis *basis, const sessio
 
 /* ---- numbers of pieces ------------------------------------------------------------------------------------------- */
 
-/* Returns whether the number of pieces must not depend on cameras, because statistics would. */
-static bool is_constant(const scene *scene, const piece_error *of)
-{
-    return of->is_counted && !scene->is_surface_error_given;
-}
-
 /* Returns the smallest number of pieces with which the errors of surfaces and of volumes are allowed. In meshes all of
  * whose cells are refined, memory and time grow with its cube, so that more than 2 pieces for the error of surfaces must
  * be asked for. */
@@ -282,7 +275,6 @@ static int find_pieces(const scene *scene, const session_finer_choice *choice, c
 {
     enum { MOST_UNASKED = 2 };
     const bool is_limited = of->needs_all && !scene->is_surface_error_given;
-    if (is_constant(scene, of)) return 1;
     const int supported = session_most_parts(choice), most = is_limited ? MOST_UNASKED : FINER_MOST_PARTS;
     int parts = 1;
     while (parts < FINER_MOST_PARTS && parts < supported && of->light_excess > parts * parts) parts++;
@@ -439,8 +431,7 @@ static void choose_all(const session_pieces_basis *basis, piece_error *errors, p
     limit_memory(scene, catalogue, errors, steps, choices, report);
     for (int m = 0; m < catalogue->mesh_count && !scene->finer_pieces; m++) {
         /* the bound does not hold for serendipity cells without the nodes that they lack */
-        choices[m].is_completed = errors[m].is_shown && choices[m].parts == 1 && choices[m].serendipity_count > 0 &&
-                                  !is_constant(scene, &errors[m]);
+        choices[m].is_completed = errors[m].is_shown && choices[m].parts == 1 && choices[m].serendipity_count > 0;
         if (errors[m].is_shown) report_pieces(catalogue->meshes[m].name, &choices[m], &errors[m], report);
     }
 }

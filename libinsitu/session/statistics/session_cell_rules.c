@@ -1,0 +1,395 @@
+/* Let p be the order of a cell, J the Jacobian of its map, and f its value. The volume is the integral of det J, and
+ * the deviation needs that of f^2 det J. In a straight cell the map is linear in each factor (a line, a triangle or a
+ * tet), otherwise it has the order p. Then f^2 det J is a polynomial of these degrees, for which the rules are exact:
+ *
+ *     factor                  straight   bent
+ *     each line of a hex      2 p + 2    5 p - 1
+ *     triangle of a wedge     2 p + 1    5 p - 2
+ *     line of a wedge         2 p + 2    5 p - 1
+ *     tet                     2 p        5 p - 3, at most 33
+ *
+ * Products of lines are summed factor by factor, so that all of their degrees are affordable: with p = 4 a bent hex has
+ * 1000 points and takes some 50 multiplications for each of them. The functions of a tet are not products. With p = 7,
+ * the last order of which bent tets are exact, there are 4913 points, at each of which 120 nodes are summed. Beyond,
+ * straight tets are still exact. In bent ones the rest is that of an analytic function and a rule of degree 33.
+ *
+ * The area element of a shell is a root, which no rule integrates exactly unless the shell is flat. Flat shells need
+ * the degree 4 p - 1, or 4 p - 2 in a triangle. Rules with 4 p points along each axis have twice that degree, and are
+ * affordable in two dimensions. */
+#include "session_cell_rules.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_derivatives.h"
+#include "session_shape.h"
+
+enum {
+    LANES = 4,                /* points whose sums are computed together */
+    BLOCK = 32,               /* most points of a block */
+    MOST_FUNCTIONS = 1 << 20, /* most numbers of a factor's functions that are stored */
+    MOST_TET_POINTS = 17,     /* most points along an axis of bent tets, unless straight ones need more */
+    SIZE = 4,                 /* number of doubles of a tuple: x, y, z and a value */
+    MOST_SIZE = SIZE + 6,     /* the same with the slopes of positions along two lines */
+    AXES = 3
+};
+
+/* ---- numbers of points ----------------------------------------------------------------------------------------- */
+
+static int points_of_degree(int degree)
+{
+    return degree / 2 + 1;
+}
+
+static int count_first_points(const session_nodes *of, bool is_bent)
+{
+    const int p = of->order;
+    if (grid_is_shell_type(of->type)) return 4 * p;
+    if (of->type == GRID_WEDGE) return points_of_degree(is_bent ? 5 * p - 2 : 2 * p + 1);
+    if (of->type == GRID_HEX) return points_of_degree(is_bent ? 5 * p - 1 : 2 * p + 2);
+    const int straight = points_of_degree(2 * p), bent = points_of_degree(5 * p - 3);
+    const int most = straight > MOST_TET_POINTS ? straight : MOST_TET_POINTS;
+    return !is_bent ? straight : bent < most ? bent : most;
+}
+
+static int count_line_points(const session_nodes *of, bool is_bent)
+{
+    const int p = of->order;
+    return grid_is_shell_type(of->type) ? 4 * p : points_of_degree(is_bent ? 5 * p - 1 : 2 * p + 2);
+}
+
+/* ---- functions of nodes ---------------------------------------------------------------------------------------- */
+
+/* Computes Lagrange's polynomials of the nodes on a line, and their slopes, at a point. */
+static void find_line_functions(const session_rule_factor *factor, const double *nodes, double at, double *out,
+                                int stride, int slopes)
+{
+    const int p = factor->order;
+    for (int n = 0; n <= p; n++) {
+        double value = 1, slope = 0;
+        for (int m = 0; m <= p; m++) {
+            if (m == n) continue;
+            slope = (slope * (at - nodes[m]) + value) / (nodes[n] - nodes[m]);
+            value *= (at - nodes[m]) / (nodes[n] - nodes[m]);
+        }
+        out[n * stride] = value;
+        out[n * stride + slopes] = slope;
+    }
+}
+
+/* Computes Silvester's functions (session_derivatives.c) of the nodes of a triangle or tet at a point, and their slopes
+ * along each axis. */
+static void find_simplex_functions(const session_rule_factor *factor, const double at[3], double *out, int stride,
+                                   int slopes)
+{
+    double values[4][NODES_MOST_ORDER + 1], derivatives[4][NODES_MOST_ORDER + 1];
+    const int p = factor->order, dimensions = factor->rule.dimensions;
+    const double coordinates[4] = {at[0], at[1], at[2], 1 - at[0] - at[1] - at[2]};
+    for (int a = 0; a < 4; a++) {
+        values[a][0] = 1;
+        derivatives[a][0] = 0;
+        for (int n = 1; n <= p; n++) {
+            const double t = (p * coordinates[a] - (n - 1)) / n;
+            values[a][n] = values[a][n - 1] * t;
+            derivatives[a][n] = derivatives[a][n - 1] * t + values[a][n - 1] * p / n;
+        }
+    }
+    for (int k = 0; k <= (dimensions > 2 ? p : 0); k++)
+        for (int j = 0; j <= p - k; j++)
+            for (int i = 0; i <= p - k - j; i++, out += stride) {
+                const int n[4] = {i, j, k, p - i - j - k};
+                double f[4];
+                for (int a = 0; a < 4; a++) f[a] = values[a][n[a]];
+                const double last = f[0] * f[1] * f[2] * derivatives[3][n[3]];
+                out[0] = f[0] * f[1] * f[2] * f[3];
+                out[slopes] = derivatives[0][i] * f[1] * f[2] * f[3] - last;
+                out[2 * slopes] = f[0] * derivatives[1][j] * f[2] * f[3] - last;
+                if (dimensions > 2) out[3 * slopes] = f[0] * f[1] * derivatives[2][k] * f[3] - last;
+            }
+}
+
+/* Returns the number of doubles of the functions at one block of points. */
+static size_t count_block(const session_rule_factor *factor)
+{
+    return (size_t)(1 + factor->rule.dimensions) * (size_t)factor->node_count * (size_t)factor->width;
+}
+
+static void fill_block(const session_rule_factor *factor, int first, double *out)
+{
+    const int slopes = factor->node_count * factor->width;
+    double nodes[NODES_MOST_ORDER + 1];
+    if (factor->rule.dimensions == 1) session_place_nodes(factor->order, factor->is_lobatto, nodes);
+    for (int n = 0; n < factor->width && first + n < factor->rule.count; n++) {
+        const double *at = factor->rule.points[first + n];
+        if (factor->rule.dimensions == 1)
+            find_line_functions(factor, nodes, at[0], out + n, factor->width, slopes);
+        else
+            find_simplex_functions(factor, at, out + n, factor->width, slopes);
+    }
+}
+
+static bool make_factor(int dimensions, int order, bool is_lobatto, int points, session_rule_factor *out)
+{
+    static const int types[] = {GRID_NO_TYPE, GRID_NO_TYPE, GRID_TRIANGLE, GRID_TET};
+    out->order = order;
+    out->node_count = dimensions > 1 ? session_complete_nodes(types[dimensions], order).count : order + 1;
+    out->is_lobatto = is_lobatto;
+    if (!session_make_quadrature(dimensions, points, &out->rule)) return false;
+    const int whole = (out->rule.count + LANES - 1) / LANES * LANES;
+    out->width = whole < BLOCK ? whole : BLOCK;
+    const size_t blocks = (size_t)((out->rule.count - 1) / out->width + 1);
+    if (dimensions > 1 && blocks * count_block(out) > MOST_FUNCTIONS) return true;
+    out->functions = base_calloc(blocks * count_block(out), sizeof *out->functions);
+    for (size_t b = 0; b < blocks && out->functions; b++)
+        fill_block(out, (int)b * out->width, out->functions + b * count_block(out));
+    return out->functions;
+}
+
+/* ---- kinds of cells -------------------------------------------------------------------------------------------- */
+
+static bool is_box(int type)
+{
+    return type == GRID_HEX || type == GRID_QUAD;
+}
+
+static bool make_rule(const session_nodes *of, int line_count, bool is_lobatto, bool is_bent, session_product_rule *out)
+{
+    const int axes = grid_is_shell_type(of->type) ? 2 : AXES;
+    return make_factor(axes - line_count, of->order, is_lobatto, count_first_points(of, is_bent), &out->first) &&
+           (line_count == 0 || make_factor(1, of->order, is_lobatto, count_line_points(of, is_bent), &out->line));
+}
+
+/* Computes the linear functions of the corners at all nodes. */
+static bool weigh_corners(bool is_lobatto, session_cell_rules *out)
+{
+    const session_nodes *of = &out->nodes.complete;
+    const session_shape *shape = session_shape_of(of->type);
+    const int p = of->order, simplex = (grid_is_shell_type(of->type) ? 2 : AXES) - out->line_count;
+    double line[NODES_MOST_ORDER + 1];
+    session_place_nodes(p, is_lobatto, line);
+    out->corner_count = shape->corner_count;
+    double *weights = base_alloc((size_t)(of->count * shape->corner_count) * sizeof *weights);
+    out->corner_weights = weights;
+    if (!weights) return false;
+    for (int n = 0; n < (p + 1) * (p + 1) * (p + 1); n++) {
+        const int at[3] = {n % (p + 1), n / (p + 1) % (p + 1), n / (p + 1) / (p + 1)};
+        if (!session_is_node(of, at[0], at[1], at[2])) continue;
+        const int node = session_node_index(of, INSITU_ORDER_LEXICOGRAPHIC, at[0], at[1], at[2]);
+        for (int c = 0; c < shape->corner_count; c++) {
+            double first = 1, product = 1;
+            for (int a = 0; a < simplex; a++) first -= line[at[a]];
+            for (int a = 0; a < simplex; a++)
+                if (shape->corners[c][a]) first = line[at[a]];
+            for (int a = simplex; a < AXES; a++) product *= shape->corners[c][a] ? line[at[a]] : 1 - line[at[a]];
+            weights[node * shape->corner_count + c] = first * product;
+        }
+    }
+    return true;
+}
+
+bool session_make_cell_rules(const session_nodes *of, insitu_vertex_order order, bool is_lobatto,
+                             session_cell_rules *out)
+{
+    const bool has_spacing = is_lobatto && is_box(of->type);
+    *out = (session_cell_rules){.line_count = of->type == GRID_HEX                              ? 2
+                                              : of->type == GRID_QUAD || of->type == GRID_WEDGE ? 1
+                                                                                                : 0};
+    return session_make_completion(of, order, &out->nodes) && weigh_corners(has_spacing, out) &&
+           make_rule(of, out->line_count, has_spacing, true, &out->bent) &&
+           (grid_is_shell_type(of->type) || make_rule(of, out->line_count, has_spacing, false, &out->straight));
+}
+
+static void drop_factor(session_rule_factor *factor)
+{
+    session_drop_quadrature(&factor->rule);
+    base_free(factor->functions);
+}
+
+void session_drop_cell_rules(session_cell_rules *rules)
+{
+    session_drop_interpolation(&rules->nodes);
+    base_free(rules->corner_weights);
+    drop_factor(&rules->straight.first);
+    drop_factor(&rules->straight.line);
+    drop_factor(&rules->bent.first);
+    drop_factor(&rules->bent.line);
+    *rules = (session_cell_rules){.line_count = 0};
+}
+
+/* ---- one cell -------------------------------------------------------------------------------------------------- */
+
+/* The state of visiting the points of one cell. Lattices have one array of nodes for each component. After a sum over a
+ * line, a component is a value at the line's point, and there are three more: the slopes of the positions. */
+typedef struct cell_visit {
+    const session_cell_rules *rules;
+    const session_product_rule *rule;
+    double *lattices[AXES]; /* at the nodes of the first factor and of so many lines */
+    double *functions;      /* memory for a block of functions that are not stored */
+    session_visit_points *visit;
+    void *of;
+} cell_visit;
+
+static size_t count_lattice(const session_cell_rules *rules, int lines)
+{
+    size_t count = (size_t)rules->bent.first.node_count;
+    for (int n = 0; n < lines; n++) count *= (size_t)rules->nodes.of.order + 1;
+    return count;
+}
+
+size_t session_cell_rules_work_size(const session_cell_rules *rules)
+{
+    const size_t nodes = (size_t)rules->nodes.complete.count;
+    size_t size = SIZE * nodes + (AXES + 1) * (size_t)rules->bent.first.node_count * BLOCK;
+    for (int lines = 0; lines <= rules->line_count; lines++) size += MOST_SIZE * count_lattice(rules, lines);
+    return size;
+}
+
+/* Multiplies a matrix of node_count x width with the values of one component, or of three components that follow each
+ * other, at the nodes. Sums of LANES points stay in registers. */
+static inline __attribute__((always_inline)) void multiply(const double *restrict matrix, int node_count, int width,
+                                                           const double *restrict values, const int components,
+                                                           double (*restrict out)[BLOCK])
+{
+    for (int first = 0; first < width; first += LANES) {
+        double sums[3][LANES] = {{0}};
+        for (int n = 0; n < node_count; n++)
+            for (int c = 0; c < components; c++)
+                for (int i = 0; i < LANES; i++)
+                    sums[c][i] += matrix[n * width + first + i] * values[c * node_count + n];
+        for (int c = 0; c < components; c++) memcpy(out[c] + first, sums[c], sizeof sums[c]);
+    }
+}
+
+static void multiply_one(const double *matrix, int node_count, int width, const double *values, double (*out)[BLOCK])
+{
+    multiply(matrix, node_count, width, values, 1, out);
+}
+
+static void multiply_three(const double *matrix, int node_count, int width, const double *values, double (*out)[BLOCK])
+{
+    multiply(matrix, node_count, width, values, 3, out);
+}
+
+static double find_measure(double (*slopes)[AXES][BLOCK], int axes, int point)
+{
+    double s[AXES][AXES], cross[AXES];
+    for (int axis = 0; axis < axes; axis++)
+        for (int x = 0; x < 3; x++) s[axis][x] = slopes[axis][x][point];
+    for (int x = 0; x < 3; x++)
+        cross[x] = s[0][(x + 1) % 3] * s[1][(x + 2) % 3] - s[0][(x + 2) % 3] * s[1][(x + 1) % 3];
+    return axes < AXES ? sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2])
+                       : cross[0] * s[2][0] + cross[1] * s[2][1] + cross[2] * s[2][2];
+}
+
+/* Visits one block of points of the first factor. weight: product of the weights of the lines' points. */
+static void visit_block(const cell_visit *v, int first, const double *functions, double weight)
+{
+    const session_rule_factor *factor = &v->rule->first;
+    const int nodes = factor->node_count, width = factor->width, dimensions = factor->rule.dimensions;
+    const int lines = v->rules->line_count, rest = factor->rule.count - first;
+    const double *in = v->lattices[0];
+    double slopes[AXES][AXES][BLOCK], values[1][BLOCK], measures[BLOCK];
+    for (int axis = 0; axis < dimensions; axis++)
+        multiply_three(functions + (1 + axis) * nodes * width, nodes, width, in, slopes[axis]);
+    multiply_one(functions, nodes, width, in + 3 * nodes, values);
+    /* the slopes along the last line are the first ones that were added to the components */
+    for (int line = 0; line < lines; line++)
+        multiply_three(functions, nodes, width, in + (SIZE + 3 * line) * nodes, slopes[dimensions + lines - 1 - line]);
+    const int count = rest < width ? rest : width;
+    for (int i = 0; i < count; i++)
+        measures[i] = weight * factor->rule.weights[first + i] * find_measure(slopes, dimensions + lines, i);
+    v->visit(v->of, count, measures, values[0]);
+}
+
+static void visit_first(const cell_visit *v, double weight)
+{
+    const session_rule_factor *factor = &v->rule->first;
+    const double *functions = factor->functions ? factor->functions : v->functions;
+    for (int first = 0; first < factor->rule.count; first += factor->width) {
+        if (!factor->functions) fill_block(factor, first, v->functions);
+        visit_block(v, first, functions, weight);
+        if (factor->functions) functions += count_block(factor);
+    }
+}
+
+/* Sums one component over a line. functions: those of the nodes at one point, `width` numbers apart. */
+static void sum_line(const session_rule_factor *line, const double *functions, size_t size, const double *restrict in,
+                     double *restrict out)
+{
+    memset(out, 0, size * sizeof *out);
+    for (int n = 0; n < line->node_count; n++)
+        for (size_t i = 0; i < size; i++) out[i] += functions[n * line->width] * in[(size_t)n * size + i];
+}
+
+/* Sums over the last of so many lines, at a point of its rule. */
+static void reduce_line(const cell_visit *v, int lines, int point)
+{
+    const session_rule_factor *line = &v->rule->line;
+    const double *values = line->functions + (size_t)(point / line->width) * count_block(line) + point % line->width;
+    const double *slopes = values + line->node_count * line->width;
+    const size_t size = count_lattice(v->rules, lines - 1), stride = size * (size_t)line->node_count;
+    const int components = SIZE + 3 * (v->rules->line_count - lines);
+    for (int c = 0; c < components; c++)
+        sum_line(line, values, size, v->lattices[lines] + (size_t)c * stride,
+                 v->lattices[lines - 1] + (size_t)c * size);
+    for (int c = 0; c < 3; c++)
+        sum_line(line, slopes, size, v->lattices[lines] + (size_t)c * stride,
+                 v->lattices[lines - 1] + (size_t)(components + c) * size);
+}
+
+static void visit_points(const cell_visit *v)
+{
+    const session_quadrature *line = &v->rule->line.rule;
+    const int lines = v->rules->line_count, along = lines > 0 ? line->count : 1, across = lines > 1 ? line->count : 1;
+    for (int k = 0; k < across; k++) {
+        if (lines > 1) reduce_line(v, 2, k);
+        for (int j = 0; j < along; j++) {
+            if (lines > 0) reduce_line(v, 1, j);
+            visit_first(v, (lines > 1 ? line->weights[k] : 1) * (lines > 0 ? line->weights[j] : 1));
+        }
+    }
+}
+
+/* Returns whether the positions are the linear functions of the corners, up to rounding. If they are not, the degree is
+ * higher, so that the tolerance must not be above the error of rounding by much. */
+static bool is_straight(const session_cell_rules *rules, const double *tuples, const double *positions)
+{
+    static const double tolerance = 1e-12;
+    const size_t nodes = (size_t)rules->nodes.complete.count;
+    double size = 0, most = 0;
+    for (size_t n = 0; n < nodes; n++)
+        for (int x = 0; x < 3; x++) {
+            double linear = 0;
+            for (int c = 0; c < rules->corner_count; c++)
+                linear += rules->corner_weights[n * (size_t)rules->corner_count + (size_t)c] *
+                          (tuples[SIZE * rules->nodes.corners[c] + x] - tuples[SIZE * rules->nodes.corners[0] + x]);
+            const double at = positions[(size_t)x * nodes + n];
+            size = fmax(size, fabs(at));
+            most = fmax(most, fabs(at - linear));
+        }
+    return most <= tolerance * size;
+}
+
+void session_visit_cell(const session_cell_rules *rules, const double *tuples, double *work,
+                        session_visit_points *visit, void *of)
+{
+    cell_visit v = {.rules = rules, .visit = visit, .of = of};
+    const size_t nodes = (size_t)rules->nodes.complete.count;
+    double *complete = work;
+    v.functions = work + SIZE * nodes;
+    double *next = v.functions + (AXES + 1) * (size_t)rules->bent.first.node_count * BLOCK;
+    for (int lines = 0; lines <= rules->line_count; lines++) {
+        v.lattices[lines] = next;
+        next += MOST_SIZE * count_lattice(rules, lines);
+    }
+    session_complete_tuples(&rules->nodes, SIZE, tuples, complete);
+    double *lattice = v.lattices[rules->line_count];
+    for (size_t n = 0; n < nodes; n++)
+        for (size_t c = 0; c < SIZE; c++)
+            lattice[c * nodes + n] =
+                complete[SIZE * n + c] - (c < 3 ? tuples[(size_t)(SIZE * rules->nodes.corners[0]) + c] : 0);
+    const bool is_bent = grid_is_shell_type(rules->nodes.of.type) || !is_straight(rules, tuples, lattice);
+    v.rule = is_bent ? &rules->bent : &rules->straight;
+    visit_points(&v);
+}

@@ -1,0 +1,54 @@
+/* Sums of fractions as integers, which are the same for any order of summation, and histograms of such sums. A sum
+ * consists of two words, the multiples of 2^28 and the remainder of 2^52 times the fraction, so that 2^34 fractions can
+ * be added. */
+#ifndef SESSION_FIXED_SUMS_H
+#define SESSION_FIXED_SUMS_H
+
+#include <math.h>
+#include <stdint.h>
+
+enum { FIXED_LOW_BITS = 28, SESSION_MAX_BINS = 256 };
+
+static inline void add_fixed_point(int64_t sum[2], double share)
+{
+    const int64_t whole = llrint(share * 0x1p52);
+    sum[0] += whole >> FIXED_LOW_BITS;
+    sum[1] += whole & ((1 << FIXED_LOW_BITS) - 1);
+}
+
+static inline double sum_from_fixed_point(const int64_t sum[2])
+{
+    return ((double)sum[0] * (1 << FIXED_LOW_BITS) + (double)sum[1]) * 0x1p-52;
+}
+
+/* Returns a value's position in the range, 0 at low and 1 at high. It does not overflow. */
+static inline double position_in_range(double value, double low, double high)
+{
+    return high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0;
+}
+
+/* As above, limited to 0 .. 1. */
+static inline double share_of_range(double value, double low, double high)
+{
+    return fmin(fmax(position_in_range(value, low, high), 0), 1);
+}
+
+/* The bins of a histogram, which have equal widths. */
+typedef struct session_bins {
+    int count; /* at most SESSION_MAX_BINS */
+    double low, high;
+} session_bins;
+
+/* Returns the bin of a value between low and high. */
+static inline int find_bin_within(const session_bins *bins, double value)
+{
+    return (int)fmin(share_of_range(value, bins->low, bins->high) * bins->count, bins->count - 1);
+}
+
+/* Returns the bin of a value, or -1 if it is outside. */
+static inline int find_bin(const session_bins *bins, double value)
+{
+    return value < bins->low || value > bins->high ? -1 : find_bin_within(bins, value);
+}
+
+#endif
