@@ -303,7 +303,7 @@ static const session_bound_factor *factor_of(const session_bound *of, int factor
 
 static bool make_levels(session_bound *out)
 {
-    const int type = out->nodes.of.type, p = out->nodes.of.order;
+    const int type = out->lattice.type, p = out->lattice.order;
     bool is_made = true;
     for (int order = p < COARSE ? (COARSE + p - 1) / p * p : p; is_made; order *= 2) {
         if (out->level_count == BOUND_MOST_LEVELS || (out->level_count > 0 && order > FINE)) break;
@@ -318,9 +318,14 @@ static bool make_levels(session_bound *out)
 
 bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, session_bound *out)
 {
-    const int type = of->type, is_box = type == GRID_HEX || type == GRID_QUAD;
-    *out = (session_bound){.axis_count = type == GRID_QUAD || type == GRID_TRIANGLE ? 2 : 3};
+    const bool is_pyramid = of->type == GRID_PYRAMID;
+    const int type = is_pyramid ? GRID_HEX : of->type, is_box = type == GRID_HEX || type == GRID_QUAD;
+    *out = (session_bound){.axis_count = type == GRID_QUAD || type == GRID_TRIANGLE ? 2 : 3,
+                           .lattice = session_complete_nodes(type, of->order)};
     bool is_made = session_make_interpolation(of, order, 1, is_lobatto, &out->nodes) && make_levels(out);
+    if (is_pyramid && is_made) out->collapse = session_make_collapse(of->order);
+    is_made = is_made && (out->collapse || !is_pyramid);
+    is_lobatto = is_lobatto && !is_pyramid;
     if (is_box || type == GRID_WEDGE) is_made = is_made && make_factor(out, 1, is_lobatto && is_box, &out->line);
     if (!is_box) is_made = is_made && make_factor(out, type == GRID_TET ? 3 : 2, false, &out->simplex);
     return is_made;
@@ -329,6 +334,8 @@ bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool
 void session_drop_bound(session_bound *bound)
 {
     session_drop_interpolation(&bound->nodes);
+    base_free(bound->collapse);
+    bound->collapse = NULL;
     for (int level = 0; level < bound->level_count; level++) session_drop_pattern(&bound->levels[level].pieces);
     drop_factor(&bound->line);
     drop_factor(&bound->simplex);
@@ -353,14 +360,13 @@ typedef struct bound_job {
 
 size_t session_bound_work_size(const session_bound *of)
 {
-    const size_t nodes = (size_t)of->nodes.complete.count, fine = (size_t)of->levels[of->level_count - 1].count;
+    const size_t nodes = (size_t)of->lattice.count, fine = (size_t)of->levels[of->level_count - 1].count;
     return SIZE * (2 * nodes + 6 * fine) + 3 * fine;
 }
 
 static void divide_work(bound_job *job, double *work)
 {
-    const size_t nodes = SIZE * (size_t)job->of->nodes.complete.count,
-                 fine = SIZE * (size_t)job->of->levels[job->level].count;
+    const size_t nodes = SIZE * (size_t)job->of->lattice.count, fine = SIZE * (size_t)job->of->levels[job->level].count;
     job->nodes = work;
     job->coefficients = work += nodes;
     job->fine = work += nodes;
@@ -375,7 +381,7 @@ static void divide_work(bound_job *job, double *work)
 static void apply(const bound_job *job, int size, const double *const matrices[3], bool is_fine, const double *in,
                   double *out)
 {
-    const int count = count_factors(job->of->nodes.of.type);
+    const int count = count_factors(job->of->lattice.type);
     int inner = size, outer = 1;
     for (int f = 0; f < count; f++) outer *= factor_of(job->of, f)->node_count;
     for (int f = 0; f < count; f++) {
@@ -453,7 +459,7 @@ typedef struct bound_sums {
  * factor to the next. */
 static void add_factor(const bound_job *job, const session_bound_factor *factor, int inner, bound_sums *sums)
 {
-    const int p = job->of->nodes.of.order, all = SIZE * job->of->nodes.complete.count;
+    const int p = job->of->nodes.of.order, all = SIZE * job->of->lattice.count;
     double above[SIZE][MOST_DIRECTIONS], below[SIZE][MOST_DIRECTIONS];
     for (int c = 0; c < SIZE; c++)
         for (int d = 0; d < MOST_DIRECTIONS; d++) above[c][d] = below[c][d] = -INFINITY;
@@ -480,8 +486,13 @@ static void add_factor(const bound_job *job, const session_bound_factor *factor,
 static void find_coefficients(const bound_job *job, int size, const double *tuples)
 {
     const double *matrices[3];
-    for (int f = 0; f < count_factors(job->of->nodes.of.type); f++) matrices[f] = factor_of(job->of, f)->bernstein;
+    for (int f = 0; f < count_factors(job->of->lattice.type); f++) matrices[f] = factor_of(job->of, f)->bernstein;
     session_complete_tuples(&job->of->nodes, size, tuples, job->nodes);
+    if (job->of->collapse) {
+        multiply(job->of->collapse, job->of->lattice.count, job->of->nodes.complete.count, 1, size, job->nodes,
+                 job->work);
+        memcpy(job->nodes, job->work, (size_t)(job->of->lattice.count * size) * sizeof *job->nodes);
+    }
     apply(job, size, matrices, false, job->nodes, job->coefficients);
 }
 
@@ -491,7 +502,7 @@ static void bound_differences(bound_job *job)
     bound_sums sums = {{0}, {0}};
     double largest[SIZE];
     int inner = SIZE;
-    for (int f = 0; f < count_factors(job->of->nodes.of.type); f++) {
+    for (int f = 0; f < count_factors(job->of->lattice.type); f++) {
         add_factor(job, factor_of(job->of, f), inner, &sums);
         inner *= factor_of(job->of, f)->node_count;
     }
@@ -506,7 +517,7 @@ static void find_sphere(const bound_job *job, session_cell_bound *out)
 {
     double low[SIZE], high[SIZE], half[3], zero = 0;
     for (int c = 0; c < SIZE; c++) low[c] = high[c] = job->coefficients[c];
-    for (int i = 0; i < SIZE * job->of->nodes.complete.count; i++) {
+    for (int i = 0; i < SIZE * job->of->lattice.count; i++) {
         zero += 0 * job->coefficients[i];
         low[i % SIZE] = fmin(low[i % SIZE], job->coefficients[i]);
         high[i % SIZE] = fmax(high[i % SIZE], job->coefficients[i]);
@@ -544,8 +555,8 @@ static void find_gradient(const bound_job *job, int node, double out[3])
 static void find_gradients(bound_job *job)
 {
     const session_bound *of = job->of;
-    const int count = count_factors(of->nodes.of.type);
-    const double *values[3], *matrices[3];
+    const int count = count_factors(of->lattice.type);
+    const double *values[3] = {NULL}, *matrices[3];
     int axis = 0;
     for (int f = 0; f < count; f++) values[f] = factor_of(of, f)->values[job->level];
     apply(job, SIZE, values, true, job->nodes, job->fine);
@@ -558,15 +569,25 @@ static void find_gradients(bound_job *job)
     for (int n = 0; n < of->levels[job->level].count; n++) find_gradient(job, n, job->gradients[n]);
 }
 
+/* Returns the number of nodes of the level's lattice that have a gradient: all, except the last layer of pyramids, in
+ * which the collapsed hex is flat. */
+static int count_gradients(const bound_job *job)
+{
+    const session_bound_level *level = &job->of->levels[job->level];
+    return job->of->collapse ? level->order * (level->order + 1) * (level->order + 1) : level->count;
+}
+
 /* Returns a lower bound of the length of any weighted mean of the gradients at a piece's corners; 0 if the bound is not
- * positive or not finite. */
+ * positive or not finite. Corners without a gradient are left out. */
 static double least_gradient(const bound_job *job, const int *corners, int count)
 {
+    const int known = count_gradients(job);
     double mean[3] = {0}, least = INFINITY;
     for (int c = 0; c < count; c++)
-        for (int x = 0; x < 3; x++) mean[x] += job->gradients[corners[c]][x];
+        for (int x = 0; x < 3 && corners[c] < known; x++) mean[x] += job->gradients[corners[c]][x];
     const double length = vector3_length(mean);
-    for (int c = 0; c < count; c++) least = fmin(least, vector3_dot(mean, job->gradients[corners[c]]) / length);
+    for (int c = 0; c < count; c++)
+        if (corners[c] < known) least = fmin(least, vector3_dot(mean, job->gradients[corners[c]]) / length);
     return isfinite(length) && least > 0 ? least : 0;
 }
 
@@ -611,7 +632,8 @@ static double find_node_distance(const session_bound *of, const double *tuples)
 static double find_volume(const session_bound *of, const double *tuples)
 {
     const session_shape *shape = session_shape_of(of->nodes.of.type);
-    const double share = of->nodes.of.type == GRID_TET ? 1.0 / 6 : of->nodes.of.type == GRID_WEDGE ? 0.5 : 1;
+    const int type = of->nodes.of.type;
+    const double share = type == GRID_TET ? 1.0 / 6 : type == GRID_PYRAMID ? 1.0 / 3 : type == GRID_WEDGE ? 1.0 / 2 : 1;
     double axes[3][3] = {{0}}, cross[3];
     int counts[3] = {0};
     for (int e = 0; e < shape->edge_count; e++) {
@@ -637,7 +659,7 @@ static double find_volume(const session_bound *of, const double *tuples)
 static void find_mean_gradient(bound_job *job, const session_cell_bound *bound, double out[3])
 {
     static const double straight = 1e-6;
-    const int count = job->of->levels[job->level].count;
+    const int count = count_gradients(job);
     for (int x = 0; x < 3; x++) out[x] = 0;
     if (bound->position_error <= straight * bound->radius) return;
     find_gradients(job);
@@ -674,7 +696,7 @@ static difference_means find_means(int dimensions, const double *second)
 static difference_means find_factor_means(const bound_job *job, const session_bound_factor *factor, int inner,
                                           const double *coefficients)
 {
-    const int p = job->of->nodes.of.order, all = job->of->nodes.complete.count;
+    const int p = job->of->nodes.of.order, all = job->of->lattice.count;
     const int directions = direction_counts[factor->dimensions];
     difference_means out = {0, 0};
     int count = 0;
@@ -703,11 +725,11 @@ static double mean_difference(const bound_job *job, const double gradient[3], do
 {
     double mean = 0, variance = 0;
     int inner = 1;
-    for (int i = 0; i < job->of->nodes.complete.count; i++) {
+    for (int i = 0; i < job->of->lattice.count; i++) {
         const double *tuple = job->coefficients + SIZE * i;
         coefficients[i] = tuple[3] - vector3_dot(gradient, tuple);
     }
-    for (int f = 0; f < count_factors(job->of->nodes.of.type); f++) {
+    for (int f = 0; f < count_factors(job->of->lattice.type); f++) {
         const session_bound_factor *factor = factor_of(job->of, f);
         const difference_means own = find_factor_means(job, factor, inner, coefficients);
         mean += own.mean;
@@ -723,7 +745,7 @@ bool session_may_cross(const session_bound *of, const double *values, const sess
     double low = INFINITY, high = -INFINITY, zero = 0;
     divide_work(&job, work);
     find_coefficients(&job, 1, values);
-    for (int i = 0; i < of->nodes.complete.count; i++) {
+    for (int i = 0; i < of->lattice.count; i++) {
         zero += 0 * job.coefficients[i]; /* NaN if a coefficient is not finite */
         low = fmin(low, job.coefficients[i]);
         high = fmax(high, job.coefficients[i]);

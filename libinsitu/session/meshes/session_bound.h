@@ -42,13 +42,16 @@ typedef struct session_bound_level {
 /* The data from which the bounds of one kind of cell are computed. */
 typedef struct session_bound {
     session_interpolation nodes; /* the cell's nodes, and all nodes of its order */
+    session_nodes lattice;       /* the same as nodes.complete; a hex for pyramids, which are read as collapsed hexes */
+    double *collapse;            /* for pyramids: matrix from nodes.complete to `lattice`; otherwise NULL */
     int axis_count;              /* number of axes of the reference cell, 2 or 3 */
     int level_count;
     session_bound_level levels[BOUND_MOST_LEVELS]; /* each has twice the order of the one before */
     session_bound_factor line, simplex;
 } session_bound;
 
-/* Prepares the bounds of one kind of cell: cells other than pyramids, of an order from 1 to BOUND_MOST_ORDER. order and
+/* Prepares the bounds of one kind of cell, of an order from 1 to BOUND_MOST_ORDER, pyramids up to
+ * INTERPOLATION_MOST_PYRAMID. order and
  * is_lobatto: as in session_make_interpolation(). Returns false if memory runs out; the caller must drop *out in any
  * case. */
 bool session_make_bound(const session_nodes *of, insitu_vertex_order order, bool is_lobatto, session_bound *out);

@@ -52,7 +52,7 @@ typedef struct deviation_work {
  * but they are marked, since their neighbours may be of higher order. */
 static bool has_bound(const session_nodes *of)
 {
-    return of->order <= BOUND_MOST_ORDER && of->type != GRID_PYRAMID;
+    return of->order <= (of->type == GRID_PYRAMID ? (int)INTERPOLATION_MOST_PYRAMID : (int)BOUND_MOST_ORDER);
 }
 
 static bool begin_work(const session_mesh *mesh, const session_deviation_request *request, deviation_work *w)

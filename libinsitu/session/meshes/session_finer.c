@@ -312,7 +312,7 @@ static bool count_mesh(session_mesh *mesh)
     if (is_made) count_spacings(&polynomials, counts, positions, cells);
     for (int i = 0; i < polynomials.rows.kind_count; i++) {
         const session_nodes *of = &polynomials.rows.kinds[i].nodes;
-        counts[PYRAMIDS] += of->type == GRID_PYRAMID ? cells[i] : 0;
+        counts[PYRAMIDS] += of->type == GRID_PYRAMID && of->order > INTERPOLATION_MOST_PYRAMID ? cells[i] : 0;
         counts[SERENDIPITY] += of->is_complete ? 0 : cells[i];
         counts[SHELLS] += grid_is_shell_type(of->type) ? cells[i] : 0;
     }
@@ -345,7 +345,7 @@ int session_most_parts(const session_finer_choice *choice)
 static session_finer_choice make_choice(const int64_t sums[SESSION_FINER_COUNTS])
 {
     session_finer_choice out = {.order = NODES_MOST_ORDER,
-                                .pyramid_count = sums[PYRAMIDS],
+                                .excluded_count = sums[PYRAMIDS],
                                 .serendipity_count = sums[SERENDIPITY],
                                 .shell_count = sums[SHELLS],
                                 .is_lobatto = sums[LOBATTO] > sums[EQUISPACED],

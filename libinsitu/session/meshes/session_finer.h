@@ -31,8 +31,9 @@ typedef struct session_cell_marks {
  * every rank, apart from the marks. */
 typedef struct session_finer_choice {
     int order; /* highest order of its cells; 0: no rank has cells of higher order */
-    int64_t pyramid_count, serendipity_count, shell_count;
-    bool is_lobatto; /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
+    int64_t serendipity_count, shell_count;
+    int64_t excluded_count; /* number of pyramids above INTERPOLATION_MOST_PYRAMID, with which a mesh has 1 piece */
+    bool is_lobatto;        /* set if nodes of hexes and quads are taken as Gauss-Lobatto points */
     int parts; /* number of parts of each edge between two nodes, 1 .. FINER_MOST_PARTS; it is chosen by the caller */
     bool is_completed;         /* set by the caller if serendipity cells get all nodes of their order, for 1 part */
     int mark_count;            /* number of parts of the mesh on this rank; 0: all cells are refined */

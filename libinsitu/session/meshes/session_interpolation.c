@@ -4,6 +4,7 @@
  *     quad       line along i, then j
  *     wedge      triangle in each layer, then line along k
  *     tet        tet
+ *     pyramid    pyramid
  *     triangle   triangle
  *
  * The bits of a sum depend on the order of its terms. So nodes on a face are computed a second time, from the face's
@@ -15,6 +16,7 @@
  * Each sum is that of differences from its first value, so that a constant is reproduced exactly. */
 #include "session_interpolation.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "memory.h"
@@ -66,6 +68,118 @@ static void fill_simplex_weights(int p, int parts, bool is_tet, double *out)
                                      find_product(p - a - b - c, (double)(fine - i - j - k) / parts);
 }
 
+/* ---- pyramids ---- */
+
+/* Returns the Legendre polynomial of order n, for t from 0 to 1. */
+static double find_legendre(int n, double t)
+{
+    double before = 0, value = 1;
+    for (int m = 0; m < n; m++) {
+        const double next = ((2 * m + 1) * (2 * t - 1) * value - m * before) / (m + 1);
+        before = value;
+        value = next;
+    }
+    return value;
+}
+
+/* Computes a pyramid's basis at a point with coordinates from 0 to 1. Its functions are
+ * P_i(x / (1 - z)) P_j(y / (1 - z)) (1 - z)^max(i, j) P_k(z), with i and j up to p, and k up to p - max(i, j). They
+ * contain all polynomials of order p, those of both orders p on the base, and no others on the triangles (Bergot,
+ * Cohen, Durufle: Higher-order finite elements for hybrid meshes using new nodal pyramidal elements, 2010). */
+static void fill_pyramid_basis(int p, const double at[3], double *out)
+{
+    const double rest = 1 - at[2], x = rest > 0 ? at[0] / rest : 0, y = rest > 0 ? at[1] / rest : 0;
+    for (int i = 0; i <= p; i++)
+        for (int j = 0; j <= p; j++) {
+            const int most = i > j ? i : j;
+            double scale = 1;
+            for (int m = 0; m < most; m++) scale *= rest;
+            for (int k = 0; k <= p - most; k++)
+                *out++ = find_legendre(i, x) * find_legendre(j, y) * scale * find_legendre(k, at[2]);
+        }
+}
+
+/* Fills rows of the basis at all nodes of a collapsed hex of order p. */
+static void fill_collapsed_rows(int p, double *out)
+{
+    const int columns = session_complete_nodes(GRID_PYRAMID, p).count;
+    for (int k = 0; k <= p; k++)
+        for (int j = 0; j <= p; j++)
+            for (int i = 0; i <= p; i++, out += columns) {
+                const double rest = 1 - (double)k / p;
+                fill_pyramid_basis(p, (const double[]){rest * i / p, rest * j / p, 1 - rest}, out);
+            }
+}
+
+/* Fills rows of the basis at all nodes of a pyramid's lattice of order n. */
+static void fill_pyramid_rows(int p, int n, double *out)
+{
+    const int columns = session_complete_nodes(GRID_PYRAMID, p).count;
+    for (int k = 0; k <= n; k++)
+        for (int j = 0; j <= n - k; j++)
+            for (int i = 0; i <= n - k; i++, out += columns)
+                fill_pyramid_basis(p, (const double[]){(double)i / n, (double)j / n, (double)k / n}, out);
+}
+
+/* Solves X A = B in place of B by elimination with pivots in the columns. A is destroyed. */
+static void solve_rows(int size, int rows, double *a, double *b)
+{
+    for (int c = 0; c < size; c++) {
+        int pivot = c;
+        for (int n = c + 1; n < size; n++)
+            if (fabs(a[c * size + n]) > fabs(a[c * size + pivot])) pivot = n;
+        for (int r = 0; r < size + rows; r++) {
+            double *row = r < size ? a + r * size : b + (r - size) * size;
+            const double swapped = row[c];
+            row[c] = row[pivot];
+            row[pivot] = swapped;
+        }
+        const double *top = a + c * size;
+        for (int r = c + 1; r < size + rows; r++) {
+            double *row = r < size ? a + r * size : b + (r - size) * size;
+            const double scaled = row[c] / top[c];
+            for (int n = c + 1; n < size; n++) row[n] -= scaled * top[n];
+            row[c] = scaled;
+        }
+    }
+    /* each row of B now holds its products with the upper triangle's inverse; the lower triangle has ones on its
+     * diagonal */
+    for (int r = 0; r < rows; r++)
+        for (int c = size - 1; c >= 0; c--)
+            for (int n = 0; n < c; n++) b[r * size + n] -= b[r * size + c] * a[c * size + n];
+}
+
+/* Computes the weights of a pyramid. Returns false if memory runs out. */
+static bool fill_pyramid_weights(int p, int parts, double *out)
+{
+    const int size = session_complete_nodes(GRID_PYRAMID, p).count;
+    double *own = base_alloc((size_t)size * (size_t)size * sizeof *own);
+    if (!own) return false;
+    fill_pyramid_rows(p, p, own);
+    fill_pyramid_rows(p, parts * p, out);
+    solve_rows(size, session_complete_nodes(GRID_PYRAMID, parts * p).count, own, out);
+    base_free(own);
+    return true;
+}
+
+double *session_make_collapse(int p)
+{
+    const int size = session_complete_nodes(GRID_PYRAMID, p).count, rows = session_complete_nodes(GRID_HEX, p).count;
+    double *own = base_alloc((size_t)size * (size_t)size * sizeof *own);
+    double *out = base_alloc((size_t)rows * (size_t)size * sizeof *out);
+    if (own && out) {
+        fill_pyramid_rows(p, p, own);
+        fill_collapsed_rows(p, out);
+        solve_rows(size, rows, own, out);
+    }
+    base_free(own);
+    if (own) return out;
+    base_free(out);
+    return NULL;
+}
+
+/* ---- all types ---- */
+
 static size_t count_weights(int type, int p, int parts)
 {
     return (size_t)session_complete_nodes(type, parts * p).count * (size_t)session_complete_nodes(type, p).count;
@@ -74,15 +188,16 @@ static size_t count_weights(int type, int p, int parts)
 static bool make_weights(const session_nodes *of, int parts, bool is_lobatto, session_interpolation *out)
 {
     const int p = of->order;
-    const bool is_box = of->type == GRID_HEX || of->type == GRID_QUAD, is_tet = of->type == GRID_TET;
+    const bool is_box = of->type == GRID_HEX || of->type == GRID_QUAD;
+    const bool is_whole = of->type == GRID_TET || of->type == GRID_PYRAMID;
     out->line = base_alloc((size_t)(parts * p + 1) * (size_t)(p + 1) * sizeof *out->line);
     if (!is_box) out->triangle = base_alloc(count_weights(GRID_TRIANGLE, p, parts) * sizeof *out->triangle);
-    if (is_tet) out->tet = base_alloc(count_weights(GRID_TET, p, parts) * sizeof *out->tet);
-    if (!out->line || (!is_box && !out->triangle) || (is_tet && !out->tet)) return false;
+    if (is_whole) out->whole = base_alloc(count_weights(of->type, p, parts) * sizeof *out->whole);
+    if (!out->line || (!is_box && !out->triangle) || (is_whole && !out->whole)) return false;
     fill_line_weights(p, parts, is_lobatto && is_box, out->line);
     if (!is_box) fill_simplex_weights(p, parts, false, out->triangle);
-    if (is_tet) fill_simplex_weights(p, parts, true, out->tet);
-    return true;
+    if (of->type == GRID_TET) fill_simplex_weights(p, parts, true, out->whole);
+    return of->type != GRID_PYRAMID || fill_pyramid_weights(p, parts, out->whole);
 }
 
 static void find_positions(const session_nodes *of, insitu_vertex_order order, session_interpolation *out)
@@ -122,7 +237,7 @@ void session_drop_interpolation(session_interpolation *interpolation)
     base_free(interpolation->positions);
     base_free(interpolation->line);
     base_free(interpolation->triangle);
-    base_free(interpolation->tet);
+    base_free(interpolation->whole);
     *interpolation = (session_interpolation){0};
 }
 
@@ -242,7 +357,8 @@ static void fill_inside(const cell_job *job)
     double *a = job->spare[0], *b = job->spare[1];
     switch (of->of.type) {
     case GRID_TRIANGLE: apply(of->triangle, triangles, triangle, 1, size, job->lattice, job->out); break;
-    case GRID_TET: apply(of->tet, of->fine.count, of->complete.count, 1, size, job->lattice, job->out); break;
+    case GRID_TET:
+    case GRID_PYRAMID: apply(of->whole, of->fine.count, of->complete.count, 1, size, job->lattice, job->out); break;
     case GRID_WEDGE:
         apply(of->triangle, triangles, triangle, c, size, job->lattice, a);
         apply(of->line, r, c, 1, triangles * size, a, job->out);

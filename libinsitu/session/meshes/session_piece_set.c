@@ -17,7 +17,7 @@
 typedef struct piece_kind {
     session_interpolation nodes;
     session_pattern pieces;
-    int corner_count; /* number of corners of a piece; the pieces of a kind have one type */
+    int corner_count; /* number of corners of a piece; 0 for pyramids, which are split into pyramids and tets */
     int word_count;   /* number of words of a cell's bits */
 } piece_kind;
 
@@ -33,7 +33,7 @@ static bool make_kind(const session_nodes *of, insitu_vertex_order order, int pa
     const int type = session_lagrange_type(of->type);
     if (!session_make_interpolation(of, order, parts, is_lobatto, &out->nodes)) return false;
     if (!session_make_pattern(type, &out->nodes.fine, INSITU_ORDER_LEXICOGRAPHIC, &out->pieces)) return false;
-    out->corner_count = grid_type_vertices(out->pieces.types[0]);
+    out->corner_count = of->type == GRID_PYRAMID ? 0 : grid_type_vertices(out->pieces.types[0]);
     out->word_count = (out->pieces.piece_count + 63) / 64;
     return true;
 }
@@ -74,12 +74,14 @@ static insitu_status fail_for_memory(const session_mesh *mesh, base_error *error
 
 /* ---- pieces at nodes --------------------------------------------------------------------------------------------- */
 
-/* Finds a piece at each of the cell's own nodes, whatever their order in the row. is_own: buffer of one flag per node
- * of the finer lattice. */
+/* Finds a piece at each of the cell's own nodes, whatever their order in the row, and all pieces of pyramids. is_own:
+ * buffer of one flag per node of the finer lattice. */
 static void find_pieces_at_nodes(const piece_kind *kind, int parts, bool *is_own, uint64_t *out)
 {
     const session_nodes *fine = &kind->nodes.fine;
     const int p = kind->nodes.of.order;
+    for (int piece = 0; !kind->corner_count && piece < kind->pieces.piece_count; piece++) set_bit(out, piece);
+    if (!kind->corner_count) return;
     memset(is_own, 0, (size_t)fine->count * sizeof *is_own);
     for (int k = 0; k <= p; k++)
         for (int j = 0; j <= p; j++)
@@ -192,7 +194,8 @@ static bool add_cells(const piece_work *w, int threads)
         is_lacking = !buffer;
 #pragma omp for schedule(dynamic, 16)
         for (int64_t cell = 0; cell < cells; cell++)
-            if (buffer && first_words[cell] < first_words[cell + 1]) add_cell(w, cell, field_size, buffer);
+            if (buffer && first_words[cell] < first_words[cell + 1] && kind_of(w, cell)->corner_count)
+                add_cell(w, cell, field_size, buffer);
         base_free(buffer);
         region_leave();
     }

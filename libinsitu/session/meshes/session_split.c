@@ -207,7 +207,8 @@ typedef struct piece_walk {
 static piece_walk walk_pieces(const split_work *w, const session_pattern *of, int64_t cell)
 {
     const int64_t *first = w->set->first_words;
-    const bool has_words = first && first[cell] < first[cell + 1];
+    /* all pieces of pyramids are made, and they have two types */
+    const bool has_words = first && first[cell] < first[cell + 1] && of->nodes.type != GRID_PYRAMID;
     return (piece_walk){has_words ? w->set->bits + first[cell] : NULL, of->piece_count, 0};
 }
 

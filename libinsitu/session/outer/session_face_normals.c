@@ -61,15 +61,21 @@ static void find_tangent(const session_face_normals *n, int node, int axis, doub
             out[x] += of->weights[term] * (n->positions[3 * of->nodes[term] + x] - n->positions[3 * node + x]);
 }
 
+bool session_has_face_normals(session_face_normals *normals, const session_mesh *mesh, int64_t cell)
+{
+    if (normals->cell != cell) read_cell(normals, mesh, cell);
+    return normals->derivatives->axis_count > 0;
+}
+
 bool session_find_face_normal(session_face_normals *normals, const session_mesh *mesh, int64_t cell, int face,
                               int64_t vertex, double out[3])
 {
     const session_rows *rows = &normals->polynomials.rows;
     double plane[3], tangents[3][3] = {{0}}, product[3];
-    if (normals->cell != cell) read_cell(normals, mesh, cell);
-    const int node = find_node(rows, cell, vertex), axes = normals->derivatives->axis_count;
     for (int x = 0; x < 3; x++) out[x] = 0;
-    if (node < 0 || !axes) return false;
+    if (!session_has_face_normals(normals, mesh, cell)) return false;
+    const int node = find_node(rows, cell, vertex), axes = normals->derivatives->axis_count;
+    if (node < 0) return false;
     session_rim_plane(&rows->kinds[session_kind_of(rows, cell)].nodes, face, plane);
     for (int a = 0; a < axes; a++) find_tangent(normals, node, a, tangents[a]);
     for (int a = 0; a < 3; a++) {

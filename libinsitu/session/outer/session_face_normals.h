@@ -17,9 +17,12 @@ typedef struct session_face_normals {
 bool session_face_normals_create(const session_mesh *mesh, session_face_normals *out);
 void session_face_normals_free(session_face_normals *normals);
 
+/* Returns whether normals of a cell's faces are known. Those of pyramids are not. */
+bool session_has_face_normals(session_face_normals *normals, const session_mesh *mesh, int64_t cell);
+
 /* Computes the normal, of any length, of a face of one of the caller's cells at one of its nodes. face: its number
  * (session_find_rim()). vertex: the node, as a vertex of session_mesh.cells. Normals at all nodes of a face are on the
- * same side of it. Returns false if the cell's polynomials are not known, as in pyramids, or the normal is 0. */
+ * same side of it. Returns false if it is not known, or 0. */
 bool session_find_face_normal(session_face_normals *normals, const session_mesh *mesh, int64_t cell, int face,
                               int64_t vertex, double out[3]);
 

@@ -143,6 +143,7 @@ typedef struct outer_work {
     /* The caller's cell and its face on which the current face lies; face: -1 if it lies on none. */
     int64_t parent;
     int face;
+    bool is_curved; /* set if the normals of that face are known */
     /* the parent and the face for which vertex_map holds vertices, and the first of these vertices */
     int64_t mapped_parent, first_mapped;
     int mapped_face;
@@ -169,7 +170,7 @@ static int64_t add_copied_vertex(outer_work *w, int64_t origin, const double pos
 /* Makes the current face use other vertices than the faces before, unless both lie on the same curved face. */
 static void separate_vertices(outer_work *w)
 {
-    if (w->face >= 0 && w->face == w->mapped_face && w->parent == w->mapped_parent) return;
+    if (w->is_curved && w->face == w->mapped_face && w->parent == w->mapped_parent) return;
     for (int64_t v = w->first_mapped; v < w->vertex_count; v++) w->vertex_map[w->out->vertex_origins[v]] = -1;
     w->first_mapped = w->vertex_count;
     w->mapped_parent = w->parent;
@@ -183,7 +184,7 @@ static void find_corner_normal(outer_work *w, const corner_loop *loop, int corne
 {
     const int count = loop->count, next = (corner + 1) % count, last = (corner + count - 1) % count;
     double a[3], b[3];
-    if (w->face >= 0 && session_find_face_normal(&w->curved, w->whole, w->parent, w->face, loop->vertices[corner], out))
+    if (w->is_curved && session_find_face_normal(&w->curved, w->whole, w->parent, w->face, loop->vertices[corner], out))
         return;
     subtract(loop->positions[next], loop->positions[corner], a);
     subtract(loop->positions[last], loop->positions[corner], b);
@@ -328,6 +329,7 @@ static void find_parent_face(outer_work *w, int64_t piece, const face_polygon *p
     w->parent = w->parents[piece];
     if (w->parent != w->rims.cell) memset(w->rim_loops, 0, sizeof w->rim_loops);
     w->face = session_find_rim(&w->rims, w->parent, p->vertices, p->count);
+    w->is_curved = w->normals && w->face >= 0 && session_has_face_normals(&w->curved, w->whole, w->parent);
 }
 
 /* Sets the loop of the cells from number `first` on, which are built on a piece's face, to the rim of the caller's

@@ -19,6 +19,7 @@
 #include "session_distances.h"
 #include "session_filled.h"
 #include "session_indexed.h"
+#include "session_interpolation.h"
 #include "session_piece_set.h"
 #include "session_volume_errors.h"
 
@@ -238,7 +239,7 @@ static insitu_status estimate_all_volumes(const session_pieces_basis *basis, con
     if (!is_any || basis->scene->finer_pieces) return INSITU_OK;
     insitu_status status = session_find_volume_ranges(basis->scene, views, basis->meshes, basis->team, &ranges, error);
     for (int m = 0; m < basis->catalogue->mesh_count && !status; m++)
-        if (choices[m].order > 1 && !choices[m].pyramid_count)
+        if (choices[m].order > 1 && !choices[m].excluded_count)
             status = estimate_volumes(basis, views, m, &choices[m], &ranges, &errors[m], error);
     session_free_volume_ranges(&ranges);
     return status;
@@ -250,7 +251,7 @@ static insitu_status find_errors(const session_pieces_basis *basis, const sessio
 {
     fill_fields(basis, views);
     for (int m = 0; m < basis->catalogue->mesh_count && !error->status; m++)
-        if (choices[m].order > 0 && !choices[m].pyramid_count)
+        if (choices[m].order > 0 && !choices[m].excluded_count)
             use_mesh(basis, views, m, &choices[m], &errors[m], report, error);
     if (reduce_errors(errors, basis->catalogue->mesh_count, basis->team->comm, error)) return error->status;
     return estimate_all_volumes(basis, views, choices, errors, error);
@@ -286,8 +287,8 @@ static void choose_fixed(const char *mesh, const scene *scene, const piece_error
                          session_report *report)
 {
     const int wanted = scene->finer_pieces, most = session_most_parts(choice);
-    choice->parts = choice->pyramid_count || !of->is_shown ? 1 : wanted < most ? wanted : most;
-    session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 1}, !choice->pyramid_count && most < wanted,
+    choice->parts = choice->excluded_count || !of->is_shown ? 1 : wanted < most ? wanted : most;
+    session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 1}, !choice->excluded_count && most < wanted,
                  "mesh \"%s\": it has cells of order %d, and so finer_pieces is %d on it instead of %d: at most %d "
                  "pieces along an edge of a cell are supported",
                  mesh, choice->order, most, wanted, NODES_MOST_ORDER);
@@ -296,7 +297,7 @@ static void choose_fixed(const char *mesh, const scene *scene, const piece_error
 static void choose_by_error(const char *mesh, const scene *scene, const piece_error *of, session_finer_choice *choice,
                             session_report *report)
 {
-    choice->parts = choice->pyramid_count || choice->order < 2 ? 1 : find_pieces(scene, choice, of);
+    choice->parts = choice->excluded_count || choice->order < 2 ? 1 : find_pieces(scene, choice, of);
     const double met = of->all.error / (choice->parts * choice->parts);
     session_warn(
         report, &(session_warning){WARNING_FINER, NULL, mesh, 1},
@@ -310,10 +311,10 @@ static void warn_of_pyramids(const char *mesh, const scene *scene, const session
                              session_report *report)
 {
     const bool is_asked = scene->finer_pieces || scene->is_surface_error_given;
-    session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 0}, is_asked && choice->pyramid_count > 0,
-                 "mesh \"%s\": %lld of its cells are pyramids, whose polynomials are not known: %s has no effect on "
-                 "it, and its cells are split at their own nodes",
-                 mesh, (long long)choice->pyramid_count, scene->finer_pieces ? "finer_pieces" : "surface_error");
+    session_warn(report, &(session_warning){WARNING_FINER, NULL, mesh, 0}, is_asked && choice->excluded_count > 0,
+                 "mesh \"%s\": %lld of its cells are pyramids of an order above %d: %s has no effect on it, and its "
+                 "cells are split at their own nodes",
+                 mesh, (long long)choice->excluded_count, INTERPOLATION_MOST_PYRAMID, scene->finer_pieces ? "finer_pieces" : "surface_error");
 }
 
 /* ---- memory ------------------------------------------------------------------------------------------------------ */
