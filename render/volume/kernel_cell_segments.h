@@ -301,30 +301,10 @@ static kernel_unit_segment kernel_exact_segment(double length, const float v[2],
                                  vf_set((float)rest[1])};
 }
 
-/* Emits the subinterval as `subdivisions` equal segments. */
-static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane,
-                                    const kernel_exact_point *from, const kernel_exact_point *to,
-                                    const double values[2], double subdivisions)
-{
-    float begin = (float)from->t;
-    for (int n = 1; n <= (int)subdivisions; n++) {
-        const double before = (n - 1) / subdivisions, after = n / subdivisions;
-        const float end = n < (int)subdivisions ? (float)kernel_interpolate(from->t, to->t, after) : (float)to->t;
-        const double x[2] = {kernel_interpolate(values[0], values[1], before),
-                             kernel_interpolate(values[0], values[1], after)};
-        const float v[2] = {(float)x[0], (float)x[1]};
-        const double rest[2] = {x[0] - (double)v[0], x[1] - (double)v[1]};
-        const kernel_unit_segment run = kernel_exact_segment((to->t - from->t) / subdivisions * h->per_t, v, rest);
-        if (begin < end) kernel_emit_segment(p, h->list, lane, vf_set(begin), vf_set(end), &run);
-        begin = end;
-    }
-}
-
-/* Adds the subinterval's segments, on its chord. They are not raised to the field's mean, as equal subintervals are,
- * because they might then reach values that have not been checked. */
-static void kernel_subinterval_add_segments(kernel_packet *p, const kernel_bisection *h, vm lane,
-                                            const kernel_exact_point *from, const kernel_subinterval *sub,
-                                            const kernel_bound *s)
+/* Adds the subinterval as a segment, on its chord. The chord is not raised to the field's mean, as those of equal
+ * subintervals are, because it might then reach values that have not been checked. */
+static void kernel_subinterval_add_segment(const kernel_bisection *h, vm lane, const kernel_exact_point *from,
+                                           const kernel_subinterval *sub)
 {
     const bool is_cut = kernel_step_between(h, sub->low, sub->high) != NULL;
     const double x[2] = {from->v, sub->end.v}, length = (sub->end.t - from->t) * h->per_t;
@@ -332,18 +312,6 @@ static void kernel_subinterval_add_segments(kernel_packet *p, const kernel_bisec
     float v[2] = {(float)x[0], (float)x[1]};
     const kernel_side_values side = kernel_step_side(h, sub->middle.v);
     for (int i = 0; i < 2 && !is_cut; i++) kernel_step_round(&side, x[i], &v[i], &rest[i]);
-    if (h->list->mixing > 0) {
-        const double contrast = (double)h->list->pieces->contrast, change = sub->high - sub->low;
-        const double most = (double)s->extinction_high, least = (double)s->extinction_low;
-        const double moved = 0.25 * length *
-                             (contrast * fmin(change * (double)s->extinction_slope, most - least) +
-                              most * fmin(change * (double)s->colour_slope, contrast));
-        const double subdivisions =
-            sqrt(fmin(moved / (double)h->list->mixing, KERNEL_MAX_SUBDIVISIONS * KERNEL_MAX_SUBDIVISIONS));
-        const double sums[2] = {(double)v[0] + rest[0], (double)v[1] + rest[1]};
-        kernel_subinterval_emit(p, h, lane, from, &sub->end, sums, fmax(ceil(subdivisions), 1));
-        return;
-    }
     const float t0 = (float)from->t, t1 = (float)sub->end.t;
     const kernel_unit_segment run = kernel_exact_segment(length, v, rest);
     if (h->list->is_double || t0 < t1) kernel_segments_add(h->list, lane, vf_set(t0), vf_set(t1), &run);
@@ -354,8 +322,8 @@ static void kernel_subinterval_add_segments(kernel_packet *p, const kernel_bisec
 static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_subinterval *sub, const kernel_bound *s,
                                        double length, bool is_cut)
 {
-    const double reach = (double)h->list->reach, depth = (double)s->extinction_low * length;
-    const double a = (double)(h->list->allowance > 0 ? h->list->allowance : h->list->mixing);
+    const double reach = (double)h->list->reach, a = (double)h->list->allowance;
+    const double depth = (double)s->extinction_low * length;
     double all;
     const double error = kernel_subinterval_error(h, sub, s, length, &all);
     if (!is_cut && h->light * error <= 0.875 * a * (length / reach + h->light * depth / (1 + depth))) return true;
@@ -363,8 +331,7 @@ static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_s
 }
 
 /* Divides an interval, whose ends and middle are known, into subintervals by bisection, and adds their segments. */
-static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_exact_point from,
-                                     kernel_subinterval whole)
+static void kernel_subinterval_halve(kernel_bisection *h, int lane, kernel_exact_point from, kernel_subinterval whole)
 {
     const kernel_segments *list = h->list;
     const vm only = vm_from_bits(1u << lane);
@@ -382,7 +349,7 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
         const bool is_last = sub.depth >= KERNEL_BISECTION_DEPTH || h->count >= KERNEL_BISECTION_SEGMENTS ||
                              count + 2 > KERNEL_BISECTION_ROOM;
         if (is_last || kernel_subinterval_is_good(h, &sub, &s, length, step != NULL)) {
-            if (list->t_begin[lane] <= (float)from.t) kernel_subinterval_add_segments(p, h, only, &from, &sub, &s);
+            if (list->t_begin[lane] <= (float)from.t) kernel_subinterval_add_segment(h, only, &from, &sub);
             const double depth = (double)s.extinction_low * length;
             h->light /= 1 + depth * (1 + 0.5 * depth);
             h->count++;
@@ -445,7 +412,7 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
         sub.end.t = (double)t1[n];
         sub.middle = kernel_exact_point_between(&h, &from, &sub.end, 0.5);
         sub.is_monotone = !cell_interval->map;
-        kernel_subinterval_halve(p, &h, n, begin, sub);
+        kernel_subinterval_halve(&h, n, begin, sub);
     }
 }
 
@@ -524,10 +491,7 @@ SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segments
         const vm mine = vm_and(vf_le(list->t_begin, s.from), vf_lt(s.from, list->t_end));
         const kernel_unit_segment run =
             kernel_unit_segment_of((s.to - s.from) * list->per_t, s.before + lift, s.after + lift);
-        if (!(list->mixing > 0))
-            kernel_segments_add(list, vm_and(open, mine), s.from, s.to, &run);
-        else if (vm_any(vm_and(open, mine)))
-            kernel_emit_segment(p, list, vm_and(open, mine), s.from, s.to, &run);
+        kernel_segments_add(list, vm_and(open, mine), s.from, s.to, &run);
         s.from = s.to;
         s.to = next;
         s.before = s.after;
@@ -543,9 +507,7 @@ static __attribute__((noinline)) void kernel_cell_interval_integrate(kernel_pack
 {
     const kernel_interval *i = cell_interval->interval;
     vf from = vf_max(i->t_in, p->t_near);
-    /* segments that compositing mixes with other volumes are not cut at this rank's surfaces, so that they are the same
-     * on any partition */
-    const vf end = vf_min(i->t_out, list->mixing > 0 ? p->clip_out : p->t_far);
+    const vf end = vf_min(i->t_out, list->t_cut);
     vm open = vm_and(i->mask, vm_and(p->active, vm_and(vf_lt(from, end), vf_lt(from, p->t_far))));
     while (vm_any(open)) {
         const vf to = vf_min(end, kernel_next_cut(p, list, from, true));
@@ -567,20 +529,14 @@ SIMD_INLINE kernel_unit_segment kernel_tet_segment(const kernel_packet *p, const
     return run;
 }
 
-/* Adds a tet's segments on rays whose interval is cut by surfaces, or whose segments must be mixed with other
- * volumes. */
+/* Adds a tet's segments on rays whose interval is cut by surfaces. */
 static __attribute__((noinline)) void kernel_tet_segments_general(kernel_packet *p, kernel_segments *list,
                                                                   const kernel_cell *c,
                                                                   const kernel_double_face faces[4], kernel_interval i)
 {
     kernel_cell_interval cell_interval = {.interval = &i};
-    kernel_unit_segment precise;
-    if (list->mixing > 0) {
-        kernel_cell_interval_bound(list, c->f, c->count, &cell_interval);
-    } else if (list->is_double) {
-        precise = kernel_tet_segment(p, list, c, faces, &i);
-        cell_interval.precise = &precise;
-    }
+    const kernel_unit_segment precise = kernel_tet_segment(p, list, c, faces, &i);
+    if (list->is_double) cell_interval.precise = &precise;
     kernel_cell_interval_integrate(p, list, &cell_interval);
 }
 
@@ -593,9 +549,9 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     kernel_tet_interval(p, c, rays, false, &i);
     if (!vm_any(i.mask)) return;
     const vm hit = i.mask;
-    vm cut = vm_or(vf_lt(i.t_in, p->t_near), vf_lt(p->t_far, i.t_out));
+    vm cut = vm_or(vf_lt(i.t_in, p->t_near), vf_lt(list->t_cut, i.t_out));
     if (list->cut) cut = vm_or(cut, vf_lt(kernel_next_cut(p, list, i.t_in, true), i.t_out));
-    cut = list->mixing > 0 ? hit : vm_and(hit, cut);
+    cut = vm_and(hit, cut);
     if (__builtin_expect(vm_any(cut), 0)) {
         i.mask = cut;
         kernel_tet_segments_general(p, list, c, faces, i);
@@ -681,7 +637,6 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segments *list, 
     kernel_interval piece;
     if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
     kernel_cell_interval cell_interval = {.interval = &piece};
-    if (list->mixing > 0) kernel_cell_interval_bound(list, c->f, c->vertex_count, &cell_interval);
     while (kernel_poly_next(&r, &polyhedron_interval)) {
         if (!c->is_constant) kernel_poly_profile(&r, &polyhedron_interval);
         kernel_profile_begin(&polyhedron_interval, &piece);

@@ -52,12 +52,15 @@ typedef struct kernel_segments {
     /* error allowed per share of the ray's length and of its absorption; 0: subintervals are as long as the sampling
      * step */
     float allowance;
-    /* > 0: error allowed by mixing; segments are then emitted at once, to be mixed with other volumes
-     * (kernel_cell_interval_subdivisions_mixed()) */
+    /* > 0: error allowed by mixing; the window's segments are then emitted, to be mixed with other volumes
+     * (kernel_emit_segment()) */
     float mixing;
     float reach; /* upper bound of a ray's length in the cells, in unit distances */
     kernel_blend blend;
     vf t_last; /* depth at which the ray ends: at an opaque surface, or behind all cells */
+    /* Depth at which segments are cut: at an opaque surface. Segments that compositing mixes with other volumes are cut
+     * only at clips, not at this rank's surfaces, so that they are the same on any partition. */
+    vf t_cut;
     /* active rays of the packet, saved here because the packet's own mask is reduced to rays that have not ended */
     vm active;
 } kernel_segments;
@@ -317,7 +320,7 @@ SIMD_INLINE void kernel_cell_interval_bound(const kernel_segments *list, const f
 {
     const kernel_pieces *t = list->pieces;
     float low = values[0], high = low;
-    if (!(list->allowance > 0) && !(list->mixing > 0)) return;
+    if (!(list->allowance > 0)) return;
     for (int i = 1; i < count; i++) {
         low = simd_min(values[i], low);
         high = simd_max(values[i], high);
@@ -455,18 +458,6 @@ SIMD_INLINE vf kernel_cell_interval_subdivisions_curved(kernel_packet *p, const 
     return vf_select(too_few, vf_set(2 * KERNEL_MAX_SUBDIVISIONS), subdivisions);
 }
 
-/* Returns the number of subintervals if compositing mixes the interval with other volumes, which it treats as a uniform
- * medium (comp.h). In an interval of depth d whose extinction and colour vary by a share v, at most d v / 4 is
- * displaced from its assumed position, and the effect on light is attenuated by the other volumes' depth in the
- * interval. That depth, times the light that arrives there, sums to 1 over a ray; so d v / 4 may be the whole error
- * allowed. */
-SIMD_INLINE vf kernel_cell_interval_subdivisions_mixed(const kernel_segments *list,
-                                                       const kernel_cell_interval *cell_interval, vf length, vf change)
-{
-    const vf moved = change * cell_interval->cost * (length * list->per_t) * 0.25f;
-    return vf_sqrt(vf_min(moved / list->mixing, vf_set(1e6f)));
-}
-
 /* Returns the number of equal subintervals into which each ray's interval is divided. *halved receives the rays for
  * which no number is accurate enough, so that their intervals must be divided by bisection. */
 SIMD_INLINE vf kernel_cell_interval_subdivisions(kernel_packet *p, const kernel_segments *list,
@@ -474,27 +465,16 @@ SIMD_INLINE vf kernel_cell_interval_subdivisions(kernel_packet *p, const kernel_
                                                  const kernel_interval *stretch, vm *halved)
 {
     const vf length = stretch->t_out - stretch->t_in, most = vf_set(KERNEL_MAX_SUBDIVISIONS);
-    const vf v0 = stretch->v_in, v1 = stretch->v_out;
-    vf subdivisions = vf_set(1), off = vf_set(0);
+    vf subdivisions = vf_set(1), off;
     *halved = vm_none();
     if (cell_interval->map && list->allowance > 0) {
         subdivisions = kernel_cell_interval_subdivisions_curved(p, list, cell_interval, rays, stretch, &off);
         *halved = vm_and(rays, vf_lt(most, subdivisions));
     } else if (cell_interval->map) {
         subdivisions = length / p->sample_step;
-        if (cell_interval->step_count && list->mixing > 0) {
-            const vf wanted = kernel_cell_interval_subdivisions_curved(p, list, cell_interval, rays, stretch, &off);
-            *halved = vm_and(rays, vf_lt(most, wanted));
-        }
-    } else if (cell_interval->step_count && list->mixing > 0) {
-        *halved = vm_and(rays, kernel_values_have_step(list->pieces, cell_interval->first_step,
-                                                       cell_interval->step_count, vf_min(v0, v1), vf_max(v0, v1)));
     } else if (cell_interval->is_narrow && cell_interval->cell) {
         *halved = rays;
     }
-    if (list->mixing > 0)
-        subdivisions = vf_max(subdivisions, kernel_cell_interval_subdivisions_mixed(list, cell_interval, length,
-                                                                                    vf_abs(v1 - v0) + 2.0f * off));
     return vf_clamp(-vf_floor(-subdivisions), vf_set(1), most);
 }
 
@@ -520,14 +500,48 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segme
     return out;
 }
 
-/* Emits a segment as a fragment of its own. kernel_integrate() stops once all but KERNEL_BLACK of the light is
- * absorbed, so that its depth is then too small; but compositing mixes fragments by their depth. So a segment that is
- * so dense is bisected until its parts are not, and emission ends when no light is left. */
+/* Returns the positions, as shares of the segment's length, at which the pieces end that begin at `from`. share: length
+ * of a piece; steps of the opacity end pieces too. */
+SIMD_INLINE vf kernel_mixed_end(const kernel_pieces *t, const kernel_unit_segment *whole, vf share, vf from)
+{
+    const vf one = vf_set(1), inverse = one / (whole->v_out - whole->v_in);
+    vf to = vf_select(vf_lt(from + 1.5f * share, one), from + share, one);
+    for (int i = 0; i < t->step_count; i++) {
+        const vf cut = (t->steps[i].cut - whole->v_in) * inverse;
+        to = vf_select(vf_lt(from, cut), vf_min(cut, to), to);
+    }
+    return to;
+}
+
+/* Returns the share of a segment's length that one fragment may have if compositing mixes it with other volumes, which
+ * it treats as a uniform medium (comp.h). In an interval of depth d whose extinction and colour vary by a share v, at
+ * most d v / 4 is displaced from its assumed position, and the effect on light is attenuated by the other volumes'
+ * depth in the interval. That depth, times the light that arrives there, sums to 1 over a ray; so d v / 4 may be the
+ * whole error allowed. Let s be the extinction, c the colour, R the contrast and s' and c' the slopes. Then d v is at
+ * most (R |s'| + s |c'|) times the change of the value, and s |c'| <= cost + R |s'|, as the cost bounds s c' + s' (c -
+ * b). */
+SIMD_INLINE vf kernel_mixed_share(const kernel_segments *list, const kernel_unit_segment *run)
+{
+    const kernel_pieces *t = list->pieces;
+    const vf low = vf_min(run->v_in, run->v_out), high = vf_max(run->v_in, run->v_out);
+    const vi entry = kernel_light_variation_entry(t, low, high);
+    vf variation, cost, extinction, steepness;
+    vf_gather_pair(&t->variations->variation, entry, &variation, &cost);
+    vf_gather_pair(&t->variations->extinction, entry, &extinction, &steepness);
+    const vf moved = (high - low) * (cost + 2.0f * steepness) * run->length * 0.25f;
+    const vf count = vf_min(-vf_floor(-vf_sqrt(moved / list->mixing)), vf_set(KERNEL_MAX_SUBDIVISIONS));
+    return 1.0f / vf_max(count, vf_set(1));
+}
+
+/* Emits a segment as fragments, which compositing mixes with other volumes. kernel_integrate() stops once all but
+ * KERNEL_BLACK of the light is absorbed, so that its depth is then too small; but compositing mixes fragments by their
+ * depth. So a fragment that is so dense is bisected until its parts are not, and emission ends when no light is
+ * left. */
 static void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, vm rays, vf t_in, vf t_out,
                                 const kernel_unit_segment *whole)
 {
-    const vf one = vf_set(1), black = vf_set(KERNEL_BLACK);
-    vf from = vf_set(0), to = one, depth = vf_set(0);
+    const vf one = vf_set(1), black = vf_set(KERNEL_BLACK), share = kernel_mixed_share(list, whole);
+    vf from = vf_set(0), to = kernel_mixed_end(list->pieces, whole, share, from), depth = vf_set(0);
     for (vm open = rays; vm_any(open);) {
         kernel_light light = kernel_light_none();
         const kernel_unit_segment run = kernel_unit_segment_part(whole, from, to);
@@ -544,7 +558,7 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, v
         depth += vf_select(put, light.depth, vf_set(0));
         open = vm_andnot(open, vm_and(put, vm_or(vf_eq(to, one), vf_lt(vf_set(KERNEL_DARK_DEPTH), depth))));
         from = vf_select(put, to, from);
-        to = vf_select(cut, middle, vf_select(put, one, to));
+        to = vf_select(cut, middle, vf_select(put, kernel_mixed_end(list->pieces, whole, share, from), to));
     }
 }
 

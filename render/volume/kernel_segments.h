@@ -19,7 +19,7 @@
  * another rank.
  *
  * If several volumes share a ray, or cells overlap, no rank has all segments at a position. With separate_samples
- * (render.h) each segment is emitted at once, cut finely enough for compositing to mix them. */
+ * (render.h) a window's segments are not integrated but emitted, cut finely enough for compositing to mix them. */
 #ifndef RENDER_KERNEL_SEGMENTS_H
 #define RENDER_KERNEL_SEGMENTS_H
 
@@ -111,6 +111,10 @@ static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
             run.length = precise[0];
             run.rest_in = precise[1];
             run.rest_out = precise[2];
+        }
+        if (list->mixing > 0) {
+            kernel_emit_segment(p, list, has, t_in, t_out, &run);
+            continue;
         }
         if (pieces->preintegral)
             light = kernel_preintegrated(pieces, has, &run, &end);

@@ -131,21 +131,23 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *li
     list->active = p->active;
     list->blend = kernel_blend_begin();
     list->t_last = vf_min(p->t_far, vf_set(far));
-    list->t_begin = p->t_near;
     list->cut = f->has_transparent && !f->job->separate_samples ? hits : NULL;
     list->first_fragment = first_fragment;
     kernel_segments_set_double(p, list, f->is_double && !f->job->separate_samples);
 }
 
-/* Prepares the packet for a volume: sets its error limits and its unit distances. */
-SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_segments *list, int volume)
+/* Prepares the packet for a volume: sets its error limits and its unit distances, and begins at the ray's begin. */
+SIMD_INLINE void kernel_ray_segments_of(kernel_packet *p, kernel_segments *list, int volume)
 {
     const kernel_frame *f = p->frame;
+    p->active = list->active;
+    list->t_begin = p->t_near;
     list->per_t = f->volumes[volume].exponent / p->sample_step * p->clip_length_ratio;
     list->volume = volume;
     list->pieces = &f->pieces[volume];
     list->allowance = f->allowance;
     list->mixing = f->job->separate_samples ? f->mixing : 0;
+    list->t_cut = list->mixing > 0 ? p->clip_out : p->t_far;
     list->reach = f->reach[volume];
 }
 
@@ -198,36 +200,17 @@ SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, cons
     s->depth = (vf_reduce_min(least) - begin) * (0.75f * (float)room) / (float)most;
 }
 
-/* Prepares all packets for the volume. Sets the tile's t_near to the least depth at which a ray's window begins; +inf
- * if all rays have ended. */
-SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets, int count,
-                                         int volume, float near)
+/* Integrates a volume's segments, window by window. */
+SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
+                                              int count, int volume, const kernel_placement *reach)
 {
     for (int n = 0; n < count; n++) kernel_ray_segments_of(&t->packets[packets[n]], &s->packets[packets[n]], volume);
-    const float front = kernel_tile_segments_front(t, s, packets, count);
-    t->t_near = front < INFINITY ? fmaxf(front, near) : front;
-}
-
-/* Emits all segments of all volumes as fragments of their own, at once and without windows. */
-static __attribute__((noinline, cold)) void kernel_tile_segments_separate(kernel_tile_trace *t, kernel_tile_segments *s,
-                                                                          const int *packets, int count,
-                                                                          const kernel_placement *reach)
-{
-    for (int volume = 0; volume < t->frame->volume_count; volume++) {
-        kernel_tile_segments_of(t, s, packets, count, volume, reach->near);
-        if (t->t_near < INFINITY) kernel_tile_segments_find(t, s, volume, reach->blocks, INFINITY);
-    }
-}
-
-/* Integrates the segments of the first volume, window by window. */
-SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
-                                              int count, const kernel_placement *reach)
-{
     for (;;) {
-        kernel_tile_segments_of(t, s, packets, count, 0, reach->near);
-        if (!(t->t_near < INFINITY)) break;
+        const float front = kernel_tile_segments_front(t, s, packets, count);
+        if (!(front < INFINITY)) break;
+        t->t_near = fmaxf(front, reach->near);
         const float end = s->depth > 0 ? t->t_near + s->depth : reach->far;
-        kernel_tile_segments_find(t, s, 0, reach->blocks, end);
+        kernel_tile_segments_find(t, s, volume, reach->blocks, end);
         kernel_tile_segments_adapt_window(s, packets, count, t->t_near, fminf(end, reach->far));
         for (int n = 0; n < count; n++) {
             kernel_segments *list = &s->packets[packets[n]];
@@ -254,10 +237,8 @@ static void kernel_tile_segments_trace(kernel_tile_trace *t)
     for (int n = 0; n < count; n++)
         kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, &t->hits[packets[n]],
                                   t->first_fragment);
-    if (t->frame->job->separate_samples)
-        kernel_tile_segments_separate(t, s, packets, count, &reach);
-    else
-        kernel_tile_segments_windows(t, s, packets, count, &reach);
+    for (int volume = 0; volume < t->frame->volume_count; volume++)
+        kernel_tile_segments_windows(t, s, packets, count, volume, &reach);
     for (int n = 0; n < count; n++) {
         kernel_segments *list = &s->packets[packets[n]];
         t->packets[packets[n]].active = list->active;
