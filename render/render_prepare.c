@@ -359,7 +359,7 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
         f->is_double = f->is_double || f->pieces[i].has_rests;
         if (status == INSITU_OK && error_of_each > 0 && !is_apart)
             status = render_preintegral_build(&f->pieces[i], t, error_of_each, (double)f->reach[i], error);
-        if (status == INSITU_OK && (is_apart || (f->allowance > 0 && has_curved_cells(job))))
+        if (status == INSITU_OK && (is_apart || has_curved_cells(job)))
             status = render_variations_build(&f->pieces[i], t, error);
     }
     return status;

@@ -267,7 +267,8 @@ static void verify_tiles(test_mesh_kind kind, int side, bool with_surface, doubl
     fixture_set_camera(&f, CAMERA_OUTSIDE, 61, 47);
     set_segments(&f, 0.02, max_error); /* more parts than a window has room for */
     if (with_surface) fixture_add_surface(&f, &value, 1, 1);
-    /* Beside a transparent surface, which is nowhere here, cells are taken one by one. */
+    /* Beside a transparent surface, which is nowhere here, tets are taken one by one, and rays in other cells are
+     * searched for cuts. */
     fixture_add_surface(&f, &nowhere, 1, 0.5f);
     fixture_draw(&f, &drawn[0]);
     f.job.surface_count--;

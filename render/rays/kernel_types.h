@@ -78,13 +78,6 @@ typedef struct kernel_step {
     float cut;
 } kernel_step;
 
-/* A range of values over which the opacity rises almost like a step. is_narrow: it is so narrow that values near it
- * need the rounding errors of the piece's ends (has_rests). */
-typedef struct kernel_steep {
-    float low, high;
-    bool is_narrow;
-} kernel_steep;
-
 /* A bin of the table of sums for preintegration (kernel_preintegral.h), in integer units. Each array holds the
  * extinction first, then the emission in three channels. The struct is read as rows of four floats. */
 typedef struct kernel_preint_entry {
@@ -124,9 +117,8 @@ typedef struct kernel_pieces {
     /* Set if a ramp of the opacity is so narrow that the rounding of its ends is visible: values near it then use the
      * ends' rounding errors (KERNEL_PIECE_LOW_REST). */
     bool has_rests;
-    int step_count, steep_count;
+    int step_count;
     kernel_step steps[RENDER_MAX_OPACITY_POINTS]; /* steps of the opacity, sorted by value */
-    kernel_steep steep[RENDER_MAX_OPACITY_POINTS];
     /* largest difference between two colours of the function in any channel; black and white count as its colours */
     float contrast;
     kernel_preintegral *preintegral; /* table of sums; NULL if the job allows no error (max_error) */

@@ -56,7 +56,7 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
             else if (kernel_is_linear(c->type))
                 kernel_tet_segments(p, &s->packets[i], c, s->precise, p->active);
             else
-                kernel_curved_segments(p, &s->packets[i], c, map, p->active);
+                kernel_curved_segments(t, i, c, map, p->active, (const vf[2]){p->t_near, s->packets[i].t_cut}, 1);
         }
     }
     kernel_blocks_shorten(t, blocks);
@@ -100,8 +100,7 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
         const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));
         const vm cut = vm_and(met, vm_or(vf_lt(i.t_in, near), vf_lt(far, i.t_out)));
         const vm own = vm_and(vm_andnot(met, cut), vm_and(vf_le(begin, i.t_in), vf_lt(i.t_in, i.t_out)));
-        const vf ends[4] = {i.t_in, i.t_out, i.v_in, i.v_out};
-        if (vm_any(own)) kernel_local_store_segments(s, at, own, ends);
+        if (vm_any(own)) kernel_local_store_segments(s, at, own, i.t_in, i.t_out, i.v_in, i.v_out);
         if (__builtin_expect(vm_any(cut), 0)) kernel_tet_segments_cut(t, s, at, r.lane, vm_bits(cut));
     }
     kernel_blocks_shorten(t, s->blocks);
@@ -179,7 +178,7 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
         }
         kernel_block_set_window_end(t, s->packets, block);
     }
-    kernel_local_segments_begin(t, s, blocks);
+    kernel_local_segments_begin(t, s, blocks, volume);
     kernel_tile_process_window(t, volume, blocks);
 }
 
@@ -225,12 +224,11 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    /* Tets are not processed in lanes if ends are in double, because these are computed per packet. Lanes must not
-     * depend on how many cells the rank has, because segments of tets in packets do not have the same bits. */
-    const bool has_lanes = kernel_segments_use_lanes(t->frame);
-    if (!kernel_tile_cells_begin(t, &kernel_volume_by_segments, has_lanes && !t->frame->is_double,
-                                 has_lanes && t->frame->pieces[0].variations))
-        return;
+    /* Tets are not processed in lanes if ends are in double, because these are computed per packet, nor if transparent
+     * surfaces cut segments, because packets are faster at searching for cuts. Lanes must not depend on how many cells
+     * the rank has, because segments of tets in packets do not have the same bits. */
+    const bool has_cuts = t->frame->has_transparent && !t->frame->job->separate_samples;
+    if (!kernel_tile_cells_begin(t, &kernel_volume_by_segments, !t->frame->is_double && !has_cuts, true)) return;
     const kernel_placement reach = kernel_tile_trees_placement(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);

@@ -328,25 +328,6 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
     }
 }
 
-/* Width of ramps that count as steep, as a share of the domain. Wider ramps need only equal subintervals, up to 1000
- * optical depths (docs/development/error_budget.md). A ramp along a logarithmic scale is steep only within this
- * distance of 0, because its slope is proportional to the inverse of the value. */
-static const double steep_width = 1.0 / 64;
-
-static void fill_steep(kernel_pieces *out, const render_transfer *t)
-{
-    for (int i = 0; i + 1 < t->opacity_count; i++) {
-        const double low = render_domain_of(t, t->opacity_values[i]),
-                     high = render_domain_of(t, t->opacity_values[i + 1]);
-        const bool is_whole = high - low < steep_width, is_even = t->scale == RENDER_LINEAR;
-        const double from = is_whole ? low : fmax(low, -steep_width), to = is_whole ? high : fmin(high, steep_width);
-        if (!(low < high && t->opacities[i] != t->opacities[i + 1])) continue;
-        if (is_even ? !is_whole : !(from < to)) continue;
-        out->steep[out->steep_count++] = (kernel_steep){(float)from, (float)to, is_narrow(t, i)};
-        out->has_rests = out->has_rests || is_narrow(t, i);
-    }
-}
-
 /* Computes the range of light intensities: from 0 to 1, extended to all colours of the table. */
 static void range_of_light(const render_transfer *t, float *low, float *high)
 {
@@ -486,7 +467,7 @@ static void fill(kernel_pieces *out, const render_transfer *t, double tolerance,
     fill_bins(out);
     fill_bounds(out, t);
     fill_steps(out, t);
-    fill_steep(out, t);
+    for (int i = 0; i + 1 < t->opacity_count; i++) out->has_rests = out->has_rests || is_narrow(t, i);
 }
 
 insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error)
