@@ -32,7 +32,7 @@ typedef float kernel_real;
 #define KERNEL_SHORT 2e-6f
 #endif
 
-enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WIDTHS = 29 };
+enum { KERNEL_PIECE_BINS = 256, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WIDTHS = 29 };
 
 /* Entries of a piece: a part of a transfer function on which opacity and colour are linear. At a value x they are
  * entry[..] + (x - low) * slope. 1 - opacity has entries of its own, because near an opacity of 1 the difference would
@@ -105,10 +105,6 @@ typedef struct kernel_pieces {
      * the bin's begin. */
     kernel_real bin_low, bin_inverse;
     kernel_real bin_first[KERNEL_PIECE_BINS];
-    /* Bounds of the function in equal-width bins, which also begin at bin_low; outside the bins the function is
-     * constant. */
-    float bound_inverse;
-    kernel_bound bounds[KERNEL_BOUND_BINS];
     /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS: its row is the
      * range's class of width, its column the equal-width bin in which the range begins; bins begin at bin_low
      * (kernel_light_variation_entry()). */

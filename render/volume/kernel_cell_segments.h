@@ -7,12 +7,12 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_bound.h"
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
 #include "kernel_crossings.h"
 #include "kernel_exact.h"
 #include "kernel_integral.h"
-#include "kernel_visible_values.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
@@ -34,8 +34,8 @@ SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
     return any;
 }
 
-/* Returns the rays on which a part of the interval lies between the two given depths, and computes where that part begins
- * and ends. */
+/* Returns the rays on which a part of the interval lies between the two given depths, and computes where that part
+ * begins and ends. */
 SIMD_INLINE vm kernel_interval_between(const kernel_packet *p, const kernel_interval *i, const vf reach[2], vf *from,
                                        vf *end)
 {
@@ -62,8 +62,8 @@ static __attribute__((noinline)) void kernel_linear_segments(const kernel_packet
     }
 }
 
-/* Bisection of a ray's interval in a cell, for rays on which no number of equal subintervals is enough. At a step of
- * the opacity there is no slope that would bound the effect of a small field error on the light. If a curved field
+/* Bisection of parts of a ray's interval in a cell for which no number of equal segments is accurate enough. At a step
+ * of the opacity there is no slope that would bound the effect of a small field error on the light. If a curved field
  * barely reaches the step, the length beyond the step grows with the square root of the excess: at 800 optical depths a
  * field error of 1e-6 of the function's domain changes such a pixel by a tenth. So all of this is computed in double,
  * from the caller's coordinates and values and the ray's position in the picture, one ray at a time, and identically
@@ -87,7 +87,7 @@ static __attribute__((noinline)) void kernel_linear_segments(const kernel_packet
  * most s' per value, the colour by c', and let R be the colours' contrast. A field error of d on average changes
  * extinction by ds <= s' d, and by at most s1 - s0. Light in the subinterval falls at least as exp(-s0 t), so that R ds
  * is visible over at most min(L, 1 / s0), and s1 dc over min(s1 L, 1) / s1: error <= R ds min(L, 1 / s0) + dc min(s1 L,
- * 1), times T. The error may be 7/8 of the share that equal subintervals have, with a = allowance: T error <= 7/8 a (L
+ * 1), times T. The error may be 7/8 of the share that equal segments have, with a = allowance: T error <= 7/8 a (L
  * / reach + T D / (1 + D)), D = s0 L. The rest is for subintervals at an extremum that touches a step, for which no
  * bisection suffices: a subinterval whose T error, from s1 - s0 alone, is at most 1/32 of a (interval / reach) is left
  * as it is. A cubic has two extrema, and four such subintervals use the remaining eighth. */
@@ -181,20 +181,6 @@ static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, co
 
 /* ---- effect of a subinterval on the light ---- */
 
-/* Return a lower and an upper bound of the extinction -ln(1 - a): the begin of the logarithm's series, and ln(1 + x) <=
- * x (6 + x) / (6 + 4 x) with x = a / (1 - a). */
-static inline double kernel_extinction_least(double a)
-{
-    return a + 0.5 * a * a;
-}
-
-static inline double kernel_extinction_most(double a)
-{
-    if (!(a < 1)) return (double)KERNEL_OPAQUE;
-    const double x = a / (1 - a);
-    return fmin(x * (6 + x) / (6 + 4 * x), (double)KERNEL_OPAQUE);
-}
-
 static inline double kernel_piece_low(const kernel_piece *p)
 {
     return (double)p->entry[KERNEL_PIECE_LOW] + (double)p->entry[KERNEL_PIECE_LOW_REST];
@@ -205,52 +191,17 @@ static inline double kernel_piece_high(const kernel_piece *p)
     return (double)p->entry[KERNEL_PIECE_HIGH] + (double)p->entry[KERNEL_PIECE_HIGH_REST];
 }
 
-/* Widens the bounds by those of a piece between two values. */
-static inline void kernel_bound_widen(kernel_bound *b, const kernel_piece *p, double low, double high)
-{
-    const double from = kernel_piece_low(p), slope = (double)p->entry[KERNEL_PIECE_SLOPE];
-    const double x0 = fmax(low, from), x1 = fmin(high, kernel_piece_high(p));
-    const double a0 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x0 - from) * slope, 1), 0);
-    const double a1 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x1 - from) * slope, 1), 0);
-    const double most = fmax(a0, a1);
-    b->extinction_low = fminf(b->extinction_low, (float)kernel_extinction_least(fmin(a0, a1)));
-    b->extinction_high = fmaxf(b->extinction_high, (float)kernel_extinction_most(most));
-    if (slope != 0)
-        b->extinction_slope =
-            fmaxf(b->extinction_slope, most < 1 ? (float)fmin(fabs(slope) / (1 - most), 1e30) : 1e30f);
-    for (int c = 0; c < 3; c++)
-        b->colour_slope = fmaxf(b->colour_slope, fabsf(p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]));
-}
-
-/* Returns bounds of the transfer function over the values from low to high. Steps of the opacity are not included. */
-static kernel_bound kernel_bound_between(const kernel_pieces *t, float low, float high)
-{
-    const float last = KERNEL_BOUND_BINS - 1;
-    const int from = (int)simd_min(simd_max((low - t->bin_low) * t->bound_inverse, 0), last);
-    const int to = (int)simd_min(simd_max((high - t->bin_low) * t->bound_inverse, 0), last);
-    kernel_bound b = t->bounds[from];
-    for (int i = from + 1; i <= to; i++) {
-        b.extinction_low = simd_min(t->bounds[i].extinction_low, b.extinction_low);
-        b.extinction_high = simd_max(t->bounds[i].extinction_high, b.extinction_high);
-        b.extinction_slope = simd_max(t->bounds[i].extinction_slope, b.extinction_slope);
-        b.colour_slope = simd_max(t->bounds[i].colour_slope, b.colour_slope);
-    }
-    return b;
-}
-
-/* Returns bounds of the transfer function over the values from low to high. If that range covers several bins, the
- * bounds of the bins are used; otherwise those of the pieces. */
+/* Returns bounds of the transfer function over the values from low to high. */
 static kernel_bound kernel_bound_of_values(const kernel_pieces *t, double low, double high)
 {
-    if ((high - low) * (double)t->bound_inverse > 2) return kernel_bound_between(t, (float)low, (float)high);
     const double last = KERNEL_PIECE_BINS - 1;
     kernel_bound out = {.extinction_low = 1e30f};
     int at = (int)t->bin_first[(int)fmin(fmax((low - (double)t->bin_low) * (double)t->bin_inverse, 0), last)];
     while (at > 0 && low < kernel_piece_low(&t->pieces[at])) at--;
     while (at + 1 < t->count && kernel_piece_high(&t->pieces[at]) <= low) at++;
     do {
-        kernel_bound_widen(&out, &t->pieces[at], low, high);
-        at++;
+        const kernel_piece *p = &t->pieces[at++];
+        kernel_bound_widen(&out, p, fmax(low, kernel_piece_low(p)), fmin(high, kernel_piece_high(p)));
     } while (at < t->count && kernel_piece_low(&t->pieces[at]) < high);
     return out;
 }
@@ -306,8 +257,8 @@ static const kernel_step *kernel_step_between(const kernel_bisection *h, double 
     return NULL;
 }
 
-/* Computes the range of float values between two neighbouring steps of the opacity, in which `inside` lies. Pieces end at
- * steps, rounded to float. */
+/* Computes the range of float values between two neighbouring steps of the opacity, in which `inside` lies. Pieces end
+ * at steps, rounded to float. */
 static void kernel_step_side(const kernel_bisection *h, double inside, float side[2])
 {
     const kernel_step *steps = h->list->pieces->steps;
@@ -351,7 +302,7 @@ static kernel_unit_segment kernel_exact_segment(double length, const float v[2],
 }
 
 /* Adds the subinterval as a segment, on its chord. The chord is not raised to the field's mean, as those of equal
- * subintervals are, because it might then reach values that have not been checked. */
+ * segments are, because it might then reach values that have not been checked. */
 static void kernel_subinterval_add_segment(const kernel_bisection *h, vm lane, const kernel_exact_point *from,
                                            const kernel_subinterval *sub)
 {
@@ -497,8 +448,8 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     kernel_segments_add(list, vm_and(mine, vf_lt(vf_set(0), run.length)), i.t_in, i.t_out, &run);
 }
 
-/* Adds the rays' intervals in a cell with quadrilateral faces whose field is constant. The value is computed in double if
- * the list is in double, because narrow ramps magnify its rounding. */
+/* Adds the rays' intervals in a cell with quadrilateral faces whose field is constant. The value is computed in double
+ * if the list is in double, because narrow ramps magnify its rounding. */
 static __attribute__((noinline)) void kernel_constant_segments(const kernel_packet *p, kernel_segments *list,
                                                                const kernel_cell *c, const kernel_interval *i,
                                                                const vf reach[2])
