@@ -334,7 +334,7 @@ static bool has_curved_cells(const render_job *job)
 /* Divides the job's error bound, max_error, among the sources of error (docs/development/error_budget.md). An eighth is
  * allowed for the colour table. Four fifths are allowed for the field, half of them in proportion to length and half in
  * proportion to optical depth. If compositing mixes the segments, only half of these four fifths is allowed for the
- * field, and the other half for the mixing. */
+ * field, and the other half for the mixing; RENDER_MIXING_ERROR is used if the job gives no max_error. */
 static insitu_status prepare_segments(kernel_frame *f, base_error *error)
 {
     const render_job *job = f->job;
@@ -343,9 +343,10 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     f->has_segments = job->integration == RENDER_SEGMENTS && (job->volume_count == 1 || is_apart);
     f->is_double = f->has_segments && job->max_error < double_error;
     if (!f->has_segments) return INSITU_OK;
-    const double error_of_each = job->max_error / job->volume_count;
+    const double max_error = is_apart && !(job->max_error > 0) ? RENDER_MIXING_ERROR : job->max_error;
+    const double error_of_each = max_error / job->volume_count;
     f->allowance = (float)((is_apart ? 0.2 : 0.4) * error_of_each);
-    if (is_apart) f->mixing = (float)(0.4 * (error_of_each > 0 ? error_of_each : RENDER_MIXING_ERROR));
+    if (is_apart) f->mixing = (float)(0.4 * error_of_each);
     /* Whether a rank finds overlaps that lie clearly in front of a surface depends on the partition. So segments that
      * are cut at a surface must give the same result, to 1e-6, whether compositing or a rank cuts them. Segments of
      * several volumes are always cut by compositing. */
@@ -358,9 +359,9 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
         f->is_double = f->is_double || f->pieces[i].has_rests;
         if (status == INSITU_OK && error_of_each > 0 && !is_apart)
             status = render_preintegral_build(&f->pieces[i], t, error_of_each, (double)f->reach[i], error);
+        if (status == INSITU_OK && (is_apart || has_curved_cells(job)))
+            status = render_variations_build(&f->pieces[i], t, error);
     }
-    if (status == INSITU_OK && f->allowance > 0 && has_curved_cells(job))
-        status = render_variations_build(&f->pieces[0], job->volumes[0].transfer, error);
     return status;
 }
 
@@ -390,7 +391,6 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     const bool bins = job->traversal == RENDER_BINNED && !job->pixels;
     frame->is_binned = bins && frame->surface_count;
     /* tracing consumes a tile's list of cells, so the volume must need only one pass over it */
-    frame->bins_volume = bins && job->volume_count == 1 && frame->volume_intervals <= 1 &&
-                         !(frame->has_segments && job->separate_samples);
+    frame->bins_volume = bins && job->volume_count == 1 && frame->volume_intervals <= 1;
     return segments;
 }

@@ -34,7 +34,7 @@ function check_include(path, line, number, room, name, last, quoted, target) {
     name = substr(line, RSTART + 1, RLENGTH - 2)
     last = name
     sub(/.*\//, "", last)
-    if (room ~ /^(base|mmbvh|scene|render|render_face|rays|cells|curved|find|surface|volume)$/ && (name == "mpi.h" || name == "insitu/insitu.h"))
+    if (room ~ /^(base|mmbvh|scene|render|render_face|rays|cells|find|surface|volume)$/ && (name == "mpi.h" || name == "insitu/insitu.h"))
         complain(path ":" number ": " room " knows no MPI, yet includes " name)
     if (room in allowed && room !~ /^(adaptors|adaptor_headers|tools)$/ && name ~ /^(vtk[A-Z]|OpenImageIO\/)/)
         complain(path ":" number ": " room " includes " name ", which belongs behind an adaptor")
@@ -55,10 +55,9 @@ BEGIN {
     allowed["render_face"] = " mmbvh base public "
     allowed["rays"] = " render_face mmbvh base public "
     allowed["cells"] = " rays" allowed["rays"]
-    allowed["curved"] = " cells" allowed["cells"]
     allowed["find"] = " cells" allowed["cells"]
     allowed["surface"] = " find" allowed["find"]
-    allowed["volume"] = " curved find" allowed["find"]
+    allowed["volume"] = " find" allowed["find"]
     allowed["render"] = " surface volume find" allowed["find"]
     allowed["compositing"] = " base public "
     allowed["scene"] = " render base public "

@@ -274,7 +274,8 @@ static void verify_tiles(test_mesh_kind kind, int side, bool with_surface, doubl
     fixture_set_camera(&f, CAMERA_OUTSIDE, 61, 47);
     set_segments(&f, 0.02, max_error); /* more parts than a window can store */
     if (with_surface) fixture_add_surface(&f, &value, 1, 1);
-    /* Next to a transparent surface, which is invisible here, cells are traced one by one. */
+    /* Next to a transparent surface, which is invisible here, tets are traced one by one, and rays in other cells are
+     * searched for cuts. */
     fixture_add_surface(&f, &nowhere, 1, 0.5f);
     fixture_draw(&f, &drawn[0]);
     f.job.surface_count--;

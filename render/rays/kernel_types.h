@@ -32,7 +32,7 @@ typedef float kernel_real;
 #define KERNEL_SHORT 2e-6f
 #endif
 
-enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WIDTHS = 29 };
+enum { KERNEL_PIECE_BINS = 256, KERNEL_VARIATION_BINS = 128, KERNEL_VARIATION_WIDTHS = 29 };
 
 /* Entries of a piece: a part of a transfer function on which opacity and colour are linear. At a value x they are
  * entry[..] + (x - low) * slope. 1 - opacity has entries of its own, because near an opacity of 1 the difference would
@@ -78,13 +78,6 @@ typedef struct kernel_step {
     float cut;
 } kernel_step;
 
-/* A range of values over which the opacity rises almost like a step. is_narrow: it is so narrow that values near it
- * need the rounding errors of the piece's ends (has_rests). */
-typedef struct kernel_steep {
-    float low, high;
-    bool is_narrow;
-} kernel_steep;
-
 /* A bin of the table of sums for preintegration (kernel_preintegral.h), in integer units. Each array holds the
  * extinction first, then the emission in three channels. The struct is read as rows of four floats. */
 typedef struct kernel_preint_entry {
@@ -112,10 +105,6 @@ typedef struct kernel_pieces {
      * the bin's begin. */
     kernel_real bin_low, bin_inverse;
     kernel_real bin_first[KERNEL_PIECE_BINS];
-    /* Bounds of the function in equal-width bins, which also begin at bin_low; outside the bins the function is
-     * constant. */
-    float bound_inverse;
-    kernel_bound bounds[KERNEL_BOUND_BINS];
     /* Bounds over ranges of values, in a table of KERNEL_VARIATION_WIDTHS × KERNEL_VARIATION_BINS: its row is the
      * range's class of width, its column the equal-width bin in which the range begins; bins begin at bin_low
      * (kernel_light_variation_entry()). */
@@ -124,9 +113,8 @@ typedef struct kernel_pieces {
     /* Set if a ramp of the opacity is so narrow that the rounding of its ends is visible: values near it then use the
      * ends' rounding errors (KERNEL_PIECE_LOW_REST). */
     bool has_rests;
-    int step_count, steep_count;
+    int step_count;
     kernel_step steps[RENDER_MAX_OPACITY_POINTS]; /* steps of the opacity, sorted by value */
-    kernel_steep steep[RENDER_MAX_OPACITY_POINTS];
     /* largest difference between two colours of the function in any channel; black and white count as its colours */
     float contrast;
     kernel_preintegral *preintegral; /* table of sums; NULL if the job allows no error (max_error) */

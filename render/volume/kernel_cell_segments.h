@@ -1,4 +1,5 @@
-/* Divides the interval of each ray in a cell, between surfaces, into segments (kernel_segments.h). */
+/* Segments of the rays' intervals in cells (kernel_segments.h): those on which the field is linear, in tets, polyhedra
+ * and constant cells, which only surfaces cut; and bisection in cells with a map. */
 #ifndef RENDER_KERNEL_CELL_SEGMENTS_H
 #define RENDER_KERNEL_CELL_SEGMENTS_H
 
@@ -6,12 +7,12 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_bound.h"
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
 #include "kernel_crossings.h"
 #include "kernel_exact.h"
 #include "kernel_integral.h"
-#include "kernel_visible_values.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
@@ -22,8 +23,47 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* Bisection of a ray's interval in a cell, for rays on which no number of equal subintervals is enough. At a step of
- * the opacity there is no slope that would bound the effect of a small field error on the light. If a curved field
+/* Returns whether the opacity has a step among each ray's values from low to high. */
+SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, vf low, vf high)
+{
+    vm any = vm_none();
+    for (int i = 0; i < t->step_count; i++) {
+        const vf cut = vf_set(t->steps[i].cut);
+        any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
+    }
+    return any;
+}
+
+/* Returns the rays on which a part of the interval lies between the two given depths, and computes where that part
+ * begins and ends. */
+SIMD_INLINE vm kernel_interval_between(const kernel_packet *p, const kernel_interval *i, const vf reach[2], vf *from,
+                                       vf *end)
+{
+    *from = vf_max(i->t_in, reach[0]);
+    *end = vf_min(i->t_out, reach[1]);
+    return vm_and(i->mask, vm_and(p->active, vm_and(vf_lt(*from, *end), vf_lt(*from, p->t_far))));
+}
+
+/* Cuts an interval on which the field is linear at transparent surfaces, and adds the parts that begin in the window.
+ * whole: the interval as a segment; reach: the depths between which segments are added. */
+static __attribute__((noinline)) void kernel_linear_segments(const kernel_packet *p, kernel_segments *list,
+                                                             const kernel_interval *i, const vf reach[2],
+                                                             const kernel_unit_segment *whole)
+{
+    vf from, end;
+    vm open = kernel_interval_between(p, i, reach, &from, &end);
+    while (vm_any(open)) {
+        const vf to = vf_min(end, kernel_next_cut(p, list, from, true));
+        const kernel_unit_segment part =
+            kernel_unit_segment_part(whole, kernel_interval_fraction(i, from), kernel_interval_fraction(i, to));
+        kernel_segments_add(list, vm_and(open, vf_le(list->t_begin, from)), from, to, &part);
+        from = to;
+        open = vm_and(open, vf_lt(from, end));
+    }
+}
+
+/* Bisection of parts of a ray's interval in a cell for which no number of equal segments is accurate enough. At a step
+ * of the opacity there is no slope that would bound the effect of a small field error on the light. If a curved field
  * barely reaches the step, the length beyond the step grows with the square root of the excess: at 800 optical depths a
  * field error of 1e-6 of the function's domain changes such a pixel by a tenth. So all of this is computed in double,
  * from the caller's coordinates and values and the ray's position in the picture, one ray at a time, and identically
@@ -47,7 +87,7 @@
  * most s' per value, the colour by c', and let R be the colours' contrast. A field error of d on average changes
  * extinction by ds <= s' d, and by at most s1 - s0. Light in the subinterval falls at least as exp(-s0 t), so that R ds
  * is visible over at most min(L, 1 / s0), and s1 dc over min(s1 L, 1) / s1: error <= R ds min(L, 1 / s0) + dc min(s1 L,
- * 1), times T. The error may be 7/8 of the share that equal subintervals have, with a = allowance: T error <= 7/8 a (L
+ * 1), times T. The error may be 7/8 of the share that equal segments have, with a = allowance: T error <= 7/8 a (L
  * / reach + T D / (1 + D)), D = s0 L. The rest is for subintervals at an extremum that touches a step, for which no
  * bisection suffices: a subinterval whose T error, from s1 - s0 alone, is at most 1/32 of a (interval / reach) is left
  * as it is. A cubic has two extrema, and four such subintervals use the remaining eighth. */
@@ -67,8 +107,7 @@ typedef struct kernel_exact_point {
 /* State of the bisection of a ray's interval in a cell. */
 typedef struct kernel_bisection {
     kernel_segments *list;
-    const kernel_cell_interval *cell_interval;
-    const kernel_exact_map *map; /* inverse map of the cell; NULL if the field is linear between the interval's ends */
+    const kernel_exact_map *map; /* inverse map of the cell */
     /* constants of the ray: at depth t its point is (u, v) * (slope * t + depth_offset) */
     double u, v, slope, depth_offset;
     kernel_exact_point in, out; /* ends of the interval, at the crossings of the faces */
@@ -86,9 +125,7 @@ static inline double kernel_interpolate(double from, double to, double share)
 /* Computes the ray's point at depth t, as kernel_value_at() does: by Newton's method from the initial guess `guess`. */
 static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, double t, const double guess[3])
 {
-    const double whole = h->out.t - h->in.t, share = whole > 0 ? (t - h->in.t) / whole : 0;
-    kernel_exact_point out = {.t = t, .v = kernel_interpolate(h->in.v, h->out.v, share)};
-    if (!h->map) return out;
+    kernel_exact_point out = {.t = t};
     const double reach = h->slope * t + h->depth_offset, target[3] = {h->u * reach, h->v * reach, t};
     double slopes[3];
     memcpy(out.r, guess, sizeof out.r);
@@ -96,7 +133,9 @@ static kernel_exact_point kernel_exact_point_at(const kernel_bisection *h, doubl
         out.r[0] = out.r[1] = 0.4;
         out.r[2] = 0.5;
         if (!kernel_exact_newton(h->map, target, out.r) || !kernel_exact_is_near(out.r)) {
+            const double share = (t - h->in.t) / (h->out.t - h->in.t);
             for (int a = 0; a < 3; a++) out.r[a] = kernel_interpolate(h->in.r[a], h->out.r[a], share);
+            out.v = kernel_interpolate(h->in.v, h->out.v, share);
             ++*h->map_failures;
             return out;
         }
@@ -142,20 +181,6 @@ static kernel_exact_point kernel_exact_point_where(const kernel_bisection *h, co
 
 /* ---- effect of a subinterval on the light ---- */
 
-/* Return a lower and an upper bound of the extinction -ln(1 - a): the begin of the logarithm's series, and ln(1 + x) <=
- * x (6 + x) / (6 + 4 x) with x = a / (1 - a). */
-static inline double kernel_extinction_least(double a)
-{
-    return a + 0.5 * a * a;
-}
-
-static inline double kernel_extinction_most(double a)
-{
-    if (!(a < 1)) return (double)KERNEL_OPAQUE;
-    const double x = a / (1 - a);
-    return fmin(x * (6 + x) / (6 + 4 * x), (double)KERNEL_OPAQUE);
-}
-
 static inline double kernel_piece_low(const kernel_piece *p)
 {
     return (double)p->entry[KERNEL_PIECE_LOW] + (double)p->entry[KERNEL_PIECE_LOW_REST];
@@ -166,36 +191,17 @@ static inline double kernel_piece_high(const kernel_piece *p)
     return (double)p->entry[KERNEL_PIECE_HIGH] + (double)p->entry[KERNEL_PIECE_HIGH_REST];
 }
 
-/* Widens the bounds by those of a piece between two values. */
-static inline void kernel_bound_widen(kernel_bound *b, const kernel_piece *p, double low, double high)
-{
-    const double from = kernel_piece_low(p), slope = (double)p->entry[KERNEL_PIECE_SLOPE];
-    const double x0 = fmax(low, from), x1 = fmin(high, kernel_piece_high(p));
-    const double a0 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x0 - from) * slope, 1), 0);
-    const double a1 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x1 - from) * slope, 1), 0);
-    const double most = fmax(a0, a1);
-    b->extinction_low = fminf(b->extinction_low, (float)kernel_extinction_least(fmin(a0, a1)));
-    b->extinction_high = fmaxf(b->extinction_high, (float)kernel_extinction_most(most));
-    if (slope != 0)
-        b->extinction_slope =
-            fmaxf(b->extinction_slope, most < 1 ? (float)fmin(fabs(slope) / (1 - most), 1e30) : 1e30f);
-    for (int c = 0; c < 3; c++)
-        b->colour_slope = fmaxf(b->colour_slope, fabsf(p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]));
-}
-
-/* Returns bounds of the transfer function over the values from low to high. If that range covers several bins, the
- * bounds of the bins are used; otherwise those of the pieces. */
+/* Returns bounds of the transfer function over the values from low to high. */
 static kernel_bound kernel_bound_of_values(const kernel_pieces *t, double low, double high)
 {
-    if ((high - low) * (double)t->bound_inverse > 2) return kernel_bound_between(t, (float)low, (float)high);
     const double last = KERNEL_PIECE_BINS - 1;
     kernel_bound out = {.extinction_low = 1e30f};
     int at = (int)t->bin_first[(int)fmin(fmax((low - (double)t->bin_low) * (double)t->bin_inverse, 0), last)];
     while (at > 0 && low < kernel_piece_low(&t->pieces[at])) at--;
     while (at + 1 < t->count && kernel_piece_high(&t->pieces[at]) <= low) at++;
     do {
-        kernel_bound_widen(&out, &t->pieces[at], low, high);
-        at++;
+        const kernel_piece *p = &t->pieces[at++];
+        kernel_bound_widen(&out, p, fmax(low, kernel_piece_low(p)), fmin(high, kernel_piece_high(p)));
     } while (at < t->count && kernel_piece_low(&t->pieces[at]) < high);
     return out;
 }
@@ -211,15 +217,12 @@ typedef struct kernel_subinterval {
 
 /* Computes the subinterval's deviation from its chord, and the range of its values, from the field at its middle and
  * quarters. */
-static void kernel_subinterval_sample(const kernel_bisection *h, const kernel_exact_point *from,
-                                      kernel_subinterval *sub, const kernel_exact_point *first,
-                                      const kernel_exact_point *third)
+static void kernel_subinterval_sample(const kernel_exact_point *from, kernel_subinterval *sub,
+                                      const kernel_exact_point *first, const kernel_exact_point *third)
 {
     const double a = from->v, b = sub->end.v, rise = b - a;
-    sub->deviation = 0;
     sub->low = fmin(a, b);
     sub->high = fmax(a, b);
-    if (!h->map) return;
     sub->deviation = fmax(fmax(fabs(a + 0.25 * rise - first->v), fabs(a + 0.75 * rise - third->v)),
                           fabs(a + 0.5 * rise - sub->middle.v));
     sub->is_monotone = sub->is_monotone || fabs(rise) >= 12 * sub->deviation;
@@ -248,47 +251,44 @@ static double kernel_subinterval_error(const kernel_bisection *h, const kernel_s
 /* Returns a step of the opacity whose value is strictly between low and high, or NULL if there is none. */
 static const kernel_step *kernel_step_between(const kernel_bisection *h, double low, double high)
 {
-    const kernel_step *steps = h->list->pieces->steps + h->cell_interval->first_step;
-    for (int i = 0; i < h->cell_interval->step_count; i++)
+    const kernel_step *steps = h->list->pieces->steps;
+    for (int i = 0; i < h->list->pieces->step_count; i++)
         if (low < steps[i].at && steps[i].at < high) return &steps[i];
     return NULL;
 }
 
-/* The range of float values between two neighbouring steps of the opacity. Pieces end at steps, rounded to float. */
-typedef struct kernel_side_values {
-    float low, high;
-} kernel_side_values;
-
-static kernel_side_values kernel_step_side(const kernel_bisection *h, double inside)
+/* Computes the range of float values between two neighbouring steps of the opacity, in which `inside` lies. Pieces end
+ * at steps, rounded to float. */
+static void kernel_step_side(const kernel_bisection *h, double inside, float side[2])
 {
     const kernel_step *steps = h->list->pieces->steps;
-    kernel_side_values out = {-3e38f, 3e38f};
     int n = 0;
-    for (; n < h->list->pieces->step_count && steps[n].at <= inside; n++) out.low = steps[n].cut;
+    side[0] = -3e38f, side[1] = 3e38f;
+    for (; n < h->list->pieces->step_count && steps[n].at <= inside; n++) side[0] = steps[n].cut;
     /* a segment whose constant value is a step's value lies above the step; rounding must not move other segments
      * there */
-    if (n < h->list->pieces->step_count) out.high = nextafterf(steps[n].cut, out.low);
-    return out;
+    if (n < h->list->pieces->step_count) side[1] = nextafterf(steps[n].cut, side[0]);
 }
 
 /* Rounds x to float and clamps it to the range between two neighbouring steps; *rest: the rounding error. */
-static void kernel_step_round(const kernel_side_values *side, double x, float *v, double *rest)
+static void kernel_step_round(const float side[2], double x, float *v, double *rest)
 {
-    const double active = fmax(fmin(x, (double)side->high), (double)side->low);
+    const double active = fmax(fmin(x, (double)side[1]), (double)side[0]);
     *v = (float)active;
-    *rest = side->low < *v && *v < side->high ? active - (double)*v : 0;
+    *rest = side[0] < *v && *v < side[1] ? active - (double)*v : 0;
 }
 
 /* Returns bounds of the transfer function over the subinterval's values. step: a step among the values, or NULL. */
 static kernel_bound kernel_subinterval_bound(const kernel_bisection *h, const kernel_subinterval *sub,
                                              const kernel_step *step)
 {
-    const kernel_side_values side = kernel_step_side(h, sub->middle.v);
+    float side[2];
+    kernel_step_side(h, sub->middle.v, side);
     if (step)
         return kernel_bound_of_values(h->list->pieces, fmin(sub->low, (double)nextafterf(step->cut, -3e38f)),
                                       fmax(sub->high, (double)nextafterf(step->cut, 3e38f)));
-    const double low = fmin(fmax(sub->low, (double)side.low), (double)side.high);
-    const double high = fmin(fmax(sub->high, (double)side.low), (double)side.high);
+    const double low = fmin(fmax(sub->low, (double)side[0]), (double)side[1]);
+    const double high = fmin(fmax(sub->high, (double)side[0]), (double)side[1]);
     return kernel_bound_of_values(h->list->pieces, low, high);
 }
 
@@ -301,49 +301,17 @@ static kernel_unit_segment kernel_exact_segment(double length, const float v[2],
                                  vf_set((float)rest[1])};
 }
 
-/* Emits the subinterval as `subdivisions` equal segments. */
-static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane,
-                                    const kernel_exact_point *from, const kernel_exact_point *to,
-                                    const double values[2], double subdivisions)
-{
-    float begin = (float)from->t;
-    for (int n = 1; n <= (int)subdivisions; n++) {
-        const double before = (n - 1) / subdivisions, after = n / subdivisions;
-        const float end = n < (int)subdivisions ? (float)kernel_interpolate(from->t, to->t, after) : (float)to->t;
-        const double x[2] = {kernel_interpolate(values[0], values[1], before),
-                             kernel_interpolate(values[0], values[1], after)};
-        const float v[2] = {(float)x[0], (float)x[1]};
-        const double rest[2] = {x[0] - (double)v[0], x[1] - (double)v[1]};
-        const kernel_unit_segment run = kernel_exact_segment((to->t - from->t) / subdivisions * h->per_t, v, rest);
-        if (begin < end) kernel_emit_segment(p, h->list, lane, vf_set(begin), vf_set(end), &run);
-        begin = end;
-    }
-}
-
-/* Adds the subinterval's segments, on its chord. They are not raised to the field's mean, as equal subintervals are,
- * because they might then reach values that have not been checked. */
-static void kernel_subinterval_add_segments(kernel_packet *p, const kernel_bisection *h, vm lane,
-                                            const kernel_exact_point *from, const kernel_subinterval *sub,
-                                            const kernel_bound *s)
+/* Adds the subinterval as a segment, on its chord. The chord is not raised to the field's mean, as those of equal
+ * segments are, because it might then reach values that have not been checked. */
+static void kernel_subinterval_add_segment(const kernel_bisection *h, vm lane, const kernel_exact_point *from,
+                                           const kernel_subinterval *sub)
 {
     const bool is_cut = kernel_step_between(h, sub->low, sub->high) != NULL;
     const double x[2] = {from->v, sub->end.v}, length = (sub->end.t - from->t) * h->per_t;
     double rest[2] = {0, 0};
-    float v[2] = {(float)x[0], (float)x[1]};
-    const kernel_side_values side = kernel_step_side(h, sub->middle.v);
-    for (int i = 0; i < 2 && !is_cut; i++) kernel_step_round(&side, x[i], &v[i], &rest[i]);
-    if (h->list->mixing > 0) {
-        const double contrast = (double)h->list->pieces->contrast, change = sub->high - sub->low;
-        const double most = (double)s->extinction_high, least = (double)s->extinction_low;
-        const double moved = 0.25 * length *
-                             (contrast * fmin(change * (double)s->extinction_slope, most - least) +
-                              most * fmin(change * (double)s->colour_slope, contrast));
-        const double subdivisions =
-            sqrt(fmin(moved / (double)h->list->mixing, KERNEL_MAX_SUBDIVISIONS * KERNEL_MAX_SUBDIVISIONS));
-        const double sums[2] = {(double)v[0] + rest[0], (double)v[1] + rest[1]};
-        kernel_subinterval_emit(p, h, lane, from, &sub->end, sums, fmax(ceil(subdivisions), 1));
-        return;
-    }
+    float v[2] = {(float)x[0], (float)x[1]}, side[2];
+    kernel_step_side(h, sub->middle.v, side);
+    for (int i = 0; i < 2 && !is_cut; i++) kernel_step_round(side, x[i], &v[i], &rest[i]);
     const float t0 = (float)from->t, t1 = (float)sub->end.t;
     const kernel_unit_segment run = kernel_exact_segment(length, v, rest);
     if (h->list->is_double || t0 < t1) kernel_segments_add(h->list, lane, vf_set(t0), vf_set(t1), &run);
@@ -354,8 +322,8 @@ static void kernel_subinterval_add_segments(kernel_packet *p, const kernel_bisec
 static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_subinterval *sub, const kernel_bound *s,
                                        double length, bool is_cut)
 {
-    const double reach = (double)h->list->reach, depth = (double)s->extinction_low * length;
-    const double a = (double)(h->list->allowance > 0 ? h->list->allowance : h->list->mixing);
+    const double reach = (double)h->list->reach, a = (double)h->list->allowance;
+    const double depth = (double)s->extinction_low * length;
     double all;
     const double error = kernel_subinterval_error(h, sub, s, length, &all);
     if (!is_cut && h->light * error <= 0.875 * a * (length / reach + h->light * depth / (1 + depth))) return true;
@@ -363,8 +331,7 @@ static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_s
 }
 
 /* Divides an interval, whose ends and middle are known, into subintervals by bisection, and adds their segments. */
-static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_exact_point from,
-                                     kernel_subinterval whole)
+static void kernel_subinterval_halve(kernel_bisection *h, int lane, kernel_exact_point from, kernel_subinterval whole)
 {
     const kernel_segments *list = h->list;
     const vm only = vm_from_bits(1u << lane);
@@ -375,14 +342,14 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
         kernel_subinterval sub = stack[--count];
         const kernel_exact_point first = kernel_exact_point_between(h, &from, &sub.middle, 0.5);
         const kernel_exact_point third = kernel_exact_point_between(h, &sub.middle, &sub.end, 0.5);
-        kernel_subinterval_sample(h, &from, &sub, &first, &third);
+        kernel_subinterval_sample(&from, &sub, &first, &third);
         const kernel_step *step = kernel_step_between(h, sub.low, sub.high);
         const kernel_bound s = kernel_subinterval_bound(h, &sub, step);
         const double length = (sub.end.t - from.t) * h->per_t;
         const bool is_last = sub.depth >= KERNEL_BISECTION_DEPTH || h->count >= KERNEL_BISECTION_SEGMENTS ||
                              count + 2 > KERNEL_BISECTION_ROOM;
         if (is_last || kernel_subinterval_is_good(h, &sub, &s, length, step != NULL)) {
-            if (list->t_begin[lane] <= (float)from.t) kernel_subinterval_add_segments(p, h, only, &from, &sub, &s);
+            if (list->t_begin[lane] <= (float)from.t) kernel_subinterval_add_segment(h, only, &from, &sub);
             const double depth = (double)s.extinction_low * length;
             h->light /= 1 + depth * (1 + 0.5 * depth);
             h->count++;
@@ -401,24 +368,22 @@ static void kernel_subinterval_halve(kernel_packet *p, kernel_bisection *h, int 
     }
 }
 
-/* Adds the segments of the rays' intervals from t0 to t1 by bisection; only those that begin in the window are kept. */
-static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_packet *p, kernel_segments *list,
-                                                                        const kernel_cell_interval *cell_interval,
-                                                                        vm rays, vf t0, vf t1)
+/* Adds the segments of the rays' intervals from t0 to t1 by bisection; only those that begin in the window are kept. i:
+ * the rays' intervals in the whole cell. */
+static __attribute__((noinline, cold)) void kernel_interval_bisect(kernel_packet *p, kernel_segments *list,
+                                                                   const kernel_cell *c, const kernel_interval *i,
+                                                                   vm rays, vf t0, vf t1)
 {
-    const kernel_interval *i = cell_interval->interval;
     const kernel_frame *f = p->frame;
     const bool is_flat = f->job->camera.is_orthographic;
     kernel_exact_map map;
     kernel_lanes at;
     kernel_packet_lanes(p, &at);
-    const kernel_transfer *transfer = &f->volumes[list->volume];
-    if (cell_interval->map) kernel_exact_setup(&map, p, cell_interval->cell, transfer);
+    kernel_exact_setup(&map, p, c, &f->volumes[list->volume]);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int n = __builtin_ctz(bits);
         kernel_bisection h = {.list = list,
-                              .cell_interval = cell_interval,
-                              .map = cell_interval->map ? &map : NULL,
+                              .map = &map,
                               .u = at.px[n] - p->tile->centre_x,
                               .v = at.py[n] - p->tile->centre_y,
                               .slope = is_flat ? 0 : 1,
@@ -429,12 +394,10 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
                               .length = (double)((t1[n] - t0[n]) * list->per_t[n]),
                               .light = 1,
                               .map_failures = &p->thread->map_failures};
-        for (int a = 0; a < 3 && cell_interval->map; a++) {
+        for (int a = 0; a < 3; a++) {
             h.in.r[a] = (double)i->r_in[a][n];
             h.out.r[a] = (double)i->r_out[a][n];
         }
-        if (!cell_interval->map && cell_interval->cell)
-            h.in.v = h.out.v = kernel_double_domain(transfer, cell_interval->cell->values[0]);
         const double whole = h.out.t - h.in.t;
         if (!(whole > 0)) continue;
         const double a = ((double)t0[n] - h.in.t) / whole, b = ((double)t1[n] - h.in.t) / whole;
@@ -444,117 +407,11 @@ static __attribute__((noinline, cold)) void kernel_cell_interval_bisect(kernel_p
         begin.t = (double)t0[n];
         sub.end.t = (double)t1[n];
         sub.middle = kernel_exact_point_between(&h, &from, &sub.end, 0.5);
-        sub.is_monotone = !cell_interval->map;
-        kernel_subinterval_halve(p, &h, n, begin, sub);
+        kernel_subinterval_halve(&h, n, begin, sub);
     }
 }
 
-/* ---- a cell's segments ---- */
-
-/* The state while an interval's equal subintervals are processed in order: the field at three consecutive ends. */
-typedef struct kernel_parts {
-    vf t0, t1, cell_interval, count;
-    vf last;     /* field at the interval's end t1 */
-    vf from, to; /* depths of the current subinterval's ends */
-    /* field at the begin and the end of the current subinterval, and at the end of the next one */
-    vf before, after, ahead;
-    vf bend, next_bend; /* second differences of the field at the begin and the end of the current subinterval */
-} kernel_parts;
-
-/* Returns t at the n-th boundary between subintervals, and stores the field there in *value. */
-SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_cell_interval *cell_interval, const kernel_parts *s,
-                                vm rays, int n, vf *value)
-{
-    const vm inner = vm_and(rays, vf_lt(vf_set((float)n), s->count));
-    const vf t = vf_select(inner, s->t0 + s->cell_interval * (float)n, s->t1);
-    *value = s->last;
-    if (vm_any(inner)) *value = vf_select(inner, kernel_cell_interval_value(p, cell_interval, inner, t), s->last);
-    return t;
-}
-
-/* Returns by how much a subinterval's chord must be raised so that its mean equals the field's mean. For a parabola
- * that is a twelfth of the second difference, which is estimated from the adjacent subintervals. A single subinterval
- * is not raised. */
-SIMD_INLINE vf kernel_parts_chord_offset(const kernel_parts *s, vm is_first, vm is_last)
-{
-    const vf zero = vf_set(0), both = 0.5f * (s->bend + s->next_bend);
-    const vf bend = vf_select(is_first, vf_select(is_last, zero, s->next_bend), vf_select(is_last, s->bend, both));
-    return bend * (-1.0f / 12);
-}
-
-/* Adds a tet's interval from t0 to t1 as one segment, computed in double, if it begins in the window. */
-SIMD_INLINE void kernel_cell_interval_double(kernel_segments *list, const kernel_cell_interval *cell_interval, vm rays,
-                                             vf t0, vf t1)
-{
-    const kernel_interval *i = cell_interval->interval;
-    const kernel_unit_segment run = kernel_unit_segment_part(cell_interval->precise, kernel_interval_fraction(i, t0),
-                                                             kernel_interval_fraction(i, t1));
-    const vm mine = vm_and(vf_le(list->t_begin, t0), vf_lt(t0, list->t_end));
-    kernel_segments_add(list, vm_and(rays, mine), t0, t1, &run);
-}
-
-/* Adds the segments of the interval from t0 to t1 that begin in the window. */
-SIMD_INLINE void kernel_cell_interval_segments(kernel_packet *p, kernel_segments *list,
-                                               const kernel_cell_interval *cell_interval, vm rays, vf t0, vf t1)
-{
-    kernel_parts s = {.t0 = t0, .t1 = t1, .from = t0};
-    if (cell_interval->precise) {
-        kernel_cell_interval_double(list, cell_interval, rays, t0, t1);
-        return;
-    }
-    s.before = kernel_cell_interval_value(p, cell_interval, rays, t0);
-    s.last = kernel_cell_interval_value(p, cell_interval, rays, t1);
-    vm halved;
-    const kernel_interval stretch = {.t_in = t0, .t_out = t1, .v_in = s.before, .v_out = s.last};
-    s.count = kernel_cell_interval_subdivisions(p, list, cell_interval, rays, &stretch, &halved);
-    if (__builtin_expect(vm_any(halved), 0)) {
-        kernel_cell_interval_bisect(p, list, cell_interval, halved, t0, t1);
-        rays = vm_andnot(rays, halved);
-        if (!vm_any(rays)) return;
-    }
-    s.cell_interval = (t1 - t0) / s.count;
-    s.to = kernel_parts_end(p, cell_interval, &s, rays, 1, &s.after);
-    s.bend = vf_set(0);
-    vm open = rays;
-    for (int n = 1; vm_any(open); n++) {
-        const vm inner = vm_and(open, vf_lt(vf_set((float)n), s.count));
-        const vf next = kernel_parts_end(p, cell_interval, &s, inner, n + 1, &s.ahead);
-        s.next_bend = (s.before - s.after) + (s.ahead - s.after);
-        const vf lift = kernel_parts_chord_offset(&s, n == 1 ? rays : vm_none(), vm_not(inner));
-        const vm mine = vm_and(vf_le(list->t_begin, s.from), vf_lt(s.from, list->t_end));
-        const kernel_unit_segment run =
-            kernel_unit_segment_of((s.to - s.from) * list->per_t, s.before + lift, s.after + lift);
-        if (!(list->mixing > 0))
-            kernel_segments_add(list, vm_and(open, mine), s.from, s.to, &run);
-        else if (vm_any(vm_and(open, mine)))
-            kernel_emit_segment(p, list, vm_and(open, mine), s.from, s.to, &run);
-        s.from = s.to;
-        s.to = next;
-        s.before = s.after;
-        s.after = s.ahead;
-        s.bend = s.next_bend;
-        open = vm_and(inner, vf_lt(s.from, list->t_end));
-    }
-}
-
-/* Divides the interval at surfaces, and adds the segments of its parts that begin in the window. */
-static __attribute__((noinline)) void kernel_cell_interval_integrate(kernel_packet *p, kernel_segments *list,
-                                                                     const kernel_cell_interval *cell_interval)
-{
-    const kernel_interval *i = cell_interval->interval;
-    vf from = vf_max(i->t_in, p->t_near);
-    /* segments that compositing mixes with other volumes are not cut at this rank's surfaces, so that they are the same
-     * on any partition */
-    const vf end = vf_min(i->t_out, list->mixing > 0 ? p->clip_out : p->t_far);
-    vm open = vm_and(i->mask, vm_and(p->active, vm_and(vf_lt(from, end), vf_lt(from, p->t_far))));
-    while (vm_any(open)) {
-        const vf to = vf_min(end, kernel_next_cut(p, list, from, true));
-        const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
-        if (vm_any(mine)) kernel_cell_interval_segments(p, list, cell_interval, mine, from, to);
-        from = to;
-        open = vm_and(open, vf_lt(from, end));
-    }
-}
+/* ---- cells in which the field is linear ---- */
 
 /* Returns a tet's interval as a segment, computed in double if the list is in double. */
 SIMD_INLINE kernel_unit_segment kernel_tet_segment(const kernel_packet *p, const kernel_segments *list,
@@ -562,26 +419,9 @@ SIMD_INLINE kernel_unit_segment kernel_tet_segment(const kernel_packet *p, const
                                                    const kernel_interval *i)
 {
     kernel_unit_segment run = kernel_unit_segment_of(i->t_out - i->t_in, i->v_in, i->v_out);
-    if (list->is_double) kernel_tet_double(p, c, faces, &list->rays, i->mask, &run);
+    if (list->is_double) kernel_tet_double(p, c, faces, list->u, list->v, i->mask, &run);
     run.length *= list->per_t;
     return run;
-}
-
-/* Adds a tet's segments on rays whose interval is cut by surfaces, or whose segments must be mixed with other
- * volumes. */
-static __attribute__((noinline)) void kernel_tet_segments_general(kernel_packet *p, kernel_segments *list,
-                                                                  const kernel_cell *c,
-                                                                  const kernel_double_face faces[4], kernel_interval i)
-{
-    kernel_cell_interval cell_interval = {.interval = &i};
-    kernel_unit_segment precise;
-    if (list->mixing > 0) {
-        kernel_cell_interval_bound(list, c->f, c->count, &cell_interval);
-    } else if (list->is_double) {
-        precise = kernel_tet_segment(p, list, c, faces, &i);
-        cell_interval.precise = &precise;
-    }
-    kernel_cell_interval_integrate(p, list, &cell_interval);
 }
 
 /* Adds a tet's interval as one segment, which only surfaces cut. faces: the tet's faces in double; read only if the
@@ -592,36 +432,33 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     kernel_interval i;
     kernel_tet_interval(p, c, rays, false, &i);
     if (!vm_any(i.mask)) return;
-    const vm hit = i.mask;
-    vm cut = vm_or(vf_lt(i.t_in, p->t_near), vf_lt(p->t_far, i.t_out));
+    vm cut = vm_or(vf_lt(i.t_in, p->t_near), vf_lt(list->t_cut, i.t_out));
     if (list->cut) cut = vm_or(cut, vf_lt(kernel_next_cut(p, list, i.t_in, true), i.t_out));
-    cut = list->mixing > 0 ? hit : vm_and(hit, cut);
+    cut = vm_and(i.mask, cut);
+    const vm window = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
+    const vm mine = vm_andnot(vm_and(i.mask, window), cut);
+    if (!vm_any(vm_or(mine, cut))) return;
+    const kernel_unit_segment run = kernel_tet_segment(p, list, c, faces, &i);
     if (__builtin_expect(vm_any(cut), 0)) {
         i.mask = cut;
-        kernel_tet_segments_general(p, list, c, faces, i);
-        i.mask = vm_andnot(hit, cut);
+        kernel_linear_segments(p, list, &i, (const vf[2]){p->t_near, list->t_cut}, &run);
     }
-    const vm window = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
-    const vm mine = vm_and(i.mask, window);
-    if (!vm_any(mine)) return;
     /* the length decides which segments are kept, because in double it may be positive if both ends are the same
      * float32 */
-    const kernel_unit_segment run = kernel_tet_segment(p, list, c, faces, &i);
     kernel_segments_add(list, vm_and(mine, vf_lt(vf_set(0), run.length)), i.t_in, i.t_out, &run);
 }
 
-/* Adds the segments of a cell with quadrilateral faces. map: the cell's inverse map; NULL if the field is constant. */
-static __attribute__((noinline)) void kernel_curved_segments(kernel_packet *p, kernel_segments *list,
-                                                             const kernel_cell *c, const kernel_map *map, vm rays)
+/* Adds the rays' intervals in a cell with quadrilateral faces whose field is constant. The value is computed in double
+ * if the list is in double, because narrow ramps magnify its rounding. */
+static __attribute__((noinline)) void kernel_constant_segments(const kernel_packet *p, kernel_segments *list,
+                                                               const kernel_cell *c, const kernel_interval *i,
+                                                               const vf reach[2])
 {
-    kernel_interval intervals[KERNEL_MAX_CELL_INTERVALS];
-    kernel_cell_interval cell_interval = {.map = map, .cell = c};
-    const int count = kernel_curved_intervals(p, c, rays, intervals);
-    if (count && (map || list->pieces->has_rests)) kernel_cell_interval_bound(list, c->f, c->count, &cell_interval);
-    for (int k = 0; k < count; k++) {
-        cell_interval.interval = &intervals[k];
-        kernel_cell_interval_integrate(p, list, &cell_interval);
-    }
+    const double exact = kernel_double_domain(&p->frame->volumes[list->volume], c->values[0]);
+    const vf value = vf_set((float)exact);
+    kernel_unit_segment whole = kernel_unit_segment_of((i->t_out - i->t_in) * list->per_t, value, value);
+    if (list->is_double) whole.rest_in = whole.rest_out = vf_set((float)(exact - (double)(float)exact));
+    kernel_linear_segments(p, list, i, reach, &whole);
 }
 
 /* The following functions sample volumes in polyhedra, where the field along a ray is a piecewise linear profile. */
@@ -680,8 +517,6 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segments *list, 
     kernel_polyhedron_interval polyhedron_interval;
     kernel_interval piece;
     if (!c || !kernel_poly_allocate(p, c, &r) || !kernel_poly_cross(&r, rays, false)) return;
-    kernel_cell_interval cell_interval = {.interval = &piece};
-    if (list->mixing > 0) kernel_cell_interval_bound(list, c->f, c->vertex_count, &cell_interval);
     while (kernel_poly_next(&r, &polyhedron_interval)) {
         if (!c->is_constant) kernel_poly_profile(&r, &polyhedron_interval);
         kernel_profile_begin(&polyhedron_interval, &piece);
@@ -689,7 +524,9 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segments *list, 
             piece.mask = kernel_profile_continues(&polyhedron_interval, &piece, piece.mask);
             if (!vm_any(piece.mask)) break;
             kernel_profile_next(&r, &polyhedron_interval, polyhedron_interval.u_out, &piece);
-            kernel_cell_interval_integrate(p, list, &cell_interval);
+            const kernel_unit_segment whole =
+                kernel_unit_segment_of((piece.t_out - piece.t_in) * list->per_t, piece.v_in, piece.v_out);
+            kernel_linear_segments(p, list, &piece, (const vf[2]){p->t_near, list->t_cut}, &whole);
         }
     }
 }

@@ -45,12 +45,8 @@ typedef struct kernel_double_face {
     double least; /* the face is not seen edge on if the weight is larger than this */
 } kernel_double_face;
 
-/* The (u, v) of a packet's rays in double, relative to the tile's centre. */
-typedef struct kernel_double_rays {
-    kernel_f64 u[2], v[2];
-} kernel_double_rays;
-
-SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_double_rays *out)
+/* Computes the (u, v) of a packet's rays in double, relative to the tile's centre. */
+SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_f64 u[2], kernel_f64 v[2])
 {
     kernel_lanes lanes;
     kernel_packet_lanes(p, &lanes);
@@ -58,8 +54,8 @@ SIMD_INLINE void kernel_double_rays_of(const kernel_packet *p, kernel_double_ray
         lanes.px[i] -= p->tile->centre_x;
         lanes.py[i] -= p->tile->centre_y;
     }
-    memcpy(out->u, lanes.px, sizeof out->u);
-    memcpy(out->v, lanes.py, sizeof out->v);
+    memcpy(u, lanes.px, sizeof lanes.px);
+    memcpy(v, lanes.py, sizeof lanes.py);
 }
 
 /* ---- a cell ---- */
@@ -164,16 +160,16 @@ SIMD_INLINE void kernel_double_value(kernel_f64 value, int half, vf *v, vf *rest
     kernel_f64_store_lanes(rest, half, value - kernel_f64_of(v, half));
 }
 
-/* Computes half of the lanes of a tet's interval as a segment, whose length is in t. Returns the rays for which it is
- * valid. hit: for each face, the rays that cross it. */
-SIMD_INLINE kernel_f64_mask kernel_double_half(const kernel_double_face faces[4], const kernel_double_rays *rays,
+/* Computes half of the lanes of a tet's interval as a segment, whose length is in t, on the rays at (u, v). Returns the
+ * rays for which it is valid. hit: for each face, the rays that cross it. */
+SIMD_INLINE kernel_f64_mask kernel_double_half(const kernel_double_face faces[4], kernel_f64 u, kernel_f64 v,
                                                const vm hit[4], int half, kernel_unit_segment *out)
 {
     kernel_double_end first = {0}, last = {0};
     kernel_f64_mask met = {0};
     for (int n = 0; n < 4; n++) {
         const kernel_f64_mask m = kernel_f64_of_mask(hit[n], half);
-        const kernel_double_end end = kernel_double_intersect(&faces[n], rays->u[half], rays->v[half]);
+        const kernel_double_end end = kernel_double_intersect(&faces[n], u, v);
         kernel_double_select(m & ~met, &end, &first);
         kernel_double_select(m & met, &end, &last);
         met |= m;
@@ -191,16 +187,15 @@ SIMD_INLINE kernel_f64_mask kernel_double_half(const kernel_double_face faces[4]
 /* Replaces, on the given rays, the length, in t, and the values of *run, a tet's interval in float32, by those computed
  * in double. */
 static __attribute__((noinline)) void kernel_tet_double(const kernel_packet *p, const kernel_cell *c,
-                                                        const kernel_double_face faces[4],
-                                                        const kernel_double_rays *rays, vm active,
-                                                        kernel_unit_segment *run)
+                                                        const kernel_double_face faces[4], const kernel_f64 u[2],
+                                                        const kernel_f64 v[2], vm active, kernel_unit_segment *run)
 {
     kernel_unit_segment exact = *run;
     vf sound = vf_set(0);
     vm hit[4];
     kernel_tet_faces(p, c, active, hit);
     for (int half = 0; half < 2; half++) {
-        const kernel_f64_mask is_sound = kernel_double_half(faces, rays, hit, half, &exact);
+        const kernel_f64_mask is_sound = kernel_double_half(faces, u[half], v[half], hit, half, &exact);
         kernel_f64_store_lanes(&sound, half, kernel_f64_select(is_sound, (kernel_f64){0} + 1, (kernel_f64){0}));
     }
     const vm better = vm_and(active, vf_lt(vf_set(0), sound));

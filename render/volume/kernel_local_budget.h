@@ -43,32 +43,34 @@
 #define RENDER_KERNEL_LOCAL_BUDGET_H
 
 #include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_cell_segments.h"
 #include "kernel_colour.h"
 #include "kernel_integral.h"
-#include "kernel_local.h"
 #include "kernel_local_deviation.h"
-#include "kernel_tile.h"
-#include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "simd.h"
 
-enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_PIECES = 32 };
+/* An interval is halved up to KERNEL_LOCAL_LEVELS times into parts, each with a polynomial of its own.
+ * KERNEL_LOCAL_PIECES: maximum number of segments of a part. */
+enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_LEVELS = 5, KERNEL_LOCAL_PIECES = 32 };
+#define KERNEL_LOCAL_LEAST_SHARE (1.0f / (1 << KERNEL_LOCAL_LEVELS))
 
 /* Share of the allowed error of light that the residual of Newton's method may cause. */
 #define KERNEL_LOCAL_SLACK 0.4f
 
-/* The error budget of the rays in a vector of cells. */
+/* Rounding of an interval's values in float32, relative to max(1, |value|). docs/development/error_budget.md derives at
+ * most 4e-7; ten times as much is counted as an error of the field if the opacity has narrow ramps. */
+#define KERNEL_VALUE_ROUNDING 4e-6f
+
+/* The error budget of a tile's rays in a volume. */
 typedef struct kernel_local_budget {
     const kernel_pieces *pieces;
+    const kernel_transfer *transfer;
+    /* allowance: error allowed per share of the ray's length and of its absorption; if it is 0, segments are at most as
+     * long as the sampling step */
     float allowance, reach;
-    /* Bounds, per lane, of the change of light due to a field error, over the values from low to high, which are those
-     * of the lane's cell (kernel_light_variation). cost: maximum of that change; error_variation: its variation. */
-    float low[SIMD_WIDTH], high[SIMD_WIDTH];
-    float cost[SIMD_WIDTH], error_variation[SIMD_WIDTH];
-    /* upper bound of the change of the error's weight per depth: cost + R |s'|, as defined at the top of this file */
-    float weight_change[SIMD_WIDTH];
-    float extinction[SIMD_WIDTH];
-    kernel_local_nonlinear nonlinear;
+    float step;                       /* the sampling step in unit distances */
     float per_t[KERNEL_LOCAL_PIXELS]; /* unit distances per t, by packet and lane */
 } kernel_local_budget;
 
@@ -78,7 +80,8 @@ typedef struct kernel_local_budget {
  * lie outside of these values. If there is one chord, its ends exceed them by at most three sixteenths of the values'
  * range (kernel_local_leaves_range()). If there are several, their ends exceed them by a sixth of the parabola's
  * maximum, which is less than that range. */
-SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values)[SIMD_WIDTH], int type)
+SIMD_INLINE void kernel_local_bound(const kernel_local_budget *b, const float (*values)[SIMD_WIDTH], int type,
+                                    kernel_local_bounds *out)
 {
     const kernel_pieces *t = b->pieces;
     vf low = vf_load(values[0]), high = low, error_variation, cost, extinction, steepness;
@@ -92,41 +95,44 @@ SIMD_INLINE void kernel_local_bound(kernel_local_budget *b, const float (*values
     const vi entry = kernel_light_variation_entry(t, low, high);
     vf_gather_pair(&t->variations->variation, entry, &error_variation, &cost);
     vf_gather_pair(&t->variations->extinction, entry, &extinction, &steepness);
-    vf_store(b->cost, cost);
-    vf_store(b->error_variation, error_variation);
-    vf_store(b->weight_change, cost + steepness);
-    vf_store(b->extinction, extinction);
-    vf_store(b->low, low);
-    vf_store(b->high, high);
+    vf_store(out->cost, cost);
+    vf_store(out->error_variation, error_variation);
+    vf_store(out->weight_change, cost + steepness);
+    vf_store(out->extinction, extinction);
+    vf_store(out->low, low);
+    vf_store(out->high, high);
     /* the residual of Newton's method may cause a share of the error that is allowed for the ray's length alone */
-    const vf slack = vf_set(KERNEL_LOCAL_SLACK * b->allowance / b->reach) / (cost * vf_load(b->nonlinear.sensitivity));
-    const vf tolerance = vf_min(vf_max(slack, vf_set(1e-6f)), vf_load(b->nonlinear.residual_limit));
-    vf_store(b->nonlinear.tolerance, tolerance);
+    const vf slack = vf_set(KERNEL_LOCAL_SLACK * b->allowance / b->reach) / (cost * vf_load(out->sensitivity));
+    const vf tolerance = vf_min(vf_max(slack, vf_set(1e-6f)), vf_load(out->residual_limit));
+    vf_store(out->tolerance, tolerance);
+}
+
+/* Sets the same bounds in all lanes, for a cell that is too nonlinear for lanes: its derivatives are not bounded, so
+ * the bend is taken as 1, and the sum of the nonlinear terms' slopes as the range of the values. */
+SIMD_INLINE void kernel_local_bound_of_cell(const kernel_local_budget *b, const kernel_cell *c,
+                                            kernel_local_bounds *out)
+{
+    float values[8][SIMD_WIDTH];
+    for (int i = 0; i < c->count; i++) vf_store(values[i], vf_set(c->f[i]));
+    vf_store(out->sensitivity, vf_set(0));
+    vf_store(out->residual_limit, vf_set(0));
+    kernel_local_bound(b, (const float(*)[SIMD_WIDTH])values, c->type, out);
+    vf_store(out->bend, vf_set(1));
+    vf_store(out->unsampled, kernel_local_nonlinear_unsampled(c->type) * (vf_load(out->high) - vf_load(out->low)));
 }
 
 /* ---- rays in cells ---- */
 
-/* A vector of rays, each with a cell of its own. */
-typedef struct kernel_local_pairs {
-    kernel_lane_rays rays;
-    kernel_point ends[2];
-    kernel_local_deviations off_chord;
-    vm active;
-    vf begin;        /* depth at which the ray's window begins */
-    vf count;        /* number of segments into which the interval is divided */
-    float unsampled; /* factor by which kernel_local_nonlinear.unsampled is multiplied; it is 1 for a whole interval */
-} kernel_local_pairs;
-
 /* Returns by how much a single chord must be raised so that its mean equals the field's mean. */
 SIMD_INLINE vf kernel_local_chord_offset(const kernel_local_pairs *p)
 {
-    const vf *d = p->off_chord.field;
+    const vf *d = p->field;
     return (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
 }
 
 /* Returns the rays for which a single segment is not possible: the values at its ends, raised so that its mean equals
  * the field's, are outside the range of values for which the error bounds hold. */
-SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_budget *b, const kernel_local_pairs *p)
+SIMD_INLINE vm kernel_local_leaves_range(const kernel_local_bounds *b, const kernel_local_pairs *p)
 {
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, lift = kernel_local_chord_offset(p);
     const vf low = vf_min(v0, v1) + lift, high = vf_max(v0, v1) + lift;
@@ -145,21 +151,26 @@ typedef struct kernel_local_errors {
     vf weight_change;
 } kernel_local_errors;
 
-SIMD_INLINE void kernel_local_errors_of(const kernel_local_budget *b, const kernel_local_pairs *p,
-                                        kernel_local_errors *out)
+SIMD_INLINE void kernel_local_errors_of(const kernel_local_budget *b, const kernel_local_bounds *bounds,
+                                        const kernel_local_pairs *p, kernel_local_errors *out)
 {
     const vi lane = p->rays.lane;
-    const vf *d = p->off_chord.field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
+    const vf *d = p->field, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
-    const vf bend = kernel_gather_lane(b->nonlinear.bend, lane);
-    const vf unseen = p->unsampled * kernel_gather_lane(b->nonlinear.unsampled, lane);
+    const vf bend = kernel_gather_lane(bounds->bend, lane);
+    const float square = p->share * p->share, unsampled = p->share < 1 ? 2 * square * square : 1;
+    const vf unseen = unsampled * kernel_gather_lane(bounds->unsampled, lane);
     const vf least = vf_muladd(0.01f * bend, parabola + cubic, unseen);
-    const vf depth = vf_min(kernel_gather_lane(b->extinction, lane) * length, vf_set(1));
+    const vf depth = vf_min(kernel_gather_lane(bounds->extinction, lane) * length, vf_set(1));
     out->quartic = vf_max(vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]), least);
     out->mean = 0.26f * parabola + (1.09f * cubic + 4.0f * out->quartic);
-    out->residual_error = kernel_gather_lane(b->nonlinear.sensitivity, lane) * p->off_chord.residual;
+    out->residual_error = kernel_gather_lane(bounds->sensitivity, lane) * p->residual;
+    if (__builtin_expect(b->pieces->has_rests, 0)) {
+        const vf largest = vf_max(vf_max(vf_abs(p->ends[0].value), vf_abs(p->ends[1].value)), vf_set(1));
+        out->residual_error += KERNEL_VALUE_ROUNDING * largest;
+    }
     out->length = length;
-    out->weight_change = kernel_gather_lane(b->weight_change, lane) * depth;
+    out->weight_change = kernel_gather_lane(bounds->weight_change, lane) * depth;
 }
 
 /* Returns the error of light per unit distance if the interval becomes one segment: the part that varies along the
@@ -171,32 +182,33 @@ SIMD_INLINE vf kernel_local_single_segment_error(const kernel_local_errors *w, v
 }
 
 /* Computes the upper bounds of the change of light by a field error, over the range of the ray's own values, which
- * includes those of raised chords (see the top of this file). */
-SIMD_INLINE void kernel_local_ray_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic,
-                                        vf *error_variation, vf *cost)
+ * includes those of raised chords (see the top of this file). Returns the rays on which the opacity has a step in this
+ * range. */
+SIMD_INLINE vm kernel_local_ray_bound(const kernel_pieces *t, const kernel_local_pairs *p, vf quartic,
+                                      vf *error_variation, vf *cost)
 {
-    const vf *d = p->off_chord.field, v0 = p->ends[0].value, v1 = p->ends[1].value, zero = vf_set(0);
+    const vf *d = p->field, v0 = p->ends[0].value, v1 = p->ends[1].value, zero = vf_set(0);
     const vf wide = 0.85f * vf_abs(d[2] - d[0]) + 10.0f * quartic;
     const vf low = vf_min(v0, v1) + (1.17f * vf_min(d[1], zero) - wide);
     const vf high = vf_max(v0, v1) + (1.17f * vf_max(d[1], zero) + wide);
     vf_gather_pair(&t->variations->variation, kernel_light_variation_entry(t, low, high), error_variation, cost);
+    const vf rounding = KERNEL_VALUE_ROUNDING * vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
+    return kernel_values_have_step(t, low - rounding, high + rounding);
 }
 
 /* Sets the number of segments per ray, with an allowed error that includes the ray's absorption. Returns the rays for
  * which no number is enough. */
-static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_tile_trace *t,
-                                                                const kernel_local_budget *b,
+static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_local_budget *b,
                                                                 const kernel_local_errors *wrong, vf least,
                                                                 kernel_local_pairs *p)
 {
-    const kernel_transfer *transfer = &t->frame->volumes[0];
     const vf v0 = p->ends[0].value, v1 = p->ends[1].value, one = vf_set(1);
-    vf opacities = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1)), error_variation, cost;
+    vf opacities = 0.125f * (kernel_opacity(b->transfer, v0) + kernel_opacity(b->transfer, v1)), error_variation, cost;
     for (int i = 0; i < 3; i++) {
-        const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + p->off_chord.field[i];
-        opacities += 0.25f * kernel_opacity(transfer, value);
+        const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + p->field[i];
+        opacities += 0.25f * kernel_opacity(b->transfer, value);
     }
-    kernel_local_ray_bound(b->pieces, p, wrong->quartic, &error_variation, &cost);
+    const vm has_step = kernel_local_ray_bound(b->pieces, p, wrong->quartic, &error_variation, &cost);
     /* The error of light that is allowed per unit distance. */
     const vf allowed = b->allowance * (vf_set(1 / b->reach) + opacities / vf_muladd(wrong->length, opacities, one));
     const vm few = vf_le(kernel_local_single_segment_error(wrong, error_variation, cost), allowed);
@@ -205,25 +217,39 @@ static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_til
     const vf wanted = -vf_floor(-vf_sqrt(made / vf_max(allowed - rest, vf_set(1e-30f))));
     p->count = vf_select(few, least, vf_clamp(wanted, vf_set(2), vf_set(KERNEL_LOCAL_PIECES + 1)));
     const vm fails = vm_or(vm_not(vf_lt(rest, 0.9f * allowed)), vf_lt(vf_set(KERNEL_LOCAL_PIECES), p->count));
-    return vm_andnot(fails, few);
+    return vm_or(vm_andnot(fails, few), has_step);
+}
+
+/* Sets the number of segments per ray so that none is longer than the sampling step. Returns the rays that need so many
+ * that one polynomial is not accurate enough for them. */
+SIMD_INLINE vm kernel_local_count_by_step(const kernel_local_budget *b, kernel_local_pairs *p)
+{
+    const vf length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
+    const vf wanted = vf_max(-vf_floor(length * (-1 / b->step)), vf_set(1));
+    p->count = vf_min(wanted, vf_set(KERNEL_LOCAL_PIECES));
+    return p->share > KERNEL_LOCAL_LEAST_SHARE ? vf_lt(vf_set(4), wanted) : vm_none();
 }
 
 /* Sets the number of segments per ray; returns the rays for which no number is enough. It first tests whether one
  * segment is enough, with the ray's length alone and the bounds over all of the cell's values; only other rays use
  * kernel_local_count_by_depth(). */
-SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local_budget *b, kernel_local_pairs *p)
+SIMD_INLINE vm kernel_local_count(const kernel_local_budget *b, const kernel_local_bounds *bounds,
+                                  kernel_local_pairs *p)
 {
     kernel_local_errors wrong;
-    kernel_local_errors_of(b, p, &wrong);
+    if (!(b->allowance > 0)) return kernel_local_count_by_step(b, p);
+    kernel_local_errors_of(b, bounds, p, &wrong);
     const vf one = vf_set(1), allowed = vf_set(b->allowance * (1 / b->reach));
-    const vf error_variation = kernel_gather_lane(b->error_variation, p->rays.lane),
-             cost = kernel_gather_lane(b->cost, p->rays.lane);
-    const vm strays = kernel_local_leaves_range(b, p);
-    const vm enough =
-        vm_andnot(vf_le(kernel_local_single_segment_error(&wrong, error_variation, cost), allowed), strays);
+    const vf error_variation = kernel_gather_lane(bounds->error_variation, p->rays.lane),
+             cost = kernel_gather_lane(bounds->cost, p->rays.lane);
+    const vm strays = kernel_local_leaves_range(bounds, p);
+    vm enough = vm_andnot(vf_le(kernel_local_single_segment_error(&wrong, error_variation, cost), allowed), strays);
+    if (__builtin_expect(b->pieces->step_count > 0, 0))
+        enough = vm_andnot(enough, kernel_values_have_step(b->pieces, kernel_gather_lane(bounds->low, p->rays.lane),
+                                                           kernel_gather_lane(bounds->high, p->rays.lane)));
     p->count = one;
     if (!vm_any(vm_andnot(p->active, enough))) return vm_none();
-    const vm none = kernel_local_count_by_depth(t, b, &wrong, vf_select(strays, 2.0f * one, one), p);
+    const vm none = kernel_local_count_by_depth(b, &wrong, vf_select(strays, 2.0f * one, one), p);
     p->count = vf_select(enough, one, p->count);
     return vm_andnot(none, enough);
 }

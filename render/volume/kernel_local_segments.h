@@ -1,5 +1,6 @@
 /* Computes segments of hexes, wedges and pyramids with one ray-cell pair per lane (kernel_segments.h explains
- * segments). */
+ * segments). Rays for which that is not possible are processed by packets, cell by cell, and their intervals are
+ * divided by the same rule. */
 #ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
 #define RENDER_KERNEL_LOCAL_SEGMENTS_H
 
@@ -45,62 +46,46 @@ typedef struct kernel_tile_segments {
     unsigned blocks;               /* blocks of the current window */
     kernel_local_faces faces;
     kernel_local_budget budget;
+    kernel_local_bounds bounds;
+    bool is_double; /* set if the ends of segments are stored in double */
+    bool has_cuts;  /* set if transparent surfaces cut segments */
     kernel_local_list met, crossed[2];
     /* For each packet and lane: begin and end of the window, side by side; likewise begin and end of the ray. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS];
 } kernel_tile_segments;
 
-/* Adds a segment to a ray's list if it begins before the end of the ray's window; it must not begin before the window.
- * at: position of the ray's pixel among the packets. */
-SIMD_INLINE void kernel_local_store_segment(kernel_tile_segments *b, int at, const kernel_segment *s)
+/* Adds one segment per lane to the lists of the given rays. */
+SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places, vm rays, vf t_in, vf t_out, vf v_in,
+                                             vf v_out)
 {
-    kernel_segments *list = &b->packets[at / SIMD_WIDTH];
-    const int lane = at % SIMD_WIDTH;
-    if (!(s->t_in < list->t_end[lane])) return;
-    const kernel_segment_double precise = {(s->t_out - s->t_in) * list->per_t[lane], 0, 0, 0};
-    if (__builtin_expect(kernel_segments_insert(list, lane, s, &precise), 1)) return;
-    const kernel_unit_segment run = kernel_unit_segment_of(vf_set(precise.length), vf_set(s->v_in), vf_set(s->v_out));
-    kernel_integrate(list->pieces, vm_from_bits(1u << lane), &run, &list->unsorted_light);
-}
-
-/* Coefficients of a polynomial that is zero at u = -1/2 and 1/2. kernel_local_deviation() returns its value at u,
- * kernel_local_primitive() its integral from 0 to u. */
-typedef struct kernel_local_polynomial {
-    vf a, b, c;
-} kernel_local_polynomial;
-
-SIMD_INLINE vf kernel_local_deviation(const kernel_local_polynomial *p, vf u)
-{
-    return (0.25f - u * u) * vf_muladd(vf_muladd(p->c, u, p->b), u, p->a);
-}
-
-SIMD_INLINE vf kernel_local_primitive(const kernel_local_polynomial *p, vf u)
-{
-    const vf square = u * u;
-    const vf odd = p->a * (0.25f - square * (1.0f / 3)) + p->c * square * (1.0f / 12 - square * 0.2f);
-    return u * odd + p->b * square * (0.125f - 0.25f * square);
-}
-
-/* Adds one segment per lane to the lists of the given rays. ends: t_in, t_out, v_in, v_out; places: position of each
- * ray's pixel among the packets. */
-SIMD_INLINE void kernel_local_store_segments(kernel_tile_segments *b, vi places, vm rays, const vf ends[4])
-{
-    kernel_segment all[SIMD_WIDTH];
     int32_t at[SIMD_WIDTH];
     memcpy(at, &places, sizeof at);
-    vf_store_rows(&all[0].t_in, ends);
-    for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
-        const int i = __builtin_ctz(bits);
-        kernel_local_store_segment(b, at[i], &all[i]);
-    }
+    vf length = vf_set(0);
+    if (b->is_double) length = (t_out - t_in) * vf_gather(b->budget.per_t, places);
+    const kernel_unit_segment run = kernel_unit_segment_of(length, v_in, v_out);
+    kernel_segments_add_at(b->packets, b->is_double, at, rays, t_in, t_out, &run);
+}
+
+/* f: coefficients of a polynomial in u that is zero at u = -1/2 and 1/2. kernel_local_deviation() returns its value at
+ * u, kernel_local_primitive() its integral from 0 to u. */
+SIMD_INLINE vf kernel_local_deviation(const vf f[3], vf u)
+{
+    return (0.25f - u * u) * vf_muladd(vf_muladd(f[2], u, f[1]), u, f[0]);
+}
+
+SIMD_INLINE vf kernel_local_primitive(const vf f[3], vf u)
+{
+    const vf square = u * u;
+    const vf odd = f[0] * (0.25f - square * (1.0f / 3)) + f[2] * square * (1.0f / 12 - square * 0.2f);
+    return u * odd + f[1] * square * (0.125f - 0.25f * square);
 }
 
 /* Adds the segments of rays for which one segment is enough. */
 SIMD_INLINE void kernel_local_emit_one(kernel_tile_segments *b, const kernel_local_pairs *p, vm rays)
 {
     const vf t0 = p->ends[0].t, t1 = p->ends[1].t, lift = kernel_local_chord_offset(p);
-    const vf ends[4] = {t0, t1, p->ends[0].value + lift, p->ends[1].value + lift};
-    kernel_local_store_segments(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), ends);
+    kernel_local_store_segments(b, p->rays.at, vm_and(rays, vm_and(vf_le(p->begin, t0), vf_lt(t0, t1))), t0, t1,
+                                p->ends[0].value + lift, p->ends[1].value + lift);
 }
 
 /* Adds the segments of rays that need several: equal subintervals of the interval, with chords that have the mean of
@@ -108,22 +93,20 @@ SIMD_INLINE void kernel_local_emit_one(kernel_tile_segments *b, const kernel_loc
 static __attribute__((noinline)) void kernel_local_emit_several(kernel_tile_segments *b, const kernel_local_pairs *p,
                                                                 vm rays)
 {
-    const vf *d = p->off_chord.field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].value,
-             v1 = p->ends[1].value;
-    const vf share = 1.0f / p->count, cell_interval = t1 - t0, rise = v1 - v0;
-    kernel_local_polynomial f = {.a = 4.0f * d[1], .b = (32.0f / 3) * (d[2] - d[0])};
-    f.c = 16.0f * ((8.0f / 3) * (d[0] + d[2]) - f.a);
-    vf from = t0, u0 = vf_set(-0.5f), off0 = vf_set(0), sum0 = kernel_local_primitive(&f, u0);
+    const vf *d = p->field, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].value, v1 = p->ends[1].value;
+    const vf share = 1.0f / p->count, length = t1 - t0, rise = v1 - v0, middle = 4.0f * d[1];
+    const vf f[3] = {middle, (32.0f / 3) * (d[2] - d[0]), 16.0f * ((8.0f / 3) * (d[0] + d[2]) - middle)};
+    vf from = t0, u0 = vf_set(-0.5f), off0 = vf_set(0), sum0 = kernel_local_primitive(f, u0);
     vm open = rays;
     for (int n = 1; vm_any(open); n++) {
         const vf number = vf_set((float)n), along = number * share;
         const vm inner = vm_and(open, vf_lt(number, p->count));
-        const vf u1 = vf_select(inner, along - 0.5f, vf_set(0.5f)), sum1 = kernel_local_primitive(&f, u1);
-        const vf to = vf_select(inner, t0 + cell_interval * along, t1), off1 = kernel_local_deviation(&f, u1);
+        const vf u1 = vf_select(inner, along - 0.5f, vf_set(0.5f)), sum1 = kernel_local_primitive(f, u1);
+        const vf to = vf_select(inner, t0 + length * along, t1), off1 = kernel_local_deviation(f, u1);
         const vf lift = (sum1 - sum0) * p->count - 0.5f * (off0 + off1);
         const vf in = (v0 + (u0 + 0.5f) * rise) + (off0 + lift), out = (v1 - (0.5f - u1) * rise) + (off1 + lift);
-        const vf ends[4] = {from, to, in, out};
-        kernel_local_store_segments(b, p->rays.at, vm_and(open, vm_and(vf_le(p->begin, from), vf_lt(from, to))), ends);
+        kernel_local_store_segments(b, p->rays.at, vm_and(open, vm_and(vf_le(p->begin, from), vf_lt(from, to))), from,
+                                    to, in, out);
         from = to;
         u0 = u1;
         off0 = off1;
@@ -141,83 +124,170 @@ SIMD_INLINE void kernel_local_emit(kernel_tile_segments *b, const kernel_local_p
 
 /* ---- parts of an interval ---- */
 
-enum { KERNEL_LOCAL_PARTS = 8 };
+static void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places, vi lanes, unsigned wanted,
+                                                 const vf reach[2], float share);
 
-/* Computes part `number` of `count` equal parts of the rays' intervals. at: end of the part before it. In the ends of
- * each part, depth and value are those of the part, but the reference coordinates are those of the whole interval. */
-SIMD_INLINE void kernel_local_divide(const kernel_local_chord *chord, const kernel_local_pairs *whole, vm rays,
-                                     int number, int count, kernel_local_part *at, kernel_local_pairs *parts, int type)
+/* Adds the segments of the rays' intervals. Each interval is halved, and its parts again, until one polynomial is
+ * accurate enough for a part. If it is not even for the shortest parts, these are passed on: from vectors of cells to
+ * packets, and from packets to bisection in double. */
+SIMD_INLINE void kernel_local_divide_intervals(kernel_tile_trace *t, const kernel_local_bounds *bounds,
+                                               const kernel_local_chord *chord, const kernel_local_pairs *whole,
+                                               vm rays, int type)
 {
-    const kernel_point *first = &whole->ends[0], *last = &whole->ends[1];
-    const float share = 1.0f / (float)count;
-    kernel_local_pairs *part = &parts[number];
-    *part = *whole;
-    part->active = rays;
-    part->unsampled = 2 * (share * share) * (share * share);
-    kernel_local_part_next(chord, share, rays, type, at, &part->off_chord);
-    if (number > 0) part->ends[0] = parts[number - 1].ends[1];
-    if (number + 1 < count) {
-        const vf along = vf_set((float)(number + 1) * share);
-        part->ends[1].t = first->t + (last->t - first->t) * along;
-        part->ends[1].value = (first->value + (last->value - first->value) * along) + at->deviation;
-    }
-}
-
-/* Adds the segments of rays for which one polynomial is not accurate enough: their intervals are divided into halves,
- * quarters or eighths, with a polynomial for each part. Returns the rays for which even eighths are not accurate
- * enough. */
-SIMD_INLINE vm kernel_local_divide_intervals(const kernel_tile_trace *t, kernel_tile_segments *b,
-                                             const kernel_local_pairs *whole, vm rays, int type)
-{
-    kernel_local_chord chord;
-    kernel_local_part at;
-    kernel_local_pairs parts[KERNEL_LOCAL_PARTS];
-    kernel_local_chord_of(&t->thread->tile_cells->lanes.cells, &b->budget.nonlinear, whole->rays.lane, whole->ends,
-                          type, &chord);
-    for (int count = 2; count <= KERNEL_LOCAL_PARTS && vm_any(rays); count *= 2) {
-        vm good = rays;
-        kernel_local_part_begin(&whole->ends[0], &at);
-        for (int i = 0; i < count && vm_any(good); i++) {
-            kernel_local_divide(&chord, whole, good, i, count, &at, parts, type);
-            const vm fails = kernel_local_count(t, &b->budget, &parts[i]);
-            good = vm_andnot(good, vm_or(fails, parts[i].off_chord.has_diverged));
+    kernel_tile_segments *b = t->thread->tile_segments;
+    kernel_local_places stack[KERNEL_LOCAL_LEVELS + 2];
+    vm mine[KERNEL_LOCAL_LEVELS + 2] = {rays};
+    kernel_local_places_of(chord, whole->ends, rays, type, &stack[0]);
+    for (int count = 1; count > 0;) {
+        const kernel_local_places places = stack[--count];
+        kernel_local_pairs part;
+        kernel_local_pairs_of(whole, &places, mine[count], &part);
+        part.active = vm_and(part.active, vf_lt(part.begin, part.ends[1].t));
+        const vm fails = vm_or(kernel_local_count(&b->budget, bounds, &part), part.has_diverged);
+        /* in the cells of packets, nothing bounds what the first three places do not show */
+        const vm good = type == GRID_NO_TYPE && part.share == 1 ? vm_none() : vm_andnot(part.active, fails);
+        const vm rest = vm_andnot(part.active, good);
+        kernel_local_emit(b, &part, good);
+        if (!vm_any(rest)) continue;
+        const vf reach[2] = {part.ends[0].t, part.ends[1].t};
+        if (part.share > KERNEL_LOCAL_LEAST_SHARE) {
+            for (int half = 1; half >= 0; half--, count++) {
+                kernel_local_places_halve(chord, whole->ends, &places, half, rest, type, &stack[count]);
+                mine[count] = rest;
+            }
+        } else if (type == GRID_NO_TYPE) {
+            kernel_segments *list = &b->packets[chord->packet - t->packets];
+            kernel_interval_bisect(chord->packet, list, chord->cell, chord->interval, rest, reach[0], reach[1]);
+        } else {
+            kernel_local_segments_process_singly(t, part.rays.at, part.rays.lane, vm_bits(rest), reach, part.share);
         }
-        for (int i = 0; i < count && vm_any(good); i++) kernel_local_emit(b, &parts[i], good);
-        rays = vm_andnot(rays, good);
     }
-    return rays;
 }
 
-static __attribute__((noinline)) vm kernel_local_segments_parts(const kernel_tile_trace *t, kernel_tile_segments *b,
-                                                                const kernel_local_pairs *whole, vm rays, int type)
+SIMD_INLINE void kernel_local_segments_parts_of(kernel_tile_trace *t, const kernel_local_pairs *whole, vm rays,
+                                                int type)
 {
-    return KERNEL_OF_TYPE(type, kernel_local_divide_intervals, t, b, whole, rays);
+    const kernel_local_bounds *bounds = &t->thread->tile_segments->bounds;
+    kernel_local_chord chord;
+    kernel_local_chord_of(&t->thread->tile_cells->lanes.cells, bounds, whole->rays.lane, whole->ends, type, &chord);
+    kernel_local_divide_intervals(t, bounds, &chord, whole, rays, type);
+}
+
+/* As above, for rays in the cells of the current vector. */
+static __attribute__((noinline)) void kernel_local_segments_parts(kernel_tile_trace *t, const kernel_local_pairs *whole,
+                                                                  vm rays, int type)
+{
+    KERNEL_OF_TYPE(type, kernel_local_segments_parts_of, t, whole, rays);
+}
+
+/* ---- packets of rays in one cell ---- */
+
+/* Adds the segments of a packet's rays in a cell with quadrilateral faces, between the depths `reach`, which are a
+ * share of the rays' intervals in the cell. map: the cell's inverse map; NULL if the field is constant. */
+static __attribute__((noinline)) void kernel_curved_segments(kernel_tile_trace *t, int packet, const kernel_cell *c,
+                                                             const kernel_map *map, vm rays, const vf reach[2],
+                                                             float share)
+{
+    kernel_tile_segments *b = t->thread->tile_segments;
+    kernel_packet *p = &t->packets[packet];
+    kernel_segments *list = &b->packets[packet];
+    kernel_interval intervals[KERNEL_MAX_CELL_INTERVALS];
+    kernel_local_bounds bounds;
+    kernel_local_chord chord = {.packet = p, .map = map, .cell = c};
+    kernel_local_pairs whole = {.begin = list->t_begin, .share = share};
+    const int count = kernel_curved_intervals(p, c, rays, intervals);
+    if (count && map) kernel_local_bound_of_cell(&b->budget, c, &bounds);
+    for (int i = 0; i < SIMD_WIDTH; i++) whole.rays.at[i] = packet * SIMD_WIDTH + i;
+    for (int k = 0; k < count; k++) {
+        vf from, end;
+        chord.interval = &intervals[k];
+        if (!map) kernel_constant_segments(p, list, c, &intervals[k], reach);
+        vm open = map ? kernel_interval_between(p, &intervals[k], reach, &from, &end) : vm_none();
+        for (; vm_any(open); open = vm_and(open, vf_lt(from, end))) {
+            const vf to = vf_min(end, kernel_next_cut(p, list, from, true));
+            const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
+            whole.ends[0].t = from;
+            whole.ends[1].t = from = to;
+            for (int n = 0; n < 2; n++)
+                whole.ends[n].value = kernel_value_at(p, map, &intervals[k], mine, whole.ends[n].t);
+            if (vm_any(mine)) kernel_local_divide_intervals(t, &bounds, &chord, &whole, mine, GRID_NO_TYPE);
+        }
+    }
 }
 
 /* ---- rays ---- */
 
-/* Processes the rays in `wanted` cell by cell; rays with the same cell and packet are processed together. */
+/* Processes the rays in `wanted`, between the depths `reach`, which are a share of their intervals, cell by cell; rays
+ * with the same cell and packet are processed together. */
 static __attribute__((noinline)) void kernel_local_segments_process_singly(kernel_tile_trace *t, vi places, vi lanes,
-                                                                           unsigned wanted)
+                                                                           unsigned wanted, const vf reach[2],
+                                                                           float share)
 {
     const kernel_tile_cells *cells = t->thread->tile_cells;
     int32_t at[SIMD_WIDTH], lane[SIMD_WIDTH];
+    float depths[2][SIMD_WIDTH];
     memcpy(at, &places, sizeof at);
     memcpy(lane, &lanes, sizeof lane);
+    for (int end = 0; end < 2; end++) vf_store(depths[end], reach[end]);
     while (wanted) {
         const int first = __builtin_ctz(wanted), packet = at[first] / SIMD_WIDTH;
+        vf own[2] = {vf_set(0), vf_set(0)};
         unsigned same = 0;
         for (unsigned more = wanted; more; more &= more - 1) {
             const int i = __builtin_ctz(more);
             if (lane[i] != lane[first] || at[i] / SIMD_WIDTH != packet) continue;
+            for (int end = 0; end < 2; end++) own[end][at[i] % SIMD_WIDTH] = depths[end][i];
             same |= 1u << at[i] % SIMD_WIDTH;
             wanted &= ~(1u << i);
         }
         if (!kernel_tile_make_current(t, lane[first])) continue;
-        kernel_packet *p = &t->packets[packet];
-        kernel_curved_segments(p, &t->thread->tile_segments->packets[packet], &cells->cell,
-                               cells->cell.is_constant ? NULL : &cells->map, vm_and(p->active, vm_from_bits(same)));
+        kernel_curved_segments(t, packet, &cells->cell, cells->cell.is_constant ? NULL : &cells->map,
+                               vm_and(t->packets[packet].active, vm_from_bits(same)), own, share);
     }
+}
+
+/* Returns for each given ray the depth of the first transparent surface behind t, +inf if there is none. */
+static __attribute__((noinline)) vf kernel_local_next_cut(const kernel_tile_trace *t, const kernel_tile_segments *b,
+                                                          vi places, vm rays, vf from)
+{
+    int32_t at[SIMD_WIDTH];
+    float next[SIMD_WIDTH];
+    memcpy(at, &places, sizeof at);
+    vf_store(next, vf_set(INFINITY));
+    for (unsigned bits = b->has_cuts ? vm_bits(rays) : 0; bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits), packet = at[i] / SIMD_WIDTH;
+        next[i] = kernel_next_cut(&t->packets[packet], &b->packets[packet], vf_set(from[i]), true)[at[i] % SIMD_WIDTH];
+    }
+    return vf_load(next);
+}
+
+/* Adds the segments of rays whose intervals surfaces cut, between the depths `reach`. */
+SIMD_INLINE void kernel_local_segments_cut_of(kernel_tile_trace *t, kernel_tile_segments *b,
+                                              const kernel_local_pairs *whole, vm rays, const vf reach[2], int type)
+{
+    const kernel_local_cells *cells = &t->thread->tile_cells->lanes.cells;
+    const vf end = vf_min(whole->ends[1].t, reach[1]);
+    kernel_local_pairs part = *whole;
+    kernel_local_chord chord;
+    kernel_local_chord_of(cells, &b->bounds, whole->rays.lane, whole->ends, type, &chord);
+    vf from = vf_max(whole->ends[0].t, reach[0]);
+    for (vm open = vm_and(rays, vf_lt(from, end)); vm_any(open); open = vm_and(open, vf_lt(from, end))) {
+        const vf between[2] = {from, vf_min(end, kernel_local_next_cut(t, b, whole->rays.at, open, from))};
+        vm alone = vm_none();
+        for (int n = 0; n < 2; n++)
+            alone = vm_or(alone, kernel_local_move_end(&chord, whole->ends, open, between[n], type, &part.ends[n]));
+        kernel_local_segments_parts(t, &part, vm_andnot(open, alone), type);
+        if (__builtin_expect(vm_any(alone), 0))
+            kernel_local_segments_process_singly(t, whole->rays.at, whole->rays.lane, vm_bits(alone), between, 1);
+        from = between[1];
+    }
+}
+
+static __attribute__((noinline)) void kernel_local_segments_cut(kernel_tile_trace *t, kernel_tile_segments *b,
+                                                                const kernel_local_pairs *whole, vm rays,
+                                                                const vf reach[2], int type)
+{
+    KERNEL_OF_TYPE(type, kernel_local_segments_cut_of, t, b, whole, rays, reach);
 }
 
 SIMD_INLINE void kernel_local_list_add(kernel_local_list *list, vm rays, vi words)
@@ -249,8 +319,11 @@ SIMD_INLINE void kernel_local_segments_faces(kernel_tile_trace *t, kernel_tile_s
     words = words | crossed.first << KERNEL_LOCAL_FACES | crossed.last << (KERNEL_LOCAL_FACES + 3);
     kernel_local_list_add(&b->crossed[0], vm_and(crossed.two, on_quad), words);
     if (kernel_has_triangles(type)) kernel_local_list_add(&b->crossed[1], vm_andnot(crossed.two, on_quad), words);
-    if (__builtin_expect(vm_any(crossed.alone), 0))
-        kernel_local_segments_process_singly(t, rays.at, rays.lane, vm_bits(crossed.alone));
+    if (__builtin_expect(vm_any(crossed.alone), 0)) {
+        vf reach[2];
+        vf_gather_pair(b->reach, 2 * rays.at, &reach[0], &reach[1]);
+        kernel_local_segments_process_singly(t, rays.at, rays.lane, vm_bits(crossed.alone), reach, 1);
+    }
 }
 
 /* Adds the segments of a vector of rays, from index n on, each of which crosses two faces of its cell. */
@@ -260,23 +333,28 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_tile_s
     const kernel_local_lanes *l = &t->thread->tile_cells->lanes;
     kernel_local_pairs p;
     vi words;
-    vf end, near, far;
-    p.unsampled = 1;
+    vf end, reach[2];
+    p.share = 1;
     p.active = kernel_local_list_load(list, &t->tile, n, &words, &p.rays);
     const vi face[2] = {words >> KERNEL_LOCAL_FACES & 7, words >> (KERNEL_LOCAL_FACES + 3) & 7};
     kernel_local_cross(&l->transformed, &b->faces, &p.rays, p.active, type, face, p.ends);
     vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
-    vf_gather_pair(b->reach, 2 * p.rays.at, &near, &far);
+    vf_gather_pair(b->reach, 2 * p.rays.at, &reach[0], &reach[1]);
     p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
-    const vm cut = vm_or(vf_lt(p.ends[0].t, near), vf_lt(far, p.ends[1].t));
-    kernel_local_deviations_of(&l->cells, &b->budget.nonlinear, p.rays.lane, p.active, p.ends, type, &p.off_chord);
-    vm alone = vm_and(p.active, vm_or(cut, p.off_chord.has_diverged));
+    vm cut = vm_or(vf_lt(p.ends[0].t, reach[0]), vf_lt(reach[1], p.ends[1].t));
+    if (b->has_cuts)
+        cut = vm_or(cut, vf_lt(kernel_local_next_cut(t, b, p.rays.at, p.active, p.ends[0].t), p.ends[1].t));
+    cut = vm_and(cut, p.active);
+    if (__builtin_expect(vm_any(cut), 0)) kernel_local_segments_cut(t, b, &p, cut, reach, type);
+    p.active = vm_andnot(p.active, cut);
+    kernel_local_deviations_of(&l->cells, &b->bounds, &p, type);
+    const vm alone = vm_and(p.active, p.has_diverged);
     p.active = vm_andnot(p.active, alone);
-    const vm coarse = vm_and(p.active, kernel_local_count(t, &b->budget, &p));
+    const vm coarse = vm_and(p.active, kernel_local_count(&b->budget, &b->bounds, &p));
     kernel_local_emit(b, &p, vm_andnot(p.active, coarse));
-    if (__builtin_expect(vm_any(coarse), 0)) alone = vm_or(alone, kernel_local_segments_parts(t, b, &p, coarse, type));
+    if (__builtin_expect(vm_any(coarse), 0)) kernel_local_segments_parts(t, &p, coarse, type);
     if (__builtin_expect(vm_any(alone), 0))
-        kernel_local_segments_process_singly(t, p.rays.at, p.rays.lane, vm_bits(alone));
+        kernel_local_segments_process_singly(t, p.rays.at, p.rays.lane, vm_bits(alone), reach, 1);
 }
 
 /* Lists those of the rays from index n on that may meet their cells within the window. */
@@ -322,8 +400,8 @@ SIMD_INLINE void kernel_local_segments_prepare(const kernel_tile_trace *t, kerne
                                                kernel_tile_segments *s, int type)
 {
     kernel_local_faces_of(&t->tile, &l->transformed, l->ends, type, &s->faces);
-    kernel_local_nonlinear_of(&l->cells, type, &s->budget.nonlinear);
-    kernel_local_bound(&s->budget, (const float(*)[SIMD_WIDTH])l->transformed.at[3], type);
+    kernel_local_nonlinear_of(&l->cells, type, &s->bounds);
+    kernel_local_bound(&s->budget, (const float(*)[SIMD_WIDTH])l->transformed.at[3], type, &s->bounds);
 }
 
 /* Transforms the queue's cells into tile space; returns the visible ones, and stores in *lanes those that can be
@@ -332,13 +410,8 @@ static __attribute__((noinline)) unsigned kernel_local_segments_transform(kernel
                                                                           int type, unsigned *lanes)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    const kernel_pieces *pieces = s->budget.pieces;
     const unsigned showing = kernel_local_transform(t, l, KERNEL_LOCAL_BENT_MOST, lanes, type);
     KERNEL_OF_TYPE(type, kernel_local_segments_prepare, t, l, s);
-    /* cells with values at a step of the opacity or on a steep ramp are not processed in lanes */
-    const vf low = vf_load(s->budget.low), high = vf_load(s->budget.high);
-    *lanes &= ~vm_bits(vm_or(kernel_values_are_steep(pieces, low, high, false),
-                             kernel_values_have_step(pieces, 0, pieces->step_count, low, high)));
     return showing;
 }
 
@@ -373,11 +446,17 @@ static void kernel_local_segments_finish(kernel_tile_trace *t, int unused)
 }
 
 /* Copies, for each pixel, the window and the ends of the ray from the packets into arrays. */
-static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_tile_segments *b, unsigned blocks)
+static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_tile_segments *b, unsigned blocks,
+                                        int volume)
 {
-    b->budget.pieces = &t->frame->pieces[0];
-    b->budget.allowance = t->frame->allowance;
-    b->budget.reach = t->frame->reach[0];
+    const kernel_frame *f = t->frame;
+    b->budget.pieces = &f->pieces[volume];
+    b->budget.transfer = &f->volumes[volume];
+    b->budget.allowance = f->allowance;
+    b->budget.reach = f->reach[volume];
+    b->budget.step = f->volumes[volume].exponent;
+    b->is_double = f->is_double && !f->job->separate_samples;
+    b->has_cuts = f->has_transparent && !f->job->separate_samples;
     b->blocks = blocks;
     for (int i = 0; i < KERNEL_LOCAL_PIXELS; i++) b->window[2 * i] = INFINITY, b->window[2 * i + 1] = -INFINITY;
     for (; blocks; blocks &= blocks - 1) {
@@ -392,7 +471,7 @@ static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_tile_
                 b->window[at] = from[n];
                 b->window[at + 1] = list->t_end[n];
                 b->reach[at] = p->t_near[n];
-                b->reach[at + 1] = p->t_far[n];
+                b->reach[at + 1] = list->t_cut[n];
             }
         }
     }

@@ -1,6 +1,6 @@
 /* Stores the segments of each ray until everything in front of them is known: one unsorted list of bounded length per
- * ray. kernel_segments.h explains how windows of depth work with this bounded length. Then decides into how many
- * segments a ray's interval in a cell is divided. */
+ * ray. kernel_segments.h explains how windows of depth work with this bounded length. Emits segments that compositing
+ * mixes with other volumes. */
 #ifndef RENDER_KERNEL_SEGMENT_LIST_H
 #define RENDER_KERNEL_SEGMENT_LIST_H
 
@@ -21,24 +21,16 @@
 
 enum { KERNEL_WINDOW = 128 };
 
-typedef struct kernel_segment {
-    float t_in, t_out, v_in, v_out;
-} kernel_segment;
-
-/* Length in unit distances and rounding errors of a segment's values, used if the ends of segments are stored in double
- * (one lane of kernel_unit_segment). It is as large as kernel_segment, so that one index serves both. */
-typedef struct kernel_segment_double {
-    float length, rest_in, rest_out, unused;
-} kernel_segment_double;
-
 /* The segments of a packet's rays in a volume and a window of depth. */
 typedef struct kernel_segments {
     int count[SIMD_WIDTH];
-    kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* segments of each ray, unsorted */
-    kernel_segment_double precise[SIMD_WIDTH][KERNEL_WINDOW];
-    bool is_double; /* set if the ends of segments are stored in double */
-    int capacity;   /* capacity of each ray's list; half as large in double, so that a tile's lists stay in the cache */
-    kernel_double_rays rays;
+    float items[SIMD_WIDTH][KERNEL_WINDOW][4]; /* t_in, t_out, v_in and v_out of each ray's segments, unsorted */
+    /* Set if the ends of segments are stored in double (kernel_unit_segment): each segment's length in unit distances,
+     * and the rounding errors of v_in and v_out. Its rows have four numbers too, so that one index serves both. */
+    bool is_double;
+    float precise[SIMD_WIDTH][KERNEL_WINDOW][4];
+    int capacity; /* capacity of each ray's list; half as large in double, so that a tile's lists stay in the cache */
+    kernel_f64 u[2], v[2]; /* (u, v) of the rays in double, relative to the tile's centre; set if is_double is */
     /* Light of the segments that do not fit into a list because too many begin at the same t, as in meshes that overlap
      * many times. Such segments have no order; they are integrated here at once, and blended behind the window. */
     kernel_light unsorted_light;
@@ -52,22 +44,18 @@ typedef struct kernel_segments {
     /* error allowed per share of the ray's length and of its absorption; 0: subintervals are as long as the sampling
      * step */
     float allowance;
-    /* > 0: error allowed by mixing; segments are then emitted at once, to be mixed with other volumes
-     * (kernel_cell_interval_subdivisions_mixed()) */
+    /* > 0: error allowed by mixing; the window's segments are then emitted, to be mixed with other volumes
+     * (kernel_emit_segment()) */
     float mixing;
     float reach; /* upper bound of a ray's length in the cells, in unit distances */
     kernel_blend blend;
     vf t_last; /* depth at which the ray ends: at an opaque surface, or behind all cells */
+    /* Depth at which segments are cut: at an opaque surface. Segments that compositing mixes with other volumes are cut
+     * only at clips, not at this rank's surfaces, so that they are the same on any partition. */
+    vf t_cut;
     /* active rays of the packet, saved here because the packet's own mask is reduced to rays that have not ended */
     vm active;
 } kernel_segments;
-
-/* Returns whether segments can be integrated one ray-cell pair per lane. They cannot if transparent surfaces cut them,
- * or if each becomes a fragment of its own. */
-SIMD_INLINE bool kernel_segments_use_lanes(const kernel_frame *f)
-{
-    return !f->has_transparent && !f->job->separate_samples;
-}
 
 /* Returns the lane of the packet that holds the pixel, or -1 if the pixel is not in the packet. */
 SIMD_INLINE int kernel_packet_lane_of_pixel(const kernel_packet *p, uint32_t pixel)
@@ -118,23 +106,23 @@ SIMD_INLINE void kernel_segments_set_double(const kernel_packet *p, kernel_segme
 {
     list->is_double = is_double;
     list->capacity = is_double ? KERNEL_WINDOW / 2 : KERNEL_WINDOW;
-    if (is_double) kernel_double_rays_of(p, &list->rays);
+    if (is_double) kernel_double_rays_of(p, list->u, list->v);
 }
 
 static void kernel_items_sort(kernel_segments *list, int lane)
 {
-    kernel_segment *items = list->items[lane];
-    kernel_segment_double *precise = list->precise[lane];
+    float(*items)[4] = list->items[lane], (*precise)[4] = list->precise[lane];
     for (int n = 1; n < list->capacity; n++) {
-        const kernel_segment s = items[n];
-        const kernel_segment_double its = precise[n];
+        float own[2][4];
+        memcpy(own[0], items[n], sizeof own[0]);
+        memcpy(own[1], precise[n], sizeof own[1]);
         int at = n;
-        for (; at > 0 && items[at - 1].t_in > s.t_in; at--) {
-            items[at] = items[at - 1];
-            precise[at] = precise[at - 1];
+        for (; at > 0 && items[at - 1][0] > own[0][0]; at--) {
+            memcpy(items[at], items[at - 1], sizeof *items);
+            memcpy(precise[at], precise[at - 1], sizeof *precise);
         }
-        items[at] = s;
-        precise[at] = its;
+        memcpy(items[at], own[0], sizeof own[0]);
+        memcpy(precise[at], own[1], sizeof own[1]);
     }
 }
 
@@ -145,74 +133,79 @@ SIMD_INLINE void kernel_heap_clear(kernel_light *unsorted_light, int lane)
     unsorted_light->transmittance[lane] = 1;
 }
 
-/* Makes space in a full list: the window ends at the begin of one of its farther segments, and all segments from there
- * on are dropped. Returns false if all segments, including the new one, begin at the same depth. */
-static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segments *list, int lane,
-                                                                    const kernel_segment *s)
+/* Makes space in a full list for a segment that begins at t_in: the window ends at the begin of one of its farther
+ * segments, and all segments from there on are dropped. Returns false if all segments, including the new one, begin at
+ * the same depth. */
+static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segments *list, int lane, float t_in)
 {
-    kernel_segment *items = list->items[lane];
+    const float(*items)[4] = (const float(*)[4])list->items[lane];
     kernel_items_sort(list, lane);
     int count = list->capacity * 3 / 4;
-    const float first = items[0].t_in, last = items[list->capacity - 1].t_in;
+    const float first = items[0][0], last = items[list->capacity - 1][0];
     if (first == last) {
-        if (s->t_in == first) return false;
-        list->t_end[lane] = simd_max(s->t_in, first);
-        if (s->t_in < first) {
+        if (t_in == first) return false;
+        list->t_end[lane] = simd_max(t_in, first);
+        if (t_in < first) {
             list->count[lane] = 0;
             kernel_heap_clear(&list->unsorted_light, lane);
         }
     } else {
-        while (items[count].t_in == first) count++;
-        while (items[count - 1].t_in == items[count].t_in) count--;
+        while (items[count][0] == first) count++;
+        while (items[count - 1][0] == items[count][0]) count--;
         list->count[lane] = count;
-        list->t_end[lane] = items[count].t_in;
+        list->t_end[lane] = items[count][0];
     }
     list->is_shortened = true;
     return true;
 }
 
 /* Adds a segment to a ray's list. Returns false if the list is full and all its segments begin at the same t. */
-SIMD_INLINE bool kernel_segments_insert(kernel_segments *list, int lane, const kernel_segment *s,
-                                        const kernel_segment_double *precise)
+SIMD_INLINE bool kernel_segments_insert(kernel_segments *list, int lane, const float item[4], const float precise[4])
 {
     if (__builtin_expect(list->count[lane] == list->capacity, 0)) {
-        if (!kernel_segments_shorten(list, lane, s)) return false;
-        if (!(s->t_in < list->t_end[lane])) return true;
+        if (!kernel_segments_shorten(list, lane, item[0])) return false;
+        if (!(item[0] < list->t_end[lane])) return true;
     }
-    if (list->is_double) list->precise[lane][list->count[lane]] = *precise;
-    list->items[lane][list->count[lane]++] = *s;
+    const int n = list->count[lane]++;
+    if (list->is_double) memcpy(list->precise[lane][n], precise, sizeof list->precise[lane][n]);
+    memcpy(list->items[lane][n], item, sizeof list->items[lane][n]);
     return true;
 }
 
-/* Adds a segment from t_in to t_out to the list of each given ray. Segments must begin in the rays' windows. */
+/* Adds a segment from t_in to t_out to the list of each given ray whose window does not end before it. Segments must
+ * not begin before the rays' windows. at: position of each ray among the packets' rays, from `packets` on. The length
+ * of `run` is used only if the lists are in double. */
+SIMD_INLINE void kernel_segments_add_at(kernel_segments *packets, bool is_double, const int32_t at[SIMD_WIDTH], vm rays,
+                                        vf t_in, vf t_out, const kernel_unit_segment *run)
+{
+    float all[SIMD_WIDTH][4], doubles[SIMD_WIDTH][4];
+    const vf ends[4] = {t_in, t_out, run->v_in, run->v_out};
+    const vf precise[4] = {run->length, run->rest_in, run->rest_out, vf_set(0)};
+    vf_store_rows(all[0], ends);
+    if (is_double) vf_store_rows(doubles[0], precise);
+    for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits), lane = at[i] % SIMD_WIDTH;
+        kernel_segments *list = &packets[at[i] / SIMD_WIDTH];
+        if (!(all[i][0] < list->t_end[lane])) continue;
+        if (__builtin_expect(kernel_segments_insert(list, lane, all[i], doubles[i]), 1)) continue;
+        const float length = is_double ? run->length[i] : (t_out[i] - t_in[i]) * list->per_t[lane];
+        const kernel_unit_segment own = {vf_set(length), vf_set(run->v_in[i]), vf_set(run->v_out[i]),
+                                         vf_set(run->rest_in[i]), vf_set(run->rest_out[i])};
+        kernel_integrate(list->pieces, vm_from_bits(1u << lane), &own, &list->unsorted_light);
+    }
+}
+
+/* As above, for the rays of one packet: lane n is ray n. */
 static __attribute__((noinline)) void kernel_segments_add(kernel_segments *list, vm rays, vf t_in, vf t_out,
                                                           const kernel_unit_segment *run)
 {
-    kernel_segment all[SIMD_WIDTH];
-    kernel_segment_double doubles[SIMD_WIDTH];
-    const vf ends[4] = {t_in, t_out, run->v_in, run->v_out};
-    const vf precise[4] = {run->length, run->rest_in, run->rest_out, vf_set(0)};
-    unsigned bits = vm_bits(rays), left = 0;
-    if (!bits) return;
-    vf_store_rows(&all[0].t_in, ends);
-    if (list->is_double) vf_store_rows(&doubles[0].length, precise);
-    for (; bits; bits &= bits - 1) {
-        const int lane = __builtin_ctz(bits);
-        if (!kernel_segments_insert(list, lane, &all[lane], &doubles[lane])) left |= bits & -bits;
-    }
-    if (__builtin_expect(left != 0, 0)) kernel_integrate(list->pieces, vm_from_bits(left), run, &list->unsorted_light);
+    static const int32_t own[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    if (vm_any(rays)) kernel_segments_add_at(list, list->is_double, own, rays, t_in, t_out, run);
 }
-
-/* The packet's segments sorted by t_in: row n holds the n-th segment of each ray. */
-typedef struct kernel_sorted {
-    int row_count;
-    vf t_in[KERNEL_WINDOW]; /* +inf if a ray has fewer segments */
-    vi item[KERNEL_WINDOW]; /* position of the segment, in floats from list->items on */
-} kernel_sorted;
 
 SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi item)
 {
-    return vf_gather(&list->items[0][0].t_in + member, item);
+    return vf_gather(list->items[0][0] + member, item);
 }
 
 /* Returns the rays on which the two segments begin at the same t and `item` ends before `earlier`: it has length 0 in
@@ -223,29 +216,30 @@ static __attribute__((noinline, cold)) vm kernel_segments_begin_equal(const kern
     return vm_and(same, vf_lt(kernel_items_gather(list, 1, item), kernel_items_gather(list, 1, earlier)));
 }
 
-/* Sorts the segments of all rays by insertion. They are nearly sorted already, because the traversal is front to
- * back. */
-static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out)
+/* Sorts the segments of all rays by t_in. Row n of the results holds the n-th segment of each ray: where it begins,
+ * +inf if a ray has fewer segments, and its position in floats from list->items on. Returns the number of rows. It
+ * sorts by insertion, as the segments are nearly sorted already, because the traversal is front to back. */
+static int kernel_segments_sort(const kernel_segments *list, vf begins[KERNEL_WINDOW], vi items[KERNEL_WINDOW])
 {
-    enum { FLOATS = sizeof(kernel_segment) / sizeof(float) };
+    enum { FLOATS = sizeof list->items[0][0] / sizeof(float) };
     int32_t first[SIMD_WIDTH];
     vi firsts, counts;
-    out->row_count = 0;
+    int row_count = 0;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
         first[lane] = lane * KERNEL_WINDOW * FLOATS;
-        out->row_count = list->count[lane] > out->row_count ? list->count[lane] : out->row_count;
+        row_count = list->count[lane] > row_count ? list->count[lane] : row_count;
     }
     memcpy(&firsts, first, sizeof firsts);
     memcpy(&counts, list->count, sizeof counts);
     const vf count = vf_from_vi(counts);
-    for (int n = 0; n < out->row_count; n++) {
+    for (int n = 0; n < row_count; n++) {
         const vm has = vf_lt(vf_set((float)n), count);
         vi item = (vi)vf_select(has, (vf)(firsts + n * FLOATS), (vf)firsts);
         vf t_in = vf_select(has, kernel_items_gather(list, 0, item), vf_set(INFINITY));
         int at = n;
         for (; at > 0; at--) {
-            const vf before = out->t_in[at - 1];
-            const vi earlier = out->item[at - 1];
+            const vf before = begins[at - 1];
+            const vi earlier = items[at - 1];
             vm moves = vf_lt(t_in, before);
             if (list->is_double) {
                 const vm same = vm_and(vf_eq(t_in, before), vf_lt(t_in, vf_set(INFINITY)));
@@ -253,250 +247,23 @@ static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out
                     moves = vm_or(moves, kernel_segments_begin_equal(list, same, item, earlier));
             }
             if (!vm_any(moves)) break;
-            out->t_in[at] = vf_select(moves, before, t_in);
-            out->item[at] = (vi)vf_select(moves, (vf)earlier, (vf)item);
+            begins[at] = vf_select(moves, before, t_in);
+            items[at] = (vi)vf_select(moves, (vf)earlier, (vf)item);
             t_in = vf_select(moves, t_in, before);
             item = (vi)vf_select(moves, (vf)item, (vf)earlier);
         }
-        out->t_in[at] = t_in;
-        out->item[at] = item;
+        begins[at] = t_in;
+        items[at] = item;
     }
+    return row_count;
 }
 
-/* The following part decides how a ray's interval in a cell is divided into segments, each with a linear field
- * (kernel_segments.h): into equal subintervals or, if these are not accurate enough, by bisection
- * (kernel_cell_segments.h). */
+/* ---- parts of segments ---- */
 
-/* Maximum number of equal subintervals of an interval. */
+/* Maximum number of equal parts into which a segment is divided to be mixed. */
 enum { KERNEL_MAX_SUBDIVISIONS = 256 };
 /* Optical depth at which the transmittance exp(-depth) is KERNEL_BLACK or slightly more. */
 #define KERNEL_DARK_DEPTH 18.4f
-
-/* The interval of a ray in the current cell, how the field is computed along it, and the accuracy that is required. */
-typedef struct kernel_cell_interval {
-    const kernel_map *map; /* inverse map of the cell; NULL if the field is linear */
-    /* the cell; NULL for a tet or a polyhedron; if `map` is NULL, the cell's field is constant */
-    const kernel_cell *cell;
-    const kernel_interval *interval;
-    const kernel_unit_segment *precise; /* a tet's whole interval as a segment, computed in double; or NULL */
-    float cost; /* change of light per unit distance for a field error of 1; 0 if neither error nor mixing is limited */
-    /* first of the opacity's steps that lie within the range of the cell's values, and their number */
-    int first_step, step_count;
-    /* set if a steep ramp, or a narrow ramp, lies within the range of the cell's values */
-    bool is_steep, is_narrow;
-} kernel_cell_interval;
-
-/* Returns bounds of the transfer function over the values from low to high. Steps of the opacity are not included. */
-SIMD_INLINE kernel_bound kernel_bound_between(const kernel_pieces *t, float low, float high)
-{
-    const float last = KERNEL_BOUND_BINS - 1;
-    const int from = (int)simd_min(simd_max((low - t->bin_low) * t->bound_inverse, 0), last);
-    const int to = (int)simd_min(simd_max((high - t->bin_low) * t->bound_inverse, 0), last);
-    kernel_bound b = t->bounds[from];
-    for (int i = from + 1; i <= to; i++) {
-        b.extinction_low = simd_min(t->bounds[i].extinction_low, b.extinction_low);
-        b.extinction_high = simd_max(t->bounds[i].extinction_high, b.extinction_high);
-        b.extinction_slope = simd_max(t->bounds[i].extinction_slope, b.extinction_slope);
-        b.colour_slope = simd_max(t->bounds[i].colour_slope, b.colour_slope);
-    }
-    return b;
-}
-
-/* Returns an upper bound of the change of light per unit distance for a field error of 1. With extinction s and colour
- * c, a field error d changes the light by at most T (contrast |s'| + s |c'|) d per unit distance
- * (docs/development/error_budget.md). */
-SIMD_INLINE float kernel_bound_cost(const kernel_pieces *t, const kernel_bound *b)
-{
-    return simd_min(t->contrast * b->extinction_slope + b->extinction_high * b->colour_slope, 1e30f);
-}
-
-/* Computes the maximum of this change of light over the cell's values, and finds the steps and ramps within these
- * values. */
-SIMD_INLINE void kernel_cell_interval_bound(const kernel_segments *list, const float *values, int count,
-                                            kernel_cell_interval *out)
-{
-    const kernel_pieces *t = list->pieces;
-    float low = values[0], high = low;
-    if (!(list->allowance > 0) && !(list->mixing > 0)) return;
-    for (int i = 1; i < count; i++) {
-        low = simd_min(values[i], low);
-        high = simd_max(values[i], high);
-    }
-    const kernel_bound b = kernel_bound_between(t, low, high);
-    out->cost = kernel_bound_cost(t, &b);
-    while (out->first_step < t->step_count && t->steps[out->first_step].cut < low) out->first_step++;
-    while (out->first_step + out->step_count < t->step_count && t->steps[out->first_step + out->step_count].cut <= high)
-        out->step_count++;
-    for (int i = 0; i < t->steep_count; i++) {
-        const bool is_met = low <= t->steep[i].high && t->steep[i].low <= high;
-        out->is_steep = out->is_steep || is_met;
-        out->is_narrow = out->is_narrow || (is_met && t->steep[i].is_narrow);
-    }
-}
-
-SIMD_INLINE vf kernel_cell_interval_value(kernel_packet *p, const kernel_cell_interval *cell_interval, vm rays, vf t)
-{
-    const kernel_interval *i = cell_interval->interval;
-    return cell_interval->map ? kernel_value_at(p, cell_interval->map, i, rays, t) : kernel_line_value(i, t);
-}
-
-/* Returns the rays whose values from low to high meet a steep ramp, or, if is_narrow is set, a narrow one. */
-SIMD_INLINE vm kernel_values_are_steep(const kernel_pieces *t, vf low, vf high, bool is_narrow)
-{
-    vm any = vm_none();
-    for (int i = 0; i < t->steep_count; i++) {
-        const kernel_steep *steep = &t->steep[i];
-        if (is_narrow && !steep->is_narrow) continue;
-        any = vm_or(any, vm_and(vf_le(low, vf_set(steep->high)), vf_le(vf_set(steep->low), high)));
-    }
-    return any;
-}
-
-/* Returns the rays whose values from low to high contain one of the opacity's steps first .. first + count - 1. */
-SIMD_INLINE vm kernel_values_have_step(const kernel_pieces *t, int first, int count, vf low, vf high)
-{
-    vm any = vm_none();
-    for (int i = first; i < first + count; i++) {
-        const vf cut = vf_set(t->steps[i].cut);
-        any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
-    }
-    return any;
-}
-
-/* Rounding of an interval's values in float32, relative to max(1, |value|). docs/development/error_budget.md derives at
- * most 4e-7. */
-#define KERNEL_VALUE_ROUNDING 1e-6f
-
-enum { KERNEL_DEVIATION_SAMPLES = 8 };
-
-/* Deviation of the field from the chord between its values at the interval's ends, sampled at each eighth of the
- * interval. */
-typedef struct kernel_cell_interval_deviation {
-    vf most;
-    /* deviation at the middle of a parabola whose second derivative is the mean absolute one of the field */
-    vf bend;
-    vf opacity; /* mean opacity along the interval, from samples at its quarters */
-} kernel_cell_interval_deviation;
-
-/* Returns the mean size of the field's second derivative, as a deviation (kernel_cell_interval_deviation.bend).
- * Subintervals of length h deviate from their chords by h^2 / 12 of the second derivative on average, and the error of
- * light is the integral of that. Second differences over an eighth give the mean size; towards the ends they are
- * extrapolated. */
-SIMD_INLINE vf kernel_cell_interval_curvature(const vf off[KERNEL_DEVIATION_SAMPLES + 1])
-{
-    vf second[KERNEL_DEVIATION_SAMPLES], sum = vf_set(0);
-    for (int i = 1; i < KERNEL_DEVIATION_SAMPLES; i++) {
-        second[i] = (off[i + 1] - off[i]) - (off[i] - off[i - 1]);
-        sum += vf_abs(second[i]);
-    }
-    const vf begin = 2.0f * second[1] - second[2];
-    const vf end = 2.0f * second[KERNEL_DEVIATION_SAMPLES - 1] - second[KERNEL_DEVIATION_SAMPLES - 2];
-    return sum + 0.5f * (vf_abs(begin) + vf_abs(end));
-}
-
-SIMD_INLINE void kernel_cell_interval_deviate(kernel_packet *p, const kernel_segments *list,
-                                              const kernel_cell_interval *cell_interval, vm rays,
-                                              const kernel_interval *stretch, kernel_cell_interval_deviation *out)
-{
-    const vf t0 = stretch->t_in, length = stretch->t_out - t0, v0 = stretch->v_in, v1 = stretch->v_out;
-    const kernel_transfer *transfer = &p->frame->volumes[list->volume];
-    vf off[KERNEL_DEVIATION_SAMPLES + 1];
-    off[0] = off[KERNEL_DEVIATION_SAMPLES] = out->most = vf_set(0);
-    out->opacity = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
-    for (int i = 1; i < KERNEL_DEVIATION_SAMPLES; i++) {
-        const float share = (1.0f / KERNEL_DEVIATION_SAMPLES) * (float)i;
-        const vf v = kernel_value_at(p, cell_interval->map, cell_interval->interval, rays, t0 + length * share);
-        off[i] = v - (v0 + (v1 - v0) * share);
-        out->most = vf_max(out->most, vf_abs(off[i]));
-        if (i % 2 == 0) out->opacity += 0.25f * kernel_opacity(transfer, v);
-    }
-    out->bend = kernel_cell_interval_curvature(off);
-}
-
-/* Returns the number of subintervals, as a real number, into which the interval must be divided, and stores the largest
- * deviation of its field from the chord.
- *
- * With n subintervals, each deviates from its chord by 1 / n^2 of the bend, two thirds of that on average; the bound
- * uses 1.5 times as much. Second differences accumulate the values' rounding, which is subtracted, but the bend is
- * never less than the largest deviation. The error allowed is the interval's share of the ray's length and of its
- * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as a lower bound of the extinction.
- *
- * No number is enough in three cases: if a step of the opacity lies among the values; if a steep ramp does and too many
- * subintervals would be needed; or if a narrow ramp does in which the values' rounding alone would use an eighth of the
- * allowed error. */
-SIMD_INLINE vf kernel_cell_interval_subdivisions_curved(kernel_packet *p, const kernel_segments *list,
-                                                        const kernel_cell_interval *cell_interval, vm rays,
-                                                        const kernel_interval *stretch, vf *deviation)
-{
-    const vf length = stretch->t_out - stretch->t_in, v0 = stretch->v_in, v1 = stretch->v_out;
-    kernel_cell_interval_deviation off;
-    kernel_cell_interval_deviate(p, list, cell_interval, rays, stretch, &off);
-    const vf largest = vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
-    const vf bend = vf_max(off.most, off.bend - 0.5f * KERNEL_VALUE_ROUNDING * largest);
-    const vf distance = length * list->per_t, depth = distance * off.opacity;
-    const vf allowed = list->allowance * (distance / list->reach + depth / (1.0f + depth));
-    const vf made = bend * cell_interval->cost * distance; /* a factor 3/2 and a factor 2/3 cancel each other */
-    *deviation = off.most;
-    const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
-    const vf subdivisions = vf_min(wanted, vf_set(KERNEL_MAX_SUBDIVISIONS));
-    if (!cell_interval->step_count && !cell_interval->is_steep) return subdivisions;
-    const vf wide = 1.5f * off.most + KERNEL_VALUE_ROUNDING * largest, low = vf_min(v0, v1) - wide,
-             high = vf_max(v0, v1) + wide;
-    vm too_few = kernel_values_have_step(list->pieces, cell_interval->first_step, cell_interval->step_count, low, high);
-    if (cell_interval->is_steep) {
-        const vm many = vf_lt(vf_set(KERNEL_MAX_SUBDIVISIONS), wanted);
-        too_few = vm_or(too_few, vm_and(many, kernel_values_are_steep(list->pieces, low, high, false)));
-    }
-    if (cell_interval->is_narrow) {
-        const vf rounded = (8 * KERNEL_VALUE_ROUNDING) * largest * cell_interval->cost * distance;
-        const vm shows = vf_lt(allowed, rounded);
-        too_few = vm_or(too_few, vm_and(shows, kernel_values_are_steep(list->pieces, low, high, true)));
-    }
-    return vf_select(too_few, vf_set(2 * KERNEL_MAX_SUBDIVISIONS), subdivisions);
-}
-
-/* Returns the number of subintervals if compositing mixes the interval with other volumes, which it treats as a uniform
- * medium (comp.h). In an interval of depth d whose extinction and colour vary by a share v, at most d v / 4 is
- * displaced from its assumed position, and the effect on light is attenuated by the other volumes' depth in the
- * interval. That depth, times the light that arrives there, sums to 1 over a ray; so d v / 4 may be the whole error
- * allowed. */
-SIMD_INLINE vf kernel_cell_interval_subdivisions_mixed(const kernel_segments *list,
-                                                       const kernel_cell_interval *cell_interval, vf length, vf change)
-{
-    const vf moved = change * cell_interval->cost * (length * list->per_t) * 0.25f;
-    return vf_sqrt(vf_min(moved / list->mixing, vf_set(1e6f)));
-}
-
-/* Returns the number of equal subintervals into which each ray's interval is divided. *halved receives the rays for
- * which no number is accurate enough, so that their intervals must be divided by bisection. */
-SIMD_INLINE vf kernel_cell_interval_subdivisions(kernel_packet *p, const kernel_segments *list,
-                                                 const kernel_cell_interval *cell_interval, vm rays,
-                                                 const kernel_interval *stretch, vm *halved)
-{
-    const vf length = stretch->t_out - stretch->t_in, most = vf_set(KERNEL_MAX_SUBDIVISIONS);
-    const vf v0 = stretch->v_in, v1 = stretch->v_out;
-    vf subdivisions = vf_set(1), off = vf_set(0);
-    *halved = vm_none();
-    if (cell_interval->map && list->allowance > 0) {
-        subdivisions = kernel_cell_interval_subdivisions_curved(p, list, cell_interval, rays, stretch, &off);
-        *halved = vm_and(rays, vf_lt(most, subdivisions));
-    } else if (cell_interval->map) {
-        subdivisions = length / p->sample_step;
-        if (cell_interval->step_count && list->mixing > 0) {
-            const vf wanted = kernel_cell_interval_subdivisions_curved(p, list, cell_interval, rays, stretch, &off);
-            *halved = vm_and(rays, vf_lt(most, wanted));
-        }
-    } else if (cell_interval->step_count && list->mixing > 0) {
-        *halved = vm_and(rays, kernel_values_have_step(list->pieces, cell_interval->first_step,
-                                                       cell_interval->step_count, vf_min(v0, v1), vf_max(v0, v1)));
-    } else if (cell_interval->is_narrow && cell_interval->cell) {
-        *halved = rays;
-    }
-    if (list->mixing > 0)
-        subdivisions = vf_max(subdivisions, kernel_cell_interval_subdivisions_mixed(list, cell_interval, length,
-                                                                                    vf_abs(v1 - v0) + 2.0f * off));
-    return vf_clamp(-vf_floor(-subdivisions), vf_set(1), most);
-}
 
 /* Returns the rounded sum a + b; *lost becomes the rounding error, computed exactly (Knuth). */
 SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
@@ -520,14 +287,48 @@ SIMD_INLINE kernel_unit_segment kernel_unit_segment_part(const kernel_unit_segme
     return out;
 }
 
-/* Emits a segment as a fragment of its own. kernel_integrate() stops once all but KERNEL_BLACK of the light is
- * absorbed, so that its depth is then too small; but compositing mixes fragments by their depth. So a segment that is
- * so dense is bisected until its parts are not, and emission ends when no light is left. */
+/* Returns the positions, as shares of the segment's length, at which the pieces end that begin at `from`. share: length
+ * of a piece; steps of the opacity end pieces too. */
+SIMD_INLINE vf kernel_mixed_end(const kernel_pieces *t, const kernel_unit_segment *whole, vf share, vf from)
+{
+    const vf one = vf_set(1), inverse = one / (whole->v_out - whole->v_in);
+    vf to = vf_select(vf_lt(from + 1.5f * share, one), from + share, one);
+    for (int i = 0; i < t->step_count; i++) {
+        const vf cut = (t->steps[i].cut - whole->v_in) * inverse;
+        to = vf_select(vf_lt(from, cut), vf_min(cut, to), to);
+    }
+    return to;
+}
+
+/* Returns the share of a segment's length that one fragment may have if compositing mixes it with other volumes, which
+ * it treats as a uniform medium (comp.h). In an interval of depth d whose extinction and colour vary by a share v, at
+ * most d v / 4 is displaced from its assumed position, and the effect on light is attenuated by the other volumes'
+ * depth in the interval. That depth, times the light that arrives there, sums to 1 over a ray; so d v / 4 may be the
+ * whole error allowed. Let s be the extinction, c the colour, R the contrast and s' and c' the slopes. Then d v is at
+ * most (R |s'| + s |c'|) times the change of the value, and s |c'| <= cost + R |s'|, as the cost bounds s c' + s' (c -
+ * b). */
+SIMD_INLINE vf kernel_mixed_share(const kernel_segments *list, const kernel_unit_segment *run)
+{
+    const kernel_pieces *t = list->pieces;
+    const vf low = vf_min(run->v_in, run->v_out), high = vf_max(run->v_in, run->v_out);
+    const vi entry = kernel_light_variation_entry(t, low, high);
+    vf variation, cost, extinction, steepness;
+    vf_gather_pair(&t->variations->variation, entry, &variation, &cost);
+    vf_gather_pair(&t->variations->extinction, entry, &extinction, &steepness);
+    const vf moved = (high - low) * (cost + 2.0f * steepness) * run->length * 0.25f;
+    const vf count = vf_min(-vf_floor(-vf_sqrt(moved / list->mixing)), vf_set(KERNEL_MAX_SUBDIVISIONS));
+    return 1.0f / vf_max(count, vf_set(1));
+}
+
+/* Emits a segment as fragments, which compositing mixes with other volumes. kernel_integrate() stops once all but
+ * KERNEL_BLACK of the light is absorbed, so that its depth is then too small; but compositing mixes fragments by their
+ * depth. So a fragment that is so dense is bisected until its parts are not, and emission ends when no light is
+ * left. */
 static void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, vm rays, vf t_in, vf t_out,
                                 const kernel_unit_segment *whole)
 {
-    const vf one = vf_set(1), black = vf_set(KERNEL_BLACK);
-    vf from = vf_set(0), to = one, depth = vf_set(0);
+    const vf one = vf_set(1), black = vf_set(KERNEL_BLACK), share = kernel_mixed_share(list, whole);
+    vf from = vf_set(0), to = kernel_mixed_end(list->pieces, whole, share, from), depth = vf_set(0);
     for (vm open = rays; vm_any(open);) {
         kernel_light light = kernel_light_none();
         const kernel_unit_segment run = kernel_unit_segment_part(whole, from, to);
@@ -544,7 +345,7 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segments *list, v
         depth += vf_select(put, light.depth, vf_set(0));
         open = vm_andnot(open, vm_and(put, vm_or(vf_eq(to, one), vf_lt(vf_set(KERNEL_DARK_DEPTH), depth))));
         from = vf_select(put, to, from);
-        to = vf_select(cut, middle, vf_select(put, one, to));
+        to = vf_select(cut, middle, vf_select(put, kernel_mixed_end(list->pieces, whole, share, from), to));
     }
 }
 

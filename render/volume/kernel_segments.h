@@ -19,7 +19,7 @@
  * another rank.
  *
  * If several volumes share a ray, or cells overlap, no rank has all segments at a position. With separate_samples
- * (render.h) each segment is emitted at once, cut finely enough for compositing to mix them. */
+ * (render.h) a window's segments are not integrated but emitted, cut finely enough for compositing to mix them. */
 #ifndef RENDER_KERNEL_SEGMENTS_H
 #define RENDER_KERNEL_SEGMENTS_H
 
@@ -90,27 +90,31 @@ static void kernel_blend_segments(kernel_packet *p, kernel_segments *list)
 {
     const kernel_pieces *pieces = list->pieces;
     kernel_blend *b = &list->blend;
-    kernel_sorted sorted;
+    vf begins[KERNEL_WINDOW];
+    vi items[KERNEL_WINDOW];
     kernel_preint_end end;
     end.value = vf_set(NAN);
-    kernel_segments_sort(list, &sorted);
-    for (int n = 0; n < sorted.row_count; n++) {
-        const vf t_in = sorted.t_in[n];
-        const vi item = sorted.item[n];
+    const int row_count = kernel_segments_sort(list, begins, items);
+    for (int n = 0; n < row_count; n++) {
+        const vf t_in = begins[n];
         const vm has = vm_and(vf_lt(t_in, vf_set(INFINITY)), vf_lt(vf_set(KERNEL_DARK), b->light));
         if (!vm_any(has)) break;
-        int32_t items[SIMD_WIDTH];
+        int32_t at[SIMD_WIDTH];
         vf segment[4], precise[4];
-        vi_store(items, item);
-        vf_gather_rows(&list->items[0][0].t_in, items, segment);
+        vi_store(at, items[n]);
+        vf_gather_rows(list->items[0][0], at, segment);
         const vf t_out = segment[1];
         kernel_unit_segment run = kernel_unit_segment_of((t_out - t_in) * list->per_t, segment[2], segment[3]);
         kernel_light light = kernel_light_none();
         if (list->is_double) {
-            vf_gather_rows(&list->precise[0][0].length, items, precise);
+            vf_gather_rows(list->precise[0][0], at, precise);
             run.length = precise[0];
             run.rest_in = precise[1];
             run.rest_out = precise[2];
+        }
+        if (list->mixing > 0) {
+            kernel_emit_segment(p, list, has, t_in, t_out, &run);
+            continue;
         }
         if (pieces->preintegral)
             light = kernel_preintegrated(pieces, has, &run, &end);

@@ -56,7 +56,7 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
             else if (kernel_is_linear(c->type))
                 kernel_tet_segments(p, &s->packets[i], c, s->precise, p->active);
             else
-                kernel_curved_segments(p, &s->packets[i], c, map, p->active);
+                kernel_curved_segments(t, i, c, map, p->active, (const vf[2]){p->t_near, s->packets[i].t_cut}, 1);
         }
     }
     kernel_blocks_shorten(t, blocks);
@@ -100,8 +100,7 @@ static __attribute__((noinline)) unsigned kernel_tet_segments_small(kernel_tile_
         const vm met = vm_and(i.mask, vm_and(vf_le(begin, i.t_out), vf_lt(i.t_in, end)));
         const vm cut = vm_and(met, vm_or(vf_lt(i.t_in, near), vf_lt(far, i.t_out)));
         const vm own = vm_and(vm_andnot(met, cut), vm_and(vf_le(begin, i.t_in), vf_lt(i.t_in, i.t_out)));
-        const vf ends[4] = {i.t_in, i.t_out, i.v_in, i.v_out};
-        if (vm_any(own)) kernel_local_store_segments(s, at, own, ends);
+        if (vm_any(own)) kernel_local_store_segments(s, at, own, i.t_in, i.t_out, i.v_in, i.v_out);
         if (__builtin_expect(vm_any(cut), 0)) kernel_tet_segments_cut(t, s, at, r.lane, vm_bits(cut));
     }
     kernel_blocks_shorten(t, s->blocks);
@@ -131,21 +130,23 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *li
     list->active = p->active;
     list->blend = kernel_blend_begin();
     list->t_last = vf_min(p->t_far, vf_set(far));
-    list->t_begin = p->t_near;
     list->cut = f->has_transparent && !f->job->separate_samples ? hits : NULL;
     list->first_fragment = first_fragment;
     kernel_segments_set_double(p, list, f->is_double && !f->job->separate_samples);
 }
 
-/* Prepares the packet for a volume: sets its error limits and its unit distances. */
-SIMD_INLINE void kernel_ray_segments_of(const kernel_packet *p, kernel_segments *list, int volume)
+/* Prepares the packet for a volume: sets its error limits and its unit distances, and begins at the ray's begin. */
+SIMD_INLINE void kernel_ray_segments_of(kernel_packet *p, kernel_segments *list, int volume)
 {
     const kernel_frame *f = p->frame;
+    p->active = list->active;
+    list->t_begin = p->t_near;
     list->per_t = f->volumes[volume].exponent / p->sample_step * p->clip_length_ratio;
     list->volume = volume;
     list->pieces = &f->pieces[volume];
     list->allowance = f->allowance;
     list->mixing = f->job->separate_samples ? f->mixing : 0;
+    list->t_cut = list->mixing > 0 ? p->clip_out : p->t_far;
     list->reach = f->reach[volume];
 }
 
@@ -177,7 +178,7 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
         }
         kernel_block_set_window_end(t, s->packets, block);
     }
-    kernel_local_segments_begin(t, s, blocks);
+    kernel_local_segments_begin(t, s, blocks, volume);
     kernel_tile_process_window(t, volume, blocks);
 }
 
@@ -198,36 +199,17 @@ SIMD_INLINE void kernel_tile_segments_adapt_window(kernel_tile_segments *s, cons
     s->depth = (vf_reduce_min(least) - begin) * (0.75f * (float)room) / (float)most;
 }
 
-/* Prepares all packets for the volume. Sets the tile's t_near to the least depth at which a ray's window begins; +inf
- * if all rays have ended. */
-SIMD_INLINE void kernel_tile_segments_of(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets, int count,
-                                         int volume, float near)
+/* Integrates a volume's segments, window by window. */
+SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
+                                              int count, int volume, const kernel_placement *reach)
 {
     for (int n = 0; n < count; n++) kernel_ray_segments_of(&t->packets[packets[n]], &s->packets[packets[n]], volume);
-    const float front = kernel_tile_segments_front(t, s, packets, count);
-    t->t_near = front < INFINITY ? fmaxf(front, near) : front;
-}
-
-/* Emits all segments of all volumes as fragments of their own, at once and without windows. */
-static __attribute__((noinline, cold)) void kernel_tile_segments_separate(kernel_tile_trace *t, kernel_tile_segments *s,
-                                                                          const int *packets, int count,
-                                                                          const kernel_placement *reach)
-{
-    for (int volume = 0; volume < t->frame->volume_count; volume++) {
-        kernel_tile_segments_of(t, s, packets, count, volume, reach->near);
-        if (t->t_near < INFINITY) kernel_tile_segments_find(t, s, volume, reach->blocks, INFINITY);
-    }
-}
-
-/* Integrates the segments of the first volume, window by window. */
-SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
-                                              int count, const kernel_placement *reach)
-{
     for (;;) {
-        kernel_tile_segments_of(t, s, packets, count, 0, reach->near);
-        if (!(t->t_near < INFINITY)) break;
+        const float front = kernel_tile_segments_front(t, s, packets, count);
+        if (!(front < INFINITY)) break;
+        t->t_near = fmaxf(front, reach->near);
         const float end = s->depth > 0 ? t->t_near + s->depth : reach->far;
-        kernel_tile_segments_find(t, s, 0, reach->blocks, end);
+        kernel_tile_segments_find(t, s, volume, reach->blocks, end);
         kernel_tile_segments_adapt_window(s, packets, count, t->t_near, fminf(end, reach->far));
         for (int n = 0; n < count; n++) {
             kernel_segments *list = &s->packets[packets[n]];
@@ -242,22 +224,19 @@ SIMD_INLINE void kernel_tile_segments_windows(kernel_tile_trace *t, kernel_tile_
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    /* Tets are not processed in lanes if ends are in double, because these are computed per packet. Lanes must not
-     * depend on how many cells the rank has, because segments of tets in packets do not have the same bits. */
-    const bool has_lanes = kernel_segments_use_lanes(t->frame);
-    if (!kernel_tile_cells_begin(t, &kernel_volume_by_segments, has_lanes && !t->frame->is_double,
-                                 has_lanes && t->frame->pieces[0].variations))
-        return;
+    /* Tets are not processed in lanes if ends are in double, because these are computed per packet, nor if transparent
+     * surfaces cut segments, because packets are faster at searching for cuts. Lanes must not depend on how many cells
+     * the rank has, because segments of tets in packets do not have the same bits. */
+    const bool has_cuts = t->frame->has_transparent && !t->frame->job->separate_samples;
+    if (!kernel_tile_cells_begin(t, &kernel_volume_by_segments, !t->frame->is_double && !has_cuts, true)) return;
     const kernel_placement reach = kernel_tile_trees_placement(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
     for (int n = 0; n < count; n++)
         kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, &t->hits[packets[n]],
                                   t->first_fragment);
-    if (t->frame->job->separate_samples)
-        kernel_tile_segments_separate(t, s, packets, count, &reach);
-    else
-        kernel_tile_segments_windows(t, s, packets, count, &reach);
+    for (int volume = 0; volume < t->frame->volume_count; volume++)
+        kernel_tile_segments_windows(t, s, packets, count, volume, &reach);
     for (int n = 0; n < count; n++) {
         kernel_segments *list = &s->packets[packets[n]];
         t->packets[packets[n]].active = list->active;

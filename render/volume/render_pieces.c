@@ -10,6 +10,7 @@
  * farther up, at a distance g in the logarithm, it is h^2 / (8 g). So sqrt(g / 2 e) pieces suffice, and halving makes
  * at most twice as many. Over 12 decades that is 105 pieces for e = 1.25e-3, and 370 for 1e-4. */
 #include "render_pieces.h"
+#include "kernel_bound.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "render_scale.h"
@@ -25,7 +26,6 @@
 /* A value far outside every domain. It is finite so that 0 times it is 0. */
 static const kernel_real endless = (kernel_real)0x1p100;
 /* Upper bound of extinctions and of their slopes, per unit distance. */
-static const double steepest = 1e6;
 static const double rounding = 1e-7;
 
 static int compare_cuts(const void *left, const void *right)
@@ -75,11 +75,6 @@ typedef struct kept_entry {
 /* Error bound of the extinction of ramps, relative to the extinction, if the job allows no error. */
 static const double exact_share = 1e-4;
 
-static double extinction_of(double opacity)
-{
-    return opacity < 1 ? fmin(-log1p(-opacity), steepest) : steepest;
-}
-
 /* A part of a ramp; the ramp goes from the opacity point with index `ramp` to the next one. */
 typedef struct ramp_part {
     const render_transfer *transfer;
@@ -112,8 +107,8 @@ static bool is_bent(const ramp_part *r, double tolerance)
     for (int i = 1; i < PLACES; i++) {
         const double share = r->low + (r->high - r->low) * i / PLACES;
         const double chord = a0 + (ramp_value(r, share) - low) / (high - low) * (a1 - a0);
-        const double truth = extinction_of(ramp_opacity(r, share));
-        if (1.1 * fabs(extinction_of(chord) - truth) > tolerance * truth) return true;
+        const double truth = kernel_extinction_of(ramp_opacity(r, share));
+        if (1.1 * fabs(kernel_extinction_of(chord) - truth) > tolerance * truth) return true;
     }
     return false;
 }
@@ -249,7 +244,7 @@ static void set_piece(const render_transfer *t, const kept_entry *entries, kerne
     set_colours(t, entries, middle, begin, piece);
 }
 
-/* ---- bins and bounds ---- */
+/* ---- bins and steps ---- */
 
 static void fill_bins(kernel_pieces *out)
 {
@@ -258,57 +253,6 @@ static void fill_bins(kernel_pieces *out)
         const kernel_real x = out->bin_low + (kernel_real)i / out->bin_inverse;
         while (piece + 1 < out->count && out->pieces[piece].entry[KERNEL_PIECE_HIGH] <= x) piece++;
         out->bin_first[i] = (kernel_real)piece;
-    }
-}
-
-static int bound_bin(const kernel_pieces *t, double x)
-{
-    const double place = (x - (double)t->bin_low) * (double)t->bound_inverse;
-    return place < 0 ? 0 : place >= KERNEL_BOUND_BINS ? KERNEL_BOUND_BINS - 1 : (int)place;
-}
-
-static float largest(double a, float b)
-{
-    return (float)a > b ? (float)a : b;
-}
-
-static double piece_opacity(const kernel_piece *p, double x)
-{
-    const kernel_real *e = p->entry;
-    const double along = (x - (double)e[KERNEL_PIECE_LOW]) - (double)e[KERNEL_PIECE_LOW_REST];
-    return fmin(fmax((double)e[KERNEL_PIECE_OPACITY] + along * (double)e[KERNEL_PIECE_SLOPE], 0), 1);
-}
-
-/* Computes the minimum and the maximum of the absolute slope of the extinction between two values of a piece. */
-static void steepness_of(const kernel_piece *p, double from, double to, double out[2])
-{
-    const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to), most = fmax(a0, a1);
-    const double steepness = fabs((double)p->entry[KERNEL_PIECE_SLOPE]);
-    out[0] = steepness / fmax(1 - fmin(a0, a1), 1e-30);
-    out[1] = steepness > 0 ? (most < 1 ? fmin(steepness / (1 - most), 1e30) : 1e30) : 0;
-}
-
-/* Widens a bin's bounds by those of the piece between two of its values. */
-static void widen(kernel_bound *b, const kernel_piece *p, double from, double to)
-{
-    const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to);
-    double steepness[2];
-    steepness_of(p, from, to, steepness);
-    b->extinction_low = fminf(b->extinction_low, (float)extinction_of(fmin(a0, a1)));
-    b->extinction_high = largest(extinction_of(fmax(a0, a1)), b->extinction_high);
-    b->extinction_slope = largest(steepness[1], b->extinction_slope);
-    for (int c = 0; c < 3; c++)
-        b->colour_slope = largest(fabs((double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]), b->colour_slope);
-}
-
-static void bound_piece(kernel_pieces *out, const kernel_piece *p)
-{
-    const double low = (double)p->entry[KERNEL_PIECE_LOW], high = (double)p->entry[KERNEL_PIECE_HIGH];
-    const int first = bound_bin(out, low), last = bound_bin(out, high);
-    for (int bin = first; bin <= last; bin++) {
-        const double begin = (double)out->bin_low + bin / (double)out->bound_inverse;
-        const double end = (double)out->bin_low + (bin + 1) / (double)out->bound_inverse;
-        widen(&out->bounds[bin], p, bin == first ? low : fmax(low, begin), bin == last ? high : fmin(high, end));
     }
 }
 
@@ -325,25 +269,6 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
             last++;
         if (t->opacities[i] != t->opacities[last])
             out->steps[out->step_count++] = (kernel_step){at, (float)(kernel_real)at};
-    }
-}
-
-/* Width of ramps that count as steep, as a share of the domain. Wider ramps need only equal subintervals, up to 1000
- * optical depths (docs/development/error_budget.md). A ramp along a logarithmic scale is steep only within this
- * distance of 0, because its slope is proportional to the inverse of the value. */
-static const double steep_width = 1.0 / 64;
-
-static void fill_steep(kernel_pieces *out, const render_transfer *t)
-{
-    for (int i = 0; i + 1 < t->opacity_count; i++) {
-        const double low = render_domain_of(t, t->opacity_values[i]),
-                     high = render_domain_of(t, t->opacity_values[i + 1]);
-        const bool is_whole = high - low < steep_width, is_even = t->scale == RENDER_LINEAR;
-        const double from = is_whole ? low : fmax(low, -steep_width), to = is_whole ? high : fmin(high, steep_width);
-        if (!(low < high && t->opacities[i] != t->opacities[i + 1])) continue;
-        if (is_even ? !is_whole : !(from < to)) continue;
-        out->steep[out->steep_count++] = (kernel_steep){(float)from, (float)to, is_narrow(t, i)};
-        out->has_rests = out->has_rests || is_narrow(t, i);
     }
 }
 
@@ -394,8 +319,8 @@ static void variation_in_piece(value_variation *variation, const kernel_piece *p
     kernel_bound b = {.extinction_low = 1e30f};
     const bool falls = p->entry[KERNEL_PIECE_SLOPE] < 0;
     double steepness[2];
-    widen(&b, p, from, to);
-    steepness_of(p, from, to, steepness);
+    kernel_bound_widen(&b, p, from, to);
+    kernel_piece_steepness(p, from, to, steepness);
     /* Minimum and maximum of the slope of the extinction, with its sign. */
     const double fall = falls ? -steepness[1] : steepness[0], rise = falls ? -steepness[0] : steepness[1];
     const double least = (double)b.extinction_low, most = (double)b.extinction_high;
@@ -464,29 +389,21 @@ static void fill_variations(kernel_pieces *out, const double behind[2])
     }
 }
 
-static void fill_bounds(kernel_pieces *out, const render_transfer *t)
-{
-    float low, high;
-    for (int i = 0; i < KERNEL_BOUND_BINS; i++) out->bounds[i] = (kernel_bound){.extinction_low = 1e30f};
-    for (int i = 0; i < out->count; i++) bound_piece(out, &out->pieces[i]);
-    range_of_light(t, &low, &high);
-    out->contrast = high - low;
-}
-
 static void fill(kernel_pieces *out, const render_transfer *t, double tolerance, kernel_real *cuts, kept_entry *entries)
 {
     const int count = collect_cuts(t, tolerance > rounding ? tolerance : rounding, cuts, entries);
+    float low, high;
     out->count = count + 1;
     set_piece(t, entries, -endless, cuts[0], &out->pieces[0]);
     for (int i = 0; i + 1 < count; i++) set_piece(t, entries, cuts[i], cuts[i + 1], &out->pieces[i + 1]);
     set_piece(t, entries, cuts[count - 1], endless, &out->pieces[count]);
     out->bin_low = cuts[0];
     out->bin_inverse = KERNEL_PIECE_BINS / (cuts[count - 1] - cuts[0]);
-    out->bound_inverse = (float)(KERNEL_BOUND_BINS / (double)(cuts[count - 1] - cuts[0]));
     fill_bins(out);
-    fill_bounds(out, t);
+    range_of_light(t, &low, &high);
+    out->contrast = high - low;
     fill_steps(out, t);
-    fill_steep(out, t);
+    for (int i = 0; i + 1 < t->opacity_count; i++) out->has_rests = out->has_rests || is_narrow(t, i);
 }
 
 insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error)

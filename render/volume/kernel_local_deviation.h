@@ -1,0 +1,348 @@
+/* Evaluates the field along rays between two faces of their hexes, wedges or pyramids, one ray-cell pair per lane. It
+ * is evaluated at three places between the faces, or in each part of a ray's interval. Callers pass the cell type as a
+ * constant; GRID_NO_TYPE means that a packet's rays are in one cell, and the field is computed by its inverse map.
+ *
+ * In kernel_local.h's reference coordinates r the field is f0 + g r + (its nonlinear terms), and y = r + n(r) is linear
+ * along the ray, where the nonlinear terms are n = B b with products b of coordinates. So with r = y - n(r)
+ *     field = f0 + g y + h b(r),   h = (the field's nonlinear terms) - g B.
+ * The first part is linear along the ray. So the field deviates from its chord between the faces by h times the
+ * deviation of b from its own chord. As that is small, r need not be known as accurately as for the field itself.
+ *
+ * r is found by Newton's method, from the line between its values at the faces. In the middle of a cell n' is zero, so
+ * that a step with the derivatives there adds the residual, and leaves |n'| of it to the next step. Such a step has a
+ * third of the terms of a step with the derivatives at the current point, and all places are computed side by side.
+ *
+ * Error bound. Let the residual be the sum over the coordinates of |y - (r + n(r))|. The derivative of n is at most N
+ * in the cell. If r lies slightly outside the cell (kernel_local_is_near()), the derivative is at most 1.082 N:
+ *              r may be up to                                   derivative          gradients of b
+ *     hex      |ρ|, |σ|, |κ| <= 0.52                            1.04^2 N            sqrt(2) 0.52, sqrt(3) 0.52^2
+ *     wedge    0.02 outside, within the cell times 1.06         1.06 N              |(0.52, 0.707)|
+ *     pyramid  |α|, |β| <= 0.52 k, k <= 1.02                    1.045 N             |(0.52, 0.52, 0.52^2)|
+ * These regions are convex. So r errs by at most residual / (1 - 1.082 N), provided that r itself is no farther
+ * outside, which is checked; rays that fail the check are processed by the inverse map. */
+#ifndef RENDER_KERNEL_LOCAL_DEVIATION_H
+#define RENDER_KERNEL_LOCAL_DEVIATION_H
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_local.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_tile_trace.h"
+#include "simd.h"
+
+enum { KERNEL_DEVIATION_STEPS = 8 };
+
+/* Distance, in reference coordinates, by which points may lie outside the cell, which extends from -1/2 to 1/2. */
+#define KERNEL_DEVIATION_MARGIN 0.02f
+
+/* Bounds of the errors of one cell per lane (kernel_local_budget.h). */
+typedef struct kernel_local_bounds {
+    /* h: coefficients of the field's deviation from linear (the file's opening comment) */
+    float terms[KERNEL_NONLINEAR_TERMS][SIMD_WIDTH];
+    /* square of the upper bound of the derivative of the map's nonlinear part */
+    float bend[SIMD_WIDTH];
+    /* lower bound of the part of the field's deviation that is not visible at the three sampled places (the error E of
+     * kernel_local_budget.h) */
+    float unsampled[SIMD_WIDTH];
+    float sensitivity[SIMD_WIDTH];    /* error bound of the field per unit of the residual */
+    float residual_limit[SIMD_WIDTH]; /* largest residual for which the field's value is valid */
+    float tolerance[SIMD_WIDTH];      /* Newton's method stops at a residual of at most this */
+    /* Bounds of the change of light due to a field error, over the values from low to high, which are those of the
+     * lane's cell (kernel_light_variation). cost: maximum of that change; error_variation: its variation. */
+    float low[SIMD_WIDTH], high[SIMD_WIDTH];
+    float cost[SIMD_WIDTH], error_variation[SIMD_WIDTH];
+    /* upper bound of the change of the error's weight per depth: cost + R |s'|, as defined in kernel_local_budget.h */
+    float weight_change[SIMD_WIDTH];
+    float extinction[SIMD_WIDTH];
+} kernel_local_bounds;
+
+/* A vector of rays, each with a cell of its own. */
+typedef struct kernel_local_pairs {
+    kernel_lane_rays rays;
+    kernel_point ends[2];
+    vm active;
+    vf begin;        /* depth at which the ray's window begins */
+    vf count;        /* number of segments into which the interval is divided */
+    float share;     /* share of the ray's whole interval in its cell */
+    vf field[3];     /* the field minus its chord, at a quarter, the middle and three quarters of the interval */
+    vf residual;     /* largest residual at these places, and at those of the parts that contain this one */
+    vm has_diverged; /* rays for which Newton's method did not find the reference coordinates */
+} kernel_local_pairs;
+
+/* ---- cells ---- */
+
+/* Returns an upper bound of the gradient of nonlinear term number `term` in cells of this type. */
+SIMD_INLINE float kernel_local_nonlinear_slope(int type, int term)
+{
+    return kernel_is_prism(type) ? 0.88f : kernel_has_apex(type) ? 0.79f : term < 3 ? 0.74f : 0.47f;
+}
+
+/* Returns the factor e of kernel_local_budget.h: the part of the field's deviation that the three sampled places may
+ * miss is at most e times its bound. */
+SIMD_INLINE float kernel_local_nonlinear_unsampled(int type)
+{
+    return kernel_is_box(type) ? 0.0011f : kernel_is_prism(type) ? 0.0004f : 0;
+}
+
+/* Computes the members of *out from `terms` to `residual_limit`. */
+SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, int type, kernel_local_bounds *out)
+{
+    vf most = vf_set(0);
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
+        vf own = vf_load(c->field[4 + k]);
+        for (int a = 0; a < 3; a++) own = vf_muladd(-vf_load(c->field[1 + a]), vf_load(c->nonlinear_part[k][a]), own);
+        vf_store(out->terms[k], own);
+        most += vf_abs(own) * kernel_local_nonlinear_slope(type, k);
+    }
+    const vf bend = vf_sqrt(vf_load(c->bend)), room = 1.0f - 1.082f * bend;
+    vf_store(out->bend, vf_load(c->bend));
+    vf_store(out->unsampled, kernel_local_nonlinear_unsampled(type) * vf_load(c->bend) * most);
+    vf_store(out->sensitivity, most / room);
+    vf_store(out->residual_limit, KERNEL_DEVIATION_MARGIN * room);
+}
+
+/* ---- rays in cells ---- */
+
+/* The line between the reference coordinates at a ray's two faces, and the chords of the nonlinear terms, per ray. A
+ * position u on the ray goes from -1/2 to 1/2. */
+typedef struct kernel_local_chord {
+    /* reference coordinates at the line's middle, and their difference between the line's ends */
+    vf middle[3], span[3];
+    /* the nonlinear terms' chords: value at the middle, and difference between the ends */
+    vf mean[KERNEL_NONLINEAR_TERMS], rise[KERNEL_NONLINEAR_TERMS];
+    vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3], own[KERNEL_NONLINEAR_TERMS];
+    vf tolerance, residual_limit;
+    /* Used instead of the members above if the type is GRID_NO_TYPE: the packet, its cell, the cell's inverse map, and
+     * the rays' intervals in the cell. */
+    kernel_packet *packet;
+    const kernel_cell *cell;
+    const kernel_map *map;
+    const kernel_interval *interval;
+} kernel_local_chord;
+
+/* Five places of a part of a ray's interval, evenly spaced from its begin to its end. */
+typedef struct kernel_local_places {
+    float u, width;     /* position at which the part begins, and its length; the whole interval has a length of 1 */
+    vf r[5][3], off[5]; /* reference coordinates; the field minus the chord of the whole interval */
+    vf residual;        /* largest residual at these places, and at those of the parts that contain this one */
+    vm is_known;        /* rays for which Newton's method found all reference coordinates */
+} kernel_local_places;
+
+typedef struct kernel_local_iterate {
+    vf r[3], residual[3], deviation;
+} kernel_local_iterate;
+
+SIMD_INLINE void kernel_local_nonlinear_at(int type, const vf r[3], vf out[KERNEL_NONLINEAR_TERMS])
+{
+    kernel_nonlinear_terms b;
+    kernel_nonlinear_terms_at(type, r, &b);
+    memcpy(out, b.term, sizeof b.term);
+}
+
+/* Returns the rays whose reference coordinates r lie in the cell, or outside by at most KERNEL_DEVIATION_MARGIN. */
+SIMD_INLINE vm kernel_local_is_near(int type, const vf r[3])
+{
+    if (kernel_is_prism(type)) return vf_le(vf_set(-KERNEL_DEVIATION_MARGIN), kernel_local_border_distance(type, r));
+    const vf most = vf_max(vf_abs(r[0]), vf_abs(r[1])), half = vf_set(0.5f + KERNEL_DEVIATION_MARGIN);
+    if (kernel_is_box(type)) return vf_le(vf_max(most, vf_abs(r[2])), half);
+    return vm_and(vf_le(most, half * r[2]), vf_le(r[2], vf_set(1 + KERNEL_DEVIATION_MARGIN)));
+}
+
+SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const kernel_local_bounds *bounds, vi lane,
+                                       const kernel_point ends[2], int type, kernel_local_chord *out)
+{
+    vf first[KERNEL_NONLINEAR_TERMS], last[KERNEL_NONLINEAR_TERMS];
+    kernel_local_nonlinear_at(type, ends[0].r, first);
+    kernel_local_nonlinear_at(type, ends[1].r, last);
+    for (int a = 0; a < 3; a++) {
+        out->middle[a] = 0.5f * (ends[0].r[a] + ends[1].r[a]);
+        out->span[a] = ends[1].r[a] - ends[0].r[a];
+    }
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
+        out->mean[k] = 0.5f * (first[k] + last[k]);
+        out->rise[k] = last[k] - first[k];
+        out->own[k] = kernel_gather_lane(bounds->terms[k], lane);
+        for (int a = 0; a < 3; a++) out->nonlinear_part[k][a] = kernel_gather_lane(cells->nonlinear_part[k][a], lane);
+    }
+    out->tolerance = kernel_gather_lane(bounds->tolerance, lane);
+    out->residual_limit = kernel_gather_lane(bounds->residual_limit, lane);
+}
+
+/* Computes the residual of the reference coordinates r at position u on the ray, and the field's deviation from its
+ * chord there. */
+SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, vf u, int type, kernel_local_iterate *p)
+{
+    vf term[KERNEL_NONLINEAR_TERMS];
+    kernel_local_nonlinear_at(type, p->r, term);
+    for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(c->span[a], u, c->middle[a]) - p->r[a];
+    for (int k = 0; k < kernel_nonlinear_count(type); k++) {
+        term[k] -= vf_muladd(c->rise[k], u, c->mean[k]);
+        for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(-c->nonlinear_part[k][a], term[k], p->residual[a]);
+    }
+    p->deviation = c->own[0] * term[0];
+    for (int k = 1; k < kernel_nonlinear_count(type); k++) p->deviation = vf_muladd(c->own[k], term[k], p->deviation);
+}
+
+SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)
+{
+    return (vf_abs(p->residual[0]) + vf_abs(p->residual[1])) + vf_abs(p->residual[2]);
+}
+
+/* Refines the reference coordinates r at `count` places from initial guesses by Newton's method. *residual receives the
+ * largest residual left at any place. Returns the rays for which r is valid at all places: in the cell or slightly
+ * outside, with a small enough residual. */
+SIMD_INLINE vm kernel_local_newton(const kernel_local_chord *c, const vf *places, int count, vm rays, int type,
+                                   kernel_local_iterate *at, vf *residual)
+{
+    for (int n = 0;; n++) {
+        *residual = vf_set(0);
+        for (int i = 0; i < count; i++) {
+            kernel_local_iterate_at(c, places[i], type, &at[i]);
+            *residual = vf_max(kernel_local_residual_of(&at[i]), *residual);
+        }
+        const vm open = vm_andnot(rays, vf_le(*residual, c->tolerance));
+        if (n == KERNEL_DEVIATION_STEPS || !vm_any(open)) break;
+        for (int i = 0; i < count; i++)
+            for (int a = 0; a < 3; a++) at[i].r[a] = vf_select(open, at[i].r[a] + at[i].residual[a], at[i].r[a]);
+    }
+    vm is_near = vf_le(*residual, c->residual_limit);
+    for (int i = 0; i < count; i++) is_near = vm_and(is_near, kernel_local_is_near(type, at[i].r));
+    return is_near;
+}
+
+/* Computes the field minus the chord of the interval between `ends` at `count` positions, by the inverse map. */
+static __attribute__((noinline)) void kernel_local_map_deviations(const kernel_local_chord *c, const kernel_point *ends,
+                                                                  const vf *u, int count, vm rays, vf *out)
+{
+    for (int i = 0; i < count; i++) {
+        const vf along = u[i] + 0.5f, t = ends[0].t + (ends[1].t - ends[0].t) * along;
+        const vf value = kernel_value_at(c->packet, c->map, c->interval, rays, t);
+        out[i] = value - (ends[0].value + (ends[1].value - ends[0].value) * along);
+    }
+}
+
+/* Evaluates the field at the places first, first + step and so on before the last one, from guesses of their reference
+ * coordinates. ends: the ends of the whole interval. */
+SIMD_INLINE void kernel_local_evaluate(const kernel_local_chord *c, const kernel_point *ends, int first, int step,
+                                       vm rays, int type, kernel_local_places *p)
+{
+    kernel_local_iterate at[3];
+    vf u[3], off[3], residual;
+    int count = 0;
+    for (int i = first; i < 4; i += step, count++) {
+        u[count] = vf_set(p->u + 0.25f * (float)i * p->width);
+        memcpy(at[count].r, p->r[i], sizeof p->r[i]);
+    }
+    if (type == GRID_NO_TYPE) {
+        kernel_local_map_deviations(c, ends, u, count, rays, off);
+    } else {
+        p->is_known = vm_and(p->is_known, kernel_local_newton(c, u, count, rays, type, at, &residual));
+        p->residual = vf_max(residual, p->residual);
+    }
+    for (int i = first, n = 0; i < 4; i += step, n++) {
+        memcpy(p->r[i], at[n].r, sizeof p->r[i]);
+        p->off[i] = type == GRID_NO_TYPE ? off[n] : at[n].deviation;
+    }
+}
+
+/* Evaluates the field at the five places of a whole interval. */
+SIMD_INLINE void kernel_local_places_of(const kernel_local_chord *c, const kernel_point ends[2], vm rays, int type,
+                                        kernel_local_places *out)
+{
+    *out = (kernel_local_places){.u = -0.5f, .width = 1, .is_known = vm_all_lanes()};
+    if (type != GRID_NO_TYPE) {
+        kernel_local_iterate middle;
+        memcpy(middle.r, c->middle, sizeof middle.r);
+        for (int n = 0; n < 2; n++) {
+            kernel_local_iterate_at(c, vf_set(0), type, &middle);
+            for (int a = 0; a < 3; a++) middle.r[a] += middle.residual[a];
+        }
+        for (int a = 0; a < 3; a++) {
+            const vf near_middle = 0.25f * c->middle[a];
+            out->r[0][a] = ends[0].r[a];
+            out->r[1][a] = vf_muladd(c->span[a], vf_set(-0.25f), near_middle) + 0.75f * middle.r[a];
+            out->r[2][a] = middle.r[a];
+            out->r[3][a] = vf_muladd(c->span[a], vf_set(0.25f), near_middle) + 0.75f * middle.r[a];
+            out->r[4][a] = ends[1].r[a];
+        }
+    }
+    kernel_local_evaluate(c, ends, 1, 1, rays, type, out);
+}
+
+/* Evaluates the field at the five places of one half of a part. */
+SIMD_INLINE void kernel_local_places_halve(const kernel_local_chord *c, const kernel_point ends[2],
+                                           const kernel_local_places *p, int half, vm rays, int type,
+                                           kernel_local_places *out)
+{
+    *out = (kernel_local_places){.width = 0.5f * p->width, .residual = p->residual, .is_known = p->is_known};
+    out->u = p->u + (float)half * out->width;
+    for (int i = 0; i < 3; i++) {
+        out->off[2 * i] = p->off[2 * half + i];
+        memcpy(out->r[2 * i], p->r[2 * half + i], sizeof p->r[0]);
+    }
+    for (int i = 1; i < 4; i += 2)
+        for (int a = 0; a < 3; a++) out->r[i][a] = 0.5f * (out->r[i - 1][a] + out->r[i + 1][a]);
+    kernel_local_evaluate(c, ends, 1, 2, rays, type, out);
+}
+
+/* Returns the position of the part's end on the whole interval, from `first` to `last`. */
+SIMD_INLINE vf kernel_local_along(vf first, vf last, float u)
+{
+    if (u < 0.5f) return first + (last - first) * (u + 0.5f);
+    return last;
+}
+
+/* Makes the part the interval of the rays: its ends, and the field's deviations from the chord between them. whole: the
+ * rays with the whole interval. */
+SIMD_INLINE void kernel_local_pairs_of(const kernel_local_pairs *whole, const kernel_local_places *p, vm rays,
+                                       kernel_local_pairs *out)
+{
+    const kernel_point *first = &whole->ends[0], *last = &whole->ends[1];
+    *out = *whole;
+    out->active = rays;
+    out->share = whole->share * p->width;
+    for (int n = 0; n < 2; n++) {
+        const float u = p->u + (float)n * p->width;
+        out->ends[n].t = kernel_local_along(first->t, last->t, u);
+        out->ends[n].value = kernel_local_along(first->value, last->value, u) + p->off[4 * n];
+    }
+    for (int i = 0; i < 3; i++)
+        out->field[i] = p->off[i + 1] - vf_muladd(p->off[4] - p->off[0], vf_set(0.25f * (float)(i + 1)), p->off[0]);
+    out->residual = p->residual;
+    out->has_diverged = vm_not(p->is_known);
+}
+
+/* Computes the field's deviations from its chord, of the whole interval in the cell. */
+SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, const kernel_local_bounds *bounds,
+                                            kernel_local_pairs *p, int type)
+{
+    kernel_local_chord chord;
+    kernel_local_places places;
+    kernel_local_chord_of(cells, bounds, p->rays.lane, p->ends, type, &chord);
+    kernel_local_places_of(&chord, p->ends, p->active, type, &places);
+    p->has_diverged = vm_not(places.is_known);
+    p->residual = places.residual;
+    for (int i = 0; i < 3; i++) p->field[i] = places.off[i + 1];
+}
+
+/* Replaces an end of the rays in the mask, whose intervals have the given ends, by the point at depth t between them.
+ * Returns the rays for which Newton's method did not find its reference coordinates. */
+SIMD_INLINE vm kernel_local_move_end(const kernel_local_chord *c, const kernel_point ends[2], vm rays, vf t, int type,
+                                     kernel_point *out)
+{
+    const vf along = (t - ends[0].t) / (ends[1].t - ends[0].t), u = along - 0.5f;
+    kernel_local_iterate at;
+    vf residual;
+    for (int a = 0; a < 3; a++) at.r[a] = vf_muladd(c->span[a], u, c->middle[a]);
+    const vm known = kernel_local_newton(c, &u, 1, rays, type, &at, &residual);
+    kernel_point point = {.t = t, .value = (ends[0].value + (ends[1].value - ends[0].value) * along) + at.deviation};
+    memcpy(point.r, at.r, sizeof point.r);
+    kernel_point_move(rays, &point, out);
+    return vm_andnot(rays, known);
+}
+
+#endif
