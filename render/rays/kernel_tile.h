@@ -175,7 +175,7 @@ static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, c
             error[i] += fabsf(normal[a][i]);
         }
     }
-    /* The magnitude of positions is at most size + 1 (kernel_packet_tree_rays()). The sum of three products has an
+    /* Positions near the scene and the eye have magnitudes of at most size + 1. The sum of three products has an
      * error of 4 roundings of this number times the 1-norm of the normal; the centre and the half widths of a box add 1
      * rounding, the normal and the offset 1 more. */
     for (int i = 0; i < KERNEL_LANES; i++) {

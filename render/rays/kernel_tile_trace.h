@@ -61,7 +61,6 @@ SIMD_INLINE void kernel_block_begin(kernel_tile_trace *t, int block)
         const int i = block * KERNEL_BLOCK_PACKETS + n;
         kernel_packet_begin(&t->packets[i], t->frame, &t->tile, t->thread, x + n % across * KERNEL_PACKET_COLUMNS,
                             y + n / across * KERNEL_PACKET_ROWS);
-        if (t->frame->needs_packets) kernel_packet_complete(&t->packets[i]);
         kernel_hits_begin(&t->hits[i]);
     }
 }

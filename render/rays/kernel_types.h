@@ -292,11 +292,10 @@ typedef struct kernel_frame {
      * own. */
     int volume_intervals;
     bool has_transparent;
-    bool is_binned;     /* set if the cells of surfaces are binned by tile, unless there are too many */
-    bool bins_volume;   /* set if the cells of the only volume are binned by tile */
-    bool needs_planes;  /* set if tiles traverse the trees, for which they need planes */
-    bool needs_packets; /* set if single packets traverse trees as well, which normals by differences require */
-    bool has_segments;  /* set if volumes are integrated by segments; otherwise they are sampled */
+    bool is_binned;    /* set if the cells of surfaces are binned by tile, unless there are too many */
+    bool bins_volume;  /* set if the cells of the only volume are binned by tile */
+    bool needs_planes; /* set if tiles traverse the trees, for which they need planes */
+    bool has_segments; /* set if volumes are integrated by segments; otherwise they are sampled */
     /* set if the ends of intervals in tets and of bisected intervals are computed in double (kernel_exact.h) */
     bool is_double;
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
