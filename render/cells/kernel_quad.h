@@ -37,7 +37,6 @@
 
 #include "grid.h"
 #include "kernel_shapes.h"
-#include "kernel_wide.h"
 #include "simd.h"
 
 /* A quad's corners, projected along each ray, and the edge functions of its sides. e01 is that from corner 0 to corner
@@ -201,79 +200,9 @@ static inline void kernel_quad_store_point(kernel_quad_point *out, int lane, con
     out->t[lane] = (float)place[2];
 }
 
-/* ---- SIMD_WIDTH / 2 rays, in double ---- */
-
-typedef struct kernel_f64_quad {
-    kernel_f64 x[4], y[4];
-} kernel_f64_quad;
-
-typedef struct kernel_f64_quadratic {
-    kernel_f64 c0, c1, c2;
-} kernel_f64_quadratic;
-
-SIMD_INLINE kernel_f64 kernel_f64_cross(const kernel_f64_quad *q, int i, int j)
-{
-    return q->x[i] * q->y[j] - q->x[j] * q->y[i];
-}
-
-SIMD_INLINE kernel_f64_mask kernel_f64_vanishes(const kernel_f64_quadratic *c)
-{
-    return (kernel_f64_mask)(c->c0 == 0) & (kernel_f64_mask)(c->c1 == 0) & (kernel_f64_mask)(c->c2 == 0);
-}
-
-/* Returns, per lane, the root in [0, 1] of the quadratic at which half of its derivative equals `turn`, by the same
- * formulas as kernel_scalar_root(). */
-SIMD_INLINE kernel_f64 kernel_f64_root(const kernel_f64_quadratic *c, kernel_f64 turn)
-{
-    const kernel_f64 zero = {0}, one = zero + 1;
-    const kernel_f64_mask is_sum = (kernel_f64_mask)(c->c1 * turn <= 0);
-    const kernel_f64 n = kernel_f64_select(is_sum, turn - c->c1, c->c0);
-    const kernel_f64 d = kernel_f64_select(is_sum, n + c->c2, (c->c0 - c->c1) - turn);
-    const kernel_f64 whole = kernel_f64_select(is_sum, one, zero);
-    const kernel_f64 x = kernel_f64_select((kernel_f64_mask)(d != 0), n / d, whole);
-    const kernel_f64 least = kernel_f64_select((kernel_f64_mask)(x < one), x, one);
-    return kernel_f64_select((kernel_f64_mask)(x >= 0), least, zero);
-}
-
-/* Computes the patch's point for the wanted rays in one half of the lanes. Each of these rays crosses one triangle.
- * Returns the rays for which one of the quadratics A and B vanishes, whose points must be computed one by one. */
-SIMD_INLINE kernel_f64_mask kernel_f64_single_point(const kernel_quad *quad, vm wanted, int half,
-                                                    kernel_quad_point *out)
-{
-    const kernel_f64 zero = {0}, one = zero + 1;
-    kernel_f64_quad q;
-    kernel_f64 z[4], old[3];
-    const vi turns_b = vi_from_bits(quad->e01) ^ vi_from_bits(quad->e32);
-    const kernel_f64_mask by_b = kernel_f64_of_mask(vm_sign(turns_b), half);
-    const kernel_f64_mask negative_a = kernel_f64_of_mask(vm_sign(vi_from_bits(quad->e03)), half);
-    const kernel_f64_mask negative_b = kernel_f64_of_mask(vm_sign(vi_from_bits(quad->e01)), half);
-    for (int i = 0; i < 4; i++) {
-        q.x[i] = kernel_f64_of(&quad->x[i], half);
-        q.y[i] = kernel_f64_of(&quad->y[i], half);
-        z[i] = kernel_f64_of(&quad->z[i], half);
-    }
-    const kernel_f64 across = kernel_f64_cross(&q, 0, 2);
-    const kernel_f64_quadratic a = {kernel_f64_cross(&q, 0, 3), 0.5 * (across + kernel_f64_cross(&q, 1, 3)),
-                                    kernel_f64_cross(&q, 1, 2)};
-    const kernel_f64_quadratic b = {kernel_f64_cross(&q, 0, 1), 0.5 * (across + kernel_f64_cross(&q, 3, 1)),
-                                    kernel_f64_cross(&q, 3, 2)};
-    const kernel_f64 square = kernel_f64_select(by_b, b.c1 * b.c1 - b.c0 * b.c2, a.c1 * a.c1 - a.c0 * a.c2);
-    const kernel_f64 root = kernel_f64_sqrt(kernel_f64_select((kernel_f64_mask)(square > 0), square, zero));
-    const kernel_f64_mask is_rising = (by_b & negative_b) | (~by_b & negative_a);
-    const kernel_f64 turn = kernel_f64_select(by_b ^ is_rising, root, -root);
-    const kernel_f64 s = kernel_f64_root(&a, turn), r = kernel_f64_root(&b, -turn);
-    const kernel_f64 t = (one - r) * ((one - s) * z[0] + s * z[1]) + r * ((one - s) * z[3] + s * z[2]);
-    const kernel_f64_mask rays = kernel_f64_of_mask(wanted, half);
-    vf *const lists[3] = {&out->s, &out->r, &out->t};
-    const kernel_f64 places[3] = {s, r, t};
-    for (int n = 0; n < 3; n++) {
-        old[n] = kernel_f64_of(lists[n], half);
-        kernel_f64_store_lanes(lists[n], half, kernel_f64_select(rays, places[n], old[n]));
-    }
-    return rays & (kernel_f64_vanishes(&a) | kernel_f64_vanishes(&b));
-}
-
-static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad *q, vm wanted, kernel_quad_point *out)
+/* Computes the points of the wanted rays, each of which crosses exactly one of the two triangles. They are few:
+ * Newton's method in float32 is accurate enough for most rays (kernel_patch_converged()). */
+static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_quad_point *out)
 {
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
@@ -282,22 +211,6 @@ static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad 
         kernel_scalar_single_point(&flat, place);
         kernel_quad_store_point(out, lane, place);
     }
-}
-
-static __attribute__((noinline)) void kernel_quad_single_point(const kernel_quad *q, vm wanted, kernel_quad_point *out)
-{
-    unsigned vanishing = 0;
-    for (int half = 0; half < 2; half++) {
-        const unsigned lanes = ((1u << KERNEL_HALF) - 1) << half * KERNEL_HALF;
-        int64_t rays[KERNEL_HALF], any = 0;
-        if (!(vm_bits(wanted) & lanes)) continue;
-        const kernel_f64_mask vanish = kernel_f64_single_point(q, wanted, half, out);
-        memcpy(rays, &vanish, sizeof rays);
-        for (int i = 0; i < KERNEL_HALF; i++) any |= rays[i];
-        if (!any) continue;
-        for (int i = 0; i < KERNEL_HALF; i++) vanishing |= (unsigned)(rays[i] & 1) << (half * KERNEL_HALF + i);
-    }
-    if (__builtin_expect(vanishing, 0)) kernel_quad_limit(q, vm_from_bits(vanishing), out);
 }
 
 /* Computes the points of the wanted rays that meet the patch twice: one in out[0], the other in out[1]. Returns these
