@@ -1,15 +1,30 @@
 /* Finds the tets, hexes, wedges and pyramids that isosurfaces cross, SIMD_WIDTH cells at a time (kernel_candidates.h):
  *
  *     cells of one type, one per lane:   do their values straddle an isovalue?
- *     cells that do, one per lane:       the slab of kernel_outline.h and its box of pixels; for tets the points where
- *                                        the isovalue crosses their edges
+ *     cells that do, one per lane:       the slab that contains the isosurface and its box of pixels; for tets the
+ *                                        points where the isovalue crosses their edges
  *
- * Positions are differences from the eye in float32, along the camera's axes. A hit is the mean of the vertices with
- * non-negative weights, and its value is the mean of their values with the same weights (kernel_outline.h). So the hit
- * lies in the slab |L| <= E of kernel_outline.h, computed from the same rounded positions. The hit's error is then at
- * most that of the vertices, 8 roundings of their distance from the eye, which is less than the margins of
- * kernel_add_lanes(). That cells whose map is not folded contain their hits also holds only up to rounding; cells whose
- * size is near the rounding error lie within the margins anyway. */
+ * In a tet the isosurface is flat: a triangle or quadrangle whose corners are the points on the edges at which the
+ * field is zero. Hits in float32 lie on it as well. The weights from which a face's depth and value are computed all
+ * have one sign (kernel_cell.h) and err by a few units in the last place. So both are exact for some point of the face
+ * very close to the ray, and the line between two such points with values of opposite signs passes through the
+ * isosurface.
+ *
+ * Other cells: let L be linear in the point, and E its largest difference from the field F at a vertex. F - L is the
+ * mean of these differences, weighted by the shape functions, which are non-negative in the cell and sum to 1. So |F -
+ * L| <= E in the whole cell, however distorted it is; the values of faces, on their patches, are the field's. A hit is
+ * a zero of F, or is interpolated between two values of opposite signs, so that |L| <= E there too: it lies in a slab
+ * of the cell's hull, which is thin if the field is smooth. This holds for points with reference coordinates in the
+ * cell. If the cell's map is folded, solutions up to a quarter outside are accepted (kernel_map.h), where the weights'
+ * absolute values sum to at most 1.5³. The map is not folded if the derivative of its nonlinear part has a Frobenius
+ * norm of less than 1 (kernel_local.h): then no two reference points have the same position, and points between a ray's
+ * crossings of the faces are in the cell.
+ *
+ * Positions are differences from the eye in float32, along the camera's axes. The slab is computed from the same
+ * rounded positions as the hit's mean of the vertices. The hit's error is then at most that of the vertices, 8
+ * roundings of their distance from the eye, which is less than the margins of kernel_add_lanes(). That cells whose map
+ * is not folded contain their hits also holds only up to rounding; cells whose size is near the rounding error lie
+ * within the margins anyway. */
 #ifndef RENDER_KERNEL_CANDIDATE_SURFACES_H
 #define RENDER_KERNEL_CANDIDATE_SURFACES_H
 
@@ -20,7 +35,7 @@
 #include "kernel_cell_values.h"
 #include "kernel_cell.h"
 #include "kernel_finder.h"
-#include "kernel_outline.h"
+#include "kernel_local.h"
 #include "kernel_shapes.h"
 #include "kernel_tile.h"
 #include "kernel_wide.h"
@@ -36,82 +51,52 @@ typedef struct kernel_curved_lanes {
     vm fitting_lanes;
 } kernel_curved_lanes;
 
-/* at: the linear function L of kernel_outline.h at the vertices. The isosurface lies in the slab |L| <= thickness; the
+/* at: the linear function L at the vertices. The isosurface lies in the slab |L| <= thickness; the
  * thickness is infinite if no such slab is known. */
 typedef struct kernel_curved_slab {
     vf at[8], thickness;
 } kernel_curved_slab;
 
-/* Returns the lanes whose cells are not folded, so that their map is invertible. inverse: the inverse of the Jacobian
- * at the cell's middle. The limit 0.9, instead of the exact 1, leaves a margin far larger than all rounding. */
-SIMD_INLINE vm kernel_curved_lanes_unfolded(const kernel_curved_lanes *l, const kernel_differential *d, int count,
-                                            vf inverse[3][3])
+/* Returns the lanes whose cells are not folded. terms: the coefficients of the three coordinates; inverse: the inverse
+ * of the matrix of their linear terms. The limit 0.9, instead of the exact 1, leaves a margin far larger than all
+ * rounding. */
+SIMD_INLINE vm kernel_curved_lanes_unfolded(int type, const vf terms[4][8], const vf inverse[3][3])
 {
-    vf y[8][3], off[12];
-    vm unfolded = vm_all_lanes();
-    for (int i = 1; i < count; i++) {
-        vf move[3];
-        for (int a = 0; a < 3; a++) move[a] = l->at[i][a] - l->at[0][a];
-        for (int a = 0; a < 3; a++)
-            y[i][a] = (inverse[a][0] * move[0] + inverse[a][1] * move[1]) + inverse[a][2] * move[2];
-    }
-    for (int a = 0; a < 3; a++) y[0][a] = vf_set(0);
-    for (int n = 0; n < d->column_count; n++) {
-        const signed char *v = d->columns[n].vertex;
-        off[n] = vf_set(0);
-        for (int a = 0; a < 3; a++) {
-            vf part = (y[v[1]][a] - y[v[0]][a]) - (a == d->columns[n].along ? 1.0f : 0);
-            if (v[2] != v[3]) part += y[v[3]][a] - y[v[2]][a];
-            off[n] += part * part;
-        }
-    }
-    for (int n = 0; n < d->corner_count; n++) {
-        const signed char *columns = d->corners[n];
-        unfolded = vm_and(unfolded, vf_lt(off[columns[0]] + off[columns[1]] + off[columns[2]], vf_set(0.9f)));
-    }
-    return unfolded;
+    vf nonlinear_part[KERNEL_NONLINEAR_TERMS][3];
+    for (int k = 0; k < kernel_nonlinear_count(type); k++)
+        for (int i = 0; i < 3; i++)
+            nonlinear_part[k][i] =
+                (inverse[i][0] * terms[0][4 + k] + inverse[i][1] * terms[1][4 + k]) + inverse[i][2] * terms[2][4 + k];
+    return vf_lt(kernel_local_nonlinearity(type, (const vf(*)[3])nonlinear_part), vf_set(0.9f));
 }
 
-/* Computes the linear function L (kernel_outline.h) at the vertices, and the thickness of the slab that contains the
- * isosurface. |f| is at most about 1. With r the rounding error of one coordinate, positions have an error of at most
- * r, and their mean has one of at most 8 r. Lanes whose volume is near float32's minimum are removed from
- * fitting_lanes. */
-SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, kernel_curved_slab *out)
+/* Computes the linear function L at the vertices, and the thickness of the slab that contains the isosurface. |f| is at
+ * most about 1. With r the rounding error of one coordinate, positions have an error of at most r, and their mean has
+ * one of at most 8 r. Lanes whose volume is near float32's minimum are removed from fitting_lanes. */
+SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, kernel_curved_slab *out, int type)
 {
-    const kernel_differential *differential = kernel_cell_differential(type);
     const int count = grid_type_vertices(type);
-    vf d[4][3], n[3][3], middle[4], g[3], size = vf_set(0), error = size, error_bound = size;
+    vf terms[4][8], inverse[3][3], g[3], size = vf_set(0), error = size, error_bound = size;
     for (int a = 0; a < 4; a++) {
-        middle[a] = d[a][0] = d[a][1] = d[a][2] = vf_set(0);
-        for (int i = 0; i < count; i++) {
-            const vf v = a < 3 ? l->at[i][a] : l->f[i];
-            middle[a] += v * (1 / (float)count);
-            for (int k = 0; k < 3; k++) d[a][k] += v * differential->middle[k][i];
-        }
+        vf v[8];
+        for (int i = 0; i < count; i++) v[i] = a < 3 ? l->at[i][a] : l->f[i];
+        kernel_local_terms(type, v, terms[a]);
     }
-    for (int i = 0; i < 3; i++) {
-        const int u = (i + 1) % 3, v = (i + 2) % 3;
-        for (int a = 0; a < 3; a++) {
-            const int b = (a + 1) % 3, c = (a + 2) % 3;
-            n[i][a] = d[b][u] * d[c][v] - d[c][u] * d[b][v];
-        }
-    }
-    const vf volume = (d[0][0] * n[0][0] + d[1][0] * n[0][1]) + d[2][0] * n[0][2];
+    const vf volume = kernel_local_invert((const vf(*)[8])terms, inverse);
     l->fitting_lanes = vm_and(l->fitting_lanes, vf_lt(vf_set(1e-30f), vf_abs(volume)));
-    const vf inverse = 1.0f / volume;
-    for (int i = 0; i < 3; i++)
-        for (int a = 0; a < 3; a++) n[i][a] *= inverse;
-    for (int a = 0; a < 3; a++) g[a] = (d[3][0] * n[0][a] + d[3][1] * n[1][a]) + d[3][2] * n[2][a];
+    for (int a = 0; a < 3; a++)
+        g[a] = (terms[3][1] * inverse[0][a] + terms[3][2] * inverse[1][a]) + terms[3][3] * inverse[2][a];
     for (int i = 0; i < count; i++) {
-        out->at[i] = middle[3];
+        out->at[i] = terms[3][0];
         for (int a = 0; a < 3; a++) {
-            const vf part = g[a] * (l->at[i][a] - middle[a]);
+            const vf part = g[a] * (l->at[i][a] - terms[a][0]);
             out->at[i] += part;
             size = vf_max(vf_abs(part), size);
         }
         error = vf_max(vf_abs(out->at[i] - l->f[i]), error);
     }
-    error *= vf_select(kernel_curved_lanes_unfolded(l, differential, count, n), vf_set(1), vf_set(3.4f));
+    const vm unfolded = kernel_curved_lanes_unfolded(type, (const vf(*)[8])terms, (const vf(*)[3])inverse);
+    error *= vf_select(unfolded, vf_set(1), vf_set(3.4f));
     for (int a = 0; a < 3; a++) {
         vf reach = vf_set(0);
         for (int i = 0; i < count; i++) reach = vf_max(vf_abs(l->at[i][a]), reach);
@@ -124,10 +109,7 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type, k
 static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lanes *l, int type,
                                                                kernel_curved_slab *out)
 {
-    if (kernel_is_box(type)) /* the type is a constant, so that loops have constant lengths and compilers unroll them */
-        kernel_curved_lanes_slab_of(l, kernel_curved_types[KERNEL_SHAPE_HEX], out);
-    else
-        kernel_curved_lanes_slab_of(l, type, out);
+    KERNEL_OF_TYPE(type, kernel_curved_lanes_slab_of, l, out);
 }
 
 /* Computes the bounds of the slab's polytope: of the vertices that lie in the slab, and of the points where lines

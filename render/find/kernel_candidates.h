@@ -4,16 +4,16 @@
  * (render_candidates.c; sort-middle in the terms of Molnar et al. 1994). Tiles trace them roughly front to back, and
  * skip blocks that have nearer hits (render_kernels.c, kernel_batch.h; for volumes kernel_tile_cells.h):
  *
- *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
+ *     nodes --- ranges, picture's planes ---> cells --- surfaces' boxes ---> tiles --- nearest first ---> blocks
  *
  * Alternatively each tile traverses the trees (kernel_tile_surface.h). It then tests many of the nodes that its
  * neighbours test too, and transforms cells that mostly lie beside the tile. That is faster if most cells are hidden,
  * because it skips everything behind the hits. It is used for opaque surfaces with several cells per pixel, and for
  * frames in which too many cells are visible.
  *
- * A cell's pixels are the bounding box of its projected outline (kernel_outline.h), widened by a margin that is larger
- * than all rounding errors. Rays then test the cells themselves, so the picture is the same to the last bit for any
- * traversal. */
+ * A cell's pixels are the bounding box of the surface in it (kernel_candidate_surfaces.h), widened by a margin that is
+ * larger than all rounding errors. Rays then test the cells themselves, so the picture is the same to the last bit for
+ * any traversal. */
 #ifndef RENDER_KERNEL_CANDIDATES_H
 #define RENDER_KERNEL_CANDIDATES_H
 

@@ -259,34 +259,27 @@ SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const 
     return placement;
 }
 
-/* Maximum number of points of an outline: eight, padded to a whole vector. */
-enum { KERNEL_OUTLINE_POINTS = 16 };
-
-/* Points in tile space whose convex hull contains a cell: its vertices, or the corners of its bounding box. */
-typedef struct kernel_outline {
-    int count;
-    float point[3][KERNEL_OUTLINE_POINTS];
-    float size[3]; /* largest |X|, |Y|, |Z| of the cell's vertices */
-} kernel_outline;
-
-/* Relative margin that is added to an outline's extent, so that rays that hit the cell only by rounding stay within
- * it. */
+/* Relative margin that is added to the extent of a cell's points, so that rays that hit the cell only by rounding stay
+ * within it. */
 #define KERNEL_OUTLINE_PAD 1e-5f
 
-SIMD_INLINE kernel_placement kernel_outline_placement(const kernel_planes *q, const kernel_outline *o)
+/* Classifies the convex hull of points in tile space. places: the points' x, y and z. */
+SIMD_INLINE kernel_placement kernel_points_placement(const kernel_planes *q, const float *const places[3], int count)
 {
     kernel_sides sides = {0, 0};
     kernel_placement placement = {0};
+    float most[3] = {0, 0, 0};
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < count; i++) most[a] = fabsf(places[a][i]) > most[a] ? fabsf(places[a][i]) : most[a];
     for (int v = 0; v < KERNEL_LANE_VECTORS; v++) {
         vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
-        for (int i = 0; i < o->count; i++) {
-            const vf at = (q->normal[0][v] * o->point[0][i] + q->normal[1][v] * o->point[1][i]) +
-                          (q->normal[2][v] * o->point[2][i] + q->offset[v]);
+        for (int i = 0; i < count; i++) {
+            const vf at = (q->normal[0][v] * places[0][i] + q->normal[1][v] * places[1][i]) +
+                          (q->normal[2][v] * places[2][i] + q->offset[v]);
             low = vf_min(low, at);
             high = vf_max(high, at);
         }
-        const vf size =
-            (q->size[0][v] * o->size[0] + q->size[1][v] * o->size[1]) + (q->size[2][v] * o->size[2] + q->error[v]);
+        const vf size = (q->size[0][v] * most[0] + q->size[1][v] * most[1]) + (q->size[2][v] * most[2] + q->error[v]);
         low -= size * KERNEL_OUTLINE_PAD;
         high += size * KERNEL_OUTLINE_PAD;
         kernel_sides_add(&sides, v, low, high);

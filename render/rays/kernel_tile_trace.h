@@ -109,12 +109,12 @@ SIMD_INLINE bool kernel_pixels_beyond(const kernel_tile_trace *t, unsigned box, 
     return false;
 }
 
-/* Returns those of the given blocks in which a body with this outline may be visible: it meets the block, and is not
- * hidden by nearer hits. */
-SIMD_INLINE unsigned kernel_tile_visible_blocks(const kernel_tile_trace *t, const kernel_outline *outline,
+/* Returns those of the given blocks in which a cell with these vertices, whose x, y and z are given, may be visible: it
+ * meets the block, and is not hidden by nearer hits. */
+SIMD_INLINE unsigned kernel_tile_visible_blocks(const kernel_tile_trace *t, const float *const places[3], int count,
                                                 unsigned blocks)
 {
-    const kernel_placement placement = kernel_outline_placement(&t->tile_planes, outline);
+    const kernel_placement placement = kernel_points_placement(&t->tile_planes, places, count);
     if (placement.far < t->t_near) return 0;
     return blocks & placement.blocks & kernel_blocks_beyond(t, placement.near);
 }
