@@ -53,13 +53,13 @@ typedef struct kernel_contraction {
     vf offset[3], middle, nonlinear_part[4][3], field[4], error_growth, error_bound, domain_margin;
 } kernel_contraction;
 
-/* The result of the contraction test, per ray. one: rays with exactly one crossing; none: rays without a crossing. For
- * rays in `one`, t is the depth relative to vertex 0 and r the reference coordinates, accurate to
- * KERNEL_CONTRACTION_END. */
-typedef struct kernel_contracted {
+/* The result of a test that needs no crossings of faces, per ray. one: rays with exactly one crossing; none: rays
+ * without a crossing. For rays in `one`, t is the crossing's depth and r its reference coordinates. kernel_contract()
+ * computes depths relative to vertex 0, and reference coordinates that are accurate to KERNEL_CONTRACTION_END. */
+typedef struct kernel_decided {
     vm one, none;
     vf t, r[3];
-} kernel_contracted;
+} kernel_decided;
 
 /* Computes the rays in the reference spaces of their cells. */
 SIMD_INLINE void kernel_cell_ray_of(const kernel_curved *c, const kernel_rays *rays, vi lane, kernel_cell_ray *out)
@@ -163,8 +163,8 @@ SIMD_INLINE vm kernel_contraction_excludes_root(int type, const kernel_contracti
     return vf_lt(2.0f * most + error_bound, 0.999f * kernel_dot(s, s));
 }
 
-SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_ray *ray, vm rays,
-                                 kernel_contracted *out, int type)
+SIMD_INLINE void kernel_contract(const kernel_contraction *c, const kernel_cell_ray *ray, vm rays, kernel_decided *out,
+                                 int type)
 {
     const int terms = kernel_nonlinear_count(type);
     const vf over = 1.0f / ray->rise, t = (ray->level + c->middle) * over;
