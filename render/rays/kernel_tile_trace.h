@@ -25,7 +25,6 @@ typedef struct kernel_tile_trace {
     unsigned begun;         /* mask of the blocks whose packets have been set up */
     /* number of the interval, counted from 0, in which volumes are being traced on each ray (kernel_clip.h) */
     int clip_interval;
-    int64_t first_fragment; /* index of the tile's first fragment in the thread's list */
     float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* farthest t_far of the rays of each block, one block per lane */
     /* t_far of each pixel, row by row; kept only if the tile traverses the trees for surfaces */
@@ -138,7 +137,6 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     t->thread = thread;
     t->traced_blocks = wanted;
     t->begun = 0;
-    t->first_fragment = thread->out->count;
     t->t_near = (float)-f->depth_shift;
     for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) t->far[v] = vf_set(INFINITY);
     kernel_tile_setup(&t->tile, f, x0, y0);

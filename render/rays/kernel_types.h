@@ -319,8 +319,8 @@ typedef struct kernel_thread {
     struct kernel_finder *finder;
     /* current tile's candidates of surfaces and of the volume; used only if the frame bins them */
     kernel_bin bin, volume_bin;
-    uint32_t serial; /* number of the current tile, counted from 1; cached cells of other tiles are out of date */
-    fragment_list *out;
+    uint32_t serial;   /* number of the current tile, counted from 1; cached cells of other tiles are out of date */
+    fragment_list out; /* fragments of the current tile */
     /* Ensures space for `more` more items in the list; returns false if memory ran out. */
     bool (*reserve)(fragment_list *list, int64_t more);
     /* Hits whose normals need samples of other ranks' cells, and the function that adds space for more; it returns

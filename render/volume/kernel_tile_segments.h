@@ -120,8 +120,7 @@ static const kernel_volume_method kernel_volume_by_segments = {
 /* ---- windows of depth ---- */
 
 /* Prepares the packet for segments of all volumes. hits: the packet's hits on surfaces. */
-SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *list, float far, const kernel_hits *hits,
-                                           int64_t first_fragment)
+SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *list, float far, const kernel_hits *hits)
 {
     const kernel_frame *f = p->frame;
     kernel_lanes lanes;
@@ -133,7 +132,6 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_segments *li
     list->t_last = vf_min(p->t_far, vf_set(far));
     list->t_begin = p->t_near;
     list->cut = f->has_transparent && !f->job->separate_samples ? hits : NULL;
-    list->first_fragment = first_fragment;
     kernel_segments_set_double(p, list, f->is_double && !f->job->separate_samples);
 }
 
@@ -252,8 +250,7 @@ static void kernel_tile_segments_trace(kernel_tile_trace *t)
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
     for (int n = 0; n < count; n++)
-        kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, &t->hits[packets[n]],
-                                  t->first_fragment);
+        kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far, &t->hits[packets[n]]);
     if (t->frame->job->separate_samples)
         kernel_tile_segments_separate(t, s, packets, count, &reach);
     else
