@@ -301,21 +301,15 @@ SIMD_INLINE kernel_wide_doubles kernel_raw_to_double(bool is_narrow, const kerne
 
 /* ---- cells of uniform and rectilinear lattices ---- */
 
-/* Coordinates of cells of a uniform or rectilinear lattice: those of each cell's lower end (ends[0]) and upper end
- * (ends[1]), by axis. */
-typedef struct kernel_lattice_cells {
-    kernel_wide_doubles ends[2][3];
-} kernel_lattice_cells;
-
 SIMD_INLINE bool kernel_arrays_have_axes(const kernel_arrays *p)
 {
     return p->coordinates[0].array.axis != NULL;
 }
 
-/* Reads the coordinates of hexes of a uniform or rectilinear lattice, given each hex's first vertex. It reads 6 numbers
- * per hex instead of 24. */
+/* Reads the coordinates of hexes of a uniform or rectilinear lattice, given each hex's first vertex: those of its lower
+ * end (cells[0]) and upper end (cells[1]), by axis. It reads 6 numbers per hex instead of 24. */
 static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arrays *p, const int32_t first[SIMD_WIDTH],
-                                                                kernel_lattice_cells *out)
+                                                                kernel_wide_doubles cells[2][3])
 {
     for (int axis = 0; axis < 3; axis++) {
         const grid_axis *along = p->coordinates[axis].array.axis;
@@ -325,7 +319,7 @@ static __attribute__((noinline)) void kernel_lattice_cells_read(const kernel_arr
             ends[0][n] = at[0];
             ends[1][n] = at[1];
         }
-        for (int end = 0; end < 2; end++) memcpy(&out->ends[end][axis], ends[end], sizeof ends[end]);
+        for (int end = 0; end < 2; end++) memcpy(&cells[end][axis], ends[end], sizeof ends[end]);
     }
 }
 

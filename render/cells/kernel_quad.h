@@ -341,12 +341,6 @@ SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm on
     }
 }
 
-SIMD_INLINE void kernel_quads_intersect(const kernel_quad *q, int count, vm once, kernel_quad_point *out)
-{
-    const vm all[2] = {once, once};
-    kernel_quads_cross(q, count, all, false, out);
-}
-
 /* Returns the rays that may meet the patch twice, by the signs of its sides alone. A ray that crosses exactly one
  * triangle is never among them. */
 SIMD_INLINE vm kernel_quad_sides(vm rays, vf e01, vf e32, vf e03, vf e12)
@@ -420,7 +414,8 @@ SIMD_INLINE int kernel_quad_points(const kernel_quad *q, vm once, vm twice, kern
     const vf zero = vf_set(0);
     int count = 0;
     if (vm_any(once)) {
-        kernel_quads_intersect(q, 1, once, &out[0]);
+        const vm all[2] = {once, once};
+        kernel_quads_cross(q, 1, all, false, &out[0]);
         count = 1;
     }
     if (!vm_any(twice)) return count;

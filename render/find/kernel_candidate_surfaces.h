@@ -160,15 +160,15 @@ static __attribute__((noinline)) void kernel_lattice_lanes_transform(const kerne
 {
     const render_camera *camera = &s->frame->job->camera;
     const double *axes[3] = {camera->right, camera->up, camera->forward};
-    kernel_lattice_cells cells;
+    kernel_wide_doubles cells[2][3];
     vf parts[3][3][2];
-    kernel_lattice_cells_read(&s->arrays, c->vertex[0], &cells);
+    kernel_lattice_cells_read(&s->arrays, c->vertex[0], cells);
     l->count = 8;
     l->fitting_lanes = vm_all_lanes();
     for (int end = 0; end < 2; end++) {
         vf place[3];
         for (int k = 0; k < 3; k++) {
-            const kernel_raw_numbers world = {.wide = cells.ends[end][k]};
+            const kernel_raw_numbers world = {.wide = cells[end][k]};
             place[k] =
                 kernel_raw_minus(&s->arrays.coordinates[k], &world, &s->eye[k]) * (float)s->frame->job->space.scale;
             for (int a = 0; a < 3; a++) parts[a][k][end] = place[k] * (float)axes[a][k];

@@ -133,14 +133,13 @@ SIMD_INLINE void kernel_map_line_field(const kernel_tile *tile, const kernel_map
                                        kernel_line_field *out)
 {
     const kernel_product m = kernel_product_at(map->is_pyramid, r);
-    kernel_jacobian j;
-    vf n[3], g[3];
-    kernel_jacobian_of(map->position, map->is_pyramid, &m, r, &j);
+    vf cross[3][3], n[3], g[3];
+    const vf det = kernel_jacobian(map->position, map->is_pyramid, &m, r, cross);
     kernel_gradient_of(map->field, map->is_pyramid, &m, r, n);
     kernel_gradient_of(line, map->is_pyramid, &m, r, g);
     for (int a = 0; a < 3; a++) {
-        out->normal[a] = kernel_dot(j.cross[a], n);
-        out->gradient[a] = kernel_dot(j.cross[a], g) / j.det;
+        out->normal[a] = kernel_dot(cross[a], n);
+        out->gradient[a] = kernel_dot(cross[a], g) / det;
     }
     out->normal[2] -= out->normal[0] * tile->shear_x + out->normal[1] * tile->shear_y;
     out->gradient[2] -= out->gradient[0] * tile->shear_x + out->gradient[1] * tile->shear_y;
