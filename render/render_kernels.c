@@ -289,9 +289,7 @@ static bool kernel_tile_find_flush(kernel_candidate_list *list)
         const kernel_candidate *found = &list->items[n];
         int part;
         const int value = kernel_tile_set_source(t, found->source, &part);
-        const kernel_tile_candidate candidate =
-            kernel_candidate_in_tile(found, kernel_range_in_tile(found->x0, found->x1, t->tile.x0),
-                                     kernel_range_in_tile(found->y0, found->y1, t->tile.y0));
+        const kernel_tile_candidate candidate = kernel_candidate_in_tile(found, t->tile.x0, t->tile.y0);
         if (kernel_candidate_blocks(t, &candidate) && kernel_pixels_beyond(t, candidate.box, found->near))
             kernel_tile_queue_add(t, &s->queue, &candidate, part, value);
     }
@@ -343,7 +341,7 @@ static void kernel_tile_surfaces(kernel_tile_trace *t)
 
 /* The memory that a thread keeps from tile to tile of a frame. */
 typedef struct kernel_memory {
-    kernel_cell_cache packet_cells;
+    kernel_cell packet_cells[KERNEL_CACHE_CELLS];
     kernel_cell tile_cell;
     kernel_curved tile_curved;
     kernel_curved_storage tile_curved_storage;
@@ -354,11 +352,6 @@ typedef struct kernel_memory {
     kernel_finder finder;
     kernel_tile_search search;
 } kernel_memory;
-
-static int volume_intervals(const kernel_frame *f)
-{
-    return f->volume_intervals ? f->volume_intervals : 1;
-}
 
 /* Returns whether one of the rectangle's pixels must be traced. */
 static bool has_active_pixel(const render_job *job, int x0, int y0, int columns, int rows)
@@ -396,19 +389,17 @@ static void trace_tile_surfaces(kernel_tile_trace *t)
     t->thread->surface_seconds += t->thread->clock_seconds() - start;
 }
 
-static void trace_tile_segments(kernel_tile_trace *t)
+static void trace_tile_volumes(kernel_tile_trace *t)
 {
+    const kernel_frame *f = t->frame;
     const double start = t->thread->clock_seconds();
-    for (t->clip_interval = 0; t->clip_interval < volume_intervals(t->frame); t->clip_interval++)
-        kernel_tile_segments_trace(t);
-    t->thread->volume_seconds += t->thread->clock_seconds() - start;
-}
-
-static void trace_tile_samples(kernel_tile_trace *t)
-{
-    const double start = t->thread->clock_seconds();
-    for (t->clip_interval = 0; t->clip_interval < volume_intervals(t->frame); t->clip_interval++)
-        kernel_tile_volumes(t);
+    const int intervals = f->volume_intervals ? f->volume_intervals : 1;
+    for (t->clip_interval = 0; t->clip_interval < intervals; t->clip_interval++) {
+        if (f->has_segments)
+            kernel_tile_segments_trace(t);
+        else
+            kernel_tile_volumes(t);
+    }
     t->thread->volume_seconds += t->thread->clock_seconds() - start;
 }
 
@@ -450,11 +441,7 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
     if (f->surface_count) trace_tile_surfaces(t);
-    if (!fogs) return;
-    if (f->has_segments)
-        trace_tile_segments(t);
-    else
-        trace_tile_samples(t);
+    if (fogs) trace_tile_volumes(t);
 }
 
 static void find_candidates(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
@@ -472,7 +459,7 @@ static void find_candidates(const kernel_frame *f, kernel_thread *thread, const 
 static void begin(kernel_thread *thread)
 {
     kernel_memory *m = thread->memory;
-    thread->cells = &m->packet_cells;
+    thread->cells = m->packet_cells;
     thread->tile = &m->tile;
     thread->tile_cells = &m->cells;
     thread->tile_volume = &m->volume;
@@ -482,7 +469,7 @@ static void begin(kernel_thread *thread)
     m->tile.curved = &m->tile_curved;
     m->tile_curved.storage = &m->tile_curved_storage;
     m->tile.search = &m->search.nodes;
-    for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
+    for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells[i].serial = 0;
     m->segments.depth = 0;
 }
 

@@ -182,4 +182,4 @@ static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays
     }
 }
 
-const chord_table CHORD_TABLE = {SIMD_WIDTH, sizeof(kernel_cell_cache), chord_trace};
+const chord_table CHORD_TABLE = {SIMD_WIDTH, KERNEL_CACHE_CELLS * sizeof(kernel_cell), chord_trace};

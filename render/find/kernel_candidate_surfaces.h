@@ -49,13 +49,10 @@ typedef struct kernel_curved_lanes {
     vf at[8][3], f[8];
     /* lanes whose numbers are in float32's range and not NaN; the cells of other lanes are tested one by one */
     vm fitting_lanes;
+    /* The linear function L at the vertices. The isosurface lies in the slab |L| <= thickness; the thickness is
+     * infinite if no such slab is known. Not set for tets. */
+    vf level[8], thickness;
 } kernel_curved_lanes;
-
-/* at: the linear function L at the vertices. The isosurface lies in the slab |L| <= thickness; the
- * thickness is infinite if no such slab is known. */
-typedef struct kernel_curved_slab {
-    vf at[8], thickness;
-} kernel_curved_slab;
 
 /* Returns the lanes whose cells are not folded. terms: the coefficients of the three coordinates; inverse: the inverse
  * of the matrix of their linear terms. The limit 0.9, instead of the exact 1, leaves a margin far larger than all
@@ -73,7 +70,7 @@ SIMD_INLINE vm kernel_curved_lanes_unfolded(int type, const vf terms[4][8], cons
 /* Computes the linear function L at the vertices, and the thickness of the slab that contains the isosurface. |f| is at
  * most about 1. With r the rounding error of one coordinate, positions have an error of at most r, and their mean has
  * one of at most 8 r. Lanes whose volume is near float32's minimum are removed from fitting_lanes. */
-SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, kernel_curved_slab *out, int type)
+SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, int type)
 {
     const int count = grid_type_vertices(type);
     vf terms[4][8], inverse[3][3], g[3], size = vf_set(0), error = size, error_bound = size;
@@ -87,13 +84,13 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, kernel_curv
     for (int a = 0; a < 3; a++)
         g[a] = (terms[3][1] * inverse[0][a] + terms[3][2] * inverse[1][a]) + terms[3][3] * inverse[2][a];
     for (int i = 0; i < count; i++) {
-        out->at[i] = terms[3][0];
+        l->level[i] = terms[3][0];
         for (int a = 0; a < 3; a++) {
             const vf part = g[a] * (l->at[i][a] - terms[a][0]);
-            out->at[i] += part;
+            l->level[i] += part;
             size = vf_max(vf_abs(part), size);
         }
-        error = vf_max(vf_abs(out->at[i] - l->f[i]), error);
+        error = vf_max(vf_abs(l->level[i] - l->f[i]), error);
     }
     const vm unfolded = kernel_curved_lanes_unfolded(type, (const vf(*)[8])terms, (const vf(*)[3])inverse);
     error *= vf_select(unfolded, vf_set(1), vf_set(3.4f));
@@ -103,30 +100,27 @@ SIMD_INLINE void kernel_curved_lanes_slab_of(kernel_curved_lanes *l, kernel_curv
         error_bound += vf_abs(g[a]) * reach;
     }
     const vf thickness = error + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * error_bound;
-    out->thickness = vf_select(vf_lt(thickness, vf_set(1)), thickness, vf_set(INFINITY));
+    l->thickness = vf_select(vf_lt(thickness, vf_set(1)), thickness, vf_set(INFINITY));
 }
 
-static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lanes *l, int type,
-                                                               kernel_curved_slab *out)
+static __attribute__((noinline)) void kernel_curved_lanes_slab(kernel_curved_lanes *l, int type)
 {
-    KERNEL_OF_TYPE(type, kernel_curved_lanes_slab_of, l, out);
+    KERNEL_OF_TYPE(type, kernel_curved_lanes_slab_of, l);
 }
 
 /* Computes the bounds of the slab's polytope: of the vertices that lie in the slab, and of the points where lines
  * between two vertices cross the slab's sides. */
-static __attribute__((noinline)) void kernel_curved_lanes_view_bounds(const kernel_finder *s,
-                                                                      const kernel_curved_lanes *l,
-                                                                      const kernel_curved_slab *slab,
-                                                                      kernel_view_bounds *e)
+static __attribute__((noinline)) void
+kernel_curved_lanes_view_bounds(const kernel_finder *s, const kernel_curved_lanes *l, kernel_view_bounds *e)
 {
     *e = kernel_view_bounds_empty();
     for (int i = 0; i < l->count; i++) {
-        kernel_view_bounds_add(s, e, l->at[i], vf_le(vf_abs(slab->at[i]), slab->thickness));
+        kernel_view_bounds_add(s, e, l->at[i], vf_le(vf_abs(l->level[i]), l->thickness));
         for (int j = 0; j < i; j++) {
-            const vf inverse = 1.0f / (slab->at[j] - slab->at[i]);
+            const vf inverse = 1.0f / (l->level[j] - l->level[i]);
             for (int side = 0; side < 2; side++) {
-                const vf level = side ? slab->thickness : -slab->thickness, along = (level - slab->at[i]) * inverse;
-                const vm crossed = vm_xor(vf_lt(slab->at[i], level), vf_lt(slab->at[j], level));
+                const vf level = side ? l->thickness : -l->thickness, along = (level - l->level[i]) * inverse;
+                const vm crossed = vm_xor(vf_lt(l->level[i], level), vf_lt(l->level[j], level));
                 vf point[3];
                 if (!vm_any(crossed)) continue;
                 for (int a = 0; a < 3; a++) point[a] = l->at[i][a] + along * (l->at[j][a] - l->at[i][a]);
@@ -261,13 +255,11 @@ static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const k
 
 /* ---- hexes, wedges and pyramids ---- */
 
-/* Adds the queue's cells to the candidates, with the bounds of the isosurface in them. */
-SIMD_INLINE void kernel_crossed_queue_process(kernel_finder *s, kernel_crossed_queue *h, int vertices)
+/* Adds the cells, which an isovalue crosses, to the candidates, with the bounds of the isosurface in them. */
+SIMD_INLINE void kernel_crossed_process(kernel_finder *s, const kernel_cells *c, int vertices)
 {
-    const kernel_level level = kernel_level_of(s->surface->layer->values[h->value]);
-    const kernel_cells *c = &h->cells;
+    const kernel_level level = kernel_level_of(s->surface->layer->values[c->value]);
     kernel_curved_lanes l;
-    kernel_curved_slab slab;
     kernel_view_bounds e;
     kernel_raw_numbers v[8];
     for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
@@ -276,20 +268,20 @@ SIMD_INLINE void kernel_crossed_queue_process(kernel_finder *s, kernel_crossed_q
     /* the bits of a power of two that scales the largest value to near 1: the exponent is that of the value, negated */
     const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
     for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
-    kernel_curved_lanes_slab(&l, c->type, &slab);
-    kernel_curved_lanes_view_bounds(s, &l, &slab, &e);
-    kernel_add_crossed(s, c, h->value, l.fitting_lanes, (1u << c->count) - 1, &e);
+    kernel_curved_lanes_slab(&l, c->type);
+    kernel_curved_lanes_view_bounds(s, &l, &e);
+    kernel_add_crossed(s, c, c->value, l.fitting_lanes, (1u << c->count) - 1, &e);
 }
 
-static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kernel_crossed_queue *h)
+static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kernel_cells *c)
 {
-    if (!h->cells.count) return;
-    kernel_cells_fill(&h->cells);
-    if (h->cells.vertices == 8)
-        kernel_crossed_queue_process(s, h, 8);
+    if (!c->count) return;
+    kernel_cells_fill(c);
+    if (c->vertices == 8)
+        kernel_crossed_process(s, c, 8);
     else
-        kernel_crossed_queue_process(s, h, h->cells.vertices);
-    h->cells.count = 0;
+        kernel_crossed_process(s, c, c->vertices);
+    c->count = 0;
 }
 
 static void kernel_find_all_crossed(kernel_finder *s)
@@ -299,17 +291,16 @@ static void kernel_find_all_crossed(kernel_finder *s)
 
 /* Queues the cells of the given lanes, which the isovalue crosses. A queue holds cells of one isovalue; if the isovalue
  * changes, the queue is processed first. */
-SIMD_INLINE void kernel_crossed_queue_add(kernel_finder *s, const kernel_cells *from, int vertices, int value,
-                                          unsigned lanes)
+SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
 {
-    kernel_crossed_queue *h = &s->crossed[kernel_lane_type_index(from->type)];
-    if (lanes && value != h->value) kernel_find_crossed(s, h);
+    kernel_cells *c = &s->crossed[kernel_lane_type_index(from->type)];
+    if (lanes && value != c->value) kernel_find_crossed(s, c);
     for (; lanes; lanes &= lanes - 1) {
-        if (h->cells.count == SIMD_WIDTH) kernel_find_crossed(s, h);
-        const int n = __builtin_ctz(lanes), to = h->cells.count++;
-        h->value = value;
-        h->cells.cell[to] = from->cell[n];
-        for (int i = 0; i < vertices; i++) h->cells.vertex[i][to] = from->vertex[i][n];
+        if (c->count == SIMD_WIDTH) kernel_find_crossed(s, c);
+        const int n = __builtin_ctz(lanes), to = c->count++;
+        c->value = value;
+        c->cell[to] = from->cell[n];
+        for (int i = 0; i < vertices; i++) c->vertex[i][to] = from->vertex[i][n];
     }
 }
 
@@ -328,7 +319,7 @@ SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c,
             any = vm_or(any, below);
             every = vm_and(every, below);
         }
-        kernel_crossed_queue_add(s, c, vertices, value, all & vm_bits(vm_andnot(any, every)));
+        kernel_crossed_add(s, c, vertices, value, all & vm_bits(vm_andnot(any, every)));
     }
 }
 

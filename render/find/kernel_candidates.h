@@ -118,13 +118,12 @@ typedef struct kernel_front {
  * its children need not be tested. */
 SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tree, int64_t node, bool *is_inside)
 {
-    kernel_placement placement = {0};
     if (*is_inside) return true;
-    const kernel_sides sides = kernel_box_sides(&s->planes, tree, node, &placement);
+    const kernel_placement placement = kernel_box_placement(&s->planes, tree, node);
     const unsigned outside =
-        (sides.below & (1u | 1u << KERNEL_ROWS_LANE)) | (sides.above & (2u | 2u << KERNEL_ROWS_LANE));
+        (placement.below & (1u | 1u << KERNEL_ROWS_LANE)) | (placement.above & (2u | 2u << KERNEL_ROWS_LANE));
     *is_inside = !outside && placement.near >= s->t_near;
-    return kernel_blocks_of(sides) && !(placement.far < s->t_near);
+    return placement.blocks && !(placement.far < s->t_near);
 }
 
 /* Selects the entries whose values are visible and whose boxes are in the picture. The test of values has no branch,

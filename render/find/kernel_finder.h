@@ -22,6 +22,7 @@
 typedef struct kernel_cells {
     int type, vertices; /* VTK's cell type, and the number of vertices of each cell */
     int count;
+    int value; /* for cells that an isovalue crosses: its index in the layer, the same for all cells */
     uint32_t cell[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
 } kernel_cells;
@@ -31,7 +32,7 @@ static inline void kernel_cells_begin(kernel_cells *c, int type)
 {
     c->type = type;
     c->vertices = grid_type_vertices(type);
-    c->count = 0;
+    c->count = c->value = 0;
 }
 
 /* Fills the unused lanes, from `count` on, with copies of the first cell. */
@@ -50,13 +51,6 @@ SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
     memcpy(&vertex, c->vertex[i], sizeof vertex);
     return vertex;
 }
-
-/* A queue of cells that one isovalue crosses, all of one type with quadrilateral faces, one per lane. It is processed
- * when all lanes are full (kernel_candidate_surfaces.h). */
-typedef struct kernel_crossed_queue {
-    kernel_cells cells;
-    int value; /* index of the isovalue in its layer, the same for all cells */
-} kernel_crossed_queue;
 
 /* The state of a search for candidates: that of one subtree, or that of one tile. */
 typedef struct kernel_finder {
@@ -81,7 +75,8 @@ typedef struct kernel_finder {
     int queued_count;
     /* per type (kernel_lane_type_index()), cells whose vertices are being prefetched */
     kernel_cells pending[KERNEL_LANE_TYPES];
-    kernel_crossed_queue crossed[KERNEL_CURVED_TYPES];
+    /* per type with quadrilateral faces, cells that an isovalue crosses; they are processed when all lanes are full */
+    kernel_cells crossed[KERNEL_CURVED_TYPES];
     kernel_arrays arrays;
 } kernel_finder;
 
@@ -108,9 +103,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     for (int i = 0; i < KERNEL_LANE_TYPES; i++) {
         const int type = kernel_lane_types[i];
         kernel_cells_begin(&s->pending[i], type);
-        if (kernel_is_linear(type)) continue;
-        kernel_cells_begin(&s->crossed[i].cells, type);
-        s->crossed[i].value = 0;
+        if (!kernel_is_linear(type)) kernel_cells_begin(&s->crossed[i], type);
     }
     kernel_arrays_begin(&s->arrays, f->job->parts[s->part].cells, &s->field->fields[s->part]);
     kernel_picture_borders(&borders, f);

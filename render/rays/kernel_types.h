@@ -311,7 +311,7 @@ typedef struct kernel_frame {
 typedef struct kernel_thread {
     /* The thread's memory, of the kernel table's memory_bytes. The table's begin() sets the pointers below into it. */
     void *memory;
-    struct kernel_cell_cache *cells; /* cells that single packets have met */
+    struct kernel_cell *cells; /* cells that single packets have met (kernel_cell_cache.h) */
     struct kernel_tile_trace *tile;
     struct kernel_tile_cells *tile_cells;
     struct kernel_tile_volume *tile_volume;
