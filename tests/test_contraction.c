@@ -297,7 +297,7 @@ static void decided_crossings_are_right(void **state)
                 make_batch(&b, types[k], s);
                 contract(&b, &at, &bounds);
                 for (int lane = 0; lane < SIMD_WIDTH; lane++) {
-                    n.contracting += bounds.contractions.error_growth[lane] < INFINITY;
+                    n.contracting += bounds.error_growth[lane] < INFINITY;
                     verify(&b, lane, &at, &n);
                 }
             }

@@ -376,44 +376,6 @@ SIMD_INLINE void kernel_reference_between(const kernel_point *low, const kernel_
 
 /* Largest difference that rounding causes between a face's value and the field there. */
 #define KERNEL_FACE_BAND 1e-6f
-#define KERNEL_DOMAIN_RIM 0.03125
-
-/* KERNEL_LOW and KERNEL_HIGH are the ends of the reference domain [0, 1], extended by KERNEL_DOMAIN_RIM to both sides
- * for points that rounding moves out of it. KERNEL_WIDE is the end along a leg of a wedge's triangle, which is extended
- * twice as far. For a pyramid the coordinates are a / k, b / k and k. */
-#define KERNEL_LOW -KERNEL_DOMAIN_RIM
-#define KERNEL_HIGH (1 + KERNEL_DOMAIN_RIM)
-#define KERNEL_WIDE (1 + 2 * KERNEL_DOMAIN_RIM)
-
-/* The middle and the corners of an extended reference domain. The last two corners of a wedge repeat others. */
-typedef struct kernel_domain {
-    double centre[3], corners[8][3];
-} kernel_domain;
-
-static const kernel_domain kernel_box_domain = {{0.5, 0.5, 0.5},
-                                                {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
-                                                 {KERNEL_HIGH, KERNEL_LOW, KERNEL_LOW},
-                                                 {KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW},
-                                                 {KERNEL_HIGH, KERNEL_HIGH, KERNEL_LOW},
-                                                 {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
-                                                 {KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH},
-                                                 {KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH},
-                                                 {KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH}}};
-
-static const kernel_domain kernel_wedge_domain = {{1.0 / 3, 1.0 / 3, 0.5},
-                                                  {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
-                                                   {KERNEL_WIDE, KERNEL_LOW, KERNEL_LOW},
-                                                   {KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW},
-                                                   {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
-                                                   {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH},
-                                                   {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH},
-                                                   {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH},
-                                                   {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH}}};
-
-SIMD_INLINE const kernel_domain *kernel_domain_of(int type)
-{
-    return kernel_is_prism(type) ? &kernel_wedge_domain : &kernel_box_domain;
-}
 
 /* A range of rays: their directions are (0, 0, 1) plus up to `spread` in x and y. */
 typedef struct kernel_beam {
